@@ -24,13 +24,15 @@ from manitwin.episodes.pick_place_tasks import Placeable
 from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
 from manitwin.episodes.planning.put_down import PutDown
 from manitwin.episodes.planning.two_arms import Take, TwoArmPlanner
+from manitwin.episodes.room_for_hand import begins_that_lead_there
 from manitwin.episodes.setting import table_setting
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.registry import load_skill
+from manitwin.episodes.skills.skill import Skill
 from manitwin.episodes.target_grasps import shuffled, usable_grasps
 from manitwin.geometry.poses import transform
 from manitwin.robots.load import load_robot
-from manitwin.scenes.layouts.pool import PoolTwin, pool_of
+from manitwin.scenes.layouts.pool import PoolTwin, StandingPose, pool_of
 from manitwin.scenes.loaded_scene import furniture_boxes
 from manitwin.twin.loaded_twin import TwinSource
 
@@ -72,7 +74,8 @@ class Bench:
     def attempt(self, target: PoolTwin, seed: int, wrong: str = "") -> tuple[EpisodeFacts, float]:
         """Return what became of an episode, or of its negative control of a kind, and its CPU seconds."""
         began, rng, skill = time.process_time(), np.random.default_rng(seed), load_skill("handover")
-        setting = table_setting(skill, target, self.pool, self._placeable, 0, self.robot.workspace, rng)
+        area = self.robot.workspace
+        setting = table_setting(skill, target, self.pool, self._placeable, 0, area, rng, self.begins)
         if setting is None or setting.skill_goal is None:
             return EpisodeFacts("no_room"), time.process_time() - began
         grasps = shuffled(usable_grasps(self.source.twin(target.twin_id), self.robot.gripper), rng)
@@ -93,6 +96,16 @@ class Bench:
         finally:
             Execution.close = close  # type: ignore[method-assign]
         return facts, time.process_time() - began
+
+    def begins(self, skill: Skill, target: PoolTwin) -> Sequence[StandingPose]:
+        """Return the placements from which a target can be handed over, as far as its grasps and the table tell."""
+        return begins_that_lead_there(
+            skill,
+            target,
+            self.pool.body(target.twin_id).body,
+            lambda: [each.grasp for each in usable_grasps(self.source.twin(target.twin_id), self.robot.gripper)],
+            self.robot.gripper,
+        )
 
     def _placeable(self, twin: PoolTwin) -> Placeable:
         return Placeable.of(self.pool, twin)
@@ -117,9 +130,12 @@ def main() -> None:
     parser.add_argument("--robot", default="two_pandas")
     asked = parser.parse_args()
     bench, skill = Bench(asked.dataset, asked.robot), load_skill("handover")
-    twins = [twin for twin in bench.pool.twins if skill is not None and skill.suits(bench.pool, twin, None)]
-    for twin in twins:
+    assert skill is not None
+    for twin in (each for each in bench.pool.twins if skill.suits(bench.pool, each, None)):
         if asked.categories and twin.category not in asked.categories.split(","):
+            continue
+        if not bench.begins(skill, twin):
+            print(f"{twin.category:16} takes no part: no two grasps lift it and put it down", flush=True)
             continue
         for wrong, count in (("", asked.seeds), ("beside", asked.controls), ("open", asked.controls)):
             done = [bench.attempt(twin, asked.first + number, wrong) for number in range(count)]

@@ -5,11 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from manitwin.episodes.planning.problem import Grasp
-from manitwin.episodes.room_for_hand import begins_with_room, placement_with_room
+from manitwin.episodes.room_for_hand import (
+    begins_for_two_hands,
+    begins_that_lead_there,
+    begins_with_room,
+    placement_with_room,
+)
+from manitwin.episodes.skills.registry import SKILLS
 from manitwin.geometry.poses import transform
 from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
-from manitwin.scenes.layouts.pool import StandingPose
+from manitwin.scenes.layouts.pool import PoolTwin, StandingPose
 from rigid_boxes import box
 
 HALF_M = np.array([0.045, 0.05, 0.015])
@@ -83,3 +89,28 @@ def test_what_is_too_heavy_for_a_grasp_at_its_end_does_not_begin_lying() -> None
     both = ([ON_SIDE], [ON_END], (), (FROM_Y,), JAWS)
     assert begins_with_room(*both, BAR) == [ON_SIDE]
     assert begins_with_room(*both, heavy) == []
+
+
+def two_hands(*grasps: Grasp, begin: StandingPose = ON_SIDE, mass_kg: float = 0.2) -> list[StandingPose]:
+    """The placements from which the bar is handed over, that it lies in on two sides."""
+    return begins_for_two_hands([begin], [ON_SIDE, FLAT], grasps, JAWS, box([LONG_M, WIDE_M, WIDE_M], mass_kg, 0.6))
+
+
+def test_a_bar_is_handed_over_where_one_hand_can_lift_and_another_beside_it_put_down() -> None:
+    lifts, puts = FROM_Y, jaws([0, 0, -1], [0, 1, 0], -0.045)  # the second one lays it flat, on another side
+    assert two_hands(lifts, puts) == [ON_SIDE]
+    assert two_hands(lifts) == [], "one grasp is not of two hands"
+    assert two_hands(lifts, jaws([0, 0, -1], [0, 1, 0], 0.01)) == [], "3.5 cm apart"
+    assert two_hands(lifts, jaws([0, 0, -1], [0, 1, 0], 0.0)) == [ON_SIDE]
+    assert two_hands(jaws([0, 1, 0], [0, 0, 1]), puts) == [], "from below nothing is lifted"
+    assert two_hands(lifts, jaws([0, 1, 0], [0, 0, 1], -0.045)) == [], (
+        "nor put down, but for the side that it never lies on"
+    )
+    assert two_hands(lifts, puts, mass_kg=2.0) == [], "too heavy for a hand at its end"
+
+
+def test_only_what_takes_two_arms_asks_for_two_hands() -> None:
+    bar = PoolTwin("t", "0", "bar", (ON_SIDE, FLAT), False, ())
+    for skill, expected in (("handover", []), ("lift", None)):
+        found = begins_that_lead_there(SKILLS[skill], bar, BAR, lambda: [FROM_Y], JAWS)
+        assert found == (SKILLS[skill].begins_in(bar) if expected is None else expected)

@@ -8,9 +8,10 @@ from functools import cache
 import numpy as np
 
 from manitwin.episodes.planning.grasp_candidates import CLOSED
+from manitwin.episodes.planning.placement import DROP_M
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.skills.skill import Skill
-from manitwin.episodes.steady_grasps import bears_weight
+from manitwin.episodes.steady_grasps import LEAST_APART_M, bears_weight, loads_any_way_up, pads_apart_m
 from manitwin.geometry.boxes import box_corners
 from manitwin.geometry.rigid_body import PlacedObject, RigidBody
 from manitwin.robots.grippers.gripper import Gripper
@@ -28,7 +29,7 @@ def placement_with_room(
 
     None: no placement is so; those that hardly ever occur are not asked.
     """
-    has_room = _room_over_plane(grasps, gripper)
+    has_room, lets_go = _room_over_plane(grasps, gripper), _room_over_plane(grasps, gripper, CLEARANCE_M - DROP_M)
     likely = [pose for pose in placements if pose.probability >= LEAST_LIKELY]
     for placement in sorted(likely, key=lambda pose: (pose.upright, pose.probability), reverse=True):
         if any(has_room(placement, number) for number in range(len(grasps))):
@@ -39,11 +40,14 @@ def placement_with_room(
 def begins_that_lead_there(
     skill: Skill, target: PoolTwin, body: RigidBody, grasps: Callable[[], Sequence[Grasp]], gripper: Gripper
 ) -> Sequence[StandingPose]:
-    """Return the placements that a target may begin in with a skill; where it ends in a placement, ``begins_with_room``.
+    """Return the placements that a target may begin in with a skill.
 
-    ``grasps`` are only asked for then.
+    Where it ends in a placement, ``begins_with_room``; where it takes two arms, ``begins_for_two_hands``. ``grasps`` are only
+    asked for then.
     """
     begins, ends = skill.begins_in(target), skill.ends_in(target)
+    if skill.arms == 2:
+        return begins_for_two_hands(begins, target.poses, grasps(), gripper, body)
     return begins_with_room(begins, ends, target.poses, grasps(), gripper, body) if ends else begins
 
 
@@ -74,13 +78,41 @@ def begins_with_room(
     return [begin for begin in begins if lifted(begin) & (at_ends | half_way)]
 
 
-def _room_over_plane(grasps: Sequence[Grasp], gripper: Gripper) -> Callable[[StandingPose, int], bool]:
+def begins_for_two_hands(
+    begins: Sequence[StandingPose],
+    ends: Sequence[StandingPose],
+    grasps: Sequence[Grasp],
+    gripper: Gripper,
+    body: RigidBody,
+) -> list[StandingPose]:
+    """Return those of some placements from which one hand can lift a thing and another one, beside it, put it down.
+
+    Both bear its weight any way up (``steady_grasps.loads_any_way_up``), their pads are 4 cm apart, the first has room where
+    the thing begins, the second there or in one of ``ends`` (from 3 mm higher, where it may be let go). The plane is all that is asked about, neither the arms nor whether
+    the hands have room beside each other.
+    """
+    loads = loads_any_way_up(grasps, body, gripper)
+    bearing = [number for number, load in enumerate(loads) if load is not None]
+    has_room, lets_go = _room_over_plane(grasps, gripper), _room_over_plane(grasps, gripper, CLEARANCE_M - DROP_M)
+    likely = [pose for pose in ends if pose.probability >= LEAST_LIKELY]
+
+    def serves(begin: StandingPose) -> bool:
+        givers = [grasps[number] for number in bearing if has_room(begin, number)]
+        takers = [grasps[number] for number in bearing if any(lets_go(end, number) for end in (begin, *likely))]
+        return any((pads_apart_m(giver, takers, gripper) >= LEAST_APART_M).any() for giver in givers)
+
+    return [begin for begin in begins if serves(begin)]
+
+
+def _room_over_plane(
+    grasps: Sequence[Grasp], gripper: Gripper, clearance_m: float = CLEARANCE_M
+) -> Callable[[StandingPose, int], bool]:
     """Return what tells whether the hand of a grasp, by its number, is above the plane of a placement."""
     corners_of = cache(lambda number: _corners(gripper, grasps[number]))
 
     def has_room(placement: StandingPose, number: int) -> bool:
         up = (placement.object_to_plane @ grasps[number].gripper_to_object)[2]
-        return bool(up[3] > 0 and float((corners_of(number) @ up[:3]).min() + up[3]) >= CLEARANCE_M)
+        return bool(up[3] > 0 and float((corners_of(number) @ up[:3]).min() + up[3]) >= clearance_m)
 
     return has_room
 

@@ -15,6 +15,7 @@ from manitwin.physics.trial import GRAVITY_M_S2
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.robots.grippers.parallel import ParallelGripper
 
+LEAST_APART_M = 0.04  # of the pads of two hands on one thing
 EDGE_M = 0.002  # from the pads' ends: by their last row of cells alone
 BROAD_SHARE = 0.4  # of a pad's rays: on fewer, fewer of the verified grasps hold, too (``physics.grasp_filters``)
 
@@ -68,6 +69,13 @@ def loads_any_way_up(grasps: Sequence[Grasp], body: RigidBody, gripper: Gripper)
         borne = not corner and torque_nm <= limit_nm
         found.append(int(10 * torque_nm / line_nm * PAD_CELLS / cells) if borne else None)
     return found
+
+
+def pads_apart_m(grasp: Grasp, others: Sequence[Grasp], gripper: Gripper) -> np.ndarray:
+    """Return how far the middle of a grasp's pads is from those of other grasps ``(N,)``."""
+    tip_m = np.array([[0.0, 0, gripper.tip_depth_m]])
+    tips = np.array([transform_points(each.gripper_to_object, tip_m)[0] for each in (grasp, *others)])
+    return np.asarray(np.linalg.norm(tips[1:] - tips[0], axis=1))
 
 
 def touch_narrowly(grasps: Sequence[Grasp], body: RigidBody, gripper: Gripper) -> list[bool]:

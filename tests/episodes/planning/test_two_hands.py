@@ -15,7 +15,8 @@ from manitwin.episodes.planning.placement import Placement
 from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
 from manitwin.episodes.planning.put_down import Held, PutDown
 from manitwin.episodes.planning.two_arms import TwoArmPlanner
-from manitwin.episodes.planning.two_hands import LEAST_APART_M, TwoHands
+from manitwin.episodes.planning.two_hands import TwoHands
+from manitwin.episodes.steady_grasps import LEAST_APART_M
 from manitwin.geometry.poses import transform
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.robots.load import load_robot

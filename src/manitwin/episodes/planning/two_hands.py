@@ -11,10 +11,10 @@ from manitwin.episodes.planning.arm_obstacles import ArmObstacles
 from manitwin.episodes.planning.arm_planning import ArmPlanning
 from manitwin.episodes.planning.problem import Grasp, Phase, PickPlaceProblem
 from manitwin.episodes.planning.put_down import Held
-from manitwin.episodes.steady_grasps import loads_any_way_up
-from manitwin.geometry.poses import inverse, transform_points
+from manitwin.episodes.steady_grasps import LEAST_APART_M, loads_any_way_up, pads_apart_m
+from manitwin.geometry.poses import inverse
 
-APART_M, LEAST_APART_M = 0.06, 0.04  # of the pads of two hands: nearer, they have room where they come from two sides
+APART_M = 0.06  # of the pads of two hands: nearer, they have room where they come from two sides
 
 
 class TwoHands:
@@ -23,7 +23,6 @@ class TwoHands:
     def __init__(self, giver: ArmPlanning, taker: ArmPlanning, giver_shapes: ArmObstacles):
         """Take the models of both arms, and the giver's links as obstacles."""
         self._gripper, self._taker = giver.robot.gripper, taker
-        self._tip_m = np.array([[0.0, 0, self._gripper.tip_depth_m]])
         open_m = (float(giver.robot.gripper.opening_m),)
         at_home = giver_shapes.at(giver.arm.home, open_m)
         self._hand = tuple(each for each in at_home if each.name in giver.hand.links)
@@ -40,7 +39,7 @@ class TwoHands:
         grasps, loads = self._bearing(problem)
         ranked = []
         for place, grasp in enumerate(grasps):
-            apart_m = self._apart_m(grasp.gripper_to_object, grasps)
+            apart_m = pads_apart_m(grasp, grasps, self._gripper)
             others = [loads[other] for other in np.flatnonzero(apart_m >= LEAST_APART_M)]
             if others:
                 crowded = int((apart_m >= APART_M).sum()) < len(grasps) / 4
@@ -49,7 +48,7 @@ class TwoHands:
 
     def turned(self, grasps: Sequence[Grasp], giver_to_object: np.ndarray) -> list[Held]:
         """Return grasps that are apart from the first hand, each in all its turns."""
-        apart_m = self._apart_m(giver_to_object, grasps)
+        apart_m = pads_apart_m(Grasp("", giver_to_object, 0.0), grasps, self._gripper)
         apart = [each for each, m in zip(grasps, apart_m, strict=True) if m >= LEAST_APART_M]
         return [Held(each, each.gripper_to_object @ turn) for each in apart for turn in self._taker.candidates.turns]
 
@@ -80,8 +79,3 @@ class TwoHands:
         loads = loads_any_way_up(problem.grasps, problem.target.body, self._gripper)
         both = [(grasp, load) for grasp, load in zip(problem.grasps, loads, strict=True) if load is not None]
         return [grasp for grasp, _ in both], [load for _, load in both]
-
-    def _apart_m(self, gripper_to_object: np.ndarray, others: Sequence[Grasp]) -> np.ndarray:
-        """Return how far apart the pads are from those of other grasps ``(N,)``."""
-        tips = np.array([transform_points(each.gripper_to_object, self._tip_m)[0] for each in others]).reshape(-1, 3)
-        return np.asarray(np.linalg.norm(tips - transform_points(gripper_to_object, self._tip_m), axis=1))
