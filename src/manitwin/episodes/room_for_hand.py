@@ -29,7 +29,7 @@ def placement_with_room(
 
     None: no placement is so; those that hardly ever occur are not asked.
     """
-    has_room, lets_go = _room_over_plane(grasps, gripper), _room_over_plane(grasps, gripper, CLEARANCE_M - DROP_M)
+    has_room = _room_over_plane(grasps, gripper)
     likely = [pose for pose in placements if pose.probability >= LEAST_LIKELY]
     for placement in sorted(likely, key=lambda pose: (pose.upright, pose.probability), reverse=True):
         if any(has_room(placement, number) for number in range(len(grasps))):
@@ -88,8 +88,8 @@ def begins_for_two_hands(
     """Return those of some placements from which one hand can lift a thing and another one, beside it, put it down.
 
     Both bear its weight any way up (``steady_grasps.loads_any_way_up``), their pads are 4 cm apart, the first has room where
-    the thing begins, the second there or in one of ``ends`` (from 3 mm higher, where it may be let go). The plane is all that is asked about, neither the arms nor whether
-    the hands have room beside each other.
+    the thing begins, the second there or in one of ``ends`` (from 3 mm higher, where it may be let go). The plane is all that
+    is asked about, neither the arms nor whether the hands have room beside each other.
     """
     loads = loads_any_way_up(grasps, body, gripper)
     bearing = [number for number, load in enumerate(loads) if load is not None]
