@@ -2,8 +2,9 @@
 
     python benchmarks/handover.py DATASET --seeds 10 --controls 5
 
-One row a twin. A negative control is the same episode with a second arm that goes 15 cm beside the object (beside), or does not
-close its hand (open): none may be kept. CPU seconds are those of an attempt, setting and planning included.
+One row a twin; what no two of its grasps hand over takes no part. A negative control is the same episode with a second arm
+that goes 15 cm beside the object (beside; ``replan_failed`` where it has no way there), or does not close its hand (open): none
+may be kept. CPU seconds are those of an attempt, setting and planning included.
 """
 
 from __future__ import annotations
@@ -53,13 +54,15 @@ class Deceived(TwoArmPlanner):
         put_down: PutDown,
         first: Sequence[Grasp] = (),
     ) -> Take | None:
-        """Plan for the wrong place where a plan is made anew."""
+        """Plan for the wrong place where a plan is made anew; None where there is no way to any: that is no control."""
         for angle in np.arange(0, 2 * np.pi, np.pi / 4) if first else ():
             way = BESIDE_M * np.array([np.cos(angle), np.sin(angle), 0.0])
             beside = transform(translation=way) @ object_to_world
             found = super().plan_take(problem, beside, giver_rad, opening_m, giver_to_object, put_down, first)
             if found is not None:
                 return found
+        if first:
+            return None
         return super().plan_take(problem, object_to_world, giver_rad, opening_m, giver_to_object, put_down, first)
 
 
