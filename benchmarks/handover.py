@@ -15,30 +15,24 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
+from twin_bench import EXECUTED, TwinBench
 
-from manitwin.episodes.attempts import EXECUTION_FAILURES
 from manitwin.episodes.courses.handover import TAKER
 from manitwin.episodes.episode import run_episode
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.execution import Execution
-from manitwin.episodes.pick_place_tasks import Placeable
 from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
 from manitwin.episodes.planning.put_down import PutDown
 from manitwin.episodes.planning.two_arms import Take, TwoArmPlanner
-from manitwin.episodes.room_for_hand import begins_that_lead_there
 from manitwin.episodes.setting import table_setting
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.registry import load_skill
-from manitwin.episodes.skills.skill import Skill
 from manitwin.episodes.target_grasps import shuffled, usable_grasps
 from manitwin.geometry.poses import transform
-from manitwin.robots.load import load_robot
-from manitwin.scenes.layouts.pool import PoolTwin, StandingPose, pool_of
+from manitwin.scenes.layouts.pool import PoolTwin
 from manitwin.scenes.loaded_scene import furniture_boxes
-from manitwin.twin.loaded_twin import TwinSource
 
 BESIDE_M = 0.15
-EXECUTED = {"kept", "unplanned_contact", "disturbed", *EXECUTION_FAILURES}
 
 
 class Deceived(TwoArmPlanner):
@@ -66,19 +60,19 @@ class Deceived(TwoArmPlanner):
         return super().plan_take(problem, object_to_world, giver_rad, opening_m, giver_to_object, put_down, first)
 
 
-class Bench:
+class Bench(TwinBench):
     """Handovers of the twins of one data set."""
 
     def __init__(self, dataset: str, robot: str):
         """Read the pool."""
-        self.pool, self.source, self.robot = pool_of(dataset), TwinSource(dataset), load_robot(robot)
+        super().__init__(dataset, robot)
         self.planners = {"": TwoArmPlanner(self.robot), "beside": Deceived(self.robot)}
 
     def attempt(self, target: PoolTwin, seed: int, wrong: str = "") -> tuple[EpisodeFacts, float]:
         """Return what became of an episode, or of its negative control of a kind, and its CPU seconds."""
         began, rng, skill = time.process_time(), np.random.default_rng(seed), load_skill("handover")
         area = self.robot.workspace
-        setting = table_setting(skill, target, self.pool, self._placeable, 0, area, rng, self.begins)
+        setting = table_setting(skill, target, self.pool, self.placeable, 0, area, rng, self.begins)
         if setting is None or setting.skill_goal is None:
             return EpisodeFacts("no_room"), time.process_time() - began
         grasps = shuffled(usable_grasps(self.source.twin(target.twin_id), self.robot.gripper), rng)
@@ -99,19 +93,6 @@ class Bench:
         finally:
             Execution.close = close  # type: ignore[method-assign]
         return facts, time.process_time() - began
-
-    def begins(self, skill: Skill, target: PoolTwin) -> Sequence[StandingPose]:
-        """Return the placements from which a target can be handed over, as far as its grasps and the table tell."""
-        return begins_that_lead_there(
-            skill,
-            target,
-            self.pool.body(target.twin_id).body,
-            lambda: [each.grasp for each in usable_grasps(self.source.twin(target.twin_id), self.robot.gripper)],
-            self.robot.gripper,
-        )
-
-    def _placeable(self, twin: PoolTwin) -> Placeable:
-        return Placeable.of(self.pool, twin)
 
 
 _close = Execution.close

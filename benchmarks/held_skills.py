@@ -18,25 +18,19 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
+from twin_bench import EXECUTED, TwinBench
 from wrong_goals import CONTROLS, pushed_beside, wrong_goal
 
-from manitwin.episodes.attempts import EXECUTION_FAILURES
 from manitwin.episodes.episode import run_episode
-from manitwin.episodes.pick_place_tasks import Placeable
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import PickPlaceProblem
-from manitwin.episodes.room_for_hand import begins_that_lead_there
 from manitwin.episodes.setting import table_setting
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.registry import load_skill
-from manitwin.episodes.skills.skill import Skill
 from manitwin.episodes.target_grasps import shuffled, usable_grasps
-from manitwin.robots.load import load_robot
-from manitwin.scenes.layouts.pool import PoolTwin, StandingPose, pool_of
+from manitwin.scenes.layouts.pool import PoolTwin
 from manitwin.scenes.loaded_scene import furniture_boxes
-from manitwin.twin.loaded_twin import TwinSource
 
-EXECUTED = {"kept", "unplanned_contact", "disturbed", *EXECUTION_FAILURES}
 JUDGED = {
     "kept",
     "unplanned_contact",
@@ -45,19 +39,19 @@ JUDGED = {
 }  # what is dropped on its way tells nothing of a judge
 
 
-class Bench:
+class Bench(TwinBench):
     """Episodes of one robot with the twins of one data set."""
 
     def __init__(self, dataset: str, robot: str):
         """Read the pool."""
-        self.pool, self.source, self.robot = pool_of(dataset), TwinSource(dataset), load_robot(robot)
+        super().__init__(dataset, robot)
         self.planner = PickPlacePlanner(self.robot)
 
     def attempt(self, skill_name: str, target: PoolTwin, seed: int, wrong: str = "") -> tuple[str, float]:
         """Return the outcome of an episode, or of its negative control of a kind, and its CPU seconds."""
         began, rng, skill = time.process_time(), np.random.default_rng(seed), load_skill(skill_name)
         area = self.robot.workspace
-        setting = table_setting(skill, target, self.pool, self._placeable, 0, area, rng, self._begins)
+        setting = table_setting(skill, target, self.pool, self.placeable, 0, area, rng, self.begins)
         if setting is None or setting.skill_goal is None:
             return "no_room", time.process_time() - began
         goal = setting.skill_goal
@@ -84,7 +78,7 @@ class Bench:
         for twin in self.pool.twins:
             partners = [each for each in self.pool.twins if each is not twin] if skill.has_partner else [None]
             asked_for = not categories or twin.category in categories
-            if asked_for and self._begins(skill, twin) and any(skill.suits(self.pool, twin, each) for each in partners):
+            if asked_for and self.begins(skill, twin) and any(skill.suits(self.pool, twin, each) for each in partners):
                 found.append(twin)
         return found
 
@@ -103,18 +97,6 @@ class Bench:
         while len(order) < count:
             order += [twins[int(number)] for number in rng.permutation(len(twins))]
         return [self.attempt(skill_name, twin, first + number) for number, twin in enumerate(order[:count])]
-
-    def _begins(self, skill: Skill, target: PoolTwin) -> Sequence[StandingPose]:
-        return begins_that_lead_there(
-            skill,
-            target,
-            self.pool.body(target.twin_id).body,
-            lambda: [each.grasp for each in usable_grasps(self.source.twin(target.twin_id), self.robot.gripper)],
-            self.robot.gripper,
-        )
-
-    def _placeable(self, twin: PoolTwin) -> Placeable:
-        return Placeable.of(self.pool, twin)
 
 
 def row(name: str, ran: Sequence[tuple[str, float]]) -> str:

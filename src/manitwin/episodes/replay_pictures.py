@@ -28,10 +28,8 @@ from manitwin.scenes.furniture_pictures import TEXTURE_VARIANTS, add_furniture
 from manitwin.scenes.scene import Furniture, SurfaceBox
 from manitwin.scenes.twin_looks import simplified_twin_looks
 
-TOLERANCE_M, FINE_PX = (
-    0.0004,
-    640,
-)  # of simplified surfaces: a third of a pixel's width at 1 m in a picture of so many pixels
+TOLERANCE_M, FINE_PX = 0.0004, 640
+"""Of simplified surfaces: a third of a pixel's width at 1 m in a picture of so many pixels."""
 MOST_TOLERANCE_M, MOST_OF_OBJECTS_M = 0.002, 0.0008
 """Of a robot's links and of objects, which may be thin and are seen from nearby, in pictures of fewer pixels."""
 FIXTURE_MATERIAL = "metal"

@@ -11,7 +11,7 @@ from manitwin.episodes.planning.grasp_candidates import CLOSED
 from manitwin.episodes.planning.placement import DROP_M
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.skills.skill import Skill
-from manitwin.episodes.steady_grasps import LEAST_APART_M, bears_weight, loads_any_way_up, pads_apart_m
+from manitwin.episodes.steady_grasps import LEAST_APART_M, bears_weight, loads_any_way_up, pad_distances_m
 from manitwin.geometry.boxes import box_corners
 from manitwin.geometry.rigid_body import PlacedObject, RigidBody
 from manitwin.robots.grippers.gripper import Gripper
@@ -99,7 +99,7 @@ def begins_for_two_hands(
     def serves(begin: StandingPose) -> bool:
         givers = [grasps[number] for number in bearing if has_room(begin, number)]
         takers = [grasps[number] for number in bearing if any(lets_go(end, number) for end in (begin, *likely))]
-        return any((pads_apart_m(giver, takers, gripper) >= LEAST_APART_M).any() for giver in givers)
+        return any((pad_distances_m(giver, takers, gripper) >= LEAST_APART_M).any() for giver in givers)
 
     return [begin for begin in begins if serves(begin)]
 

@@ -71,7 +71,7 @@ def loads_any_way_up(grasps: Sequence[Grasp], body: RigidBody, gripper: Gripper)
     return found
 
 
-def pads_apart_m(grasp: Grasp, others: Sequence[Grasp], gripper: Gripper) -> np.ndarray:
+def pad_distances_m(grasp: Grasp, others: Sequence[Grasp], gripper: Gripper) -> np.ndarray:
     """Return how far the middle of a grasp's pads is from those of other grasps ``(N,)``."""
     tip_m = np.array([[0.0, 0, gripper.tip_depth_m]])
     tips = np.array([transform_points(each.gripper_to_object, tip_m)[0] for each in (grasp, *others)])

@@ -32,9 +32,8 @@ SUPERSAMPLE = 2  # shaders/scene lights blocks of 2 x 2
 NEAR_M, FAR_M = 0.01, 30.0
 MAX_LIGHTS = 5  # shaders/scene has room for six, of which one looks down for the sky
 SHADOW_MAP_PX, HEIGHT_MAP_PX = 1024, 512
-COARSE_PX = (
-    128  # pictures of so many pixels a side show no shadow's edge that is finer than two texels of half these maps
-)
+COARSE_PX = 128
+"""Pictures of so many pixels a side show no shadow's edge that is finer than two texels of half these maps."""
 PICTURE_FORMATS = {
     "Color": "R8G8B8A8Unorm",
     "Albedo": "R8G8B8A8Unorm",

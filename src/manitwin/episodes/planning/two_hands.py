@@ -11,7 +11,7 @@ from manitwin.episodes.planning.arm_obstacles import ArmObstacles
 from manitwin.episodes.planning.arm_planning import ArmPlanning
 from manitwin.episodes.planning.problem import Grasp, Phase, PickPlaceProblem
 from manitwin.episodes.planning.put_down import Held
-from manitwin.episodes.steady_grasps import LEAST_APART_M, loads_any_way_up, pads_apart_m
+from manitwin.episodes.steady_grasps import LEAST_APART_M, loads_any_way_up, pad_distances_m
 from manitwin.geometry.poses import inverse
 
 APART_M = 0.06  # of the pads of two hands: nearer, they have room where they come from two sides
@@ -39,7 +39,7 @@ class TwoHands:
         grasps, loads = self._bearing(problem)
         ranked = []
         for place, grasp in enumerate(grasps):
-            apart_m = pads_apart_m(grasp, grasps, self._gripper)
+            apart_m = pad_distances_m(grasp, grasps, self._gripper)
             others = [loads[other] for other in np.flatnonzero(apart_m >= LEAST_APART_M)]
             if others:
                 crowded = int((apart_m >= APART_M).sum()) < len(grasps) / 4
@@ -48,7 +48,7 @@ class TwoHands:
 
     def turned(self, grasps: Sequence[Grasp], giver_to_object: np.ndarray) -> list[Held]:
         """Return grasps that are apart from the first hand, each in all its turns."""
-        apart_m = pads_apart_m(Grasp("", giver_to_object, 0.0), grasps, self._gripper)
+        apart_m = pad_distances_m(Grasp("", giver_to_object, 0.0), grasps, self._gripper)
         apart = [each for each, m in zip(grasps, apart_m, strict=True) if m >= LEAST_APART_M]
         return [Held(each, each.gripper_to_object @ turn) for each in apart for turn in self._taker.candidates.turns]
 

@@ -1,0 +1,38 @@
+"""What benchmarks of skills share: one robot with the twins of one data set, and where these may begin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from manitwin.episodes.attempts import EXECUTION_FAILURES
+from manitwin.episodes.pick_place_tasks import Placeable
+from manitwin.episodes.room_for_hand import begins_that_lead_there
+from manitwin.episodes.skills.skill import Skill
+from manitwin.episodes.target_grasps import usable_grasps
+from manitwin.robots.load import load_robot
+from manitwin.scenes.layouts.pool import PoolTwin, StandingPose, pool_of
+from manitwin.twin.loaded_twin import TwinSource
+
+EXECUTED = {"kept", "unplanned_contact", "disturbed", *EXECUTION_FAILURES}
+
+
+class TwinBench:
+    """A robot and the twins of a data set."""
+
+    def __init__(self, dataset: str, robot: str):
+        """Read the pool."""
+        self.pool, self.source, self.robot = pool_of(dataset), TwinSource(dataset), load_robot(robot)
+
+    def begins(self, skill: Skill, target: PoolTwin) -> Sequence[StandingPose]:
+        """Return the placements that a target may begin in with a skill, as far as its grasps and the table tell."""
+        return begins_that_lead_there(
+            skill,
+            target,
+            self.pool.body(target.twin_id).body,
+            lambda: [each.grasp for each in usable_grasps(self.source.twin(target.twin_id), self.robot.gripper)],
+            self.robot.gripper,
+        )
+
+    def placeable(self, twin: PoolTwin) -> Placeable:
+        """Return how a twin may be put on a table."""
+        return Placeable.of(self.pool, twin)
