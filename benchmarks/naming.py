@@ -19,10 +19,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from manitwin.config import NamingConfig
 from manitwin.errors import Rejected
 from manitwin.formats.image_file import read_image
+from manitwin.models.annotators.likely_names import usual_of
 from manitwin.models.annotators.priors import named
-from manitwin.models.classifiers.classifier import TEMPERATURE, classify, softmax
+from manitwin.models.classifiers.classifier import LIKELIEST, TEMPERATURE, classify, softmax
 from manitwin.models.classifiers.efficientnet_lite import SIDE_PX, logits
 from manitwin.models.classifiers.imagenet import load_names
 from manitwin.models.classifiers.object_pictures import object_pictures
@@ -35,6 +37,8 @@ from manitwin.render.renderer import BACKDROP, shared_renderer
 
 ELEVATIONS_DEG = (12.0, 35.0, 62.0)
 LIMITS = (0.5, 0.6, 0.7, 0.8, 0.9)
+LIMIT = NamingConfig().min_probability
+WITHIN = 1.6
 TEMPERATURES = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5)
 ALSO_RIGHT = {
     "bottle": ("glass bottle", "water bottle", "soda bottle"),
@@ -72,6 +76,8 @@ def main() -> None:
             verdicts = [verdict(category, seen, limit, highest) for category, seen in part]
             given = [v for v in verdicts if v is not None]
             print(f"limit {limit}, half {half} by the other's: {len(given)} of {len(part)} named, {sum(given)} right")
+    for half, part in enumerate(halves):
+        print_sizes(f"half {half}", part, highest_wrong(halves[1 - half]))
     if arguments.limits:
         highest = highest_wrong(rows)
         with arguments.limits.open("w", newline="", encoding="utf-8") as file:
@@ -186,6 +192,34 @@ def verdict(category: str, seen: np.ndarray, limit: float, highest: dict[str, fl
         if shares[name] >= max(limit, highest[name]):
             return name in right_names(category)
     return None
+
+
+def print_sizes(part_of: str, rows: list[tuple[str, np.ndarray]], highest: dict[str, float]) -> None:
+    """Print how far the usual size and bulk density of anything, and of likely names, are from those of unnamed things."""
+    names, off = load_names().names, []
+    for category, seen in rows:
+        truth = named(category)
+        if truth is None or truth.bulk_density_kg_m3 is None or verdict(category, seen, LIMIT, highest) is not None:
+            continue
+        shares = probabilities(seen)
+        likely = [(name, shares[name]) for name in sorted(names, key=lambda name: -shares[name])[:LIKELIEST]]
+        off.append(
+            [
+                abs(np.log(said.value / true.typical))
+                for guess in (usual_of(()), usual_of(likely))
+                for said, true in (
+                    (guess.longest_axis_m, truth.longest_axis_m),
+                    (guess.bulk_density_kg_m3, truth.bulk_density_kg_m3),
+                )
+            ]
+        )
+    apart, within = np.exp(np.mean(off, axis=0)), np.mean(np.array(off) < np.log(WITHIN), axis=0)
+    for what, anything in (("size", 0), ("bulk density", 1)):
+        of_names = anything + 2
+        print(
+            f"{part_of}, {len(off)} unnamed, {what}: a factor {apart[anything]:.2f} off by anything, {apart[of_names]:.2f} by"
+            f" names; within {WITHIN:g}: {within[anything]:.0%} and {within[of_names]:.0%}"
+        )
 
 
 def print_photos(manifest: Path, folder: Path) -> None:

@@ -57,6 +57,8 @@ def changed(folder: Path, changes: dict[str, Any]) -> TwinRecord:
 def test_an_accepted_nameless_twin_of_the_prior_of_anything_is_weak(tmp_path: Path) -> None:
     assert name_would_help(accepted(tmp_path, None, UNKNOWN))
     assert not name_would_help(accepted(tmp_path, "mug", UNKNOWN)), "it has a name"
+    guessed = {"mass_kg": {"source": "prior:likeliest"}, "friction_static": {"source": "prior:plastic"}}
+    assert name_would_help(accepted(tmp_path, None, guessed))
     assert not name_would_help(accepted(tmp_path, None, SEEN)), "a model has seen what it is"
 
 
@@ -89,7 +91,14 @@ def test_the_result_line_says_it(tmp_path: Path) -> None:
     assert named.detail_and_hint == named.detail and "--name" not in named.detail_and_hint
 
 
-@pytest.mark.parametrize(("source", "of"), [("prior:unknown", OF_ANYTHING), ("prior:orange", "usual of an orange")])
+@pytest.mark.parametrize(
+    ("source", "of"),
+    [
+        ("prior:unknown", OF_ANYTHING),
+        ("prior:likeliest", f"{OF_ANYTHING} that looks like it"),
+        ("prior:orange", "usual of an orange"),
+    ],
+)
 def test_a_size_from_a_prior_is_told_as_nobodys_statement(source: str, of: str) -> None:
     size = {"value": 0.15, "low": 0.02, "high": 0.6, "source": source}
     draft = Draft(item_id="0" * 16, payload=Item(file=None, text="x"), seed=0, fields={"size": size})

@@ -24,7 +24,7 @@ from manitwin.pipeline.links import link_table, read_articulation, visual_labels
 from manitwin.pipeline.object_state import object_name
 from manitwin.pipeline.parts import PARTS_FILE
 from manitwin.pipeline.quality import (
-    UNKNOWN,
+    OF_NO_NAME,
     filled_checks,
     likeliest_words,
     naming_checks,
@@ -231,14 +231,14 @@ def name_hint(record: TwinRecord) -> str | None:
 def name_would_help(record: TwinRecord) -> bool:
     """Tell whether the result rests on what is true of anything, or a classifier says, and a name would be better.
 
-    Accepted: size, mass or friction are of ``prior:unknown``. Rejected: where a size or mass of that prior decided, where size
+    Accepted: size, mass or friction rest on no name. Rejected: where a size or mass of that prior decided, where size
     and mass contradict each other, or where the posture of a lifted photo did, which the name has a say in.
     """
     if record.name is not None and record.naming is None:
         return False
     if record.physical is not None:
         physical = record.physical
-        return UNKNOWN in (physical.mass_kg.source, physical.friction_static.source)
+        return not OF_NO_NAME.isdisjoint((physical.mass_kg.source, physical.friction_static.source))
     if record.rejection is None:
         return False
     reason, stages = record.rejection.reason, record.provenance.stages

@@ -75,9 +75,9 @@ def read_subject(
     ``scale`` is how much larger these are than the canonical mesh, which the views were taken of; ``size_estimated`` says
     that an estimate gave it.
     """
-    given = read_given(draft)
+    given, name = read_given(draft), object_name(draft)
     return Subject(
-        name=object_name(draft),
+        name=name,
         solid=load_solid(draft.path(solid)),
         parts=tuple(read_glb(draft.path(visual))),
         metric=metric,
@@ -86,6 +86,7 @@ def read_subject(
         seed=draft.seed,
         given=given if given is None or scale == 1.0 else given.scaled(scale),
         size_estimated=size_estimated,
+        likely=_likely_names(draft) if name is None else (),
     )
 
 
@@ -128,6 +129,11 @@ def object_name(draft: Draft[Item]) -> str | None:
     if known is not None:
         return str(known["name"])
     return cast(str | None, (draft.fields.get("naming") or {}).get("name"))
+
+
+def _likely_names(draft: Draft[Item]) -> tuple[tuple[str, float], ...]:
+    guesses = (draft.fields.get("naming") or {}).get("likeliest", [])
+    return tuple((guess["name"], guess["probability"]) for guess in guesses)
 
 
 def _known(draft: Draft[Item]) -> dict[str, Any] | None:

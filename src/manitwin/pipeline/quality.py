@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any, cast
 
 from manitwin.engine.stage import Draft
+from manitwin.models.annotators.likely_names import OF_LIKELY_NAMES
 from manitwin.pipeline.grasps import GRASP_POINTS
 from manitwin.twin.record_values import Check
 from manitwin.twin.shares import wilson_interval
@@ -28,11 +29,14 @@ REHEARSAL = "rehearsal"
 PRIOR = "prior:"
 UNKNOWN = f"{PRIOR}unknown"
 """The source of what is only usual of anything."""
+OF_NO_NAME = frozenset({UNKNOWN, OF_LIKELY_NAMES})
+"""The sources of what rests on no name: of anything, or of the names that a thing may have."""
 
 SIZE_UNSAID = "nobody says how large it is"
 """What a rejection's detail says where the size is only a usual one; remedies go by it."""
 OF_ANYTHING = "usual of anything"
 """What it says besides where nobody has named the thing either."""
+LIKE_IT = " that looks like it"
 
 ESTIMATES = ("mass_kg", "friction_static", "friction_dynamic", "restitution")
 
@@ -96,9 +100,9 @@ def naming_checks(draft: Draft) -> list[Check]:
 def size_checks(draft: Draft) -> list[Check]:
     """Return the failed check of a size that is only what is usual of anything; none where somebody said it or what it is."""
     size = draft.fields.get("size")
-    if size is None or size["source"] != UNKNOWN:
+    if size is None or size["source"] not in OF_NO_NAME:
         return []
-    message = f"{SIZE_UNSAID}: {unknown_size_words(size)}; say what it is with --name"
+    message = f"{SIZE_UNSAID}: {unknown_size_words(size)}, and its mass is for that size; say what it is with --name"
     return [Check(name="size_known", passed=False, value=size["value"], message=message)]
 
 
@@ -106,8 +110,10 @@ def unknown_size_words(size: dict[str, Any]) -> str:
     """Say of a size that only a prior gives: '15 cm is what is usual of anything (2 to 60 cm)', or '... of a mug'."""
     value, low, high = (f"{100 * size[key]:.3g}" for key in ("value", "low", "high"))
     category = size["source"].removeprefix(PRIOR)
-    named = f"usual of {'an' if category[0] in 'aeiou' else 'a'} {category}"
-    return f"{value} cm is what is {OF_ANYTHING if size['source'] == UNKNOWN else named} ({low} to {high} cm)"
+    usual = {UNKNOWN: OF_ANYTHING, OF_LIKELY_NAMES: OF_ANYTHING + LIKE_IT}.get(
+        size["source"], f"usual of {'an' if category[0] in 'aeiou' else 'a'} {category}"
+    )
+    return f"{value} cm is what is {usual} ({low} to {high} cm)"
 
 
 def unsaid_size_words(draft: Draft) -> str | None:
@@ -181,7 +187,7 @@ def rehearsed_words(stages: Iterable[str]) -> str:
 def _physical_checks(draft: Draft) -> list[Check]:
     physical = draft.field("physical")
     invented = [name for name in ESTIMATES if physical[name]["source"] == "default"]
-    unknown = physical["mass_kg"]["source"] == UNKNOWN
+    unknown = physical["mass_kg"]["source"] in OF_NO_NAME
     uncertainty, longest = physical["center_of_mass_uncertainty_m"], max(physical["extents_m"])
     return [
         Check(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +57,19 @@ def test_a_thing_without_a_name_has_a_wide_interval_and_says_so() -> None:
     estimate = mass(mesh, None)
     assert estimate.source == "prior:unknown"
     assert estimate.low == pytest.approx(100 * mesh.volume) and estimate.high == pytest.approx(2000 * mesh.volume)
+
+
+def test_a_thing_without_a_name_is_about_as_large_and_heavy_as_what_it_may_be() -> None:
+    mesh = cylinder(0.5, 1.5)
+    guessed = replace(subject(mesh, None, metric=False), likely=(("orange", 0.41), ("lemon", 0.12), ("apple", 0.03)))
+    said, anything = estimate_physical(guessed, None), estimate_physical(replace(guessed, likely=()), None)
+    assert anything.longest_axis_m.source == "prior:unknown" and anything.longest_axis_m.value == 0.15
+    assert said.longest_axis_m.source == said.mass_kg.source == "prior:likeliest"
+    orange = lookup("orange").longest_axis_m.typical
+    assert orange < said.longest_axis_m.value < 0.12 and said.longest_axis_m.low < orange < said.longest_axis_m.high
+    assert said.longest_axis_m.high > 0.3, "with the rest it may be anything"
+    assert said.bulk_density_kg_m3.value > anything.bulk_density_kg_m3.value, "fruit is denser than most things"
+    assert estimate_physical(guessed, lookup("can")).longest_axis_m.source == "prior:can", "a name counts first"
 
 
 def test_only_a_mesh_of_unknown_scale_gets_a_size() -> None:

@@ -26,7 +26,8 @@ class Subject:
     metres as far as known: ``metric`` says whether the scale is declared or only guessed. ``views`` are eight pictures, and
     ``cameras`` those that took them, in the same frame and unit as the meshes. ``given`` is what an imported asset says of
     itself, in the same frame; None for every other input. ``known_as`` is what an earlier answer took it for, ``photos`` are the
-    photos that it was made of, cut out (RGBA), and ``size_estimated`` says that the metres are those of an estimate.
+    photos that it was made of, cut out (RGBA), and ``size_estimated`` says that the metres are those of an estimate. ``likely``
+    are names that it may have, each with its probability, where nobody has said one and no guess was likely enough.
     """
 
     name: str | None
@@ -40,6 +41,7 @@ class Subject:
     known_as: str | None = None
     photos: tuple[Path, ...] = ()
     size_estimated: bool = False
+    likely: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)

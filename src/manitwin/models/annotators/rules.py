@@ -9,6 +9,7 @@ from manitwin.config import Resource
 from manitwin.geometry.boxes import upright_extents
 from manitwin.geometry.ray_caster import local_thickness
 from manitwin.geometry.sampling import sample_surface
+from manitwin.models.annotators.likely_names import usual_of
 from manitwin.models.annotators.point_rules import select_points
 from manitwin.models.annotators.priors import Interval, Prior, lookup, unknown_prior
 from manitwin.models.annotators.protocol import (
@@ -70,16 +71,23 @@ class RulesAnnotator:
 
 def estimate_physical(subject: Subject, prior: Prior | None) -> PhysicalEstimates:
     """Return what the prior and the mesh say; ``prior`` is None where nobody has said what the thing is."""
-    prior = prior or unknown_prior()
+    density: Estimate | None
+    if prior is None:
+        usual, prior = usual_of(subject.likely), unknown_prior()
+        size, density = usual.longest_axis_m, usual.bulk_density_kg_m3
+    else:
+        size = prior.longest_axis_m.estimate(prior.source)
+        bulk = prior.bulk_density_kg_m3
+        density = None if bulk is None else bulk.estimate(prior.source)
     extents = upright_extents(subject.solid.vertices)
-    scale = 1.0 if subject.metric else prior.longest_axis_m.typical / float(extents.max())
+    scale = 1.0 if subject.metric else size.value / float(extents.max())
     longest_m, volume_m3 = scale * float(extents.max()), scale**3 * float(subject.solid.volume)
     return PhysicalEstimates(
-        longest_axis_m=None if subject.metric else prior.longest_axis_m.estimate(prior.source),
-        mass_kg=_unknown_mass(prior, volume_m3) if prior.category == "unknown" else _mass(prior, longest_m, volume_m3),
-        bulk_density_kg_m3=None
-        if prior.bulk_density_kg_m3 is None
-        else prior.bulk_density_kg_m3.estimate(prior.source),
+        longest_axis_m=None if subject.metric else size,
+        mass_kg=_unknown_mass(density, volume_m3)
+        if prior.category == "unknown"
+        else _mass(prior, longest_m, volume_m3),
+        bulk_density_kg_m3=density,
         friction_static=prior.friction_static.estimate(prior.source),
         friction_dynamic=prior.friction_dynamic.estimate(prior.source),
         restitution=prior.restitution.estimate(prior.source),
@@ -108,10 +116,11 @@ def _mass(prior: Prior, longest_m: float, volume_m3: float) -> Estimate:
     return _clamped(value, by_volume, prior.mass_kg, source, beyond)
 
 
-def _unknown_mass(prior: Prior, volume_m3: float) -> Estimate:
+def _unknown_mass(density_kg_m3: Estimate | None, volume_m3: float) -> Estimate:
     """Return any usual bulk density times the volume: all that can be said of a thing that nobody has named."""
-    assert prior.bulk_density_kg_m3 is not None
-    return _scaled(prior.bulk_density_kg_m3, volume_m3).estimate(prior.source)
+    assert density_kg_m3 is not None
+    value, low, high = (each * volume_m3 for each in (density_kg_m3.value, density_kg_m3.low, density_kg_m3.high))
+    return Estimate(value=value, low=low, high=high, source=density_kg_m3.source)
 
 
 def _scaled(interval: Interval, factor: float) -> Interval:
