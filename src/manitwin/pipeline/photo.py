@@ -22,7 +22,7 @@ class PhotoStage:
     """Write ``photo.png`` (RGBA, upright, alpha is the matte) and the field ``matte``."""
 
     name: ClassVar[str] = "photo"
-    version: ClassVar[str] = "10"
+    version: ClassVar[str] = "11"
     reads: ClassVar[tuple[str, ...]] = ()
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "matte")
     needs: ClassVar[Resource] = "cpu"

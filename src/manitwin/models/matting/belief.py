@@ -63,7 +63,7 @@ def features(candidate: Candidate, others: list[Candidate], share: np.ndarray) -
         [
             *(np.log(max(scores[name], LEAST)) for name in SCORES),
             *(opinions[name] for name in OPINIONS),
-            -min(misjudged(candidate, others) / MOST_MISJUDGED, 1.0),
+            -min(misjudged(candidate, others, share) / MOST_MISJUDGED, 1.0),
             min(0.0, float(np.log(bulk_px / BULKY))),
             float(not candidate.by_network),
         ]
