@@ -14,14 +14,14 @@ from manitwin.models.generators.generated_mesh import as_glb
 from manitwin.models.generators.protocol import GenerationRequest, Generator, PhotoView
 from manitwin.models.generators.run import run_generator
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.object_state import object_name
+from manitwin.pipeline.object_state import likely_names, object_name
 
 
 class GenerateStage:
     """Write ``generated.glb`` and the field ``generation``."""
 
     name: ClassVar[str] = "generate"
-    version: ClassVar[str] = "11"
+    version: ClassVar[str] = "12"
     reads: ClassVar[tuple[str, ...]] = ("photo.png?", "photos/?", "matte?", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("generated.glb", "generation")
 
@@ -48,6 +48,7 @@ class GenerateStage:
             guessed=draft.payload.name is None,
             views=views if takes_views else (),
             focal_mm=draft.field("matte")["focal_mm"] if "matte" in draft.fields else None,
+            likely=likely_names(draft),
         )
         made = run_generator(
             self.generator, request, folder, settings=self.settings, jobs=draft.jobs, submit_again=self._submit_again

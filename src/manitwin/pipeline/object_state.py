@@ -75,9 +75,9 @@ def read_subject(
     ``scale`` is how much larger these are than the canonical mesh, which the views were taken of; ``size_estimated`` says
     that an estimate gave it.
     """
-    given, name = read_given(draft), object_name(draft)
+    given = read_given(draft)
     return Subject(
-        name=name,
+        name=object_name(draft),
         solid=load_solid(draft.path(solid)),
         parts=tuple(read_glb(draft.path(visual))),
         metric=metric,
@@ -86,7 +86,7 @@ def read_subject(
         seed=draft.seed,
         given=given if given is None or scale == 1.0 else given.scaled(scale),
         size_estimated=size_estimated,
-        likely=_likely_names(draft) if name is None else (),
+        likely=likely_names(draft),
     )
 
 
@@ -131,7 +131,10 @@ def object_name(draft: Draft[Item]) -> str | None:
     return cast(str | None, (draft.fields.get("naming") or {}).get("name"))
 
 
-def _likely_names(draft: Draft[Item]) -> tuple[tuple[str, float], ...]:
+def likely_names(draft: Draft[Item]) -> tuple[tuple[str, float], ...]:
+    """Return the names that a thing without one may have, each with its probability; none of what has a name."""
+    if object_name(draft) is not None:
+        return ()
     guesses = (draft.fields.get("naming") or {}).get("likeliest", [])
     return tuple((guess["name"], guess["probability"]) for guess in guesses)
 

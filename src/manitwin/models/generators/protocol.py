@@ -40,6 +40,7 @@ class GenerationRequest:
     given. ``name`` is what the user says it is, or with ``guessed`` what a classifier takes it for. ``seed`` makes the answer
     repeatable where the generator can. ``views`` are all photos where there are several, ``rgba`` the first of them; only a
     generator that ``takes_views`` is given them. ``focal_mm`` is the lens of ``rgba`` as 35 mm equivalent, where it is stated.
+    ``likely`` are the names that a thing without one may have, each with its probability, the likeliest first.
     """
 
     rgba: np.ndarray | None
@@ -49,6 +50,7 @@ class GenerationRequest:
     guessed: bool = False
     views: tuple[PhotoView, ...] = ()
     focal_mm: float | None = None
+    likely: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)

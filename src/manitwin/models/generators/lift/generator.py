@@ -55,7 +55,11 @@ class LiftGenerator:
 
         With a reader: also what its model raises, and Rejected where the model says twice that the result is wrong.
         """
-        asked = f"{request.seed} {request.text}" if request.rgba is None else f"{request.name or ''} {request.focal_mm}"
+        asked = (
+            f"{request.seed} {request.text}"
+            if request.rgba is None
+            else f"{request.name or request.likely} {request.focal_mm}"
+        )
         pixels = b"" if request.rgba is None else np.ascontiguousarray(request.rgba).tobytes()
         digest = hashlib.sha256(pixels + asked.encode())
         for view in request.views:
@@ -74,7 +78,7 @@ class LiftGenerator:
             made = from_views(request.views, request.name)
             return Job(write_glb([made.part]), made.notes, made.unseen_share, made.known)
         if self._reader is None:
-            return from_photo(request.rgba, request.name, request.focal_mm)
+            return from_photo(request.rgba, request.name, request.focal_mm, likely=request.likely)
         return guided_from_photo(request, self._reader)
 
     def poll(self, job_id: str) -> JobState:

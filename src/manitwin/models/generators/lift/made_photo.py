@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +14,7 @@ from manitwin.errors import Rejected
 from manitwin.formats.glb import write_glb
 from manitwin.geometry.poses import GLTF_TO_OBJECT
 from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name
-from manitwin.models.generators.lift.lifting import Lifted, lift
+from manitwin.models.generators.lift.lifting import DISC_ELLIPSE_IOU, Lifted, lift
 from manitwin.models.generators.lift.seen_corners import box_from_corner
 from manitwin.models.generators.lift.surface import unseen_share
 from manitwin.models.generators.lift.texture import beside
@@ -38,6 +39,14 @@ from manitwin.twin.import_record import ImportRecord
 
 ROUND_SHARE = 0.02
 """Of the larger of both: what is as wide as deep but for this is a body of revolution without a handle."""
+LEAST_LIKELY = 0.1
+"""Probability of a name below which its shape is not tried."""
+NAMELESS_IOU, NAMELESS_OUTLINE = 0.92, 0.0045
+"""A name that is only likely has to explain more than one that a person says (``LEAST_IOU``, ``MOST_OUTLINE``)."""
+CLEARLY_LESS = 0.5
+"""Of what a simpler solid leaves unexplained of an outline, a body of revolution, a box or, where that is what it is, an
+ellipse: a can has nearly the outline of a bucket, and a plate that of a pan with its handle behind it."""
+OF_LIKELY_NAMES = "template of a likely name fitted to the photo"
 
 
 @dataclass(frozen=True)
@@ -51,10 +60,17 @@ class Job:
     metric: bool = False
 
 
-def from_photo(rgba: np.ndarray, name: str | None, focal_mm: float | None = None) -> Job:
+def from_photo(
+    rgba: np.ndarray,
+    name: str | None,
+    focal_mm: float | None = None,
+    *,
+    likely: Sequence[tuple[str, float]] = (),
+) -> Job:
     """Return the template that the name means where its fit explains the photo, else the photo lifted; raises Rejected.
 
-    What has no template, and no name or that of a box, is a box where its outline is that of one seen from a corner.
+    What has no template, and no name or that of a box, is a box where its outline is that of one seen from a corner. What has
+    no name has the shape of a template of the ``likely`` names, each with its probability, where one explains the photo.
     ``focal_mm`` is the lens as 35 mm equivalent, where it is known.
     """
     template = template_for(name)
@@ -62,7 +78,9 @@ def from_photo(rgba: np.ndarray, name: str | None, focal_mm: float | None = None
     if template is None and (hint == ShapeHint() or hint.boxy):
         box = box_from_corner(rgba, focal_mm)
         if box is not None:
-            return _unnamed_box(box, rgba)
+            return _shape_alone(box, rgba, primitive="box", source="the outline's six corners")
+    if name is None:
+        return _without_name(rgba, likely, focal_mm)
     fitted = (
         None if template is None else fit(template.category, rgba, or_of=kinds_of(template.category), focal_mm=focal_mm)
     )
@@ -126,10 +144,45 @@ def from_fit(fitted: Fitted, rgba: np.ndarray, name: str | None) -> Job:
     return Job(write_glb([visual_part(surface)]), notes_of(fitted), surface.unseen_share, known)
 
 
-def _unnamed_box(fitted: Fitted, rgba: np.ndarray) -> Job:
+def _without_name(rgba: np.ndarray, likely: Sequence[tuple[str, float]], focal_mm: float | None) -> Job:
+    """Return the template of a likely name where it explains the photo and a simpler solid hardly does, else the photo lifted."""
+    alike = _of_likely_names(rgba, likely, focal_mm)
+    try:
+        lifted = lift(rgba, ShapeHint())
+    except Rejected:
+        if alike is None or 1 - alike.residual.iou > CLEARLY_LESS * (1 - DISC_ELLIPSE_IOU):
+            raise
+        return _of_likely_name(alike, rgba)
+    if alike is not None and _explains_more(alike, lifted):
+        return _of_likely_name(alike, rgba)
+    return Job(write_glb([textured_part(lifted)]), lifted.notes, unseen_share(lifted.surface))
+
+
+def _of_likely_name(alike: Fitted, rgba: np.ndarray) -> Job:
+    return _shape_alone(alike, rgba, primitive=f"as of a {alike.category}", source=OF_LIKELY_NAMES)
+
+
+def _explains_more(alike: Fitted, lifted: Lifted) -> bool:
+    """Whether a template is to be preferred to a solid that needs no name; an inflated outline explains nothing."""
+    left, simpler = 1 - alike.residual.iou, 1 - lifted.explained.silhouette_iou
+    return lifted.notes["primitive"] == "inflation" or left < CLEARLY_LESS * simpler
+
+
+def _of_likely_names(rgba: np.ndarray, likely: Sequence[tuple[str, float]], focal_mm: float | None) -> Fitted | None:
+    """Return the template of the ``likely`` names that explains the photo best; None where none does closely."""
+    templates = [template_for(each) for each, probability in likely if probability >= LEAST_LIKELY]
+    kinds = list(dict.fromkeys(template.category for template in templates if template is not None))
+    found = fit(kinds[0], rgba, or_of=kinds[1:], focal_mm=focal_mm) if kinds else None
+    if found is None or found.residual.iou < NAMELESS_IOU or found.residual.outline > NAMELESS_OUTLINE:
+        return None
+    return found
+
+
+def _shape_alone(fitted: Fitted, rgba: np.ndarray, *, primitive: str, source: str) -> Job:
     """Return the solid alone: a thing with a box's shape is not called a box."""
     surface = texture_of([fitted], [rgba])
-    notes = notes_of(fitted) | {"primitive": "box", "source": "the outline's six corners", "rests": "standing"}
+    rests = "standing" if fitted.upright else "lying"
+    notes = notes_of(fitted) | {"primitive": primitive, "source": source, "rests": rests}
     del notes["category"]
     return Job(write_glb([visual_part(surface)]), notes, surface.unseen_share)
 

@@ -16,7 +16,7 @@ from manitwin.formats.glb import read_glb
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.generators.lift import LiftGenerator
 from manitwin.models.generators.lift.lifting import hint_from_name, lift
-from manitwin.models.generators.lift.made_photo import fitted_or_lifted
+from manitwin.models.generators.lift.made_photo import OF_LIKELY_NAMES, fitted_or_lifted, from_photo
 from manitwin.models.generators.lift.several import from_views
 from manitwin.models.generators.protocol import Generated, GenerationRequest, PhotoView
 from manitwin.models.generators.templates.catalog import load_templates
@@ -247,3 +247,32 @@ def test_template_is_that_of_the_last_words_of_a_name(name: str, category: str |
 def _generated(rgba: np.ndarray, name: str, folder: Path) -> Generated:
     generator = LiftGenerator()
     return generator.fetch(generator.submit(GenerationRequest(rgba, None, name, seed=0)), folder)
+
+
+def test_a_nameless_thing_has_the_shape_of_a_likely_name_that_explains_the_photo() -> None:
+    photo = photo_of("mug", View(np.radians(60.0), np.radians(30.0), 0.0, 0.1), {})
+    likely = (("wrench", 0.5), ("mug", 0.2), ("bowl", 0.05))
+    job = from_photo(photo, None, likely=likely)
+    assert job.notes["primitive"] == "as of a mug" and job.notes["source"] == OF_LIKELY_NAMES
+    assert job.known is None and "category" not in job.notes, "it is not called so"
+    assert job.notes["rests"] == "standing"
+    filled = from_photo(photo, None)
+    assert not filled.notes["primitive"].startswith("as of"), "without names it is lifted"
+
+
+def test_a_nameless_thing_that_no_likely_name_explains_is_lifted() -> None:
+    photo = photo_of("mug", View(np.radians(60.0), np.radians(30.0), 0.0, 0.1), {})
+    lifted = from_photo(photo, None)
+    unlike, unlikely = (("wrench", 0.9), ("plunger", 0.1)), (("mug", 0.09),)
+    assert from_photo(photo, None, likely=unlike).glb == lifted.glb
+    assert from_photo(photo, None, likely=unlikely).glb == lifted.glb
+
+
+def test_a_nameless_ellipse_is_what_explains_it_better_than_any_ellipse_is() -> None:
+    pan = photo_of("frying pan", View(np.radians(-90.0), np.radians(35.0), 0.0, 0.1), {})
+    seen = from_photo(pan, None, likely=(("frying pan", 0.9),))
+    assert seen.notes["primitive"] == "as of a frying pan"
+    plate = photo_of("plate", View(0.4, np.radians(55.0), 0.0, 0.2), {})
+    with pytest.raises(Rejected, match="the outline is an ellipse"):
+        from_photo(plate, None, likely=(("frying pan", 0.4),))
+    assert from_photo(plate, None, likely=(("frying pan", 0.4), ("plate", 0.3))).notes["primitive"] == "as of a plate"
