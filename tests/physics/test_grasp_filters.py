@@ -13,6 +13,7 @@ from manitwin.geometry.ray_caster import RayCaster
 from manitwin.physics.grasp_filters import (
     ACROSS,
     ALONG,
+    INSET,
     SUPPORT_CLEARANCE_M,
     GraspFilter,
     PadContacts,
@@ -20,9 +21,9 @@ from manitwin.physics.grasp_filters import (
     pad_contacts,
     pad_merits,
     raised,
-    torque_ratio,
 )
 from manitwin.physics.grasp_selection import select_likely
+from manitwin.physics.pad_loads import PressedPads
 from manitwin.robots.grippers.gripper import load_gripper, of_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 
@@ -54,6 +55,21 @@ def test_pads_at_the_edge_touch_with_fewer_cells() -> None:
     # the middle row of rays and one beside it, of three, lie over the box
     contacts = contacts_at([0, 0.028, 0], [0.04, 0.06, 0.05], [0, 0, 0])
     assert contacts.cells[0] == 2 * ALONG
+    half_y, half_z = (INSET * half for half in PANDA.pad_half_extents_m)
+    assert contacts.pads.most_apart_m[0] == pytest.approx([half_y, 2 * half_z])  # along Y from one row to the next
+    assert contacts.pads.least_apart_m[0] == pytest.approx([-half_y, -2 * half_z])
+
+
+def test_pads_press_around_the_middle_of_what_they_hold_wherever_it_is_in_the_open_hand() -> None:
+    contacts = contacts_at([0.01, 0, 0], [0.04, 0.06, 0.05], [0, 0, 0])
+    assert contacts.pads.middle_m[0] == pytest.approx([-0.01, 0, PANDA.tip_depth_m], abs=1e-6)
+    assert contacts.pads.width_m[0] == pytest.approx(0.04, abs=1e-6)
+
+
+def test_selection_counts_a_load_twice_as_much_as_a_lever_and_calls_none_fit_that_asks_for_more_than_half() -> None:
+    merits = pad_merits(contacts(np.array([0.0, 0.1, 0.05]), np.array([6, 6, 6])), np.array([0.5, 0.0, 0.6]))
+    assert merits.cost[:2] == pytest.approx([1, 1])
+    assert merits.fit.tolist() == [True, True, False]
 
 
 def test_pads_in_the_air_have_no_width() -> None:
@@ -84,12 +100,6 @@ def test_filter_keeps_the_grasp_on_the_faces_and_drops_air_edges_and_collisions(
     assert left.contacts.width_m[0] == pytest.approx(0.04, abs=1e-6)
 
 
-def test_torque_ratio_is_one_where_friction_just_holds_the_weight() -> None:
-    # m (g + a) l = 2 mu F r: 0.05 m from the axis, 2 * 0.75 * 50 N * 7 mm
-    mass_kg = 2 * 0.75 * 50 * 0.007 / (0.05 * (9.81 + 3.6))
-    assert torque_ratio(np.array([0.05]), mass_kg=mass_kg, force_n=50, friction=0.75) == pytest.approx(1)
-
-
 def cloud(count: int, directions: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     poses = []
     for number in range(count):
@@ -100,7 +110,9 @@ def cloud(count: int, directions: np.ndarray, rng: np.random.Generator) -> np.nd
 
 def contacts(lever_m: np.ndarray, cells: np.ndarray) -> PadContacts:
     count = len(lever_m)
-    return PadContacts(np.full(count, 0.03), cells, np.full(count, 0.01), np.zeros(count), np.ones(count), lever_m)
+    width_m, apart_m = np.full(count, 0.03), np.full((count, 2), 0.016)
+    pads = PressedPads(np.zeros((count, 3)), width_m, -apart_m, apart_m)
+    return PadContacts(width_m, cells, np.full(count, 0.01), np.zeros(count), np.ones(count), lever_m, pads)
 
 
 def test_selection_prefers_short_levers_and_large_contacts() -> None:

@@ -13,7 +13,7 @@ from manitwin.geometry.grasp_diversity import fingertips
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.models.graspers.protocol import GraspRequest, Screen
 from manitwin.models.graspers.screens import HandScreen, PadScreen, SealScreen
-from manitwin.physics.grasp_filters import PEAK_SLIDE_ACCELERATION_M_S2, torque_ratio
+from manitwin.physics.pad_loads import PEAK_SLIDE_ACCELERATION_M_S2, torque_ratio
 from manitwin.physics.trial import GRAVITY_M_S2, TrialResult, TrialSettings
 
 

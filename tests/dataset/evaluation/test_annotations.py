@@ -10,7 +10,6 @@ from typer.testing import CliRunner
 
 from json_documents import check_keys
 from manitwin.cli.main import app
-from manitwin.dataset.evaluation.annotation_scores import matches
 from manitwin.dataset.evaluation.annotations import AnnotationReport, evaluate_annotations
 from manitwin.dataset.evaluation.labels import read_labels
 from manitwin.errors import UsageError
@@ -115,11 +114,6 @@ def test_labels_that_cannot_be_read_are_one_line(tmp_path: Path, content: str, m
     path.write_text(content)
     with pytest.raises(UsageError, match=message):
         read_labels(path)
-
-
-def test_names_of_parts() -> None:
-    assert matches("pull tab", "tab") and matches("blade", "cutting blades") and matches("Handle", "handles")
-    assert not matches("handle", "head") and not matches("", "handle")
 
 
 def test_interval_is_wilsons() -> None:

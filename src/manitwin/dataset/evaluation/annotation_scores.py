@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from manitwin.dataset.evaluation.labels import Interval, Label
+from manitwin.dataset.evaluation.part_names import is_on_one_of, is_one_of, words_of
 from manitwin.models.annotators.priors import normalised
 from manitwin.twin.record import TwinRecord
 from manitwin.twin.record_values import Estimate
@@ -15,7 +16,6 @@ from manitwin.twin.record_values import Estimate
 DIMENSIONS = ("category", "language", "functional", "physical", "grasp")
 """The paper's dimensions of annotation quality."""
 MASS_FACTOR = 1.6
-_SAME = {"gray": "grey", "aluminum": "aluminium", "golden": "gold", "transparent": "clear"}
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,9 @@ def scores_of(record: TwinRecord, label: Label) -> Iterator[Score]:
         if truth:
             yield score("language", question, _names_one(said, truth), said, truth)
     for point in points.functional if label.parts else ():
-        yield score("functional", point.id, _is_one_of(point.label, label.named_parts), point.label, label.named_parts)
+        yield score(
+            "functional", point.id, is_on_one_of(point.label, label.named_parts), point.label, label.named_parts
+        )
     if label.mass_kg is not None:
         yield from _of_mass(record.twin_id, physical.mass_kg, label.mass_kg)
     if label.longest_side_m is not None:
@@ -58,7 +60,7 @@ def scores_of(record: TwinRecord, label: Label) -> Iterator[Score]:
             yield score("grasp", f"{grasp.id} type", grasp.type in label.grasp_types, grasp.type, label.grasp_types)
         region = grasp.label or ""
         if region and (label.good_regions or label.bad_regions):
-            bad = _is_one_of(region, label.bad_regions) and not _is_one_of(region, label.good_regions)
+            bad = is_one_of(region, label.bad_regions) and not is_one_of(region, label.good_regions)
             yield score("grasp", f"{grasp.id} region", not bad, region, label.good_regions)
 
 
@@ -75,28 +77,10 @@ def _score(
     return Score(twin_id, dimension, question, right, said, _text(truth))
 
 
-def matches(name: str, other: str) -> bool:
-    """Tell whether two names of a part mean the same: equal, or all words of one among those of the other, plurals alike."""
-    one, two = _words(name), _words(other)
-    return bool(one and two) and (one <= two or two <= one)
-
-
-def _is_one_of(name: str, truth: Iterable[str]) -> bool:
-    return any(matches(name, each) for each in truth)
-
-
 def _names_one(said: str, truth: Iterable[str]) -> bool:
     """Tell whether a text names at least one of the labelled words: one dominant colour, one material is enough."""
-    words = _words(re.sub(r"\([^)]*\)", " ", said))
-    return any(_words(each) <= words for each in truth)
-
-
-def _words(text: str) -> frozenset[str]:
-    found = re.findall(r"[a-z]+", text.lower())
-    plain = (_SAME.get(word, word) for word in found)
-    return frozenset(
-        word[:-1] if len(word) > 3 and word.endswith("s") and not word.endswith("ss") else word for word in plain
-    )
+    words = words_of(re.sub(r"\([^)]*\)", " ", said))
+    return any(words_of(each) <= words for each in truth)
 
 
 def _text(truth: Interval | tuple[str, ...]) -> str:

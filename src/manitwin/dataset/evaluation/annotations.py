@@ -13,10 +13,10 @@ import trimesh
 from manitwin.dataset.evaluation.annotation_scores import (
     DIMENSIONS,
     Score,
-    matches,
     scores_of,
 )
 from manitwin.dataset.evaluation.labels import read_labels
+from manitwin.dataset.evaluation.part_names import matches
 from manitwin.engine.ledger.location import local_ledger
 from manitwin.engine.ledger.reading import read_ledger
 from manitwin.errors import UsageError

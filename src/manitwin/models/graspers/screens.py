@@ -10,8 +10,9 @@ from manitwin.errors import Rejected
 from manitwin.geometry.antipodal import antipodal_pairs
 from manitwin.geometry.sampling import sample_surface
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest, Screened
-from manitwin.physics.grasp_filters import PEAK_SLIDE_ACCELERATION_M_S2, GraspFilter, pad_merits, torque_ratio
+from manitwin.physics.grasp_filters import GraspFilter, pad_merits
 from manitwin.physics.grasp_selection import Merits
+from manitwin.physics.pad_loads import PEAK_SLIDE_ACCELERATION_M_S2, load_share
 from manitwin.physics.suction import lip_load, seal
 from manitwin.physics.trial import GRAVITY_M_S2
 from manitwin.physics.trial_phases import SLIDE_DIRECTIONS
@@ -43,14 +44,16 @@ class PadScreen:
         """Keep the proposals that pass, with the widths at the pads."""
         left = self._passes(raw.gripper_to_object)
         proposals = replace(raw.take(left.index), width_m=left.contacts.width_m)
-        ratio = torque_ratio(
-            left.contacts.lever_m,
+        share = load_share(
+            left.contacts.pads,
+            proposals.gripper_to_object,
+            self._request.center_of_mass_m,
             mass_kg=self._request.mass_kg,
             force_n=self._gripper.force_n,
             friction=self._friction,
         )
         counts = {"raw": len(raw), "after_pad": left.after_pad, "after_collision": len(proposals)}
-        return Screened(proposals, pad_merits(left.contacts, ratio), counts)
+        return Screened(proposals, pad_merits(left.contacts, share), counts)
 
     def why_none(self, counts: dict[str, int]) -> Rejected:
         """Say why nothing is left, with the widths that were measured."""
