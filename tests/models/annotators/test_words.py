@@ -92,6 +92,25 @@ def test_the_users_word_is_the_category_where_it_is_another_thing(name: str, cat
     assert described(cylinder(0.03, 0.1), name).category == category
 
 
+@pytest.mark.parametrize(
+    ("category", "material", "caption"),
+    [
+        ("glass bottle", "glass", "A brown glass bottle, about 27 x 7 x 7 cm in size."),
+        ("wooden spoon", "wood", "A brown wooden spoon, about 27 x 7 x 7 cm in size."),
+        ("wooden spoon", "bamboo", "A brown wooden spoon made of bamboo, about 27 x 7 x 7 cm in size."),
+        (
+            "glass bottle",
+            "glass and steel",
+            "A brown glass bottle made of glass and steel, about 27 x 7 x 7 cm in size.",
+        ),
+    ],
+)
+def test_a_material_that_the_name_says_is_not_told_twice(category: str, material: str, caption: str) -> None:
+    captions = write_captions(category, None, material, "brown", "cylindrical", "27 x 7 x 7 cm, medium-sized")
+    assert captions[0] == caption
+    assert len(captions) == len(set(captions))
+
+
 def test_captions_tell_different_facts() -> None:
     facts = {
         "color": "turquoise", "material": "made of ceramic", "numbers": "10 x 5 x 3 cm", "size": "palm-sized",

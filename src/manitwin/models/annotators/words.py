@@ -18,6 +18,7 @@ _SIZE_WORDS = ((0.03, "tiny"), (0.10, "palm-sized"), (0.20, "hand-sized"), (0.35
 
 _A_NOT_AN = ("uk", "uni", "usb", "use", "ute", "eu", "one", "once")  # spelt with a vowel, spoken with a consonant
 _AN_NOT_A = ("hour", "honest", "heir", "mp3", "x-ray")
+_MADE_OF = {"wooden": "wood", "woollen": "wool", "golden": "gold", "metallic": "metal", "earthen": "clay"}
 
 
 def article(phrase: str) -> str:
@@ -91,6 +92,12 @@ def _shape(subject: Subject, prior: Prior | None, rng: np.random.Generator) -> s
     return f"{measured.word} and hollow, open at one side" if opening is not None else measured.word
 
 
+def _says(noun: str, material: str) -> bool:
+    """Tell whether a noun says what the thing is made of: a glass bottle, a wooden spoon, a bar of soap."""
+    words = {_MADE_OF.get(word, word) for word in noun.lower().split()}
+    return material.lower() in words
+
+
 def write_captions(category: str, prior: Prior | None, material: str, color: str, shape: str, size: str) -> list[str]:
     """Return captions of differing length, style and content, the full sentence first; ``color`` may be empty: unknown.
 
@@ -102,7 +109,8 @@ def write_captions(category: str, prior: Prior | None, material: str, color: str
     colored = f"{color} {noun}".strip()
     numbers, size_word = size.split(", ")
     edible = prior is not None and prior.surface == "food skin"
-    made_of = "" if edible or material.startswith("unknown") else f" made of {material}"
+    untold = edible or material.startswith("unknown") or _says(noun, material)
+    made_of = "" if untold else f" made of {material}"
     use = f", used for {prior.function}" if prior is not None else ""
     captions = [
         f"{article(colored).capitalize()} {colored}{made_of}, about {numbers} in size{use}.",

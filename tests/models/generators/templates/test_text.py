@@ -9,7 +9,7 @@ from manitwin.errors import UsageError
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.looks import COLORS, MATERIALS
 from manitwin.models.generators.templates.made import make
-from manitwin.models.generators.templates.text import MAX_CHARACTERS, Wanted, read_text
+from manitwin.models.generators.templates.text import MAX_CHARACTERS, Wanted, Wish, read_text
 
 TEMPLATES = load_templates()
 
@@ -43,6 +43,32 @@ def test_words_before_and_after_the_thing_describe_it() -> None:
     for text in ("a red ceramic mug", "mug, red ceramic", "mug in red ceramic"):
         wish = read(text).wishes[""]
         assert wish.rgb == red and wish.material == MATERIALS["ceramic"]
+
+
+@pytest.mark.parametrize(
+    ("text", "material"),
+    [
+        ("a wooden spoon", "wood"),
+        ("a red paper cup", "paper"),
+        ("a bamboo wooden spoon", "bamboo"),
+        ("a glass jar", "glass"),
+        ("a wood chisel", None),
+        ("a soap dispenser", None),
+        ("a red wine glass", None),
+    ],
+)
+def test_a_material_that_the_name_says_is_asked_for_where_such_things_are_of_it(
+    text: str, material: str | None
+) -> None:
+    asked = read(text).wishes.get("", Wish()).material
+    assert asked == (None if material is None else MATERIALS[material])
+
+
+def test_a_wooden_spoon_is_of_wood_and_as_heavy_as_one() -> None:
+    for seed in range(4):
+        made = make(TEMPLATES["cooking spoon"], read("a wooden spoon, 30 cm long"), np.random.default_rng(seed))
+        assert {look.material for look in made.looks.values()} == {"wood"}
+        assert 0.02 < sum(made.masses_kg.values()) < 0.06  # of beech, 30 cm long: 30 to 50 g
 
 
 def test_parts_are_described_by_their_name() -> None:

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 from manitwin.errors import UsageError
 from manitwin.models.annotators.priors import named
-from manitwin.models.generators.templates.looks import SHADES, Look, color_of, material_of, shaded
+from manitwin.models.generators.templates.looks import SHADES, Look, color_of, look_of, material_of, shaded
 from manitwin.models.generators.templates.template import Template
 
 MAX_CHARACTERS = 400
@@ -101,7 +101,8 @@ def _category(words: list[str], text: str, templates: Mapping[str, Template]) ->
     """Return the category and the words around its name, which is the last and then the longest phrase that names one.
 
     What a thing is, its last noun says: a phrase is no name where words follow that describe nothing (a mug rack is no mug),
-    but for those behind a preposition (a cup of tea is a cup).
+    but for those behind a preposition (a cup of tea is a cup). A material that the name says, of those that such a thing is of,
+    is one of the words around it: a wooden spoon is of wood, but a wood chisel is not.
     """
     words = [word for word in (word.strip('.!?;:"') for word in words) if word]
     names = {
@@ -116,8 +117,14 @@ def _category(words: list[str], text: str, templates: Mapping[str, Template]) ->
             prior = named(phrase)
             category = names.get(phrase) or (prior.category if prior is not None else "")
             if category in templates and words[start] not in _ARTICLES:
-                return category, [*words[:start], *tail]
+                return category, [*_own_materials(words[start : end - 1], templates[category]), *words[:start], *tail]
     raise UsageError(_no_category(text, words, sorted(names), len(templates)))
+
+
+def _own_materials(words: list[str], template: Template) -> list[str]:
+    """Return the words of a name that say a material which the first slot of a template has."""
+    known = {look_of(choice).material for choice in next(iter(template.slots.values())) if choice}
+    return [word for word in words if (look := material_of(word)) is not None and look.material in known]
 
 
 def _wish(words: list[str]) -> tuple[Wish, float | None, list[str]]:

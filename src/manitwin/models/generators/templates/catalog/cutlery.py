@@ -28,7 +28,14 @@ def scoop(long_m: float, wide_m: float, deep_m: float, wall_m: float) -> tuple[M
 
 
 def _spoon(
-    length_m: float, bowl: float, width_m: float, deep: float, half_m: float, wall_m: float, lift: float
+    length_m: float,
+    bowl: float,
+    width_m: float,
+    deep: float,
+    half_m: float,
+    wall_m: float,
+    lift: float,
+    flatten: float = 0.35,
 ) -> Model:
     long = bowl * length_m
     at, low = 0.5 * (length_m - long), deep * width_m
@@ -36,7 +43,9 @@ def _spoon(
     model = Model().add("bowl", outer.translate((at, 0, 0))).cut("inside", inner.translate((at, 0, 0)))
     start, end = at - 0.47 * long, -0.5 * length_m
     model.add(
-        "handle", slim(start, end, half_m, flatten=0.35, lift_m=lift * low).translate((0, 0, -0.35 * half_m)), "handle"
+        "handle",
+        slim(start, end, half_m, flatten=flatten, lift_m=lift * low).translate((0, 0, -flatten * half_m)),
+        "handle",
     )
     model.point("bowl", "opening", "inside", (at, 0.0, 0.0), (0.0, 0.0, 1.0))
     model.point("handle", "surface", "handle", (0.35 * start + 0.65 * end, 0.0, 0.85 * lift * low), (0.0, 0.0, 1.0))
@@ -57,8 +66,8 @@ def ladle(*, length_m: float, bowl: float, width_m: float) -> Model:
 
 @template("cooking spoon")
 def cooking_spoon(*, length_m: float, bowl: float, width_m: float) -> Model:
-    """Build a wooden spoon with a shallow bowl."""
-    return _spoon(length_m, bowl, width_m, 0.2, 0.0065, 0.003, 0.5)
+    """Build a wooden spoon with a shallow bowl, a thick wall and a nearly round handle, as wood asks for."""
+    return _spoon(length_m, bowl, width_m, 0.2, 0.0055, 0.004, 0.5, flatten=0.8)
 
 
 @template("fork")
