@@ -24,6 +24,8 @@ def test_names_are_the_same_where_the_words_of_one_are_among_those_of_the_other(
         ("head", "tines"),
         ("grip", "handles"),
         ("toe", "upper"),
+        ("housing", "body"),
+        ("cooking surface", "inner floor"),
     ],
 )
 def test_what_is_on_a_listed_part_or_is_it_in_another_word_is_right(name: str, listed: str) -> None:

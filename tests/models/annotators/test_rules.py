@@ -17,8 +17,8 @@ from manitwin.models.annotators.priors import load_priors, lookup
 from manitwin.models.annotators.rules import RulesAnnotator, estimate_physical
 
 
-def mass(mesh: trimesh.Trimesh, name: str | None):
-    return RulesAnnotator().estimate_physical(subject(mesh, name)).mass_kg
+def mass(mesh: trimesh.Trimesh, name: str | None, *, metric: bool = True):
+    return RulesAnnotator().estimate_physical(subject(mesh, name, metric=metric)).mass_kg
 
 
 def test_a_full_drink_can_weighs_what_its_contents_and_metal_do() -> None:
@@ -50,6 +50,27 @@ def test_interval_goes_on_beyond_the_answer_where_size_and_volume_contradict_eac
     block = trimesh.creation.box([0.2, 0.15, 0.1])
     agreed = mass(block, "toy")
     assert agreed.high == min(prior.bulk_density_kg_m3.high * block.volume, prior.mass_kg.high), "the same as before"
+
+
+def test_a_volume_by_a_guessed_size_says_less_than_one_by_a_known_one() -> None:
+    prior = lookup("drill")
+    assert prior.bulk_density_kg_m3 is not None
+    side_m = (0.5 * prior.mass_kg.typical / prior.bulk_density_kg_m3.typical / prior.longest_axis_m.typical) ** 0.5
+    light = trimesh.creation.box([prior.longest_axis_m.typical, side_m, side_m])  # as long as usual, of half the matter
+    known, guessed = mass(light, "drill"), mass(light, "drill", metric=False)
+    assert known.value < guessed.value < prior.mass_kg.typical < guessed.high
+    # log-normal: the mean of both by their inverse variances, that of the volume with nine times the size's
+    spread = {
+        name: np.log(interval.high / interval.low) / 3.29
+        for name, interval in (
+            ("mass", prior.mass_kg),
+            ("density", prior.bulk_density_kg_m3),
+            ("size", prior.longest_axis_m),
+        )
+    }
+    by_size, by_volume = (0.6 * spread["mass"]) ** -2, 1 / (spread["density"] ** 2 + (3 * spread["size"]) ** 2)
+    halved = 0.5 ** (by_volume / (by_size + by_volume))
+    assert guessed.value == pytest.approx(halved * prior.mass_kg.typical)
 
 
 def test_a_thing_without_a_name_has_a_wide_interval_and_says_so() -> None:

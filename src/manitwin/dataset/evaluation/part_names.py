@@ -9,10 +9,11 @@ SPELLINGS = {"gray": "grey", "aluminum": "aluminium", "golden": "gold", "transpa
 
 _SIDES = frozenset({"front", "back", "side", "face", "base", "bottom", "underside"})
 _ON = {
-    "body": _SIDES,
+    "body": _SIDES | {"casing", "housing"},
     "bowl": frozenset({"head", "scoop"}),
     "bristle": frozenset({"head"}),
     "cap": frozenset({"lid"}),
+    "floor": frozenset({"surface"}),
     "handle": frozenset({"grip", "haft"}),
     "lid": frozenset({"cap"}),
     "opening": frozenset({"mouth"}),

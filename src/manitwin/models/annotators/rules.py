@@ -86,7 +86,7 @@ def estimate_physical(subject: Subject, prior: Prior | None) -> PhysicalEstimate
         longest_axis_m=None if subject.metric else size,
         mass_kg=_unknown_mass(density, volume_m3)
         if prior.category == "unknown"
-        else _mass(prior, longest_m, volume_m3),
+        else _mass(prior, longest_m, volume_m3, 0.0 if subject.metric else _log_spread(prior.longest_axis_m)),
         bulk_density_kg_m3=density,
         friction_static=prior.friction_static.estimate(prior.source),
         friction_dynamic=prior.friction_dynamic.estimate(prior.source),
@@ -97,18 +97,19 @@ def estimate_physical(subject: Subject, prior: Prior | None) -> PhysicalEstimate
     )
 
 
-def _mass(prior: Prior, longest_m: float, volume_m3: float) -> Estimate:
+def _mass(prior: Prior, longest_m: float, volume_m3: float, size_spread: float) -> Estimate:
     """Combine what such a thing of this size weighs with bulk density times volume, the narrower one counting more.
 
-    Both are taken as log-normal. The answer stays in the category's interval; its own interval is what both leave open, and where
-    they contradict each other it reaches as far beyond the answer as both together are unsure.
+    Both are taken as log-normal. A volume is as unsure as the size that it was scaled by, ``size_spread`` in natural logs, three
+    times over (0: the size is known). The answer stays in the category's interval; its own interval is what both leave open, and
+    where they contradict each other it reaches as far beyond the answer as both together are unsure.
     """
     by_size = _scaled(prior.mass_kg, (longest_m / prior.longest_axis_m.typical) ** _SIZE_EXPONENT)
     if prior.bulk_density_kg_m3 is None:
         return _clamped(by_size.typical, by_size, prior.mass_kg, prior.source, 1.0)
     by_volume = _scaled(prior.bulk_density_kg_m3, volume_m3)
     weight_size = (_SAME_SIZE_SPREAD * _log_spread(by_size)) ** -2
-    weight_volume = _log_spread(by_volume) ** -2
+    weight_volume = 1 / (_log_spread(by_volume) ** 2 + (3 * size_spread) ** 2)
     logs = weight_size * np.log(by_size.typical) + weight_volume * np.log(by_volume.typical)
     value = float(np.exp(logs / (weight_size + weight_volume)))
     source = "density*volume" if weight_volume > weight_size else prior.source
