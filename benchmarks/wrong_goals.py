@@ -26,7 +26,7 @@ SIDES = ("left_of", "right_of", "behind", "in_front_of")
 CONTROLS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys((*AT_PARTNERS, "push", "hang", "insert", "press"), ("beside",)),
     **dict.fromkeys(SIDES, ("other side",)),
-    "upright": ("lying",),
+    **dict.fromkeys(("upright", "away_from"), ("lying",)),
     "lift": ("low",),
     "strike": ("beside", "turned"),
     "pour": ("beside", "empty"),

@@ -45,6 +45,18 @@ def test_objects_are_in_the_order_of_their_names_where_they_were_put(world: Robo
         assert world.object_to_world(number) == pytest.approx(placed.object_to_world, abs=1e-6)
 
 
+@pytest.mark.parametrize(("extents_m", "factor"), [([0.012, 0.2, 0.02], 2), ([0.04, 0.06, 0.1], 1)])
+def test_what_is_slender_is_held_with_more_rounds_of_the_solver(extents_m: list[float], factor: int) -> None:
+    settings, target = EpisodeSettings(), replace(problem().target, body=box(extents_m, 0.04))
+    with made(replace(problem(), target=target)) as world:
+        articulation = world.robot.articulation
+        assert articulation.get_solver_position_iterations() == settings.solver_iterations
+        world.expect_load(True)
+        assert articulation.get_solver_position_iterations() == factor * settings.solver_iterations_held
+        world.take(world.target)
+        assert articulation.get_solver_position_iterations() == settings.solver_iterations
+
+
 def test_what_stands_comes_to_rest_borne_by_the_table_and_touched_by_nobody(world: RobotWorld) -> None:
     assert world.settle(0.5).at_rest.all()
     touches = world.contacts.touches(world.contacts.read())

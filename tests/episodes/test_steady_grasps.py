@@ -86,6 +86,16 @@ def raised(grasp: Grasp, by_m: float) -> Grasp:
     return replace(grasp, gripper_to_object=grasp.gripper_to_object @ transform(None, np.array([0, 0, -by_m])))
 
 
+def test_pads_that_touch_narrowly_lift_no_more_than_a_line_bears() -> None:
+    line_nm, face_nm = torsion_limits_nm(HAND)
+    heavy, weight_n = bar(0.5), 0.5 * 9.81
+    between, light = held_at((line_nm + face_nm) / 2 / weight_n), held_at(0.5 * line_nm / weight_n)
+    narrow = [raised(each, 0.026) for each in (between, light)]
+    assert touch_narrowly([between, light, *narrow], heavy.body, HAND) == [False, False, True, True]
+    assert steady_tiers([between, light, *narrow], heavy, HAND) == [(light, narrow[1]), (between,)]
+    assert steady_tiers(narrow[:1], heavy, HAND) == []
+
+
 def test_what_is_held_any_way_up_loads_a_grasp_by_its_lever_and_by_how_little_of_the_pads_touches() -> None:
     line_nm, _ = torsion_limits_nm(HAND)
     body = bar(0.5).body

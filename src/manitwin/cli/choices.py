@@ -112,6 +112,7 @@ SKILLS = Choices(
         "behind",
         "in_front_of",
         "near",
+        "away_from",
         "upright",
         "lift",
         "hang",

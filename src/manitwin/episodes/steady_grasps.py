@@ -23,18 +23,24 @@ BROAD_SHARE = 0.4  # of a pad's rays: on fewer, fewer of the verified grasps hol
 def steady_tiers(grasps: Sequence[Grasp], target: PlacedObject, gripper: Gripper) -> list[tuple[Grasp, ...]]:
     """Return grasps in two tiers, each in their order: those that bear the target's weight where it is, and the doubtful.
 
-    The doubtful bear it where pads lie flat on it. Left out are those in which a target that is lifted turns about the jaws'
-    axis in any case. The trial of a grasp does not say so: one that lies is held at its end. A tier without grasps is left
-    out too; of other grippers than jaws there is one.
+    The doubtful bear it where pads lie flat on it, and touch it broadly (``touch_narrowly``). Left out are those in which a
+    target that is lifted turns about the jaws' axis: more than a face bears, or more than a line where pads touch narrowly. The
+    trial of a grasp does not say so: one that lies is held at its end. A tier without grasps is left out too; of other
+    grippers than jaws there is one.
     """
     if not isinstance(gripper, ParallelGripper):
         return [tuple(grasps)] if grasps else []
     torques_nm = [weight_torque_nm(each, target, gripper) for each in grasps]
     line_nm, face_nm = torsion_limits_nm(gripper)
     both = list(zip(grasps, torques_nm, strict=True))
+    on_faces = tuple(each for each, nm in both if line_nm < nm <= face_nm)
     tiers = (
         tuple(each for each, nm in both if nm <= line_nm),
-        tuple(each for each, nm in both if line_nm < nm <= face_nm),
+        tuple(
+            each
+            for each, late in zip(on_faces, touch_narrowly(on_faces, target.body, gripper), strict=True)
+            if not late
+        ),
     )
     return [tier for tier in tiers if tier]
 

@@ -116,6 +116,12 @@ def test_sides_are_those_that_the_robot_sees(side: str, way: tuple[int, int]) ->
     assert failure(0.5 + 0.03 * way[0], 0.03 * way[1]) == "above_it"
 
 
+def test_away_from_is_a_least_gap_between_footprints() -> None:
+    there = state(thing(at(0.5, 0.13, 0.02)), ("item", "table"))  # 13 cm less 6 and 2
+    assert judge(there, Literal("away_from", "item", "vessel", 0.049)).holds
+    assert judge(there, Literal("away_from", "item", "vessel", 0.051)).failure == "too_near"
+
+
 def test_near_is_a_gap_between_footprints() -> None:
     there = state(thing(at(0.5, 0.13, 0.02)), ("item", "table"))  # 13 cm less 6 and 2
     assert judge(there, Literal("near", "item", "vessel", 0.051)).holds

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from granular_things import deep_pot
@@ -59,6 +61,25 @@ def test_what_is_true_already_is_no_goal(skill: str) -> None:
     way = {"left_of": (0, 1), "right_of": (0, -1), "behind": (1, 0), "in_front_of": (-1, 0), "near": (0, 1)}[skill]
     beside = placed(0, "dice", 0.5 + 0.13 * way[0], 0.1 * way[1])
     assert goal_of(skill, around(beside, placed(1, "box", 0.5, 0.0))) is None
+
+
+def test_what_is_near_another_thing_is_set_down_away_from_it_and_where_it_was_is_too_near() -> None:
+    surroundings = around(placed(0, "dice", 0.5, 0.05), placed(1, "box", 0.5, -0.1), placed(2, "can", 0.5, 0.3))
+    goal = goal_of("away_from", surroundings)
+    assert goal is not None
+    facts = attempt(surroundings, goal, DICE)
+    assert facts.outcome == "kept", (facts, facts.evaluation)
+    assert facts.evaluation is not None and facts.evaluation.literals[0].measured["gap_m"] >= 0.15
+    put_back = replace(goal, poses=(surroundings.objects[0].object_to_world,))
+    missed = attempt(surroundings, put_back, DICE)
+    assert missed.outcome == "goal_missed" and missed.evaluation is not None
+    assert missed.evaluation.literals[0].failure == "too_near"
+
+
+def test_what_is_far_from_another_thing_is_not_asked_to_go_away_from_it() -> None:
+    assert goal_of("away_from", around(placed(0, "dice", 0.45, -0.3), placed(1, "box", 0.5, 0.2))) is None
+    board, dice = (next(twin for twin in POOL.twins if twin.category == name) for name in ("board", "dice"))
+    assert SKILLS["away_from"].suits(POOL, dice, board) and not SKILLS["away_from"].suits(POOL, dice, None)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -52,6 +52,14 @@ def test_where_no_other_grasp_serves_it_is_lifted_as_it_turns() -> None:
     assert recording is not None and closings(recording) == 2
 
 
+def test_a_grasp_on_the_knobs_far_from_the_middle_of_a_heavy_thing_is_no_plan() -> None:
+    heavy = replace(KNOBBED, mass_kg=1.9)  # at 3 cm: more than a line bears, less than a face
+    spot = around(heavy, FRAMES, 0.5, 0.05)
+    facts, _ = attempt(spot, goal_of("lift", spot), (ON_THE_KNOBS,))
+    assert facts.outcome == "no_plan"
+    assert facts.plan_failures == {"weight_not_borne": 1}
+
+
 @pytest.mark.parametrize(("turned_deg", "carries"), [(0.0, 1), (15.0, 2)])
 def test_what_turns_as_it_is_carried_is_carried_anew(
     monkeypatch: pytest.MonkeyPatch, turned_deg: float, carries: int

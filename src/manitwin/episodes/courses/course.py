@@ -194,6 +194,13 @@ class Course(ABC):
         execution.follow(retreat)
         raise NotTaken("replan_failed")
 
+    def tiers(self) -> list[tuple[Grasp, ...]]:
+        """Return the grasps that can be planned with (``tiers_of``), and count those that the target's weight would turn in."""
+        tiers = tiers_of(self.start)
+        if turning := len(self.start.problem.grasps) - sum(map(len, tiers)):
+            self.facts.plan_failures["weight_not_borne"] += turning
+        return tiers
+
     def height_m(self, execution: Execution) -> float:
         """Return how high the target's centre of mass is."""
         center = self.problem.target.body.center_of_mass_m[None]

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from manitwin.episodes.courses.course import TURNED_RAD, Course, Ended, Start, first_and_last, tiers_of
+from manitwin.episodes.courses.course import TURNED_RAD, Course, Ended, Start, first_and_last
 from manitwin.episodes.courses.regulated import Admittance, with_heights
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
@@ -97,8 +97,9 @@ class HeldCourse(Course):
                 return False
             self._reach, self._held, self._joints = found
             return True
-        grasps = tuple(grasp for tier in tiers_of(self.start) for grasp in self._ranked(tier))
-        blocking = len(self.problem.grasps) - len(grasps)
+        tiers = self.tiers()
+        grasps = tuple(grasp for tier in tiers for grasp in self._ranked(tier))
+        blocking = sum(map(len, tiers)) - len(grasps)
         self.problem = replace(self.problem, grasps=grasps)
         plan, report = self._planner.plan(self.problem, task.paths, as_hulls=task.as_hulls, longest_s=task.longest_s)
         self.facts.grasps_tried = report.tried + blocking

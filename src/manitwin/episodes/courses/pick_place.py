@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from manitwin.episodes.courses.course import Course, Ended, tiers_of
+from manitwin.episodes.courses.course import Course, Ended
 from manitwin.episodes.events import ContactWatch, EventWatch
 from manitwin.episodes.execution import Execution
 from manitwin.episodes.outcome import moved_m, turned_rad
@@ -51,7 +51,7 @@ class PickPlaceCourse(Course):
 
     def plan(self) -> bool:
         """Plan for the first goal pose that can be reached; the problem becomes that of this pose."""
-        return any(self.plan_with(grasps) for grasps in tiers_of(self.start))
+        return any(self.plan_with(grasps) for grasps in self.tiers())
 
     def plan_with(self, grasps: Sequence[Grasp]) -> bool:
         """Plan with some of the grasps."""

@@ -25,7 +25,7 @@ class RegraspCourse(PickPlaceCourse):
 
     def plan(self) -> bool:
         """Plan at once; else to a pose on the way: the goal from there, then the way there."""
-        return any(self.plan_with(grasps) or self._plan_by_a_way(grasps) for grasps in tiers_of(self.start))
+        return any(self.plan_with(grasps) or self._plan_by_a_way(grasps) for grasps in self.tiers())
 
     def _plan_by_a_way(self, grasps: Sequence[Grasp]) -> bool:
         start = self.start

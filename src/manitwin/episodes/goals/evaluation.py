@@ -16,6 +16,7 @@ JUDGES: Mapping[str, Callable[[WorldState, Literal], Judgement]] = {
     "in": spatial.inside,
     **dict.fromkeys(spatial.SIDES, spatial.beside),
     "near": spatial.near,
+    "away_from": spatial.away_from,
     "upright": spatial.upright,
     "lifted": spatial.lifted,
     "touching": spatial.touching,

@@ -29,6 +29,7 @@ SIGNATURES: Mapping[str, Signature] = {
     "behind": Signature("object"),
     "in_front_of": Signature("object"),
     "near": Signature("object", "m", 0.10),
+    "away_from": Signature("object", "m", 0.15),
     "upright": Signature(),
     "lifted": Signature(None, "m", 0.05),
     "touching": Signature("object"),

@@ -45,6 +45,11 @@ TEMPLATES: Mapping[str, tuple[str, ...]] = {
         "put {a} near {b}", "place {a} next to {b}", "set {a} down close to {b}", "bring {a} to {b}",
         "{a} should be next to {b}: move {it} there", "pick up {a} and put {it} beside {b}",
     ),
+    "away_from": (
+        "move {a} away from {b}", "put {a} farther away from {b}", "set {a} down well clear of {b}",
+        "take {a} and put {it} somewhere far from {b}", "{a} is too close to {b}: move {it} away",
+        "pick up {a} and keep {it} apart from {b}",
+    ),
     "upright": (
         "stand {a} up", "put {a} upright", "{a} has fallen over: stand {it} up", "set {a} back on {its} base",
         "pick up {a} and put {it} down upright", "please stand {a} upright again",

@@ -73,6 +73,14 @@ def near(state: WorldState, literal: Literal) -> Judgement:
     return judged({"too_far": gap_m <= literal.value, **_set_down(state, literal.subject)}, {"gap_m": gap_m})
 
 
+def away_from(state: WorldState, literal: Literal) -> Judgement:
+    """Judge that the footprints are apart by the value or more, and that the object is let go and still."""
+    assert literal.value is not None
+    moved, other = _both(state, literal)
+    gap_m = separation_m(moved.footprint_m, other.footprint_m)
+    return judged({"too_near": gap_m >= literal.value, **_set_down(state, literal.subject)}, {"gap_m": gap_m})
+
+
 def on(state: WorldState, literal: Literal) -> Judgement:
     """Judge that an object stands on another alone: it presses on nothing else, its centre of mass over the other."""
     moved, other = _both(state, literal)

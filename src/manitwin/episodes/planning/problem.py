@@ -12,8 +12,8 @@ import numpy as np
 from manitwin.geometry.rigid_body import PlacedObject, StaticBox
 
 PlanFailure = Literal[
-    "blocks_function", "outside_workspace", "no_inverse_kinematics", "approach_blocked", "lift_blocked", "place_unreachable",
-    "lower_blocked", "retreat_blocked", "path_unreachable", "path_blocked", "path_slow", "taker_blocked",
+    "weight_not_borne", "blocks_function", "outside_workspace", "no_inverse_kinematics", "approach_blocked", "lift_blocked",
+    "place_unreachable", "lower_blocked", "retreat_blocked", "path_unreachable", "path_blocked", "path_slow", "taker_blocked",
     "no_path", "no_time_parameterization",
 ]  # fmt: skip
 

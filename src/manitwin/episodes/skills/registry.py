@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from manitwin.episodes.skills.aim import Aim
+from manitwin.episodes.skills.away_from import AwayFrom
 from manitwin.episodes.skills.beside import SIDE_SKILLS
 from manitwin.episodes.skills.cut_motion import CutMotion
 from manitwin.episodes.skills.handover import Handover
@@ -31,6 +32,7 @@ _SKILLS: tuple[Skill, ...] = (
     PlaceIn(),
     STACK,
     *SIDE_SKILLS,
+    AwayFrom(),
     Upright(),
     Lift(),
     Hang(),

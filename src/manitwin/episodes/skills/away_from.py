@@ -1,0 +1,45 @@
+"""``away_from``: set an object down well clear of another one that it is near to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from manitwin.episodes.goals.goal import SIGNATURES
+from manitwin.episodes.pick_place_tasks import footprint_at, free_poses, on_its_surface
+from manitwin.episodes.skills.skill import Skill, Surroundings
+from manitwin.geometry.boxes import separation_m
+from manitwin.scenes.layouts.pool import Pool, PoolTwin
+
+DRAWN = 200
+SPARE_M = 0.02  # beyond what the goal asks for: what is set down is off by a few millimetres
+
+
+class AwayFrom(Skill):
+    """Set the target down on its surface so that it is apart from its partner; it begins nearer to it."""
+
+    name, predicate, has_partner = "away_from", "away_from", True
+
+    def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
+        """Accept any two."""
+        return partner is not None
+
+    def poses(
+        self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
+    ) -> Iterator[np.ndarray]:
+        """Yield free poses in reach, turned at random, whose footprints are far enough from the partner's."""
+        assert partner is not None
+        moved = around.objects[target]
+        least_m = SIGNATURES[self.predicate].default
+        assert least_m is not None
+        taken = [
+            footprint_at(each.body, each.object_to_world)
+            for number, each in enumerate(around.objects)
+            if number != target
+        ]
+        apart_from = taken[partner if partner < target else partner - 1]
+        object_to_plane, _ = on_its_surface(moved, 0.0)
+        for pose in free_poses(moved.body, object_to_plane, taken, around.area, rng, count=DRAWN):
+            if separation_m(footprint_at(moved.body, pose), apart_from) >= least_m + SPARE_M:
+                yield pose
