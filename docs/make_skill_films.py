@@ -51,6 +51,7 @@ TARGETS = {
     "behind": "mug",
     "in_front_of": "box",
     "near": "mug",
+    "away_from": "bottle",
     "upright": "bottle",
     "handover": "hammer",
     "lift": "mug",

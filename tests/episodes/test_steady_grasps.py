@@ -14,6 +14,7 @@ from manitwin.episodes.steady_grasps import (
     steady_tiers,
     torsion_limits_nm,
     touch_narrowly,
+    touching_shares,
     weight_torque_nm,
 )
 from manitwin.geometry.poses import transform
@@ -84,6 +85,16 @@ def test_other_grippers_keep_the_order_of_their_grasps() -> None:
 def raised(grasp: Grasp, by_m: float) -> Grasp:
     """The same grasp, its pads higher up the bar, so that fewer of their rows touch it."""
     return replace(grasp, gripper_to_object=grasp.gripper_to_object @ transform(None, np.array([0, 0, -by_m])))
+
+
+def test_part_of_the_pads_lifts_what_a_disc_of_its_area_bears() -> None:
+    line_nm, face_nm = torsion_limits_nm(HAND)
+    heavy, weight_n, disc_nm = bar(0.5), 0.5 * 9.81, face_nm * np.sqrt(0.6)
+    assert line_nm < disc_nm
+    below, above_it = (held_at(nm / weight_n) for nm in ((line_nm + disc_nm) / 2, (disc_nm + face_nm) / 2))
+    parts = [raised(each, 0.018) for each in (below, above_it)]  # of the cells of their pads 9 of 15 touch
+    assert touching_shares([below, *parts], heavy.body, HAND) == [1.0, 0.6, 0.6]
+    assert steady_tiers([below, above_it, *parts], heavy, HAND) == [(below, above_it, parts[0])]
 
 
 def test_pads_that_touch_narrowly_lift_no_more_than_a_line_bears() -> None:

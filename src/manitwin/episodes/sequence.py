@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, islice
 
 import numpy as np
 
@@ -15,14 +16,17 @@ from manitwin.episodes.courses.push import PushCourse
 from manitwin.episodes.courses.regrasp import RegraspCourse
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.execution import Execution
-from manitwin.episodes.goals.goal import Goal
+from manitwin.episodes.goals.evaluation import evaluate
+from manitwin.episodes.goals.goal import Goal, Literal
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
 from manitwin.episodes.planning.two_arms import TwoArmPlanner, alone
-from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings
+from manitwin.episodes.skills.skill import FoundPoses, Skill, SkillGoal, Surroundings, state_at_rest
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.contacts import NONE_MEANT
 from manitwin.physics.sapien.world import RobotWorld
+
+DRAWS = 12  # of a later step's poses: two sides at once are a small place
 
 
 @dataclass(frozen=True)
@@ -123,7 +127,7 @@ def _next_course(
     execution.follow(home)
     world.take(target)
     execution.literal = number
-    goal = _goal_now(step, replace(around, objects=objects), target, problem.seed)
+    goal = goal_of_later_step(sequence.steps, number, replace(around, objects=objects), problem.seed)
     if goal is None:
         raise Ended("replan_failed")
     later = Start(problem, objects, planner, settings, goal, start.granules_in)
@@ -146,11 +150,38 @@ def problem_of(
     )
 
 
-def _goal_now(step: Step, around: Surroundings, target: int, seed: int) -> SkillGoal | None:
-    """Return the step's goal with poses from where things are; one of a path is made from there anyway."""
+def goal_of_later_step(steps: Sequence[Step], number: int, around: Surroundings, seed: int) -> SkillGoal | None:
+    """Return a later step's goal with poses from where things are; one of a path is made from there anyway. None: no pose.
+
+    What is taken for a second time goes only where the literals that came true of it stay so: an object that was put left of
+    one thing, and is now put behind another one.
+    """
+    step, names = steps[number], [each.name for each in around.objects]
+    target = names.index(step.target)
     if step.goal.is_of_a_path:
         return replace(step.goal, poses=(around.objects[target].object_to_world,))
-    names = [each.name for each in around.objects]
     partner = None if step.partner is None else names.index(step.partner)
-    found = step.skill.set_goal(around, target, partner, np.random.default_rng((seed, 4)))
-    return None if found is None else replace(found, goal=step.goal.goal)
+    kept = [each for before in steps[:number] if before.target == step.target for each in before.goal.goal.literals]
+    goals = (
+        step.skill.set_goal(around, target, partner, np.random.default_rng((seed, 4, *([draw] if draw else []))))
+        for draw in range(DRAWS if kept else 1)
+    )
+    first = next(goals)
+    if first is None:
+        return None
+    every = (pose for goal in chain([first], goals) if goal is not None for pose in goal.poses)
+    poses = FoundPoses(islice((pose for pose in every if _stays(kept, around, target, pose)), step.skill.most_poses))
+    return None if next(iter(poses), None) is None else replace(first, goal=step.goal.goal, poses=poses)
+
+
+def _stays(literals: Sequence[Literal], around: Surroundings, target: int, pose: np.ndarray) -> bool:
+    """Tell whether literals hold with the target at a pose, as far as poses tell."""
+    if not literals:
+        return True
+    objects = tuple(
+        replace(each, object_to_world=pose) if number == target else each for number, each in enumerate(around.objects)
+    )
+    names = {each.name for each in objects}
+    if any(literal.second is not None and literal.second not in names for literal in literals):
+        return False  # on a peg or at a mark it is no more
+    return evaluate(state_at_rest(replace(around, objects=objects)), Goal(tuple(literals))).reached

@@ -23,7 +23,7 @@ from manitwin.scenes.layouts.surroundings import make_furniture, make_lights
 from manitwin.scenes.loaded_scene import Scene, furniture_boxes
 from manitwin.scenes.scene import Furniture, Light
 
-PARTNERS_TRIED, STARTS_TRIED = 40, 6
+PARTNERS_TRIED, STARTS_TRIED = 40, 24  # of what is to go away from its partner a fifth of the starts are near it
 Begins = Callable[[Skill, PoolTwin], Sequence[StandingPose]]
 
 

@@ -23,23 +23,21 @@ BROAD_SHARE = 0.4  # of a pad's rays: on fewer, fewer of the verified grasps hol
 def steady_tiers(grasps: Sequence[Grasp], target: PlacedObject, gripper: Gripper) -> list[tuple[Grasp, ...]]:
     """Return grasps in two tiers, each in their order: those that bear the target's weight where it is, and the doubtful.
 
-    The doubtful bear it where pads lie flat on it, and touch it broadly (``touch_narrowly``). Left out are those in which a
-    target that is lifted turns about the jaws' axis: more than a face bears, or more than a line where pads touch narrowly. The
-    trial of a grasp does not say so: one that lies is held at its end. A tier without grasps is left out too; of other
-    grippers than jaws there is one.
+    The doubtful bear it where pads lie flat on it, as a disc of the area that touches does. Left out are those in which a target
+    that is lifted turns about the jaws' axis. The trial of a grasp does not say so: one that lies is held at its end. A tier
+    without grasps is left out too; of other grippers than jaws there is one.
     """
     if not isinstance(gripper, ParallelGripper):
         return [tuple(grasps)] if grasps else []
     torques_nm = [weight_torque_nm(each, target, gripper) for each in grasps]
     line_nm, face_nm = torsion_limits_nm(gripper)
     both = list(zip(grasps, torques_nm, strict=True))
-    on_faces = tuple(each for each, nm in both if line_nm < nm <= face_nm)
+    on_faces = [(each, nm) for each, nm in both if line_nm < nm <= face_nm]
+    shares = touching_shares([each for each, _ in on_faces], target.body, gripper)
     tiers = (
         tuple(each for each, nm in both if nm <= line_nm),
         tuple(
-            each
-            for each, late in zip(on_faces, touch_narrowly(on_faces, target.body, gripper), strict=True)
-            if not late
+            each for (each, nm), share in zip(on_faces, shares, strict=True) if nm <= face_nm * float(np.sqrt(share))
         ),
     )
     return [tier for tier in tiers if tier]
@@ -90,9 +88,14 @@ def touch_narrowly(grasps: Sequence[Grasp], body: RigidBody, gripper: Gripper) -
     Of 270 lifts of 48 things, 26 of the 158 such ones turned by more than 10 degrees, of the others 3 of 112. Of other
     grippers than jaws nothing is known.
     """
-    if not isinstance(gripper, ParallelGripper) or not grasps:
+    if not isinstance(gripper, ParallelGripper):
         return [False] * len(grasps)
-    return [bool(cells < BROAD_SHARE * PAD_CELLS) for cells in _contacts(grasps, body, gripper).cells]
+    return [share < BROAD_SHARE for share in touching_shares(grasps, body, gripper)]
+
+
+def touching_shares(grasps: Sequence[Grasp], body: RigidBody, gripper: ParallelGripper) -> list[float]:
+    """Return the share of the pads that touches in each grasp, of the pad that touches less."""
+    return [int(cells) / PAD_CELLS for cells in _contacts(grasps, body, gripper).cells] if grasps else []
 
 
 def _contacts(grasps: Sequence[Grasp], body: RigidBody, gripper: ParallelGripper) -> PadContacts:

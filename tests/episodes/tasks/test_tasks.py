@@ -29,7 +29,7 @@ from manitwin.scenes.scene_files import read_scene, scene_files
 from manitwin.scenes.settings import LayoutsConfig, LayoutSettings
 
 GUARDED = {"press", "push", "strike", "wipe"}  # moves that end between two actions
-CONFIG = TasksConfig(seed=3, per_scene=5, two_literal_share=0.2, tries_of_kind=3)
+CONFIG = TasksConfig(seed=5, per_scene=5, two_literal_share=0.2, tries_of_kind=3)
 CATEGORIES = ("brick", "block", "tea box")
 
 

@@ -159,7 +159,7 @@ def set_goal(
     """
     second = None if partner is None else around.objects[partner]
     goal = skill.goal(around.objects[target], second)
-    if evaluate(_state_at_rest(around.objects), goal).reached:
+    if evaluate(state_at_rest(around), goal).reached:
         return None
     own = np.random.default_rng(
         rng.integers(2**63)
@@ -178,10 +178,13 @@ def openings_of(around: Surroundings, numbers: Sequence[int]) -> dict[str, Openi
     return {name: opening for name, opening in found.items() if opening is not None}
 
 
-def _state_at_rest(objects: Sequence[PlacedObject]) -> WorldState:
-    """Return the state before anything happens, as far as poses tell: nothing touches, nothing opens."""
+def state_at_rest(around: Surroundings) -> WorldState:
+    """Return the state in which nothing happens, as far as poses tell: nothing touches, nothing opens."""
     return WorldState(
-        {each.name: ObjectState(each.body, each.object_to_world, each.object_to_world, True) for each in objects},
+        {
+            each.name: ObjectState(each.body, each.object_to_world, each.object_to_world, True)
+            for each in around.objects
+        },
         frozenset(),
     )
 

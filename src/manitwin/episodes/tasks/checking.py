@@ -13,7 +13,7 @@ from manitwin.episodes.goals.evaluation import judge
 from manitwin.episodes.goals.goal import Goal, Literal
 from manitwin.episodes.pick_place_tasks import MIN_GAP_M
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
-from manitwin.episodes.sequence import GoalSequence, Step, course_of, merged, problem_of
+from manitwin.episodes.sequence import GoalSequence, Step, course_of, goal_of_later_step, merged, problem_of
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.registry import SKILLS
 from manitwin.episodes.skills.skill import SkillGoal
@@ -47,7 +47,7 @@ def check(
     problem = replace(scene.problem, seed=seed, fixtures=_boxes(sequence))
     for number, (step, action) in enumerate(zip(sequence.steps, candidate.actions, strict=True)):
         here = problem_of(problem, objects, action.target, step.grasps)
-        found = _goal_there(scene, step, action, objects, number, seed)
+        found = _goal_there(scene, sequence.steps, action, objects, number, seed)
         facts = EpisodeFacts()
         course = course_of(Start(here, objects, planner, settings, found), facts)
         if not course.plan():
@@ -58,6 +58,8 @@ def check(
         end = course.ends_at
         if end is None and not last:
             raise NoTask("keeps_it_in_hand")
+        if end is None and action.target in {before.target for before in candidate.actions[:number]}:
+            raise NoTask("undoes_first")  # what was put somewhere is in the hand at the end
         if end is not None:
             objects = tuple(
                 replace(each, object_to_world=end) if place == action.target else each
@@ -106,14 +108,11 @@ def skill_goal_of(scene: TaskScene, sequence: GoalSequence) -> SkillGoal:
 
 
 def _goal_there(
-    scene: TaskScene, step: Step, action: Action, objects: tuple[PlacedObject, ...], number: int, seed: int
+    scene: TaskScene, steps: Sequence[Step], action: Action, objects: tuple[PlacedObject, ...], number: int, seed: int
 ) -> SkillGoal:
     if number == 0:
-        return step.goal
-    if step.goal.is_of_a_path:
-        return replace(step.goal, poses=(objects[action.target].object_to_world,))
-    around = replace(scene.around(action.target), objects=objects)
-    found = step.skill.set_goal(around, action.target, action.partner, np.random.default_rng((seed, 4)))
+        return steps[0].goal
+    found = goal_of_later_step(steps, number, replace(scene.around(action.target), objects=objects), seed)
     if found is None:
         raise NoTask("no_place")
     return found
