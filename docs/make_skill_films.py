@@ -51,7 +51,7 @@ TARGETS = {
     "behind": "mug",
     "in_front_of": "box",
     "near": "mug",
-    "away_from": "bottle",
+    "away_from": "mug",
     "upright": "bottle",
     "handover": "hammer",
     "lift": "mug",

@@ -46,6 +46,19 @@ def test_what_is_round_would_roll_and_is_not_pushed() -> None:
         assert SKILLS["push"].suits(spot.pool, spot.twin(0), None) == slides
 
 
+def test_what_lies_so_that_it_would_roll_is_not_pushed_though_it_could_be_as_it_stands() -> None:
+    around_m = np.linspace(0, 2 * np.pi, 32, endpoint=False)
+    ring = np.column_stack([0.025 * np.cos(around_m), 0.025 * np.sin(around_m), np.zeros(32)])
+    can = replace(box([0.05, 0.05, 0.05], 0.1), hulls=(np.concatenate([ring, ring + np.array([0, 0, 0.05])]),))
+    standing = around(can, (), 0.5, 0.05)
+    (placed,) = standing.objects
+    on_its_side = transform(np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), np.array([0.5, 0.05, 0.025]))
+    lying = replace(standing, objects=(replace(placed, object_to_world=on_its_side),))
+    assert SKILLS["push"].suits(standing.pool, standing.twin(0), None)
+    assert SKILLS["push"].set_goal(standing, 0, None, np.random.default_rng(1)) is not None
+    assert SKILLS["push"].set_goal(lying, 0, None, np.random.default_rng(1)) is None
+
+
 def attempt(goal: SkillGoal, grasps: tuple[Grasp, ...] = ()) -> EpisodeFacts:
     robot, planner = panda()
     problem = PickPlaceProblem(SPOT.objects[0], goal.poses[0], grasps, (), SPOT.boxes, seed=3)

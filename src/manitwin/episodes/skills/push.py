@@ -40,6 +40,13 @@ def base_width_m(points: np.ndarray) -> float:
     return float(np.ptp(base @ np.array([np.cos(angles), np.sin(angles)]), axis=0).min())
 
 
+def can_be_pushed(points: np.ndarray) -> bool:
+    """Tell whether a fingertip finds an object of corners ``(N, 3)``, and whether that neither falls over nor rolls."""
+    *across_m, height_m = np.ptp(points, axis=0).tolist()
+    broad = min(across_m) >= max(LEAST_WIDTH_M, HEIGHT_SHARE * TIPPING * height_m)
+    return height_m >= LEAST_HEIGHT_M and broad and base_width_m(points) >= LEAST_BASE_M
+
+
 class Push(Skill):
     """Push the target to a place in reach, along a way that is free."""
 
@@ -48,10 +55,7 @@ class Push(Skill):
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
         """Accept what is high enough for a fingertip, and stands broadly enough neither to fall over nor to roll."""
         pose = self.begins_in(target)[0].object_to_plane
-        points = transform_points(pose, np.concatenate(pool.body(target.twin_id).body.hulls))
-        *across_m, height_m = np.ptp(points, axis=0).tolist()
-        broad = min(across_m) >= max(LEAST_WIDTH_M, HEIGHT_SHARE * TIPPING * height_m)
-        return height_m >= LEAST_HEIGHT_M and broad and base_width_m(points) >= LEAST_BASE_M
+        return can_be_pushed(transform_points(pose, np.concatenate(pool.body(target.twin_id).body.hulls)))
 
     def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
         """Return: pushed to the mark."""
@@ -81,9 +85,10 @@ class Push(Skill):
     def set_goal(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> SkillGoal | None:
-        """Return the goal with its mark; None where nothing is free."""
+        """Return the goal with its mark; None where nothing is free, or the target lies so that it would roll or fall over."""
         moved = around.objects[target]
-        pose = next(self.poses(around, target, partner, rng), None)
+        points = transform_points(moved.object_to_world, np.concatenate(moved.body.hulls))
+        pose = next(self.poses(around, target, partner, rng), None) if can_be_pushed(points) else None
         if pose is None:
             return None
         place_m = transform_points(pose, moved.body.center_of_mass_m[None])[0]
@@ -124,16 +129,14 @@ def strokes(moved: PlacedObject, place_m: np.ndarray, fingertips_m: np.ndarray, 
 
 def arc_to(low: np.ndarray, along: np.ndarray) -> list[np.ndarray]:
     """Return poses that come down to a low one of the hand from behind, level at the end."""
-    offsets = [np.array([*(-along * DOWN_BACK_M * each), DOWN_M * each**2]) for each in DOWN]
-    return [transform(None, offset) @ low for offset in offsets]
+    return [transform(None, np.array([*(-along * DOWN_BACK_M * each), DOWN_M * each**2])) @ low for each in DOWN]
 
 
 def _behind(points_m: np.ndarray, center_m: np.ndarray, along: np.ndarray, below_m: float) -> float:
     """Return how far an object reaches behind its centre of mass at the fingertips, in the band that these are wide."""
     flat = footprint(points_m[points_m[:, 2] <= below_m] if (points_m[:, 2] <= below_m).sum() > 3 else points_m)
     corners = (flat - center_m[:2]) @ np.column_stack([along, [-along[1], along[0]]])
-    ring = np.concatenate([corners, corners[:1]])
-    sides = np.concatenate([np.linspace(a, b, 20) for a, b in pairwise(ring)])
+    sides = np.concatenate([np.linspace(a, b, 20) for a, b in pairwise([*corners, corners[0]])])
     in_band = np.abs(sides[:, 1]) <= BAND_M
     return float(-(sides[in_band] if in_band.any() else sides)[:, 0].min())
 
