@@ -16,7 +16,7 @@ from doc_shell import Shell
 from PIL import Image
 
 from foreign_assets import mug_urdf
-from grasped_twins import write_brick
+from grasped_twins import write_bar, write_brick
 from manitwin.formats.label_picture import label_picture
 from manitwin.geometry.poses import inverse, transform
 from manitwin.scenes.locate.pose_model import PoseModel
@@ -70,14 +70,15 @@ class Folders:
 
     @cached_property
     def dataset(self) -> Path:
-        """A data set with an index: bricks named as pages name objects, with grasps from above that hold, and things."""
+        """A data set with an index: bricks named as pages name objects, a bar, and things without grasps."""
         root = self.root / "DATASET"
         bricks, things = ("mug", "mug", "kettle"), (bowl(), slab("board", 0.24, 0.16, 0.015, 0.5), can())
-        numbers = iter(sorted(range(len(bricks) + len(things)), key=twin_id))  # few episodes go to the first ids
+        numbers = iter(sorted(range(len(bricks) + len(things) + 1), key=twin_id))  # few episodes go to the first ids
         for category in bricks:
             write_brick(root, next(numbers), category)
         for thing in things:
             write_thing(root, next(numbers), thing)
+        write_bar(root, next(numbers), "rolling pin")  # what two hands can hold
         for folder in root.glob("twins/*/*"):
             _complete(folder)
         self._manitwin("index DATASET")
