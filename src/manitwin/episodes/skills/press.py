@@ -25,7 +25,7 @@ TILT_RAD = np.radians([10.0, 25.0])
 LEAST_LEAD_M = 0.0015  # of the corner that presses: where two touch at once, the force is between them, 2 cm off
 TRIED = 24
 SPEED_M_S = 0.008
-MORE_N = 1.0  # than is asked for, so that what sags away still leaves enough
+MORE_N = 3.0  # than is asked for: what sags away, and what actions recorded a frame apart miss of a peak, still leaves enough
 
 
 class Press(HeldSkill):
