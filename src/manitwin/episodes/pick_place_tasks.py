@@ -152,9 +152,7 @@ def free_goal(
     """Draw a free pose for ``objects[target]`` on its surface, turned about Z alone; None: no area."""
     moved = objects[target]
     object_to_plane, corners = on_its_surface(moved, area.support.height_m)
-    taken = [
-        footprint_at(other.body, other.object_to_world) for number, other in enumerate(objects) if number != target
-    ]
+    taken = footprints_of_others(objects, target)
     pose = _elsewhere(corners, moved.object_to_world[:2, 3], taken, area, rng)
     return None if pose is None else pose @ object_to_plane
 
@@ -172,6 +170,11 @@ def on_its_surface(moved: PlacedObject, height_m: float) -> tuple[np.ndarray, np
 def footprint_at(body: RigidBody, object_to_world: np.ndarray) -> np.ndarray:
     """Return the corners ``(K, 2)`` of what a body covers of the ground at a pose."""
     return footprint(transform_points(object_to_world, np.concatenate(body.hulls)))
+
+
+def footprints_of_others(objects: Sequence[PlacedObject], target: int) -> list[np.ndarray]:
+    """Return the footprints ``(K, 2)`` of all objects but ``objects[target]``, in their order, where they are."""
+    return [footprint_at(each.body, each.object_to_world) for number, each in enumerate(objects) if number != target]
 
 
 def free_poses(

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from manitwin.episodes.goals.goal import SIGNATURES
-from manitwin.episodes.pick_place_tasks import footprint_at, free_poses, on_its_surface
+from manitwin.episodes.pick_place_tasks import footprint_at, footprints_of_others, free_poses, on_its_surface
 from manitwin.episodes.skills.skill import Skill, Surroundings
 from manitwin.geometry.boxes import separation_m
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
@@ -33,11 +33,7 @@ class AwayFrom(Skill):
         moved = around.objects[target]
         least_m = SIGNATURES[self.predicate].default
         assert least_m is not None
-        taken = [
-            footprint_at(each.body, each.object_to_world)
-            for number, each in enumerate(around.objects)
-            if number != target
-        ]
+        taken = footprints_of_others(around.objects, target)
         apart_from = taken[partner if partner < target else partner - 1]
         object_to_plane, _ = on_its_surface(moved, 0.0)
         for pose in free_poses(moved.body, object_to_plane, taken, around.area, rng, count=DRAWN):

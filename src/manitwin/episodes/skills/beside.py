@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manitwin.episodes.goals.spatial import SECTOR_RAD, SIDE_GAP_M, SIDES
-from manitwin.episodes.pick_place_tasks import MIN_GAP_M, footprint_at, on_its_surface
+from manitwin.episodes.pick_place_tasks import MIN_GAP_M, footprints_of_others, on_its_surface
 from manitwin.episodes.skills.skill import Skill, Surroundings
 from manitwin.geometry.boxes import separation_m
 from manitwin.geometry.poses import transform, transform_points
@@ -38,11 +38,7 @@ class Beside(Skill):
         assert partner is not None
         moved, other = around.objects[target], around.objects[partner]
         object_to_plane, corners = on_its_surface(moved, around.area.support.height_m)
-        taken = [
-            footprint_at(each.body, each.object_to_world)
-            for number, each in enumerate(around.objects)
-            if number != target
-        ]
+        taken = footprints_of_others(around.objects, target)
         beside = taken[partner if partner < target else partner - 1]
         middle = transform_points(other.object_to_world, other.body.center_of_mass_m[None])[0, :2]
         center = transform_points(object_to_plane, moved.body.center_of_mass_m[None])[0, :2]

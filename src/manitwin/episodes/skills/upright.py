@@ -9,7 +9,7 @@ from itertools import cycle, islice
 import numpy as np
 
 from manitwin.episodes.goals.spatial import UPRIGHT_RAD
-from manitwin.episodes.pick_place_tasks import footprint_at, free_poses
+from manitwin.episodes.pick_place_tasks import footprints_of_others, free_poses
 from manitwin.episodes.skills.skill import FoundPoses, Skill, SkillGoal, Surroundings
 from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose
 
@@ -57,7 +57,7 @@ def _free(
     around: Surroundings, target: int, placements: Iterable[StandingPose], rng: np.random.Generator
 ) -> Iterator[np.ndarray]:
     """Yield a free pose in reach for each of some placements, as far as there is one."""
-    taken = [footprint_at(o.body, o.object_to_world) for number, o in enumerate(around.objects) if number != target]
+    taken = footprints_of_others(around.objects, target)
     for placement in placements:
         yield from free_poses(around.objects[target].body, placement.object_to_plane, taken, around.area, rng, count=1)
 
