@@ -11,7 +11,7 @@ import pytest
 import manitwin
 from manitwin.cli.causes import MEASURE_IT, NAME_IT, REMEDIES, cause_lines, group_causes
 from manitwin.engine.ledger.progress import Unaccepted
-from manitwin.pipeline.quality import OF_ANYTHING, SIZE_UNSAID
+from manitwin.pipeline.guesses import OF_ANYTHING, SIZE_UNSAID
 from manitwin.twin.record import REJECTION_REASONS
 
 

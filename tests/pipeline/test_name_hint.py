@@ -11,8 +11,8 @@ import pytest
 from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
 from manitwin.pipeline.assembly import NAME_HINT, _rejection, name_would_help
+from manitwin.pipeline.guesses import OF_ANYTHING, SIZE_UNSAID, unsaid_size_words
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.quality import OF_ANYTHING, SIZE_UNSAID, unsaid_size_words
 from manitwin.pipeline.recipe import ending_of
 from manitwin.pipeline.suspicious_size import CHECK_SCALE
 from manitwin.twin.dataset_root import twin_name

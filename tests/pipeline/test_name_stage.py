@@ -10,10 +10,10 @@ from PIL import Image
 
 from manitwin.config import BuildConfig, NamingConfig
 from manitwin.engine.stage import Draft
+from manitwin.pipeline.guesses import filled_checks, naming_checks
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.naming import NameStage, cut_view
 from manitwin.pipeline.object_state import object_name
-from manitwin.pipeline.quality import filled_checks, naming_checks
 from manitwin.pipeline.recipe import stages_for
 from manitwin.render.renderer import BACKDROP
 from manitwin.twin.record import Naming

@@ -140,7 +140,7 @@ def _cause(first: Unaccepted, count: int) -> Cause:
 
 def _of_unsaid_size(message: str) -> str | None:
     """Return the remedy of a rejection that a merely usual or an unlikely size may have decided, None where the size is sound."""
-    from manitwin.pipeline.quality import OF_ANYTHING, SIZE_UNSAID
+    from manitwin.pipeline.guesses import OF_ANYTHING, SIZE_UNSAID
     from manitwin.pipeline.suspicious_size import CHECK_SCALE
 
     if CHECK_SCALE in message:

@@ -19,19 +19,19 @@ from manitwin.formats.npy_file import labels_to_npy
 from manitwin.formats.packed_source import pack_photos, pack_source
 from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.pipeline.grasps import GRASP_POINTS
-from manitwin.pipeline.item import Item
-from manitwin.pipeline.links import link_table, read_articulation, visual_labels
-from manitwin.pipeline.object_state import object_name
-from manitwin.pipeline.parts import PARTS_FILE
-from manitwin.pipeline.quality import (
+from manitwin.pipeline.guesses import (
     OF_NO_NAME,
     filled_checks,
     likeliest_words,
     naming_checks,
-    rehearsal_checks,
     size_checks,
     unsaid_size_words,
 )
+from manitwin.pipeline.item import Item
+from manitwin.pipeline.links import link_table, read_articulation, visual_labels
+from manitwin.pipeline.object_state import object_name
+from manitwin.pipeline.parts import PARTS_FILE
+from manitwin.pipeline.quality import rehearsal_checks
 from manitwin.pipeline.suspicious_size import suspicious_size_words
 from manitwin.twin.link_records import FACE_LINKS
 from manitwin.twin.part_records import FACE_PARTS

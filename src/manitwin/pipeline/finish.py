@@ -15,10 +15,11 @@ from manitwin.formats.glb import read_glb
 from manitwin.geometry.grasp_diversity import farthest_grasps
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.pipeline.grasps import GRASP_POINTS
+from manitwin.pipeline.guesses import filled_in
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.joint_checks import joint_checks
 from manitwin.pipeline.object_state import load_hulls, load_solid, object_name
-from manitwin.pipeline.quality import filled_in, quality_checks
+from manitwin.pipeline.quality import quality_checks
 from manitwin.render.card import CardText, make_card
 from manitwin.render.card_panels import CardGrasp, CardPoint
 from manitwin.render.center_of_mass import MassCenter

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, cast
+from typing import Any
 
 from manitwin.engine.stage import Draft
-from manitwin.models.annotators.likely_names import OF_LIKELY_NAMES
 from manitwin.pipeline.grasps import GRASP_POINTS
+from manitwin.pipeline.guesses import OF_NO_NAME, filled_checks, naming_checks, size_checks
 from manitwin.twin.record_values import Check
 from manitwin.twin.shares import wilson_interval
 
@@ -25,18 +25,6 @@ CENTER_OF_MASS_LIMIT = 0.1
 
 REHEARSAL = "rehearsal"
 """The check that only fails, and is only there, where a rehearsal server stood in for a model."""
-
-PRIOR = "prior:"
-UNKNOWN = f"{PRIOR}unknown"
-"""The source of what is only usual of anything."""
-OF_NO_NAME = frozenset({UNKNOWN, OF_LIKELY_NAMES})
-"""The sources of what rests on no name: of anything, or of the names that a thing may have."""
-
-SIZE_UNSAID = "nobody says how large it is"
-"""What a rejection's detail says where the size is only a usual one; remedies go by it."""
-OF_ANYTHING = "usual of anything"
-"""What it says besides where nobody has named the thing either."""
-LIKE_IT = " that looks like it"
 
 ESTIMATES = ("mass_kg", "friction_static", "friction_dynamic", "restitution")
 
@@ -77,58 +65,6 @@ def quality_checks(draft: Draft) -> list[dict[str, Any]]:
     return [check.model_dump() for check in checks]
 
 
-def naming_checks(draft: Draft) -> list[Check]:
-    """Return what a thing is taken for that nobody has named, by a model or a classifier: a finding, unless one is sure.
-
-    None for others.
-    """
-    naming = draft.fields.get("naming")
-    if naming is None:
-        return []
-    filled, known = filled_in(draft), (draft.fields.get("generation") or {}).get("known")
-    if filled is not None and filled["category"] is not None and known is not None:
-        message = f"{filled['source']} takes it for a {known['name']}; --name overrules it"
-        return [Check(name="named", passed=True, value=str(known["name"]), message=message)]
-    value, source = naming["probability"]["value"], naming["probability"]["source"]
-    if naming["name"] is not None:
-        message = f"{source} takes it for a {naming['name']} ({likeliest_words(naming)}); --name overrules it"
-    else:
-        message = f"{source} cannot tell what it is ({likeliest_words(naming)}); say it with --name"
-    return [Check(name="named", passed=naming["name"] is not None, value=value, message=message)]
-
-
-def size_checks(draft: Draft) -> list[Check]:
-    """Return the failed check of a size that is only what is usual of anything; none where somebody said it or what it is."""
-    size = draft.fields.get("size")
-    if size is None or size["source"] not in OF_NO_NAME:
-        return []
-    message = f"{SIZE_UNSAID}: {unknown_size_words(size)}, and its mass is for that size; say what it is with --name"
-    return [Check(name="size_known", passed=False, value=size["value"], message=message)]
-
-
-def unknown_size_words(size: dict[str, Any]) -> str:
-    """Say of a size that only a prior gives: '15 cm is what is usual of anything (2 to 60 cm)', or '... of a mug'."""
-    value, low, high = (f"{100 * size[key]:.3g}" for key in ("value", "low", "high"))
-    category = size["source"].removeprefix(PRIOR)
-    usual = {UNKNOWN: OF_ANYTHING, OF_LIKELY_NAMES: OF_ANYTHING + LIKE_IT}.get(
-        size["source"], f"usual of {'an' if category[0] in 'aeiou' else 'a'} {category}"
-    )
-    return f"{value} cm is what is {usual} ({low} to {high} cm)"
-
-
-def unsaid_size_words(draft: Draft) -> str | None:
-    """Say that a size is only what is usual of such things, so that nobody has said it; None where somebody has."""
-    size = draft.fields.get("size")
-    if size is None or not size["source"].startswith(PRIOR):
-        return None
-    return f"{SIZE_UNSAID}: {unknown_size_words(size)}"
-
-
-def likeliest_words(naming: dict[str, Any]) -> str:
-    """Say the likeliest names with their probabilities: 'orange 41 %, lemon 12 %, apple 3 %'."""
-    return ", ".join(f"{guess['name']} {100 * guess['probability']:.0f} %" for guess in naming["likeliest"])
-
-
 def _unseen(draft: Draft) -> list[Check]:
     """Return what the photo did not show, where the generator says how much of the surface that is."""
     share = draft.field("generation").get("unseen_share") if "generation" in draft.fields else None
@@ -136,22 +72,6 @@ def _unseen(draft: Draft) -> list[Check]:
         return []
     message = "share of the surface that the photo does not show: its shape and colours are a guess" if share else ""
     return [Check(name="every_side_seen", passed=not share, value=share, limit=0.0, message=message)]
-
-
-def filled_in(draft: Draft) -> dict[str, Any] | None:
-    """Return the note of what a model filled in; None where none was asked."""
-    generation = draft.fields.get("generation") or {}
-    return cast(dict[str, Any] | None, generation.get("notes", {}).get("filled"))
-
-
-def filled_checks(draft: Draft) -> list[Check]:
-    """Return what a model said of the template that a thing was made of; none where no model was asked."""
-    filled = filled_in(draft)
-    if filled is None:
-        return []
-    said = [] if filled["category"] is None else [f"{filled['source']} filled in the template {filled['category']}"]
-    message = "; ".join([*said, *filled["findings"]])
-    return [Check(name="template_filled", passed=not filled["findings"], value=filled["category"], message=message)]
 
 
 def photos_checks(draft: Draft) -> list[Check]:

@@ -22,7 +22,7 @@ FACTORS = {
 def suspicious_size_words(draft: Draft[Any]) -> str | None:
     """Say that a declared size is not that of such things, and which unit would make it so; None where it is theirs.
 
-    Nothing is said where the size was estimated (``quality.unsaid_size_words``).
+    Nothing is said where the size was estimated (``guesses.unsaid_size_words``).
     """
     if draft.fields.get("size") is not None or not draft.fields.get("geometry", {}).get("metric"):
         return None

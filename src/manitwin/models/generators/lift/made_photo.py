@@ -122,7 +122,7 @@ def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) 
     if fitted is not None and flat and fitted.confidence >= LEAST_AGAINST_INFLATION:
         return from_fit(fitted, rgba, name)
     notes = lifted.notes if fitted is None else lifted.notes | {"poor_fit": notes_of(fitted)}
-    return Job(write_glb([textured_part(lifted)]), notes, unseen_share(lifted.surface))
+    return _lifted_job(lifted, notes)
 
 
 def _merely_as_wide(lifted: Lifted) -> bool:
@@ -145,32 +145,33 @@ def from_fit(fitted: Fitted, rgba: np.ndarray, name: str | None) -> Job:
 
 
 def _without_name(rgba: np.ndarray, likely: Sequence[tuple[str, float]], focal_mm: float | None) -> Job:
-    """Return the template of a likely name where it explains the photo and a simpler solid hardly does, else the photo lifted."""
-    alike = _of_likely_names(rgba, likely, focal_mm)
+    """Return the shape of a likely name's template where it explains the photo and a simpler solid hardly does, else lift it."""
+    fitted = _best_template(rgba, likely, focal_mm)
     try:
         lifted = lift(rgba, ShapeHint())
     except Rejected:
-        if alike is None or 1 - alike.residual.iou > CLEARLY_LESS * (1 - DISC_ELLIPSE_IOU):
+        if fitted is None or not _explains_more(fitted, DISC_ELLIPSE_IOU):  # what no solid explains may be an ellipse
             raise
-        return _of_likely_name(alike, rgba)
-    if alike is not None and _explains_more(alike, lifted):
-        return _of_likely_name(alike, rgba)
-    return Job(write_glb([textured_part(lifted)]), lifted.notes, unseen_share(lifted.surface))
+        lifted = None
+    if lifted is None or (fitted is not None and _is_preferred(fitted, lifted)):
+        assert fitted is not None
+        return _shape_alone(fitted, rgba, primitive=f"shape of template:{fitted.category}", source=OF_LIKELY_NAMES)
+    return _lifted_job(lifted, lifted.notes)
 
 
-def _of_likely_name(alike: Fitted, rgba: np.ndarray) -> Job:
-    return _shape_alone(alike, rgba, primitive=f"as of a {alike.category}", source=OF_LIKELY_NAMES)
-
-
-def _explains_more(alike: Fitted, lifted: Lifted) -> bool:
+def _is_preferred(fitted: Fitted, lifted: Lifted) -> bool:
     """Whether a template is to be preferred to a solid that needs no name; an inflated outline explains nothing."""
-    left, simpler = 1 - alike.residual.iou, 1 - lifted.explained.silhouette_iou
-    return lifted.notes["primitive"] == "inflation" or left < CLEARLY_LESS * simpler
+    return lifted.notes["primitive"] == "inflation" or _explains_more(fitted, lifted.explained.silhouette_iou)
 
 
-def _of_likely_names(rgba: np.ndarray, likely: Sequence[tuple[str, float]], focal_mm: float | None) -> Fitted | None:
+def _explains_more(fitted: Fitted, simpler_iou: float) -> bool:
+    """Whether a template leaves much less of the outline unexplained than a simpler solid of that overlap."""
+    return 1 - fitted.residual.iou < CLEARLY_LESS * (1 - simpler_iou)
+
+
+def _best_template(rgba: np.ndarray, likely: Sequence[tuple[str, float]], focal_mm: float | None) -> Fitted | None:
     """Return the template of the ``likely`` names that explains the photo best; None where none does closely."""
-    templates = [template_for(each) for each, probability in likely if probability >= LEAST_LIKELY]
+    templates = [template_for(name) for name, probability in likely if probability >= LEAST_LIKELY]
     kinds = list(dict.fromkeys(template.category for template in templates if template is not None))
     found = fit(kinds[0], rgba, or_of=kinds[1:], focal_mm=focal_mm) if kinds else None
     if found is None or found.residual.iou < NAMELESS_IOU or found.residual.outline > NAMELESS_OUTLINE:
@@ -178,8 +179,12 @@ def _of_likely_names(rgba: np.ndarray, likely: Sequence[tuple[str, float]], foca
     return found
 
 
+def _lifted_job(lifted: Lifted, notes: dict[str, Any]) -> Job:
+    return Job(write_glb([textured_part(lifted)]), notes, unseen_share(lifted.surface))
+
+
 def _shape_alone(fitted: Fitted, rgba: np.ndarray, *, primitive: str, source: str) -> Job:
-    """Return the solid alone: a thing with a box's shape is not called a box."""
+    """Return the solid alone, nothing known of it: a thing with a box's shape is not called a box."""
     surface = texture_of([fitted], [rgba])
     rests = "standing" if fitted.upright else "lying"
     notes = notes_of(fitted) | {"primitive": primitive, "source": source, "rests": rests}

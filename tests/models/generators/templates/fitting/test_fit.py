@@ -253,11 +253,11 @@ def test_a_nameless_thing_has_the_shape_of_a_likely_name_that_explains_the_photo
     photo = photo_of("mug", View(np.radians(60.0), np.radians(30.0), 0.0, 0.1), {})
     likely = (("wrench", 0.5), ("mug", 0.2), ("bowl", 0.05))
     job = from_photo(photo, None, likely=likely)
-    assert job.notes["primitive"] == "as of a mug" and job.notes["source"] == OF_LIKELY_NAMES
+    assert job.notes["primitive"] == "shape of template:mug" and job.notes["source"] == OF_LIKELY_NAMES
     assert job.known is None and "category" not in job.notes, "it is not called so"
     assert job.notes["rests"] == "standing"
     filled = from_photo(photo, None)
-    assert not filled.notes["primitive"].startswith("as of"), "without names it is lifted"
+    assert not filled.notes["primitive"].startswith("shape of"), "without names it is lifted"
 
 
 def test_a_nameless_thing_that_no_likely_name_explains_is_lifted() -> None:
@@ -271,8 +271,11 @@ def test_a_nameless_thing_that_no_likely_name_explains_is_lifted() -> None:
 def test_a_nameless_ellipse_is_what_explains_it_better_than_any_ellipse_is() -> None:
     pan = photo_of("frying pan", View(np.radians(-90.0), np.radians(35.0), 0.0, 0.1), {})
     seen = from_photo(pan, None, likely=(("frying pan", 0.9),))
-    assert seen.notes["primitive"] == "as of a frying pan"
+    assert seen.notes["primitive"] == "shape of template:frying pan"
     plate = photo_of("plate", View(0.4, np.radians(55.0), 0.0, 0.2), {})
     with pytest.raises(Rejected, match="the outline is an ellipse"):
         from_photo(plate, None, likely=(("frying pan", 0.4),))
-    assert from_photo(plate, None, likely=(("frying pan", 0.4), ("plate", 0.3))).notes["primitive"] == "as of a plate"
+    assert (
+        from_photo(plate, None, likely=(("frying pan", 0.4), ("plate", 0.3))).notes["primitive"]
+        == "shape of template:plate"
+    )
