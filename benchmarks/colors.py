@@ -19,6 +19,7 @@ import argparse
 import time
 import zlib
 from collections import Counter
+from collections.abc import Callable
 
 import numpy as np
 import trimesh
@@ -120,14 +121,19 @@ def score(category: str, word: str, rng: np.random.Generator, *, flat: bool) -> 
     said = [color.name for color in names]
     truth_words = ", ".join(f"{name} {share:.0%}" for name, share in truths.items())
     text = f"{category:18s} {truth_words} -> {', '.join(f'{color.name} {color.share:.0%}' for color in names)}"
+    return text, questions(said, truths, is_called)
+
+
+def questions(said: list[str], truths: dict[str, float], is_right: Callable[[str, str], bool]) -> set[str]:
+    """Return which of the three questions are answered rightly; ``is_right(said, truth)`` compares two words."""
     outcome = set()
-    if any(is_called(said[0], truth) for truth, share in truths.items() if share >= 0.25):
+    if any(is_right(said[0], truth) for truth, share in truths.items() if share >= 0.25):
         outcome.add("first")
-    if all(any(is_called(name, truth) for truth in truths) for name in said):
+    if all(any(is_right(name, truth) for truth in truths) for name in said):
         outcome.add("no false")
-    if all(any(is_called(name, truth) for name in said) for truth, share in truths.items() if share >= 1 / 3):
+    if all(any(is_right(name, truth) for name in said) for truth, share in truths.items() if share >= 1 / 3):
         outcome.add("all")
-    return text, outcome
+    return outcome
 
 
 def true_shares(made: Made, mesh: trimesh.Trimesh) -> dict[str, float]:

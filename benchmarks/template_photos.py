@@ -12,7 +12,7 @@ import trimesh
 from manitwin.geometry.poses import transform
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.made import Made, make, visual_parts
-from manitwin.models.generators.templates.text import Wanted
+from manitwin.models.generators.templates.text import Wanted, Wish
 from manitwin.render.cameras import Camera, framing_camera
 from manitwin.render.procedural_textures import procedural_texture, textured_box
 from manitwin.render.scene_lighting import DirectionalLight, Lighting
@@ -70,10 +70,14 @@ def photograph(
     elevations_deg: Sequence[float] = ELEVATIONS_DEG,
     *,
     turns_deg: Sequence[float] = (0.0,),
+    wish: Wish | None = None,
 ) -> list[TemplatePhoto]:
-    """Photograph one thing of a category: each elevation from each turn about the vertical, all else drawn from the seed."""
+    """Photograph one thing of a category: each elevation from each turn about the vertical, all else drawn from the seed.
+
+    ``wish`` is the colour or material of the whole thing; raises UsageError where it cannot be made so.
+    """
     rng = np.random.default_rng([seed, *category.encode()])
-    made = make(load_templates()[category], Wanted(category), rng)
+    made = make(load_templates()[category], Wanted(category, {} if wish is None else {"": wish}), rng)
     parts = visual_parts(made)
     points = np.concatenate([part.vertices for part in parts])
     drawn = max(1.0, LEAST_DRAWN_M / float(np.linalg.norm(np.ptp(points, axis=0))))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -9,16 +10,18 @@ import numpy as np
 
 from manitwin.config import NO_SETTINGS, Resource
 from manitwin.engine.stage import Draft
+from manitwin.models.annotators.photo_light import PhotoLight, light_of_photos
 from manitwin.models.annotators.protocol import Annotator
 from manitwin.pipeline.human_corrections import corrected_language
-from manitwin.pipeline.object_state import read_scaled_subject
+from manitwin.pipeline.item import Item
+from manitwin.pipeline.object_state import cut_out_photos, read_scaled_subject
 
 
 class CaptionStage:
     """Ask the annotator for words."""
 
     name: ClassVar[str] = "caption"
-    version: ClassVar[str] = "5"
+    version: ClassVar[str] = "6"
     reads: ClassVar[tuple[str, ...]] = (
         "visual.glb",
         "solid.npz",
@@ -29,6 +32,10 @@ class CaptionStage:
         "cameras",
         "geometry?",
         "naming?",
+        "photo.png?",
+        "photos/?",
+        "matte?",
+        "generation?",
     )
     writes: ClassVar[tuple[str, ...]] = ("language",)
 
@@ -44,6 +51,17 @@ class CaptionStage:
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Return ``language``."""
         physical = draft.field("physical")
-        subject = read_scaled_subject(draft, known_as=draft.field("called"))
+        subject = replace(read_scaled_subject(draft, known_as=draft.field("called")), light=light_of_texture(draft))
         language = self._annotator.describe(subject, physical["material"], np.array(physical["extents_m"]))
         return {"language": corrected_language(language, draft).model_dump()}
+
+
+def light_of_texture(draft: Draft[Item]) -> PhotoLight | None:
+    """Return the light of the photos whose pixels are the mesh's texture; None of any other mesh, or where it is not told.
+
+    Only ``lift`` paints a mesh with a photo as it is. Under a given alpha channel there is no ground to read it off.
+    """
+    generator = (draft.fields.get("generation") or {}).get("generator")
+    if generator != "lift" or (draft.fields.get("matte") or {}).get("method", "alpha") == "alpha":
+        return None
+    return light_of_photos(cut_out_photos(draft))

@@ -121,8 +121,10 @@ def test_only_metal_is_gold() -> None:
 def test_a_matter_under_more_and_less_light_is_one_colour() -> None:
     white = [(230, 230, 228), (200, 200, 199), (172, 172, 170)]  # 79, 58 and 41 % of the light
     assert names(squares(*((rgb, 1 / 3) for rgb in white))) == ["light grey"]
-    dark = [(30, 30, 31), (45, 45, 46), (80, 80, 82)]
+    dark = [(45, 45, 46), (68, 68, 70), (100, 100, 102)]
     assert names(squares(*((rgb, 1 / 3) for rgb in dark))) == ["dark grey"]
+    darker = [(30, 30, 31), (45, 45, 46), (80, 80, 82)]
+    assert names(squares(*((rgb, 1 / 3) for rgb in darker))) == ["black"]
     red = [(214, 44, 48), (196, 38, 43), (110, 19, 22)]
     assert names(squares(*((rgb, 1 / 3) for rgb in red))) == ["red"]
 

@@ -11,6 +11,7 @@ import numpy as np
 import trimesh
 
 from manitwin.config import Resource
+from manitwin.models.annotators.photo_light import PhotoLight
 from manitwin.render.cameras import Camera
 from manitwin.twin.import_record import ImportRecord
 from manitwin.twin.point_records import FunctionalPoint, GraspPoint
@@ -27,7 +28,8 @@ class Subject:
     ``cameras`` those that took them, in the same frame and unit as the meshes. ``given`` is what an imported asset says of
     itself, in the same frame; None for every other input. ``known_as`` is what an earlier answer took it for, ``photos`` are the
     photos that it was made of, cut out (RGBA), and ``size_estimated`` says that the metres are those of an estimate. ``likely``
-    are names that it may have, each with its probability, where nobody has said one and no guess was likely enough.
+    are names that it may have, each with its probability, where nobody has said one and no guess was likely enough. ``light`` is
+    that of the photo whose colours the parts have; None where there is none or it is not known.
     """
 
     name: str | None
@@ -42,6 +44,7 @@ class Subject:
     photos: tuple[Path, ...] = ()
     size_estimated: bool = False
     likely: tuple[tuple[str, float], ...] = ()
+    light: PhotoLight | None = None
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,17 +13,20 @@ from manitwin.geometry.openness import open_share
 from manitwin.geometry.sampling import sample_surface
 
 # (name, sRGB hex). Several shades share a name. Names and regions follow the ISCC-NBS centroid colours (Kelly and Judd
-# 1955, level 2) and the basic colour terms of Berlin and Kay 1969; the shades are chosen by eye within those regions.
+# 1955, level 2) and the basic colour terms of Berlin and Kay 1969; the shades are chosen by eye within those regions. Black and
+# dark grey are the centroids 267 and 266: between them lies L* 25, the Munsell value 2.5 at which ISCC-NBS parts the two. The
+# last three pinks are the moderate, dark and greyish yellowish pink (29, 30, 32), which people call pink, salmon or peach.
 _SHADES: tuple[tuple[str, str], ...] = (
     ("blue", "0a18f0"), ("blue", "1e3cbe"), ("dark blue", "0a0a8c"), ("dark red", "8c0808"),
-    ("black", "0a0a0a"), ("black", "1c1c1e"), ("dark grey", "3c3c3c"), ("dark grey", "555555"),
+    ("black", "0a0a0a"), ("black", "222222"), ("dark grey", "555555"),
     ("grey", "787878"), ("grey", "929292"), ("light grey", "b0b0b0"), ("light grey", "cccccc"),
     ("white", "e6e6e6"), ("white", "fdfdfd"), ("cream", "f3ead2"), ("cream", "fff5d9"),
     ("beige", "e0cda9"), ("beige", "c9b48e"), ("tan", "b8946a"), ("tan", "c8a27a"),
     ("brown", "8b5a2b"), ("brown", "7a4a32"), ("brown", "6b4226"), ("brown", "94704c"),
     ("dark brown", "3e2a1c"), ("dark brown", "4a3426"), ("red", "d01c1f"), ("red", "b3202a"),
     ("red", "e23b30"), ("dark red", "7d1416"), ("dark red", "5c1a1b"), ("pink", "f2a7b8"),
-    ("pink", "e87ba0"), ("pink", "f6cfd6"), ("orange", "f07c1c"), ("orange", "d9661f"),
+    ("pink", "e87ba0"), ("pink", "f6cfd6"), ("pink", "d9a6a9"), ("pink", "c48379"), ("pink", "c7ada3"),
+    ("orange", "f07c1c"), ("orange", "d9661f"),
     ("orange", "f79b3e"), ("dark orange", "b0521c"), ("gold", "c79a2b"), ("gold", "b58a3c"),
     ("yellow", "f5d328"), ("yellow", "e3c01c"), ("yellow", "fae36b"), ("light yellow", "fbf0a5"),
     ("olive", "77762c"), ("olive", "5d5c26"), ("yellow-green", "a8c43a"), ("yellow-green", "c9d94f"),
@@ -116,11 +120,16 @@ class ColorShare:
     share: float
 
 
-def measure_colors(parts: tuple[trimesh.Trimesh, ...], rng: np.random.Generator) -> list[ColorShare]:
+def measure_colors(
+    parts: tuple[trimesh.Trimesh, ...],
+    rng: np.random.Generator,
+    own_colors: Callable[[np.ndarray], np.ndarray] | None = None,
+) -> list[ColorShare]:
     """Return up to three named colours, as people order them; empty where nothing gives the surface a colour.
 
     The largest comes first, but a colour that tells things apart before black, grey and white that are not much more.
-    ``parts`` are visual parts with PBR materials. Colours are the base colours, without light.
+    ``parts`` are visual parts with PBR materials. Colours are the base colours; ``own_colors`` turns those of a photo's
+    pixels (sRGB ``(N, 3)`` in 0..1) into the matter's own, where the photo's light is known.
     """
     colored = [part for part in parts if _has_color(part)]
     areas = np.array([part.area for part in colored])
@@ -129,6 +138,7 @@ def measure_colors(parts: tuple[trimesh.Trimesh, ...], rng: np.random.Generator)
     counts = np.maximum(np.round(_SAMPLES * areas / areas.sum()).astype(int), 1)
     samples = [_base_colors(part, count, rng) for part, count in zip(colored, counts, strict=True)]
     colors, points, normals = (np.vstack(each) for each in zip(*samples, strict=True))
+    colors = colors if own_colors is None else own_colors(colors)
     seen = seen_from_outside(_joined(parts), points, normals)
     metallic = any(float(material_of(part).metallicFactor or 0.0) > _METALLIC for part in colored)
     return named_colors(lab_from_srgb(colors[seen]), metallic)

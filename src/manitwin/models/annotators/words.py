@@ -45,7 +45,7 @@ def size_words(extents_m: np.ndarray) -> str:
 def describe(subject: Subject, prior: Prior | None, material: str, extents_m: np.ndarray) -> Language:
     """Describe an object; ``prior`` is None where nobody has said what it is, and then the words say so."""
     rng = np.random.default_rng(subject.seed)
-    colors = measure_colors(subject.parts, rng)
+    colors = measure_colors(subject.parts, rng, None if subject.light is None else subject.light.own_colors)
     shape = _shape(subject, prior, rng)
     size = size_words(extents_m)
     category = _category(subject, prior)

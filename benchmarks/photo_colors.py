@@ -1,0 +1,126 @@
+"""Score the colours that are read off a photo, on photos of templates whose own colours are known.
+
+    python benchmarks/photo_colors.py [--seeds N] [--every K] [--held-out]
+
+Each thing is a template in a drawn colour word (``WORDS`` of ``colors.py``), rendered on one of the grounds of
+``template_photos.py`` with light, shadow and the sheen of its surroundings. A camera then chooses an exposure by the
+picture's mean (``MEANS``, whatever the ground is), has a white balance that is a little off, and a lens that spreads some of
+the whole picture's light over it (veiling glare, 0 to 3 %). Scored are the names of the pixels of the true mask, as they are
+and with the photo's light discounted. Questions, halves and what people call a colour are those of ``colors.py``, but that
+black has to be called black.
+"""
+
+from __future__ import annotations
+
+import argparse
+import zlib
+from collections import Counter
+
+import cv2
+import numpy as np
+from colors import COLORS, WORDS, is_called, questions, true_shares
+from points import held_out
+from template_photos import photograph
+
+from manitwin.errors import UsageError
+from manitwin.formats.meshes.textures import linear_to_srgb, srgb_to_linear
+from manitwin.models.annotators.photo_light import light_of_photo
+from manitwin.models.annotators.surface_color import lab_from_srgb, named_colors
+from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.text import Wish
+
+MEANS = (0.15, 0.55)
+"""Mean linear luminance of a picture: a meter's 18 % grey, to what people correct it to for pale grounds."""
+WHITE_PAPER_AT_MOST = 1.1  # of the picture's white: nobody keeps a photo whose paper is all burnt out
+GLARE = (0.0, 0.03)
+BALANCE = 0.05
+NOISE = 1.5
+SAMPLES = 3000
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+def main() -> None:
+    """Print the shares of right names with and without the light, and what is wrong with it."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--every", type=int, default=1, help="every Kth category")
+    parser.add_argument("--held-out", action="store_true")
+    arguments = parser.parse_args()
+    half = [name for name in sorted(load_templates()) if held_out(name) == arguments.held_out]
+    right: dict[str, Counter[str]] = {"as it is": Counter(), "light discounted": Counter()}
+    total = 0
+    for category in half[:: arguments.every]:
+        for seed in range(arguments.seeds):
+            case = zlib.crc32(f"photo {category} {seed} {arguments.held_out}".encode())
+            drawn = draw(category, WORDS[case % len(WORDS)], case)
+            if drawn is None:
+                continue
+            rgba, truths = drawn
+            total += 1
+            for way, said in names_of(rgba, np.random.default_rng(case)).items():
+                outcome = questions(said, truths, is_said)
+                right[way].update(outcome)
+                if way == "light discounted" and len(outcome) < 3:
+                    words = ", ".join(f"{name} {share:.0%}" for name, share in truths.items())
+                    print(
+                        f"{category:18s} {words} -> {', '.join(said)}   ({', '.join(sorted(ALL - outcome))})",
+                        flush=True,
+                    )
+    for way, counts in right.items():
+        print(
+            f"{way}: "
+            + ", ".join(f"{name} {counts[name]} of {total} ({counts[name] / total:.1%})" for name in sorted(ALL))
+        )
+
+
+ALL = {"first", "no false", "all"}
+
+
+def is_said(said: str, truth: str) -> bool:
+    """Tell whether people call a colour of that word so, and nobody calls black dark grey."""
+    return said == "black" if truth == "black" else is_called(said, truth)
+
+
+def draw(category: str, word: str, case: int) -> tuple[np.ndarray, dict[str, float]] | None:
+    """Return a photo ``(H, W, 4) uint8``, its alpha the true mask, and the shares of the thing's colours; None for bare metal."""
+    rgb = tuple(int(COLORS[word][i : i + 2], 16) / 255 for i in (0, 2, 4))
+    rng = np.random.default_rng([case, 1])
+    elevation = float(rng.choice([10.0, 30.0, 55.0]))
+    try:
+        photo = photograph(category, case, (elevation,), wish=Wish(rgb=rgb))[0]  # type: ignore[arg-type]
+    except UsageError:
+        return None
+    looks = [photo.made.looks[photo.made.mesh.names[part]] for part in photo.made.mesh.part]
+    if np.average([look.metallic for look in looks], weights=photo.truth.area_faces) > 0.5:
+        return None  # the colour of a mirror is that of its surroundings
+    alpha = np.where(photo.mask, 255, 0).astype(np.uint8)
+    return np.dstack([as_a_camera_has_it(photo.rgb, rng), alpha]), true_shares(photo.made, photo.truth)
+
+
+def as_a_camera_has_it(rgb: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return a rendered picture ``(H, W, 3) uint8`` with a camera's exposure, white balance, glare and noise."""
+    light = srgb_to_linear(rgb / 255)
+    mean = float((light @ LUMINANCE).mean())
+    exposure = min(np.exp(rng.uniform(*np.log(MEANS))) / mean, WHITE_PAPER_AT_MOST / 0.86)
+    light = light * exposure * np.exp(rng.normal(0, BALANCE, 3))
+    glare = rng.uniform(*GLARE)
+    light = (1 - glare) * light + glare * light.mean((0, 1))
+    noisy = 255 * linear_to_srgb(np.clip(light, 0, 1)) + rng.normal(0, NOISE, rgb.shape)
+    return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
+
+
+def names_of(rgba: np.ndarray, rng: np.random.Generator) -> dict[str, list[str]]:
+    """Return the names of the thing's pixels, by the way in which they are read."""
+    inside = cv2.erode((rgba[..., 3] > 127).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    pixels = rgba[inside][:, :3] / 255
+    some = pixels[rng.choice(len(pixels), min(SAMPLES, len(pixels)), replace=False)]
+    light = light_of_photo(rgba)
+    own = some if light is None else light.own_colors(some)
+    return {
+        "as it is": [color.name for color in named_colors(lab_from_srgb(some), False)],
+        "light discounted": [color.name for color in named_colors(lab_from_srgb(own), False)],
+    }
+
+
+if __name__ == "__main__":
+    main()
