@@ -102,19 +102,31 @@ def _mass(prior: Prior, longest_m: float, volume_m3: float, size_spread: float) 
 
     Both are taken as log-normal. A volume is as unsure as the size that it was scaled by, ``size_spread`` in natural logs, three
     times over (0: the size is known). The answer stays in the category's interval; its own interval is what both leave open, and
-    where they contradict each other it reaches as far beyond the answer as both together are unsure.
+    where they contradict each other, or the size is a guess, it reaches as far beyond the answer as both together are unsure.
     """
     by_size = _scaled(prior.mass_kg, (longest_m / prior.longest_axis_m.typical) ** _SIZE_EXPONENT)
     if prior.bulk_density_kg_m3 is None:
-        return _clamped(by_size.typical, by_size, prior.mass_kg, prior.source, 1.0)
+        return _clamped(by_size.typical, by_size, prior.mass_kg, prior.source)
     by_volume = _scaled(prior.bulk_density_kg_m3, volume_m3)
     weight_size = (_SAME_SIZE_SPREAD * _log_spread(by_size)) ** -2
     weight_volume = 1 / (_log_spread(by_volume) ** 2 + (3 * size_spread) ** 2)
     logs = weight_size * np.log(by_size.typical) + weight_volume * np.log(by_volume.typical)
     value = float(np.exp(logs / (weight_size + weight_volume)))
     source = "density*volume" if weight_volume > weight_size else prior.source
-    beyond = float(np.exp(_SPREAD / 2 * (weight_size + weight_volume) ** -0.5))
-    return _clamped(value, by_volume, prior.mass_kg, source, beyond)
+    beyond = float(np.exp(_SPREAD / 2 * _mass_spread(_SAME_SIZE_SPREAD * _log_spread(by_size), by_volume, size_spread)))
+    low = by_volume.low if value >= by_volume.low and not size_spread else min(by_volume.low, value / beyond)
+    high = by_volume.high if value <= by_volume.high and not size_spread else max(by_volume.high, value * beyond)
+    return _clamped(value, Interval(low=low, typical=value, high=high), prior.mass_kg, source)
+
+
+def _mass_spread(spread_at_size: float, by_volume: Interval, size_spread: float) -> float:
+    """Return how unsure the combined mass is, in natural logs.
+
+    A wrong size moves both opinions the same way: the one with its square, the other with its cube.
+    """
+    weights = np.array([spread_at_size**-2, _log_spread(by_volume) ** -2])
+    exponent = float(weights @ [_SIZE_EXPONENT, 3.0] / weights.sum())
+    return float(np.sqrt(1 / weights.sum() + (exponent * size_spread) ** 2))
 
 
 def _unknown_mass(density_kg_m3: Estimate | None, volume_m3: float) -> Estimate:
@@ -132,15 +144,10 @@ def _log_spread(interval: Interval) -> float:
     return max(float(np.log(interval.high / interval.low)) / _SPREAD, 0.02)
 
 
-def _clamped(value: float, geometry: Interval, category: Interval, source: str, beyond: float) -> Estimate:
-    """Keep ``value`` in the category's interval, and of that interval what the geometry leaves open around it.
-
-    Of a value outside of what the geometry leaves open the interval goes on by the factor ``beyond``.
-    """
-    low = geometry.low if value >= geometry.low else value / beyond
-    high = geometry.high if value <= geometry.high else value * beyond
+def _clamped(value: float, open_to: Interval, category: Interval, source: str) -> Estimate:
+    """Keep ``value`` in the category's interval, and of that interval what is left open around it."""
     value = min(max(value, category.low), category.high)
-    low, high = max(category.low, low), min(category.high, high)
+    low, high = max(category.low, open_to.low), min(category.high, open_to.high)
     return Estimate(value=value, low=min(low, value), high=max(high, value), source=source)
 
 
