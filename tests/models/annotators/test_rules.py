@@ -73,6 +73,19 @@ def test_a_volume_by_a_guessed_size_says_less_than_one_by_a_known_one() -> None:
     assert guessed.value == pytest.approx(halved * prior.mass_kg.typical)
 
 
+@pytest.mark.parametrize("name", ["drill", "pliers", "serving tray"])
+def test_interval_by_a_guessed_size_holds_what_larger_and_smaller_ones_weigh(name: str) -> None:
+    prior = lookup(name)
+    assert prior.bulk_density_kg_m3 is not None
+    length_m = prior.longest_axis_m.typical
+    side_m = (prior.mass_kg.typical / prior.bulk_density_kg_m3.typical / length_m) ** 0.5
+    usual = trimesh.creation.box([length_m, side_m, side_m])
+    guessed = mass(usual, name, metric=False)
+    for end_m in (prior.longest_axis_m.low, prior.longest_axis_m.high):
+        size = (end_m / length_m) ** 0.5  # half of the way, in natural logs
+        assert guessed.low <= mass(usual.copy().apply_scale(size), name).value <= guessed.high
+
+
 def test_a_thing_without_a_name_has_a_wide_interval_and_says_so() -> None:
     mesh = cylinder(0.03, 0.1)
     estimate = mass(mesh, None)

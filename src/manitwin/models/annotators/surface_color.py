@@ -15,7 +15,7 @@ from manitwin.geometry.sampling import sample_surface
 # (name, sRGB hex). Several shades share a name. Names and regions follow the ISCC-NBS centroid colours (Kelly and Judd
 # 1955, level 2) and the basic colour terms of Berlin and Kay 1969; the shades are chosen by eye within those regions. Black and
 # dark grey are the centroids 267 and 266: between them lies L* 25, the Munsell value 2.5 at which ISCC-NBS parts the two. The
-# last three pinks are the moderate, dark and greyish yellowish pink (29, 30, 32), which people call pink, salmon or peach.
+# last six pinks are the yellowish pinks (25, 26, 28 to 30, 32), which people call pink, salmon, coral or peach.
 _SHADES: tuple[tuple[str, str], ...] = (
     ("blue", "0a18f0"), ("blue", "1e3cbe"), ("dark blue", "0a0a8c"), ("dark red", "8c0808"),
     ("black", "0a0a0a"), ("black", "222222"), ("dark grey", "555555"),
@@ -25,7 +25,8 @@ _SHADES: tuple[tuple[str, str], ...] = (
     ("brown", "8b5a2b"), ("brown", "7a4a32"), ("brown", "6b4226"), ("brown", "94704c"),
     ("dark brown", "3e2a1c"), ("dark brown", "4a3426"), ("red", "d01c1f"), ("red", "b3202a"),
     ("red", "e23b30"), ("dark red", "7d1416"), ("dark red", "5c1a1b"), ("pink", "f2a7b8"),
-    ("pink", "e87ba0"), ("pink", "f6cfd6"), ("pink", "d9a6a9"), ("pink", "c48379"), ("pink", "c7ada3"),
+    ("pink", "e87ba0"), ("pink", "f6cfd6"), ("pink", "ffb7a5"), ("pink", "f99379"), ("pink", "f4c2c2"),
+    ("pink", "d9a6a9"), ("pink", "c48379"), ("pink", "c7ada3"),
     ("orange", "f07c1c"), ("orange", "d9661f"),
     ("orange", "f79b3e"), ("dark orange", "b0521c"), ("gold", "c79a2b"), ("gold", "b58a3c"),
     ("yellow", "f5d328"), ("yellow", "e3c01c"), ("yellow", "fae36b"), ("light yellow", "fbf0a5"),
