@@ -200,3 +200,11 @@ def test_materials_are_matter_and_no_things() -> None:
     things = {"can", "tin", "box", "jar", "bottle", "jacket", "stand", "frame", "strap", "cards", "case", "tube"}
     wrong = {name: prior.material for name, prior in load_priors().items() if things & set(prior.material.split())}
     assert not wrong
+
+
+def test_no_point_is_named_that_a_shape_does_not_show() -> None:
+    for name in ("orange", "egg", "peach"):  # round, and sold without a stem
+        assert "stem" not in " ".join(part.label for part in lookup(name).functional)
+    assert "stem end" in [part.label for part in lookup("apple").functional]
+    assert [part.label for part in lookup("toy").functional] == ["body", "base"]
+    assert "chuck" in [part.label for part in lookup("cordless drill").functional]
