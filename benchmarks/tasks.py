@@ -5,16 +5,18 @@
 Tasks are made in all scenes (``OUT/tasks``, as ``manitwin tasks`` does), so many are drawn (``OUT/drawn``), of each kind in
 turn and a quarter of two literals, and executed once each (``OUT/episodes``). A task has been planned before it is one: all that
 are drawn are plannable, and what is not executed counts as not kept. With ``--replay`` each kept episode's actions are
-carried out by ``make_env``, which has to judge them a success. Run again with the same arguments it goes on where it ended.
+carried out by ``make_env``, which has to judge them a success, and the states have to be those recorded, to the bit. Run again
+with the same arguments it goes on where it ended.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections import Counter, defaultdict, deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import ceil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +25,7 @@ from manitwin.config import RunConfig
 from manitwin.episodes.attempts import ATTEMPTS, read_attempts
 from manitwin.episodes.collect import batch_folders, collect, stored_episodes
 from manitwin.episodes.episodes_run import make_episodes
+from manitwin.episodes.recording import Recording
 from manitwin.episodes.settings import TasksConfig, TrajectoriesConfig
 from manitwin.episodes.tasks.task_files import TASKS, read_tasks, write_tasks
 from manitwin.episodes.tasks.task_record import TaskRecord
@@ -58,23 +61,43 @@ def share(name: str, right: int, of: int, rest: str = "") -> str:
     return f"{name:28} {right:4} of {of:4} = {right / max(1, of):6.1%} ({low:.0%} to {high:.0%}) {rest}"
 
 
-def replayed(tasks: Path, episodes: Path) -> tuple[int, int]:
-    """Carry out the actions of every kept episode in its task's environment; returns how many succeeded, of how many."""
-    good = count = 0
+def replayed(tasks: Path, episodes: Path) -> tuple[int, int, int]:
+    """Carry out the actions of every kept episode in its task's environment.
+
+    Returns how many succeeded, in how many joints, hands and objects were where they had been, to the bit, and of how many.
+    """
+    good = exact = count = 0
     for episode in stored_episodes(batch_folders(episodes)):
         recording, info = episode.recording, {"success": False}
         env = manitwin.make_env(tasks, episode.attempt.task_id)
         env.reset(seed=0)
         actions = np.column_stack([recording.action_joint_positions_rad, recording.action_hand]).astype(np.float32)
-        for action in actions:
-            *_, terminated, _, info = env.step(action)
+        first_other = None
+        for number, action in enumerate(actions, start=1):
+            seen, _, terminated, _, info = env.step(action)
+            if first_other is None and not is_recorded(seen, recording, number):
+                first_other = number
             if terminated:
                 break
         env.close()
-        good, count = good + bool(info["success"]), count + 1
-        if not info["success"]:
-            print(f"not a success again: {episode.attempt.task_id} {episode.attempt.goal}", flush=True)
-    return good, count
+        good, exact, count = good + bool(info["success"]), exact + (first_other is None), count + 1
+        if not info["success"] or first_other is not None:
+            print(
+                f"success {info['success']}, first other state {first_other} of {recording.steps}: "
+                f"{episode.attempt.task_id} {episode.attempt.goal}",
+                flush=True,
+            )
+    return good, exact, count
+
+
+def is_recorded(seen: Mapping[str, Any], recording: Recording, number: int) -> bool:
+    """Tell whether an observation has the recorded state, by its number, to the bit."""
+    pairs = (
+        (seen["object_poses"][:, :3], recording.object_positions_m[number]),
+        (seen["joint_positions_rad"], recording.joint_positions_rad[number]),
+        (seen["gripper_opening_m" if "gripper_opening_m" in seen else "hand"], recording.hand[number]),
+    )
+    return all(np.array_equal(now, then) for now, then in pairs)
 
 
 def main() -> None:
@@ -112,7 +135,9 @@ def main() -> None:
     kept = sum(counted["kept"] for counted in outcomes.values())
     print(share("all", kept, sum(counted.total() for counted in outcomes.values())))
     if asked.replay:
-        print(share("a success again", *replayed(drawn, episodes)))
+        good, exact, count = replayed(drawn, episodes)
+        print(share("a success again", good, count))
+        print(share("to the bit", exact, count))
 
 
 if __name__ == "__main__":

@@ -48,12 +48,22 @@ def test_objects_are_in_the_order_of_their_names_where_they_were_put(world: Robo
 @pytest.mark.parametrize(("extents_m", "factor"), [([0.012, 0.2, 0.02], 2), ([0.04, 0.06, 0.1], 1)])
 def test_what_is_slender_is_held_with_more_rounds_of_the_solver(extents_m: list[float], factor: int) -> None:
     settings, target = EpisodeSettings(), replace(problem().target, body=box(extents_m, 0.04))
-    with made(replace(problem(), target=target)) as world:
+    other = standing("object_00", [0.05, 0.05, 0.1], 0.6, 0.2)
+    with made(replace(problem(), target=target, obstacles=(other,))) as world:
         articulation = world.robot.articulation
         assert articulation.get_solver_position_iterations() == settings.solver_iterations
         world.expect_load(True)
         assert articulation.get_solver_position_iterations() == factor * settings.solver_iterations_held
-        world.take(world.target)
+        world.will_hold({other.name})
+        world.expect_load(True)
+        assert articulation.get_solver_position_iterations() == settings.solver_iterations_held
+        world.will_hold({other.name, target.name})
+        world.take(0)
+        world.expect_load(True)
+        assert articulation.get_solver_position_iterations() == factor * settings.solver_iterations_held, (
+            "whichever is taken"
+        )
+        world.expect_load(False)
         assert articulation.get_solver_position_iterations() == settings.solver_iterations
 
 

@@ -51,6 +51,8 @@ def run_episode(
         elif (course := _first_course(start, facts, sequence)).plan():
             execution = Execution(world, robot, closing, *tip_poses_of(planner))
             execution.literal = None if sequence is None else 0
+            if sequence is not None:
+                world.will_hold(sequence.moved)
             try:
                 course = carry_out(course, world, execution)
                 for later in () if sequence is None else later_courses(sequence, start, world, execution, facts):

@@ -12,7 +12,7 @@ from sapien import physx
 from manitwin.episodes.commanded_arm import CommandedArm
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.goals.world_state import Event
-from manitwin.episodes.joint_targets import JointTargets
+from manitwin.episodes.joint_targets import JointTargets, hand_share
 from manitwin.episodes.planning.problem import Grasp, Motion, Phase
 from manitwin.episodes.recorder import Recorder
 from manitwin.episodes.recording import RATE_HZ, Recording
@@ -21,7 +21,6 @@ from manitwin.physics.sapien.contacts import NONE_MEANT, ROBOT_NAME, MeantContac
 from manitwin.physics.sapien.controls.control import control_of
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.trial import TrialSettings
-from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.robot import Robot
 
 IN_HAND = frozenset(
@@ -39,8 +38,8 @@ TRACKING_S = 0.05  # after a motion, for the arm to come to rest
 class Execution:
     """Moves the robot of a world and records what happens.
 
-    All that it does takes whole rows, and between rows arms and hands are told what the environment of a task tells them, so that
-    the recorded actions lead to the recorded states again. Guarded moves end between rows: there the actions are nearly so.
+    It acts as a policy does: what it tells arms and hands it chooses at the beginning of a row, and within a row they are told
+    what the environment of a task tells them. So the recorded actions lead to the recorded states again, bit for bit.
     Of two arms one moves at a time, the one that is used; the other stays where it is told to be, and goes on pressing.
     """
 
@@ -62,10 +61,9 @@ class Execution:
         for number, (arm, tip_pose) in enumerate(zip(robot.arms or (robot,), tip_poses, strict=True)):
             world.use(number)
             home_rad = np.array(arm.home_rad, float)
-            fingers = isinstance(arm.gripper, MultiFingerGripper)
-            told = closing if fingers else replace(closing, steps_per_frame=self._steps_per_row)
+            told = replace(closing, steps_per_frame=self._steps_per_row)
             targets = JointTargets(home_rad, *world.robot.limits_rad)
-            self._arms.append(CommandedArm(tip_pose, home_rad, targets, control_of(world, told), told.steps_per_frame))
+            self._arms.append(CommandedArm(tip_pose, home_rad, targets, control_of(world, told)))
         world.use(0)
         self._arm = self._arms[0]
         self.meant: MeantContacts = NONE_MEANT
@@ -73,8 +71,9 @@ class Execution:
         self.literal: int | None = None
         self.steps = 0
         self.unplanned: set[tuple[str, str]] = set()
-        self.pressing: frozenset[frozenset[str]] = frozenset()
         self._unplanned_since_row = False
+        self._last_poses = deque([self._poses()], maxlen=REST_ROWS)
+        self._last_pressing = deque[frozenset[frozenset[str]]](maxlen=STILL_ROWS)
         touches = self._take_touches(world.contacts.read())
         self._recorder = Recorder(world, touches, self._hands_state)
 
@@ -120,32 +119,49 @@ class Execution:
         adjusted: Callable[[int], np.ndarray] | None = None,
         *,
         until_row: Callable[[], bool] | None = None,
+        pace: Callable[[int], float] | None = None,
         yields: bool = False,
     ) -> bool:
         """Move the arm along a motion and wait until it has come to rest.
 
-        A guarded move ends as soon as ``until`` is true, which is asked after every step, and the arm stays where it then is
-        told to be, or, where it ``yields``, where it is; or at the end of a row, where ``until_row`` is true. ``adjusted``
-        gives what is added to a sample's positions ``(n,)``; it is asked for all samples of a row as that begins. Returns
-        whether it went all the way.
+        A guarded move ends with the row in which ``until`` has become true, which is asked after every step, and the arm stays
+        where it then is told to be, or, where it ``yields``, where it is; or at the end of a row, where ``until_row`` is true.
+        ``adjusted`` gives what is added to a sample's positions ``(n,)``; it is asked for all samples of a row as that begins.
+        ``pace`` gives the share of a row by which the arm goes on from a sample, by its number; one sample at least.
+        Returns whether it went all the way.
         """
         samples = motion.positions_rad
-        for first in range(0, len(samples), self._steps_per_row):
-            last = min(first + self._steps_per_row, len(samples)) - 1
+        first = 0
+        while first < len(samples):
+            share = 1.0 if pace is None else pace(first)
+            last = min(first + max(1, round(share * self._steps_per_row)), len(samples)) - 1
             target_rad = samples[last]
             if adjusted is not None:
                 target_rad = target_rad + [adjusted(sample) for sample in range(first, last + 1)][-1]
+            first = last + 1
             self._arm.commanded_rad = target_rad
-            if not self._carry_out_row(motion.phase, until, yields=yields):
+            if not self._carry_out_row(motion.phase, until):
+                if yields:
+                    self.yield_here()
                 return False
             if until_row is not None and until_row():
                 return False
         self.wait_s(motion.phase, TRACKING_S)
         return True
 
+    def delayed(self, motion: Motion, sample: int) -> Motion:
+        """Return a motion that waits at its beginning for less than a row, such that the sample of this number ends a row."""
+        waits = -(sample + 1) % self._steps_per_row
+        positions_rad, velocities_rad_s = motion.positions_rad, motion.velocities_rad_s
+        return replace(
+            motion,
+            positions_rad=np.concatenate([np.repeat(positions_rad[:1], waits, axis=0), positions_rad]),
+            velocities_rad_s=np.concatenate([np.zeros((waits, positions_rad.shape[1])), velocities_rad_s]),
+        )
+
     def yield_here(self) -> None:
         """Take the joints as they are for those that they are told to be: what presses against the arm presses no more."""
-        self._stop_at(self._world.robot.joint_positions())
+        self._arm.commanded_rad = self._world.robot.joint_positions()
 
     def wait_s(self, phase: Phase, time_s: float) -> None:
         """Stay for a while, whole rows."""
@@ -197,21 +213,19 @@ class Execution:
         return inverse(self.target_to_world()) @ self._arm.tip_pose(self.commanded_rad)
 
     def rest(self, max_steps: int, still_rows: int = STILL_ROWS) -> list[list[np.ndarray]]:
-        """Stay until nothing has moved for some rows; returns the poses ``(4, 4)`` of all objects at the last rows.
-
-        ``pressing`` then has the pairs of names of what pressed on each other at any of them.
-        """
-        watch, poses = self._world.rest_watch(still_rows), deque([self._poses()], maxlen=REST_ROWS)
-        pressing = deque([self._world.contacts.pressing(self._world.contacts.read())], maxlen=STILL_ROWS)
+        """Stay until nothing has moved for some rows; returns the poses ``(4, 4)`` of all objects at the last rows."""
+        watch = self._world.rest_watch(still_rows)
         for _ in range(max_steps // self._steps_per_row):
             self.wait(Phase.REST, 1)
-            poses.append(self._poses())
-            pressing.append(self._world.contacts.pressing(self._world.contacts.read()))
             watch.look()
             if watch.all_rest:
                 break
-        self.pressing = frozenset().union(*pressing)
-        return list(poses)
+        return list(self._last_poses)
+
+    @property
+    def pressing(self) -> frozenset[frozenset[str]]:
+        """The pairs of names of what pressed on each other at any of the last rows."""
+        return frozenset().union(*self._last_pressing)
 
     def _poses(self) -> list[np.ndarray]:
         return [self._world.object_to_world(number) for number in range(len(self._world.placed))]
@@ -224,41 +238,28 @@ class Execution:
         while arm.next_told is not None:
             self._carry_out_row(phase)
 
-    def _carry_out_row(self, phase: Phase, until: Callable[[], bool] | None = None, *, yields: bool = False) -> bool:
-        """Go on until the next row is recorded, as an environment would that is told what that row says: an action.
+    def _carry_out_row(self, phase: Phase, until: Callable[[], bool] | None = None) -> bool:
+        """Go on until the next row is recorded, as an environment does that is told what that row says: an action.
 
-        Returns False where ``until`` became true on the way. The row then says where the arm stopped; of one that yields to a
-        blow it says where it was going, or the blow would be slower when the actions are carried out again.
+        Returns False where ``until`` became true on the way.
         """
         count, dt, goes_on = self._steps_per_row, self._closing.timestep_s, True
         ways = []
         for arm in self._arms:
-            arm.commanded_rad = np.asarray(arm.commanded_rad, np.float32).astype(float)
-            arm.action_rad = arm.commanded_rad
-            ways.append(arm.targets.towards(arm.action_rad, count))
+            arm.commanded_rad = np.asarray(arm.commanded_rad, np.float32).astype(float)  # as it is recorded
+            arm.choose()
+            ways.append(arm.targets.towards(arm.commanded_rad, count))
+        self._world.expect_load(any(arm.may_hold for arm in self._arms))
         for step in range(count):
             for arm, robot, (positions, steps) in zip(self._arms, self._world.robots, ways, strict=True):
-                if goes_on or arm is not self._arm:
-                    # the drives pull to where the arm is to be in the middle of the step, or it would run ahead of its targets
-                    velocities = steps[step] / (count * dt)
-                    robot.set_targets(positions[step] - velocities * (dt / 2), velocities)
-                arm.tell(step, self._closing.steps_per_frame)
-            if step == 0:
-                self._world.expect_load(any(arm.may_hold for arm in self._arms))
+                # the drives pull to where the arm is to be in the middle of the step, or it would run ahead of its targets
+                velocities = steps[step] / (count * dt)
+                robot.set_targets(positions[step] - velocities * (dt / 2), velocities)
+                arm.tell(hand_share(step + 1, self._closing.steps_per_frame, count))
             self._advance(phase)
             if goes_on and until is not None and until():
                 goes_on = False
-                here = self._world.robot.joint_positions() if yields else ways[self.used][0][step]
-                self._stop_at(here)
-                if not yields:
-                    self._arm.action_rad = self._arm.commanded_rad
         return goes_on
-
-    def _stop_at(self, joints_rad: np.ndarray) -> None:
-        """Tell the arm to be at rest at ``joints_rad (n,)`` from now on."""
-        self._arm.commanded_rad = np.asarray(joints_rad, np.float32).astype(float)
-        self._arm.targets.stop(self._arm.commanded_rad)
-        self._world.robot.set_targets(self._arm.commanded_rad, np.zeros_like(self._arm.commanded_rad))
 
     def _advance(self, phase: Phase) -> None:
         ends_row = (self.steps + 1) % self._steps_per_row == 0
@@ -287,7 +288,7 @@ class Execution:
         """Add a row. Speeds are those of the last step: PhysX's are those at its end, where stiff drives have slowed down."""
         velocities = (self._joint_positions() - joint_positions_before_rad) / self._closing.timestep_s
         self._recorder.add(
-            np.concatenate([arm.action_rad for arm in self._arms]),
+            np.concatenate([arm.commanded_rad for arm in self._arms]),
             np.concatenate([arm.told for arm in self._arms]),
             self._hands_state,
             phase,
@@ -297,6 +298,8 @@ class Execution:
             literal=self.literal,
         )
         self._unplanned_since_row = False
+        self._last_poses.append(self._poses())
+        self._last_pressing.append(frozenset(self._world.contacts.pressing(contacts)))
 
     @property
     def _is_held(self) -> bool:

@@ -21,16 +21,13 @@ class JointTargets:
         self._last = np.repeat(np.asarray(start_rad, float)[None], ORDER, axis=0)
         self._lowest, self._highest = lowest_rad, highest_rad
 
-    def stop(self, here_rad: np.ndarray) -> None:
-        """Be at rest at ``here_rad (n,)``: what went before is forgotten."""
-        self._last = np.repeat(np.asarray(here_rad, float)[None], ORDER, axis=0)
-
     def towards(self, target_rad: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the targets ``(count, n)`` at even times until the end of the step, which is ``target_rad (n,)``, and speeds.
 
         Speeds ``(count, n)`` are those there, rad a step; of joints at their limits 0.
         """
-        samples = np.concatenate([self._last, np.asarray(target_rad, float)[None]])
+        clipped_rad = np.clip(np.asarray(target_rad, float), self._lowest, self._highest)
+        samples = np.concatenate([self._last, clipped_rad[None]])
         self._last = samples[1:]
         left = np.arange(1 - count, 1) / count
         rows = _polynomial(samples, left)

@@ -74,7 +74,7 @@ def judge(
     if start.skill_goal is not None and max(execution.touches.finger_forces_n) == 0:
         last = execution.rest(round(max(settings.max_rest_s, SWINGS_S) / settings.timestep_s), REST_ROWS)
     else:
-        last = execution.rest(round(settings.max_rest_s / settings.timestep_s))
+        last = execution.rest(round(settings.max_rest_s / settings.timestep_s), REST_ROWS)
     errors = placement_errors(execution.target_to_world(), goal_object_to_world, target.body.center_of_mass_m)
     at_rest = [
         is_at_rest([row[number] for row in last], placed.body.center_of_mass_m, settings)

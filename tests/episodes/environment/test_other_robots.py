@@ -49,13 +49,16 @@ def made(root: Path, robot: str, tasks: int) -> list[StoredEpisode]:
 
 
 def replayed(env: gymnasium.Env, episode: StoredEpisode, hand: float | None = None) -> dict:
-    """Give an episode's commands to an environment; ``hand`` is told instead of what the hands were told."""
+    """Give an episode's commands to an environment, where the states have to be the same; ``hand``: told instead of its own."""
     recording, info = episode.recording, {}
     told = recording.action_hand if hand is None else np.full_like(recording.action_hand, hand)
     env.reset(seed=0)
-    for action in np.column_stack([recording.action_joint_positions_rad, told]):
+    for number, action in enumerate(np.column_stack([recording.action_joint_positions_rad, told]), start=1):
         observation, _, terminated, _, info = env.step(action)
         assert env.observation_space.contains(observation)
+        if hand is None:
+            np.testing.assert_array_equal(observation["object_poses"][:, :3], recording.object_positions_m[number])
+            np.testing.assert_array_equal(observation["joint_positions_rad"], recording.joint_positions_rad[number])
         if terminated:
             break
     return info

@@ -216,7 +216,11 @@ class HeldCourse(Course):
         return joint_spline(np.array([execution.commanded_rad, self._joints(place)]))
 
     def _guarded(self, guard: Guard, part: HeldPath, execution: Execution) -> None:
-        """Move on until what is watched presses with the guard's force, then hold still (or yield, after a blow)."""
+        """Move on until what is watched presses with the guard's force, then hold still (or yield, after a blow).
+
+        The arm goes on until the row ends. So what presses goes on the more slowly the nearer it is to that force, and a blow is
+        begun at such a time that a row ends as it touches; what has not touched by then goes on slowly.
+        """
         watch = self._watch
         assert watch is not None, "a guarded move asks its watch for the force"
         joints = self._onward(part, execution, 1.0)
@@ -225,9 +229,18 @@ class HeldCourse(Course):
         duration_s = guard.duration_s if guard.speed_m_s is None else PEAK_OF_QUINTIC * way_m / guard.speed_m_s
         motion = self._planner.timed(joints, duration_s, Phase.ACT, beyond=guard.beyond)
         touched: Callable[[], bool] = lambda: watch.force_n >= guard.stop_n  # noqa: E731
-        if execution.follow(motion, until=touched, yields=guard.beyond > 1) and guard.beyond > 1:
+        if not guard.is_blow:
+            execution.follow(motion, until=touched, pace=lambda _: max(0.0, 1 - watch.force_n / guard.stop_n))
+            execution.wait_s(Phase.HOLD, PRESSED_S)
+            return
+        there_m = (part.poses[guard.touches - guard.first] @ execution.gripper_to_object())[:3, 3]
+        ways_m = [self.start.planner.tip_pose(each)[:3, 3] - there_m for each in motion.positions_rad]
+        touches = int(np.linalg.norm(ways_m, axis=1).argmin())
+        blow = execution.delayed(motion, touches)
+        touches += len(blow.positions_rad) - len(motion.positions_rad)
+        if execution.follow(blow, until=touched, pace=lambda first: float(first <= touches), yields=True):
             execution.yield_here()
-        execution.wait_s(Phase.HOLD, YIELDED_S if guard.beyond > 1 else PRESSED_S)
+        execution.wait_s(Phase.HOLD, YIELDED_S)
 
     def _under_force(self, regulated: Regulated, part: HeldPath, execution: Execution) -> None:
         """Slide along a path's places from where the target touches now, yielding and following along the normal; then rise.

@@ -14,12 +14,13 @@ from manitwin.robots.robot import Robot
 def action_limits(robot: Robot, planner: PickPlacePlanner) -> tuple[np.ndarray, np.ndarray]:
     """Return the limits ``(n + h,) float32`` of the joints of all arms (rad), then of all hands.
 
+    Joints have those of the URDF, not what plans keep within: an arm that follows a spline may go a little beyond that.
     Jaws may be told less than nothing, which presses; a cup's vacuum is 0 or 1, other hands have their joints' limits.
     """
     planners = (planner, planner.taker) if isinstance(planner, TwoArmPlanner) else (planner,)
     hands = [_hand_limits(each) for each in robot.arms or (robot,)]
-    lowest = [each.arm.lower for each in planners] + [low for low, _ in hands]
-    highest = [each.arm.upper for each in planners] + [high for _, high in hands]
+    arms = [each.arm.limits_rad for each in planners]
+    lowest, highest = zip(*arms, *hands, strict=True)
     return np.concatenate(lowest).astype(np.float32), np.concatenate(highest).astype(np.float32)
 
 

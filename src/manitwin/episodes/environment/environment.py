@@ -189,6 +189,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         if joints_rad is not None:
             for arm, part in zip(world.robots, by_arm(world, joints_rad), strict=True):
                 arm.put(part, arm.robot.open_hand)
+        world.will_hold(self._setting.sequence.moved)
         return settled(problem, self._planner, self._settings, self._setting.goal, world), world
 
     def _leave(self) -> None:

@@ -23,7 +23,10 @@ STALLED_AFTER = (
 
 
 class ArmKinematics:
-    """An arm of n joints whose limits are those of the URDF; what turns further than once turns once, about its home."""
+    """An arm of n joints that keep within ``lower`` and ``upper (n,)`` rad.
+
+    These are the limits of the URDF, ``limits_rad``, less a margin; what turns further than once turns once, about its home.
+    """
 
     def __init__(self, robot: Robot, opening_m: float | None = None):
         """Build the model of ``robot``'s arm with open fingers, or with the distance ``opening_m`` between the pads."""
@@ -31,6 +34,7 @@ class ArmKinematics:
         self.home = np.asarray(robot.home_rad, float)
         model = self.body.model
         lower, upper = np.array(model.lowerPositionLimit), np.array(model.upperPositionLimit)
+        self.limits_rad = lower.copy(), upper.copy()
         more_than_once = upper - lower > 2 * np.pi + 1e-6
         lower[more_than_once] = np.maximum(lower, self.home - np.pi)[more_than_once]
         upper[more_than_once] = np.minimum(upper, self.home + np.pi)[more_than_once]

@@ -46,7 +46,7 @@ class Guard:
     """A guarded move: from knot ``first`` on, until what is watched presses with ``stop_n``.
 
     It goes at ``speed_m_s`` at most, or as a blow: as fast as ``duration_s`` says, fastest at the end of the path
-    (``beyond`` > 1, see ``path_timing``), and yielding as soon as it touches.
+    (``beyond`` > 1, see ``path_timing``), and yielding once it touches, which is expected at knot ``touches``.
     """
 
     first: int
@@ -54,6 +54,12 @@ class Guard:
     speed_m_s: float | None = None
     duration_s: float = 0.5
     beyond: float = 1.0
+    touches: int = 0
+
+    @property
+    def is_blow(self) -> bool:
+        """Whether it goes as fast as it can where it touches."""
+        return self.beyond > 1
 
 
 @dataclass(frozen=True)

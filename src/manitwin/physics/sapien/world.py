@@ -6,7 +6,7 @@ things turned by 5.0 degrees in the hand with it and by 3.4 without, at 50 solve
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from types import TracebackType
 
@@ -14,7 +14,7 @@ import numpy as np
 import sapien
 from sapien import physx
 
-from manitwin.geometry.rigid_body import FURNITURE_FRICTION, PlacedObject, StaticBox, stands_for_a_plane
+from manitwin.geometry.rigid_body import FURNITURE_FRICTION, PlacedObject, RigidBody, StaticBox, stands_for_a_plane
 from manitwin.physics.sapien.body import entity_at, graspable_component, static_box, static_plane
 from manitwin.physics.sapien.contacts import ContactReader, Role
 from manitwin.physics.sapien.falling import Falling
@@ -68,6 +68,7 @@ class RobotWorld:
         self._iterations, self._iterations_held = solver_iterations, solver_iterations_held
         self.placed = sorted((target, *others), key=lambda placed: placed.name)
         self.target = self.placed.index(target)
+        self.will_hold({target.name})
         self._system = system_with_gravity(timestep_s)
         self._scene = sapien.Scene([self._system])
         standing = [*boxes, *fixtures]
@@ -144,19 +145,17 @@ class RobotWorld:
         if held and not self._expects_load:
             self._falling.end()
         self._expects_load = held
-        held_count = self._iterations_held * (SLENDER_FACTOR if self._target_is_slender else 1)
+        held_count = self._iterations_held * (SLENDER_FACTOR if self._holds_slender else 1)
         iterations = held_count if held else self._iterations
         for robot in self.robots:
             robot.articulation.set_solver_position_iterations(iterations)  # also for all that the robot touches
 
-    @property
-    def _target_is_slender(self) -> bool:
-        body = self.placed[self.target].body
-        return bool(np.sqrt(body.principal_inertia[0].min() / body.mass_kg) < SLENDER_M)
+    def will_hold(self, names: Collection[str]) -> None:
+        """Say which objects the hand will hold, one after the other; without this the target alone."""
+        self._holds_slender = any(_is_slender(placed.body) for placed in self.placed if placed.name in names)
 
     def take(self, number: int) -> None:
         """Make another object the target."""
-        self.expect_load(False)
         self.target = number
         strangers, used = self.contacts.has_strangers, self.robots.index(self.robot)
         self.readers = self._readers()
@@ -221,3 +220,7 @@ class RobotWorld:
                 hand = Role.HAND if name in each.robot.hand_links else Role.ARM
                 roles.append((link, name, hand if side is None else Role(side)))
         return roles
+
+
+def _is_slender(body: RigidBody) -> bool:
+    return bool(np.sqrt(body.principal_inertia[0].min() / body.mass_kg) < SLENDER_M)
