@@ -9,10 +9,11 @@ from unittest import mock
 
 import numpy as np
 
-from manitwin.episodes.courses import push as push_course
-from manitwin.episodes.planning.held_knots import HeldPath
+from manitwin.episodes.courses.course import Start
+from manitwin.episodes.courses.push import PushCourse
+from manitwin.episodes.episode_facts import EpisodeFacts
+from manitwin.episodes.planning.closed_hand import first_corner
 from manitwin.episodes.skills.held_task import HeldScene, HeldTask
-from manitwin.episodes.skills.push import strokes
 from manitwin.episodes.skills.skill import SkillGoal
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
@@ -44,9 +45,9 @@ def wrong_goal(
     """Return a goal that is asked for and not gone for; the target is the first of ``objects``, its partner the second.
 
     beside: the whole way in a random direction (across a peg, away from a partner that it is put in, on or beside, across what it
-    points along), of a push the mark (``pushed_beside``); other side: mirrored at the partner; lying: as it lay; low and raised:
-    the way lower by 12 cm, higher by 4 cm; turned: asked of another side of the thing, its frames by 90 degrees about their X;
-    empty: no granules.
+    points along, to where the fingertips are of what is pressed), of a push the mark (``pushed_beside``); other side: mirrored at
+    the partner; lying: as it lay; low and raised: the way lower by 12 cm, higher by 4 cm; turned: asked of another side of the
+    thing, its frames by 90 degrees about their X; empty: no granules.
     """
     if kind == "empty":
         return replace(goal, granules=None)
@@ -62,8 +63,11 @@ def wrong_goal(
         task = make(scene)
         if kind == "turned":
             return replace(task, watch=make(replace(scene, frames=_turned(scene.frames))).watch)
-        across = skill == "aim" and kind == "beside"
-        ways = [_across(path.poses, off) if across else off for path in task.paths]
+        ways = [off] * len(task.paths)
+        if (skill, kind) == ("aim", "beside"):
+            ways = [_across(path.poses, off) for path in task.paths]
+        elif (skill, kind) == ("press", "beside"):
+            ways = [_hand_aside(path.poses, off, scene.fingertips_m) for path in task.paths]
         paths = zip(task.paths, ways, strict=True)
         return replace(task, paths=tuple(replace(path, poses=way @ path.poses) for path, way in paths))
 
@@ -74,12 +78,13 @@ def pushed_beside(skill: str, kind: str, rng: np.random.Generator) -> AbstractCo
     """Return a context in which what is pushed goes 15 cm beside its mark; of any other control nothing changes in it."""
     if (skill, kind) != ("push", "beside"):
         return nullcontext()
-    way = _beside_m(FAR_M, rng)
+    way, begin = _beside_m(FAR_M, rng), PushCourse.__init__
 
-    def astray(target: PlacedObject, place_m: np.ndarray, tips_m: np.ndarray, level_m: float) -> Sequence[HeldPath]:
-        return strokes(target, place_m + way, tips_m, level_m)
+    def astray(course: PushCourse, start: Start, facts: EpisodeFacts) -> None:
+        begin(course, start, facts)
+        course._place_m = course._place_m + way  # its guards as well, or a stroke across the true mark would end there
 
-    return mock.patch.object(push_course, "strokes", astray)
+    return mock.patch.object(PushCourse, "__init__", astray)
 
 
 def _way_m(
@@ -108,6 +113,16 @@ def _across(poses: np.ndarray, off: np.ndarray) -> np.ndarray:
     side = np.cross([0.0, 0, 1], poses[-1, :3, 3] - poses[0, :3, 3])
     way_m = np.linalg.norm(off[:3, 3]) * side / max(float(np.linalg.norm(side)), 1e-9)
     return transform(translation=np.copysign(1.0, float(way_m @ off[:3, 3])) * way_m)
+
+
+def _hand_aside(poses: np.ndarray, off: np.ndarray, tips_m: np.ndarray) -> np.ndarray:
+    """Return a level shift as far as ``off`` for poses ``(K, 4, 4)`` of a hand, to the side where its fingertips are.
+
+    They are 3 cm wide: shifted to another side, the corner that presses is 3 cm off and another one presses on the place.
+    """
+    corner_m, _ = first_corner(tips_m, poses[-1, :3, :3], poses[-1, :3, 3] - poses[0, :3, 3])
+    side = poses[-1, :3, :3] @ (tips_m.mean(0) - corner_m) * [1.0, 1.0, 0.0]
+    return transform(translation=np.linalg.norm(off[:3, 3]) * side / np.linalg.norm(side))
 
 
 def _far_out_m(vessel: PlacedObject, away_m: np.ndarray, way: np.ndarray) -> float:
