@@ -11,7 +11,7 @@ from brick_episodes import START, panda, problem, standing
 
 from manitwin.episodes.episode import world_of
 from manitwin.episodes.execution import IN_HAND, Execution
-from manitwin.episodes.planning.problem import Phase, PickPlaceProblem
+from manitwin.episodes.planning.problem import Motion, Phase, PickPlaceProblem
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.geometry.poses import transform
 from manitwin.geometry.rigid_body import PlacedObject, StaticBox
@@ -154,3 +154,41 @@ def test_touch_of_one_step_between_two_rows_is_not_missed(
     execution.wait(phase, 3)
     assert execution.unplanned == {pair}
     assert execution.recording().unplanned_contact.tolist() == [False, False, True, False]
+
+
+def turning(world: RobotWorld, samples: int) -> tuple[Execution, Motion]:
+    """An execution, and a motion of the arm's base of so many samples."""
+    robot, planner = panda()
+    execution = Execution(world, robot, TrialSettings(50.0, 1.0, timestep_s=1 / 120), planner.tip_pose)
+    positions_rad = np.repeat(np.array(robot.home_rad, float)[None], samples, axis=0)
+    positions_rad[:, 0] += 1e-3 * np.arange(samples)
+    return execution, Motion(Phase.REACH, positions_rad, np.zeros_like(positions_rad))
+
+
+def test_a_guarded_motion_ends_with_the_row_in_which_something_is_felt(world: RobotWorld) -> None:
+    execution, motion = turning(world, 60)
+    asked = list[int]()
+
+    def felt() -> bool:
+        asked.append(execution.steps)
+        return execution.steps == 8
+
+    assert not execution.follow(motion, felt)
+    assert asked == [*range(1, 9)], "what is felt for a moment is felt"
+    assert (execution.steps, execution.recording().steps) == (12, 2)
+    assert execution.commanded_rad == pytest.approx(motion.positions_rad[11], abs=1e-6)
+
+
+def test_a_slower_pace_takes_a_row_for_every_sample(world: RobotWorld) -> None:
+    execution, motion = turning(world, 12)
+    assert execution.follow(motion, pace=lambda first: 1.0 if first < 6 else 0.0)
+    told_rad = execution.recording().action_joint_positions_rad[:, 0]
+    assert told_rad[:7] == pytest.approx(motion.positions_rad[5:, 0], abs=1e-6)
+
+
+@pytest.mark.parametrize("sample", [20, 23])
+def test_a_delayed_motion_has_its_sample_at_the_end_of_a_row(world: RobotWorld, sample: int) -> None:
+    execution, motion = turning(world, 60)
+    delayed = execution.delayed(motion, sample)
+    assert len(delayed.positions_rad) == len(delayed.velocities_rad_s) < 66
+    assert np.array_equal(delayed.positions_rad[5::6][3], motion.positions_rad[sample])
