@@ -24,8 +24,8 @@ LEAST_HEIGHT_M = 0.012  # above the table: the tilted hand goes a little deeper 
 TILT_RAD = np.radians([10.0, 25.0])
 LEAST_LEAD_M = 0.0015  # of the corner that presses: where two touch at once, the force is between them, 2 cm off
 TRIED = 24
-SPEED_M_S = 0.004  # 0.2 mm, or 4 to 8 N, between two actions
-MORE_N = 3.0  # than is asked for: what sags away, and what actions recorded a frame apart miss of a peak, still leaves enough
+SPEED_M_S = 0.004  # 0.2 mm between two actions, in which a stiff thing presses 4 to 8 N more
+MORE_N = 3.0  # than is asked for, so that what sags away still leaves enough
 
 
 class Press(HeldSkill):

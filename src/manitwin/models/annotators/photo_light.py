@@ -17,8 +17,9 @@ from PIL import Image
 
 from manitwin.formats.meshes.textures import linear_to_srgb, srgb_to_linear
 from manitwin.models.annotators.surface_color import lab_from_srgb
+from manitwin.render.scene_lighting import LUMINANCE
 
-# chosen on one half of the categories of benchmarks/photo_colors.py
+# chosen on one half of the categories of benchmarks/photo_colors.py, the sheen also with real photos in sight (docs/measured.md)
 PALE_REFLECTANCE = 0.7  # of a pale ground: white paper has 0.85, a light grey table 0.5
 MOST_SHEEN = 0.02
 """What a surface reflects of its surroundings, of white: 4 % at normal incidence (Fresnel, refractive index 1.5) of what is half
@@ -29,7 +30,6 @@ _MOST_CHROMA = 15.0  # CIELAB; a wooden table top has 22, and is no white sheet
 _RING_SHARE = (0.02, 0.10)  # of the longer side: beyond the contact shadow, and still in the thing's own light
 _SEEN_PX = 512
 _OPAQUE = 127
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # linear sRGB (IEC 61966-2-1)
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,8 @@ def light_of_photo(rgba: np.ndarray) -> PhotoLight | None:
     lightness, *tint = lab_from_srgb(linear_to_srgb(ground))
     if lightness < _LEAST_LIGHTNESS or np.hypot(*tint) > _MOST_CHROMA:
         return None
-    white = min(float(_LUMINANCE @ ground) / PALE_REFLECTANCE, 1.0)
-    own = srgb_to_linear(rgba[rgba[..., 3] > _OPAQUE][:, :3] / 255) @ _LUMINANCE
+    white = min(float(LUMINANCE @ ground) / PALE_REFLECTANCE, 1.0)
+    own = srgb_to_linear(rgba[rgba[..., 3] > _OPAQUE][:, :3] / 255) @ LUMINANCE
     darkest = float(np.percentile(own, _DARKEST_PERCENT)) / white if len(own) else 0.0
     return PhotoLight(white, min(MOST_SHEEN, darkest))
 
