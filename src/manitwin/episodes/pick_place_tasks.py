@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,7 @@ MIN_GAP_M = 0.03
 OTHERS_RADIUS_FACTOR = 1.2
 OTHERS_ANGLE_FACTOR = 1.4
 """How much farther than the target the others may stand: what is beyond the arm's reach is in nobody's way."""
+NEARER_RADIUS_FACTOR = 0.75
 POSES_TRIED, OTHERS_TRIED = 200, 20
 
 
@@ -79,6 +80,11 @@ class PlacingArea:
             workspace.half_angle_rad * OTHERS_ANGLE_FACTOR,
         )
         return PlacingArea(wide, self.support)
+
+    def beyond(self) -> PlacingArea:
+        """Return the room in which an arm may still put something down, which planning tells: nearer to its base as well."""
+        workspace = self.wider().workspace
+        return PlacingArea(replace(workspace, min_radius_m=workspace.min_radius_m * NEARER_RADIUS_FACTOR), self.support)
 
     def draw(self, corners: np.ndarray, taken: Sequence[np.ndarray], rng: np.random.Generator) -> np.ndarray | None:
         """Draw a pose for a footprint ``(K, 2)`` that is free of those that are ``taken``; None where none was found."""

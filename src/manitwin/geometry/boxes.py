@@ -177,10 +177,16 @@ def separation_m(first: np.ndarray, second: np.ndarray) -> float:
     The largest gap along the normals of their edges (separating axes): the distance itself, but where the nearest points are
     two corners; then it is less.
     """
+    return float(separations_m(first, second, np.zeros((1, 2)))[0])
+
+
+def separations_m(first: np.ndarray, second: np.ndarray, offsets_m: np.ndarray) -> np.ndarray:
+    """Return the ``separation_m`` ``(N,)`` of two convex polygons with the first one moved by each of the offsets ``(N, 2)``."""
     gaps = []
-    for one, other in ((first, second), (second, first)):
+    for one, other, sign in ((first, second, -1.0), (second, first, 1.0)):
         edges = np.roll(one, -1, axis=0) - one
         normals = np.stack([edges[:, 1], -edges[:, 0]], 1)
         normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-        gaps.append(((other @ normals.T).min(0) - (one * normals).sum(1)).max())
-    return float(max(gaps))
+        here = (other @ normals.T).min(0) - (one * normals).sum(1)
+        gaps.append((here + sign * (offsets_m @ normals.T)).max(1))
+    return np.asarray(np.maximum(*gaps))
