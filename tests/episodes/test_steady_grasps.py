@@ -9,6 +9,7 @@ import pytest
 
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.steady_grasps import (
+    LIFTED_WEIGHT,
     bears_weight,
     loads_any_way_up,
     steady_tiers,
@@ -63,9 +64,19 @@ def test_a_line_bears_less_than_a_face_and_both_as_much_as_the_pads_press() -> N
     assert twice == pytest.approx((2 * line_nm, 2 * face_nm))
 
 
-def test_grasps_near_the_middle_come_first_and_those_that_cannot_bear_it_not_at_all() -> None:
+def test_what_bears_a_weight_at_rest_alone_does_not_bear_to_lift_it() -> None:
     line_nm, face_nm = torsion_limits_nm(HAND)
     heavy, weight_n = bar(0.5), 0.5 * 9.81
+    at_rest, lifted = held_at(0.95 * line_nm / weight_n), held_at(0.8 * line_nm / weight_n)
+    assert weight_torque_nm(at_rest, heavy, HAND) < line_nm
+    assert [bears_weight(grasp, heavy, HAND) for grasp in (at_rest, lifted)] == [False, True]
+    assert steady_tiers([at_rest, lifted], heavy, HAND) == [(lifted,), (at_rest,)]
+    assert steady_tiers([held_at(0.95 * face_nm / weight_n)], heavy, HAND) == []
+
+
+def test_grasps_near_the_middle_come_first_and_those_that_cannot_bear_it_not_at_all() -> None:
+    line_nm, face_nm = torsion_limits_nm(HAND)
+    heavy, weight_n = bar(0.5), LIFTED_WEIGHT * 0.5 * 9.81
     light, doubtful, end = 0.5 * line_nm / weight_n, (line_nm + face_nm) / 2 / weight_n, 1.01 * face_nm / weight_n
     grasps = [held_at(x) for x in (end, doubtful, light, 0.0)]
     assert steady_tiers(grasps, heavy, HAND) == [(grasps[2], grasps[3]), (grasps[1],)]
@@ -89,7 +100,7 @@ def raised(grasp: Grasp, by_m: float) -> Grasp:
 
 def test_part_of_the_pads_lifts_what_a_disc_of_its_area_bears() -> None:
     line_nm, face_nm = torsion_limits_nm(HAND)
-    heavy, weight_n, disc_nm = bar(0.5), 0.5 * 9.81, face_nm * np.sqrt(0.6)
+    heavy, weight_n, disc_nm = bar(0.5), LIFTED_WEIGHT * 0.5 * 9.81, face_nm * np.sqrt(0.6)
     assert line_nm < disc_nm
     below, above_it = (held_at(nm / weight_n) for nm in ((line_nm + disc_nm) / 2, (disc_nm + face_nm) / 2))
     parts = [raised(each, 0.018) for each in (below, above_it)]  # of the cells of their pads 9 of 15 touch
@@ -99,7 +110,7 @@ def test_part_of_the_pads_lifts_what_a_disc_of_its_area_bears() -> None:
 
 def test_pads_that_touch_narrowly_lift_no_more_than_a_line_bears() -> None:
     line_nm, face_nm = torsion_limits_nm(HAND)
-    heavy, weight_n = bar(0.5), 0.5 * 9.81
+    heavy, weight_n = bar(0.5), LIFTED_WEIGHT * 0.5 * 9.81
     between, light = held_at((line_nm + face_nm) / 2 / weight_n), held_at(0.5 * line_nm / weight_n)
     narrow = [raised(each, 0.026) for each in (between, light)]
     assert touch_narrowly([between, light, *narrow], heavy.body, HAND) == [False, False, True, True]

@@ -173,8 +173,9 @@ class Execution:
             self._carry_out_row(phase)
 
     def shape(self, grasp: Grasp | None) -> None:
-        """Shape the hand for a grasp; jaws and cups stay as they are."""
-        self._play(Phase.REACH, self._arm.hand.shaping(None if grasp is None else grasp.joints_rad))
+        """Shape the hand for a grasp; cups stay as they are."""
+        joints_rad, opening_m = (None, None) if grasp is None else (grasp.joints_rad, grasp.opening_m)
+        self._play(Phase.REACH, self._arm.hand.shaping(joints_rad, opening_m))
 
     def close(self) -> None:
         """Close the hand until it presses; from then on it keeps pressing with the closing force, whatever gives way."""

@@ -43,7 +43,7 @@ def _taken_anew(course: Course, world: RobotWorld, execution: Execution, *, with
     start, facts = course.start, course.facts
     if facts.grasp is None or not isinstance(start.planner, PickPlacePlanner):
         return None
-    planner, settings, missed = alone(start.planner), start.settings, facts.grasp.grasp_id
+    planner, settings, missed = alone(start.planner).of(facts.grasp), start.settings, facts.grasp.grasp_id
     execution.meant = NONE_MEANT
     execution.open()
     away = plan_withdrawal(

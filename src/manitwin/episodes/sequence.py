@@ -121,7 +121,7 @@ def _next_course(
     execution.meant = NONE_MEANT
     execution.open()
     assert isinstance(planner, PickPlacePlanner), "sequences are planned with the models of this planner"
-    home = alone(planner).plan_way_home(problem, execution.commanded_rad)
+    home = alone(planner).of(facts.grasp).plan_way_home(problem, execution.commanded_rad)
     if home is None:
         raise Ended("replan_failed")
     execution.follow(home)

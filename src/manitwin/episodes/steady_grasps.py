@@ -17,11 +17,14 @@ from manitwin.robots.grippers.parallel import ParallelGripper
 
 LEAST_APART_M = 0.04  # of the pads of two hands on one thing
 EDGE_M = 0.002  # from the pads' ends: by their last row of cells alone
+LIFT_ACCELERATION_M_S2 = 2.0  # of 30 planned lifts in layouts 1.1 in the median and 1.9 at most
+LIFTED_WEIGHT = 1 + LIFT_ACCELERATION_M_S2 / GRAVITY_M_S2
+"""What bears on the jaws as a thing is lifted, as a multiple of its weight."""
 BROAD_SHARE = 0.4  # of a pad's rays: on fewer, fewer of the verified grasps hold, too (``physics.grasp_filters``)
 
 
 def steady_tiers(grasps: Sequence[Grasp], target: PlacedObject, gripper: Gripper) -> list[tuple[Grasp, ...]]:
-    """Return grasps in two tiers, each in their order: those that bear the target's weight where it is, and the doubtful.
+    """Return grasps in two tiers, each in their order: those that bear to lift the target where it is, and the doubtful.
 
     The doubtful bear it where pads lie flat on it, as a disc of the area that touches does. Left out are those in which a target
     that is lifted turns about the jaws' axis. The trial of a grasp does not say so: one that lies is held at its end. A tier
@@ -29,7 +32,7 @@ def steady_tiers(grasps: Sequence[Grasp], target: PlacedObject, gripper: Gripper
     """
     if not isinstance(gripper, ParallelGripper):
         return [tuple(grasps)] if grasps else []
-    torques_nm = [weight_torque_nm(each, target, gripper) for each in grasps]
+    torques_nm = [LIFTED_WEIGHT * weight_torque_nm(each, target, gripper) for each in grasps]
     line_nm, face_nm = torsion_limits_nm(gripper)
     both = list(zip(grasps, torques_nm, strict=True))
     on_faces = [(each, nm) for each, nm in both if line_nm < nm <= face_nm]
@@ -47,7 +50,7 @@ def bears_weight(grasp: Grasp, target: PlacedObject, gripper: Gripper) -> bool:
     """Tell whether a target that is lifted where it is stays as it is in the jaws; of other grippers nothing is known."""
     if not isinstance(gripper, ParallelGripper):
         return True
-    return weight_torque_nm(grasp, target, gripper) <= torsion_limits_nm(gripper)[0]
+    return LIFTED_WEIGHT * weight_torque_nm(grasp, target, gripper) <= torsion_limits_nm(gripper)[0]
 
 
 def loads_any_way_up(grasps: Sequence[Grasp], body: RigidBody, gripper: Gripper) -> list[int | None]:

@@ -135,7 +135,7 @@ class PickPlaceCourse(Course):
         planner = self.start.planner
         if isinstance(planner, PickPlacePlanner):
             here = execution.target_to_world(), execution.commanded_rad
-            away = plan_withdrawal(planner.parts, self.problem, *here, blind=blind)
+            away = plan_withdrawal(planner.of(self.facts.grasp).parts, self.problem, *here, blind=blind)
             self.facts.replans["withdrawn" if away is not None else "not_withdrawn"] += 1
             if away is not None:
                 execution.follow(away)

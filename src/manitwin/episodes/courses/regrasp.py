@@ -73,7 +73,7 @@ class RegraspCourse(PickPlaceCourse):
         target = replace(self.problem.target, object_to_world=execution.target_to_world())
         self.start = replace(self.start, problem=replace(self.start.problem, target=target))
         assert isinstance(planner, PickPlacePlanner), "the way home is planned with the models of this planner"
-        home = planner.plan_way_home(self.start.problem, execution.commanded_rad)
+        home = planner.of(self.facts.grasp).plan_way_home(self.start.problem, execution.commanded_rad)
         if home is None:
             raise Ended("replan_failed")
         execution.follow(home)

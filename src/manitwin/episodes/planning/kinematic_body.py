@@ -54,7 +54,7 @@ def arm_of(robot: Robot, opening_m: float | None = None) -> KinematicBody:
             if apart and frozenset((links[i], links[j])) not in disabled:
                 geometry.addCollisionPair(pin.CollisionPair(i, j))
     sweeps = list[int]()
-    if opening_m is None and isinstance(robot.gripper, ParallelGripper):
+    if opening_m != 0 and isinstance(robot.gripper, ParallelGripper):
         closed = _model_of(robot, _jaws_at(robot, 0.0))[1]
         for shape, end, link in zip(shapes, closed, links, strict=True):
             if link in robot.finger_links and (corners := corners_of(shape)) is not None:

@@ -10,6 +10,7 @@ import numpy as np
 from manitwin.episodes.planning.arm_planning import ArmPlanning
 from manitwin.episodes.planning.collision_world import ProblemWorld
 from manitwin.episodes.planning.grasp_tally import GraspTally
+from manitwin.episodes.planning.narrowed_jaws import narrowed
 from manitwin.episodes.planning.placement import Placement, PlacementPlanner, goals_after_slip
 from manitwin.episodes.planning.problem import (
     Grasp,
@@ -26,6 +27,8 @@ from manitwin.episodes.planning.problem import (
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.robots.robot import Robot
 
+HAND_IN_THE_WAY = frozenset[PlanFailure](("approach_blocked", "lift_blocked", "lower_blocked", "retreat_blocked"))
+
 
 class PickPlacePlanner:
     """Plans for one robot; deterministic for a problem's seed, with work counted and never timed."""
@@ -36,10 +39,15 @@ class PickPlacePlanner:
         timestep_s: float = 1 / 120,
         settings: PlannerSettings | None = None,
         standing: tuple[PlacedObject, ...] = (),
+        opening_m: float | None = None,
     ):
-        """Build the models of arm and hand; ``standing`` are obstacles of every problem: another arm that does not move."""
-        self.parts = parts = ArmPlanning(robot, timestep_s, settings, standing=standing)
-        self._standing = standing
+        """Build the models of arm and hand; ``standing`` are obstacles of every problem: another arm that does not move.
+
+        ``opening_m`` is how far jaws are apart when they hold nothing; None: as far as they open.
+        """
+        self.parts = parts = ArmPlanning(robot, timestep_s, settings, opening_m, standing)
+        self._standing, self._opening_m = standing, opening_m
+        self._narrowed = dict[float, PickPlacePlanner]()
         self.robot, self.settings, self.arm = robot, parts.settings, parts.arm
         self._ends, self._candidates, self._solutions = parts.ends, parts.candidates, parts.solutions
         self._motions, self._world_of = parts.motions, parts.world_of
@@ -54,12 +62,33 @@ class PickPlacePlanner:
         """Return the twin's grasp frame in the world ``(4, 4)`` (+Z approach, X closing)."""
         return self.arm.gripper_pose(np.asarray(joint_positions_rad, float))
 
+    def of(self, grasp: Grasp | None) -> PickPlacePlanner:
+        """Return the planner of a hand whose jaws are as far apart as they are for a grasp."""
+        opening_m = None if grasp is None else grasp.opening_m
+        if opening_m == self._opening_m or opening_m is None:
+            return self
+        if opening_m not in self._narrowed:
+            self._narrowed[opening_m] = PickPlacePlanner(
+                self.robot, self.parts.timestep_s, self.settings, self._standing, opening_m
+            )
+        return self._narrowed[opening_m]
+
     def plan(self, problem: PickPlaceProblem) -> PlanReport:
         """Plan with the first grasp that can be, itself or turned about the approach axis (``grasp_candidates.turns_of``).
 
         At most ``settings.max_grasps`` are tried beyond a look at the hand alone. What a grasp fails of is the latest stage
-        that it came to.
+        that it came to. Where none can be planned that way and the hand was in the way of some, jaws are opened no wider than
+        each grasp needs (``narrowed_jaws``).
         """
+        report = self._plan_as_open(problem)
+        if report.plan is None and report.failures.keys() & HAND_IN_THE_WAY:
+            for grasps in narrowed(problem.grasps, self.robot.gripper):
+                found = self.of(grasps[0])._plan_as_open(replace(problem, grasps=grasps))
+                if found.plan is not None:
+                    return replace(report, plan=found.plan)
+        return report
+
+    def _plan_as_open(self, problem: PickPlaceProblem) -> PlanReport:
         world, rng = self._world_of(problem, problem.goal_object_to_world), np.random.default_rng(problem.seed)
         tally = GraspTally()
         for candidate in self._candidates.of(world):
@@ -92,6 +121,11 @@ class PickPlacePlanner:
         up for all that the object has turned since ``plan`` grasped it, it is let go a little higher or with some tilt.
         None: there is no way.
         """
+        fitting = self.of(plan.grasp)
+        if fitting is not self:
+            return fitting.plan_place(
+                problem, plan, joint_positions_rad, gripper_to_object, goal_object_to_world, with_carry
+            )
         world = self._world_of(problem, goal_object_to_world)
         world.shape_hand(plan.grasp)
         world.hold(gripper_to_object)

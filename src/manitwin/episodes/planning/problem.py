@@ -43,12 +43,14 @@ class Grasp:
     """A grasp as the planner takes it: ``gripper_to_object (4, 4)`` in the twin's grasp frame, and the width between the pads.
 
     ``joints_rad (2, J)`` are a hand's joints before closing and those to close to; None: it has none of its own.
+    ``opening_m`` is how far jaws are apart before they close and once they let go; None: as far as they open.
     """
 
     grasp_id: str
     gripper_to_object: np.ndarray
     width_m: float
     joints_rad: np.ndarray | None = None
+    opening_m: float | None = None
 
 
 @dataclass(frozen=True)

@@ -40,8 +40,12 @@ class HandControl(Protocol):
         """Tell it ``(h,)``, as a policy does; what it held it lets go of where that says so."""
         ...
 
-    def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[np.ndarray]:
-        """Take the first of a grasp's joints ``(2, J)``, those before closing and those to close to; others do nothing."""
+    def shaping(self, grasp_joints_rad: np.ndarray | None, opening_m: float | None = None) -> Iterator[np.ndarray]:
+        """Get ready for a grasp, and let go so wide from then on.
+
+        Fingers take the first of a grasp's joints ``(2, J)``, those before closing and those to close to; jaws its opening
+        (None: as wide as they go); a cup does nothing.
+        """
         ...
 
     def squeeze(self) -> np.ndarray:

@@ -72,7 +72,7 @@ class CupControl:
             self._let_go()
         self._on = on
 
-    def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[np.ndarray]:
+    def shaping(self, grasp_joints_rad: np.ndarray | None, opening_m: float | None = None) -> Iterator[np.ndarray]:
         """Stay as it is."""
         return iter(())
 

@@ -44,7 +44,7 @@ class FingersControl:
         self._told = np.asarray(told, float)
         self._world.robot.set_hand_targets(self._told)
 
-    def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[np.ndarray]:
+    def shaping(self, grasp_joints_rad: np.ndarray | None, opening_m: float | None = None) -> Iterator[np.ndarray]:
         """Move to the joints before closing; those to close to are kept for ``squeeze``."""
         if grasp_joints_rad is None:
             raise ValueError(f"a grasp of {self._gripper.name} needs its joints before closing and those to close to")

@@ -23,7 +23,7 @@ class JawsControl:
         """Take a world whose robot (of two arms, the one that is used now) has open jaws."""
         self._world, self._settings = world, settings
         self._number = world.robots.index(world.robot)
-        self._full_m = self._target_m = world.robot.robot.gripper.opening_m
+        self._full_m = self._open_m = self._target_m = world.robot.robot.gripper.opening_m
         self._shared = SharedTarget(self._full_m, settings)
 
     @property
@@ -52,9 +52,10 @@ class JawsControl:
         self._target_m = float(told[0])
         self._robot.set_opening_target(self._target_m)
 
-    def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[np.ndarray]:
-        """Stay open."""
-        return iter(())
+    def shaping(self, grasp_joints_rad: np.ndarray | None, opening_m: float | None = None) -> Iterator[np.ndarray]:
+        """Go to a grasp's opening, at the closing speed."""
+        self._open_m = self._full_m if opening_m is None else opening_m
+        return self.opening()
 
     def squeeze(self) -> np.ndarray:
         """Move the target on by one frame."""
@@ -69,10 +70,10 @@ class JawsControl:
 
     def opening(self) -> Iterator[np.ndarray]:
         """Open at the closing speed; they close again from there."""
-        self._shared = SharedTarget(self._full_m, self._settings)
+        self._shared = SharedTarget(self._open_m, self._settings)
         target_m = max(self._target_m, 0.0)
-        while target_m < self._full_m:
-            target_m = min(self._full_m, target_m + self._way_m)
+        while target_m != self._open_m:
+            target_m += float(np.clip(self._open_m - target_m, -self._way_m, self._way_m))
             yield np.array([target_m])
 
     def look(self, contacts: Sequence[physx.PhysxContact]) -> None:
