@@ -124,6 +124,8 @@ def test_a_hand_with_joints_takes_its_shape_before_it_reaches_and_closes_as_its_
     assert recording.finger_forces_n[carried].min() > 1.0  # thumb and fingers press on both sides
     assert recording.hand.shape[1] == recording.action_hand.shape[1] == 16
     assert recording.action_hand[-1] == pytest.approx(grasp.joints_rad[0], abs=1e-6)
+    opens = int(np.flatnonzero(recording.phase == Phase.OPEN)[0])
+    assert recording.action_hand[opens] == pytest.approx(recording.hand[opens], abs=1e-6), "all stop pressing at once"
     _, again = run("xarm7_allegro", grasp)
     assert again is not None and digest(again) == digest(recording)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 
 import numpy as np
 from sapien import physx
@@ -50,7 +51,7 @@ class FingersControl:
             raise ValueError(f"a grasp of {self._gripper.name} needs its joints before closing and those to close to")
         self._before, self._goal = grasp_joints_rad
         self._closing = None
-        return self._to(self._before)
+        return self._from(self._told, self._before)
 
     def squeeze(self) -> np.ndarray:
         """Move on the targets of all fingers that do not press yet."""
@@ -71,9 +72,10 @@ class FingersControl:
         return iter(())
 
     def opening(self) -> Iterator[np.ndarray]:
-        """Go back to the joints before closing."""
+        """Stop pressing where they are, all at once: none pushes the thing over; then go back to the joints before closing."""
         self._closing = None
-        return self._to(self._before)
+        here_rad = self._world.robot.hand_positions().copy()
+        return chain([here_rad], self._from(here_rad, self._before))
 
     def look(self, contacts: Sequence[physx.PhysxContact]) -> None:
         """See nothing: fingers feel what they press on."""
@@ -82,8 +84,8 @@ class FingersControl:
         """Return what the contacts tell."""
         return touches
 
-    def _to(self, joints_rad: np.ndarray) -> Iterator[np.ndarray]:
-        start, step_rad = self._told, self._gripper.drive.speed_rad_s * self._settings.frame_s
-        frames = int(np.ceil(np.abs(joints_rad - start).max() / step_rad))
+    def _from(self, start_rad: np.ndarray, end_rad: np.ndarray) -> Iterator[np.ndarray]:
+        step_rad = self._gripper.drive.speed_rad_s * self._settings.frame_s
+        frames = int(np.ceil(np.abs(end_rad - start_rad).max() / step_rad))
         for frame in range(1, frames + 1):
-            yield start + frame / frames * (joints_rad - start)
+            yield start_rad + frame / frames * (end_rad - start_rad)
