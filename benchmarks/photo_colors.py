@@ -1,6 +1,6 @@
 """Score the colours that are read off a photo, on photos of templates whose own colours are known.
 
-    python benchmarks/photo_colors.py [--seeds N] [--every K] [--held-out]
+    python benchmarks/photo_colors.py [--seeds N] [--every K] [--held-out] [--metals]
 
 Each thing is a template in a drawn colour word (``WORDS`` of ``colors.py``), rendered on one of the grounds of
 ``template_photos.py`` with light, shadow and the sheen of its surroundings. A camera then chooses an exposure by the
@@ -8,6 +8,9 @@ picture's mean (``MEANS``, whatever the ground is), has a white balance that is 
 the whole picture's light over it (veiling glare, 0 to 3 %). Scored are the names of the pixels of the true mask, as they are
 and with the photo's light discounted. Questions, halves and what people call a colour are those of ``colors.py``, but that
 black has to be called black.
+
+``--metals``: things of gold-coloured steel, brass, steel and copper, and of enamel in other colours, once each: which are called
+gold, as anything is and as metal in a photo is.
 """
 
 from __future__ import annotations
@@ -27,6 +30,7 @@ from manitwin.formats.meshes.textures import linear_to_srgb, srgb_to_linear
 from manitwin.models.annotators.photo_light import light_of_photo
 from manitwin.models.annotators.surface_color import lab_from_srgb, named_colors
 from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.looks import MATERIALS, color_of
 from manitwin.models.generators.templates.text import Wish
 
 MEANS = (0.15, 0.55)
@@ -45,7 +49,11 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--every", type=int, default=1, help="every Kth category")
     parser.add_argument("--held-out", action="store_true")
+    parser.add_argument("--metals", action="store_true")
     arguments = parser.parse_args()
+    if arguments.metals:
+        print_metals(arguments.held_out)
+        return
     half = [name for name in sorted(load_templates()) if held_out(name) == arguments.held_out]
     right: dict[str, Counter[str]] = {"as it is": Counter(), "light discounted": Counter()}
     total = 0
@@ -71,6 +79,36 @@ def main() -> None:
             f"{way}: "
             + ", ".join(f"{name} {counts[name]} of {total} ({counts[name] / total:.1%})" for name in sorted(ALL))
         )
+
+
+METAL_THINGS = (
+    "bell", "bottle", "bowl", "bracelet", "can", "cup", "flashlight", "fork", "frying pan", "key", "measuring cup", "mug",
+    "padlock", "screwdriver", "spoon", "thermos", "vase",
+)  # fmt: skip
+ENAMELS = ("olive", "brown", "tan", "beige", "cream", "yellow", "orange", "khaki", "maroon", "green")
+
+
+def print_metals(only_held_out: bool) -> None:
+    """Print how many things of each matter and colour are called gold."""
+    wishes = {
+        "gold steel": Wish(rgb=color_of("gold"), material=MATERIALS["steel"]),
+        "brass": Wish(material=MATERIALS["brass"]),
+        "steel": Wish(material=MATERIALS["stainless steel"]),
+        "copper": Wish(material=MATERIALS["copper"]),
+        **{f"{word} enamel": Wish(rgb=color_of(word), material=MATERIALS["enamel"]) for word in ENAMELS},
+    }
+    for matter, wish in wishes.items():
+        gold, total = Counter[bool](), 0
+        for category in (each for each in METAL_THINGS if held_out(each) == only_held_out):
+            case = zlib.crc32(f"metal {category} {matter}".encode())
+            rng = np.random.default_rng([case, 1])
+            photo = photograph(category, case, (float(rng.choice([10.0, 30.0, 55.0])),), wish=wish)[0]
+            rgba = np.dstack([as_a_camera_has_it(photo.rgb, rng), np.where(photo.mask, 255, 0).astype(np.uint8)])
+            lab = lab_from_srgb(own_pixels(rgba, rng)["light discounted"])
+            for metal in (False, True):
+                gold[metal] += named_colors(lab, False, metal_in_a_photo=metal)[0].name == "gold"
+            total += 1
+        print(f"{matter:14s} called gold: {gold[False]:2d} of {total}, as metal in a photo {gold[True]:2d}", flush=True)
 
 
 ALL = {"first", "no false", "all"}
@@ -111,15 +149,18 @@ def as_a_camera_has_it(rgb: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 def names_of(rgba: np.ndarray, rng: np.random.Generator) -> dict[str, list[str]]:
     """Return the names of the thing's pixels, by the way in which they are read."""
+    pixels = own_pixels(rgba, rng)
+    return {way: [color.name for color in named_colors(lab_from_srgb(each), False)] for way, each in pixels.items()}
+
+
+def own_pixels(rgba: np.ndarray, rng: np.random.Generator) -> dict[str, np.ndarray]:
+    """Return some of the thing's pixels ``(N, 3)`` sRGB in 0..1, by the way in which they are read."""
     inside = cv2.erode((rgba[..., 3] > 127).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     pixels = rgba[inside][:, :3] / 255
     some = pixels[rng.choice(len(pixels), min(SAMPLES, len(pixels)), replace=False)]
     light = light_of_photo(rgba)
     own = some if light is None else light.own_colors(some)
-    return {
-        "as it is": [color.name for color in named_colors(lab_from_srgb(some), False)],
-        "light discounted": [color.name for color in named_colors(lab_from_srgb(own), False)],
-    }
+    return {"as it is": some, "light discounted": own}
 
 
 if __name__ == "__main__":

@@ -51,17 +51,22 @@ class CaptionStage:
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Return ``language``."""
         physical = draft.field("physical")
-        subject = replace(read_scaled_subject(draft, known_as=draft.field("called")), light=light_of_texture(draft))
+        subject = read_scaled_subject(draft, known_as=draft.field("called"))
+        subject = replace(subject, photographed=is_photographed(draft), light=light_of_texture(draft))
         language = self._annotator.describe(subject, physical["material"], np.array(physical["extents_m"]))
         return {"language": corrected_language(language, draft).model_dump()}
+
+
+def is_photographed(draft: Draft[Item]) -> bool:
+    """Tell whether a mesh's texture is its photo as it is: only ``lift`` paints one so."""
+    return (draft.fields.get("generation") or {}).get("generator") == "lift"
 
 
 def light_of_texture(draft: Draft[Item]) -> PhotoLight | None:
     """Return the light of the photos whose pixels are the mesh's texture; None of any other mesh, or where it is not told.
 
-    Only ``lift`` paints a mesh with a photo as it is. Under a given alpha channel there is no ground to read it off.
+    Under a given alpha channel there is no ground to read it off.
     """
-    generator = (draft.fields.get("generation") or {}).get("generator")
-    if generator != "lift" or (draft.fields.get("matte") or {}).get("method", "alpha") == "alpha":
+    if not is_photographed(draft) or (draft.fields.get("matte") or {}).get("method", "alpha") == "alpha":
         return None
     return light_of_photos(cut_out_photos(draft))

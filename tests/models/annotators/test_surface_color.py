@@ -52,6 +52,22 @@ def test_css_colors_get_their_everyday_names(rgb: tuple[int, int, int], name: st
     assert color_name(lab_from_srgb(np.array(rgb) / 255)) == name
 
 
+def test_dark_gold_in_a_photo_of_metal_is_gold_and_paint_keeps_its_name() -> None:
+    for seen, name in (((118, 98, 44), "olive"), ((112, 84, 40), "brown"), ((190, 154, 84), "dark yellow")):
+        lab = lab_from_srgb(np.array(seen) / 255)
+        assert color_name(lab, metallic=False) == name
+        assert color_name(lab, metallic=False, metal_in_a_photo=True) == "gold"
+    paints = (
+        ((107, 66, 38), "brown"),
+        ((119, 118, 44), "olive"),
+        ((150, 150, 152), "grey"),
+        ((214, 170, 40), "dark yellow"),
+    )
+    for seen, name in paints:
+        lab = lab_from_srgb(np.array(seen) / 255)
+        assert color_name(lab, metallic=False) == color_name(lab, metallic=False, metal_in_a_photo=True) == name
+
+
 def test_parts_of_the_texture_that_no_face_shows_do_not_count() -> None:
     image = halves((200, 30, 30), (30, 60, 190))
     assert names(textured_square(image, (0.02, 0.48))) == ["red"]

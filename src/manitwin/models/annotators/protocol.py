@@ -28,8 +28,8 @@ class Subject:
     ``cameras`` those that took them, in the same frame and unit as the meshes. ``given`` is what an imported asset says of
     itself, in the same frame; None for every other input. ``known_as`` is what an earlier answer took it for, ``photos`` are the
     photos that it was made of, cut out (RGBA), and ``size_estimated`` says that the metres are those of an estimate. ``likely``
-    are names that it may have, each with its probability, where nobody has said one and no guess was likely enough. ``light`` is
-    that of the photo whose colours the parts have; None where there is none or it is not known.
+    are names that it may have, each with its probability, where nobody has said one and no guess was likely enough. They have
+    the colours of a photo as they are where they are ``photographed``; ``light`` is that photo's, None where it is not known.
     """
 
     name: str | None
@@ -44,6 +44,7 @@ class Subject:
     photos: tuple[Path, ...] = ()
     size_estimated: bool = False
     likely: tuple[tuple[str, float], ...] = ()
+    photographed: bool = False
     light: PhotoLight | None = None
 
 

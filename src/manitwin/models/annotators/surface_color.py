@@ -51,6 +51,11 @@ _TELLING = (
     1 / 3
 )  # of the largest neutral colour's share: a colour of that much comes first, a red box with white letters is red
 _METALLIC = 0.5
+_GOLDEN_HUE_RAD, _GOLDEN_CHROMA = (np.deg2rad(75.0), np.deg2rad(97.0)), (29.0, 50.0)
+"""CIELAB hue and chroma of gold and brass in photos, however dark (docs/measured.md).
+
+Brown paint has less hue, olive paint more, and yellow paint more chroma.
+"""
 _YELLOW_HUE_RAD = np.deg2rad(78.0)  # of CIELAB: between the centres of orange (70) and yellow (86)
 
 _WHITE_D65 = np.array([0.95047, 1.0, 1.08883])
@@ -91,12 +96,19 @@ def _srgb_from_hex(text: str) -> list[float]:
 _LAB = lab_from_srgb(np.array([_srgb_from_hex(shade) for _, shade in _SHADES]))
 
 
-def color_name(lab: np.ndarray, *, metallic: bool = True) -> str:
-    """Return the everyday name of a CIELAB colour ``(3,)``; only what is ``metallic`` is gold."""
+def color_name(lab: np.ndarray, *, metallic: bool = True, metal_in_a_photo: bool = False) -> str:
+    """Return the everyday name of a CIELAB colour ``(3,)``; only what is ``metallic`` is gold.
+
+    How bright metal is in a photo is told by what it reflects: then hue and chroma alone make it gold.
+    """
+    hue_rad, chroma = np.arctan2(lab[2], lab[1]), np.hypot(lab[1], lab[2])
+    (least_rad, most_rad), (least, most) = _GOLDEN_HUE_RAD, _GOLDEN_CHROMA
+    if metal_in_a_photo and least_rad <= hue_rad <= most_rad and least <= chroma <= most:
+        return "gold"
     name = _NAMES[int(np.linalg.norm(_LAB - lab, axis=1).argmin())]
     if name != "gold" or metallic:
         return name
-    return "dark yellow" if np.arctan2(lab[2], lab[1]) > _YELLOW_HUE_RAD else "orange"
+    return "dark yellow" if hue_rad > _YELLOW_HUE_RAD else "orange"
 
 
 def are_near(name: str, other: str) -> bool:
@@ -125,12 +137,15 @@ def measure_colors(
     parts: tuple[trimesh.Trimesh, ...],
     rng: np.random.Generator,
     own_colors: Callable[[np.ndarray], np.ndarray] | None = None,
+    *,
+    metal_in_a_photo: bool = False,
 ) -> list[ColorShare]:
     """Return up to three named colours, as people order them; empty where nothing gives the surface a colour.
 
     The largest comes first, but a colour that tells things apart before black, grey and white that are not much more.
     ``parts`` are visual parts with PBR materials. Colours are the base colours; ``own_colors`` turns those of a photo's
-    pixels (sRGB ``(N, 3)`` in 0..1) into the matter's own, where the photo's light is known.
+    pixels (sRGB ``(N, 3)`` in 0..1) into the matter's own, where the photo's light is known. ``metal_in_a_photo``: they are
+    those of a photo of something that is all metal.
     """
     colored = [part for part in parts if _has_color(part)]
     areas = np.array([part.area for part in colored])
@@ -142,7 +157,7 @@ def measure_colors(
     colors = colors if own_colors is None else own_colors(colors)
     seen = seen_from_outside(_joined(parts), points, normals)
     metallic = any(float(material_of(part).metallicFactor or 0.0) > _METALLIC for part in colored)
-    return named_colors(lab_from_srgb(colors[seen]), metallic)
+    return named_colors(lab_from_srgb(colors[seen]), metallic, metal_in_a_photo=metal_in_a_photo)
 
 
 def seen_from_outside(mesh: trimesh.Trimesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
@@ -190,7 +205,7 @@ def base_colors_at(part: trimesh.Trimesh, faces: np.ndarray, points: np.ndarray)
     return np.clip(linear_to_srgb(linear * factor), 0, 1)
 
 
-def named_colors(lab: np.ndarray, metallic: bool) -> list[ColorShare]:
+def named_colors(lab: np.ndarray, metallic: bool, *, metal_in_a_photo: bool = False) -> list[ColorShare]:
     """Return up to three named colours of what a camera saw of a surface at places ``(N, 3)`` CIELAB, as people order them.
 
     Places that one matter may show under more or less light are one matter: a scan's texture holds the light of its capture.
@@ -198,7 +213,7 @@ def named_colors(lab: np.ndarray, metallic: bool) -> list[ColorShare]:
     centers, labels = _merged(*_k_means(lab))
     shares: dict[str, float] = {}
     for index in range(len(centers)):
-        name = color_name(np.median(lab[labels == index], axis=0), metallic=metallic)
+        name = color_name(np.median(lab[labels == index], axis=0), metallic=metallic, metal_in_a_photo=metal_in_a_photo)
         shares[name] = shares.get(name, 0.0) + float((labels == index).mean())
     ranked = _ranked(_by_family(shares))
     return [ranked[0], *(c for c in ranked[1:_MOST_NAMES] if c.share >= _LEAST_SHARE)]

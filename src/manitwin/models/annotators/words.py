@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from manitwin.geometry.cavity import find_opening
@@ -18,6 +20,23 @@ _SIZE_WORDS = ((0.03, "tiny"), (0.10, "palm-sized"), (0.20, "hand-sized"), (0.35
 
 _A_NOT_AN = ("uk", "uni", "usb", "use", "ute", "eu", "one", "once")  # spelt with a vowel, spoken with a consonant
 _AN_NOT_A = ("hour", "honest", "heir", "mp3", "x-ray")
+_METALS = frozenset(
+    (
+        "metal",
+        "steel",
+        "iron",
+        "aluminium",
+        "brass",
+        "bronze",
+        "copper",
+        "silver",
+        "gold",
+        "pewter",
+        "tin",
+        "titanium",
+        "zinc",
+    )
+)
 _MADE_OF = {"wooden": "wood", "woollen": "wool", "golden": "gold", "metallic": "metal", "earthen": "clay"}
 
 
@@ -45,7 +64,10 @@ def size_words(extents_m: np.ndarray) -> str:
 def describe(subject: Subject, prior: Prior | None, material: str, extents_m: np.ndarray) -> Language:
     """Describe an object; ``prior`` is None where nobody has said what it is, and then the words say so."""
     rng = np.random.default_rng(subject.seed)
-    colors = measure_colors(subject.parts, rng, None if subject.light is None else subject.light.own_colors)
+    own_colors = None if subject.light is None else subject.light.own_colors
+    colors = measure_colors(
+        subject.parts, rng, own_colors, metal_in_a_photo=subject.photographed and is_metal(material)
+    )
     shape = _shape(subject, prior, rng)
     size = size_words(extents_m)
     category = _category(subject, prior)
@@ -60,6 +82,11 @@ def describe(subject: Subject, prior: Prior | None, material: str, extents_m: np
         caption=captions[0],
         captions=captions,
     )
+
+
+def is_metal(material: str) -> bool:
+    """Tell whether a material in words is metal and nothing else."""
+    return all(matter.split()[-1] in _METALS for matter in re.split(r", | and | or | with ", material) if matter)
 
 
 def _category(subject: Subject, prior: Prior | None) -> str:
