@@ -1,12 +1,15 @@
 """Print how tasks of scenes do that are drawn evenly over kinds: executed, kept, and carried out again in their environments.
 
     python benchmarks/tasks.py SCENES OUT --count 500 --jobs 2
+    python benchmarks/tasks.py SCENES OUT --plannable 16
 
 Tasks are made in all scenes (``OUT/tasks``, as ``manitwin tasks`` does), so many are drawn (``OUT/drawn``), of each kind in
 turn and a quarter of two literals, and executed once each (``OUT/episodes``). A task has been planned before it is one: all that
 are drawn are plannable, and what is not executed counts as not kept. With ``--replay`` each kept episode's actions are
 carried out by ``make_env``, which has to judge them a success, and the states have to be those recorded, to the bit. Run again
 with the same arguments it goes on where it ended.
+
+``--plannable``: instead, all candidates of one literal of so many scenes are checked, by as many processes as ``--jobs`` says.
 """
 
 from __future__ import annotations
@@ -14,9 +17,13 @@ from __future__ import annotations
 import argparse
 from collections import Counter, defaultdict, deque
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import cache, partial
 from math import ceil
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 
@@ -24,13 +31,22 @@ import manitwin
 from manitwin.config import RunConfig
 from manitwin.episodes.attempts import ATTEMPTS, read_attempts
 from manitwin.episodes.collect import batch_folders, collect, stored_episodes
-from manitwin.episodes.episodes_run import make_episodes
+from manitwin.episodes.episodes_run import EpisodesSource, make_episodes
+from manitwin.episodes.planning.two_arms import planner_of
 from manitwin.episodes.recording import Recording
 from manitwin.episodes.settings import TasksConfig, TrajectoriesConfig
+from manitwin.episodes.target_grasps import usable_grasps
+from manitwin.episodes.tasks.candidates import Candidate, single_actions
+from manitwin.episodes.tasks.checking import NoTask, check
 from manitwin.episodes.tasks.task_files import TASKS, read_tasks, write_tasks
 from manitwin.episodes.tasks.task_record import TaskRecord
+from manitwin.episodes.tasks.task_scene import TaskScene
 from manitwin.episodes.tasks.tasks_run import make_tasks
-from manitwin.scenes.scene_files import scene_ids
+from manitwin.robots.load import load_robot
+from manitwin.scenes.layouts.pool import pool_of
+from manitwin.scenes.loaded_scene import Scene
+from manitwin.scenes.scene_files import scene_ids, scene_name
+from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.shares import wilson_interval
 
 SPARE = 2.0  # so many times as many tasks are made as are drawn: rare kinds are not in every scene
@@ -59,6 +75,45 @@ def share(name: str, right: int, of: int, rest: str = "") -> str:
     """Return a row with a share and its 95 % interval."""
     low, high = wilson_interval(right, of)
     return f"{name:28} {right:4} of {of:4} = {right / max(1, of):6.1%} ({low:.0%} to {high:.0%}) {rest}"
+
+
+def plannable_of(scenes: Path, robot_name: str, seed: int, scene_id: str) -> tuple[Counter[str], Counter[str]]:
+    """Return how many candidates of one literal a scene has of each kind, and how many of these can be planned."""
+    source, robot, settings = EpisodesSource.of(scenes, None), load_robot(robot_name), TasksConfig(seed=seed)
+    twins, planner = TwinSource(source.dataset), planner_of(robot, settings.episode.timestep_s)
+    loaded = Scene.read(scenes / scene_name(scene_id), source.dataset)
+    grasps = cache(lambda twin_id: usable_grasps(twins.twin(twin_id), robot.gripper))
+    scene, rng = (
+        TaskScene(loaded, pool_of(source.dataset), robot, grasps),
+        np.random.default_rng([seed, crc32(scene_id.encode())]),
+    )
+    candidates, plannable = Counter[str](), Counter[str]()
+    for action in single_actions(scene, Counter()):
+        candidates[action.kind] += 1
+        try:
+            check(scene, Candidate((action,)), planner, settings.episode, int(rng.integers(1 << 62)))
+        except NoTask:
+            continue
+        plannable[action.kind] += 1
+    return candidates, plannable
+
+
+def print_plannable(scenes: Path, count: int, robot: str, seed: int, jobs: int) -> None:
+    """Print a row for each scene and kind, and one for all."""
+    ids = scene_ids(scenes)[:count]
+    every, able = Counter[str](), Counter[str]()
+    of_scene = list[int]()
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        for scene_id, (candidates, plannable) in zip(
+            ids, pool.map(partial(plannable_of, scenes, robot, seed), ids), strict=True
+        ):
+            every, able = every + candidates, able + plannable
+            of_scene.append(plannable.total())
+            print(f"{scene_id}: {plannable.total()} of {candidates.total()}, of {len(plannable)} kinds", flush=True)
+    for kind, number in sorted(every.items()):
+        print(share(kind, able[kind], number))
+    mean, low, high = np.mean(of_scene), min(of_scene), max(of_scene)
+    print(f"a scene: {every.total() / len(ids):.0f} candidates, {mean:.0f} plannable ({low} to {high})")
 
 
 def replayed(tasks: Path, episodes: Path) -> tuple[int, int, int]:
@@ -110,7 +165,11 @@ def main() -> None:
     parser.add_argument("--robot", default="panda")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--replay", action="store_true")
+    parser.add_argument("--plannable", type=int, metavar="SCENES", help="check all candidates of so many scenes")
     asked = parser.parse_args()
+    if asked.plannable:
+        print_plannable(asked.scenes, asked.plannable, asked.robot, asked.seed, asked.jobs)
+        return
     run = RunConfig(cpu=asked.jobs)
     per_scene = ceil(SPARE * asked.count / len(scene_ids(asked.scenes)))
     made, drawn, episodes = (asked.out / name for name in ("tasks", "drawn", "episodes"))

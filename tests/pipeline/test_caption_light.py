@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from manitwin.engine.stage import Draft
-from manitwin.pipeline.caption import light_of_texture
+from manitwin.pipeline.caption import is_photographed, light_of_texture
 from manitwin.pipeline.item import Item
 
 MADE = {"generation": {"generator": "lift"}, "matte": {"method": "network"}}
@@ -33,6 +33,9 @@ def draft(fields: dict[str, Any], photo: Path) -> Draft[Item]:
 def test_a_mesh_that_was_painted_with_a_photo_has_its_light(photo: Path) -> None:
     light = light_of_texture(draft(MADE, photo))
     assert light is not None and 0.5 < light.white < 0.7
+    assert is_photographed(draft(MADE, photo))
+    assert not is_photographed(draft({"generation": {"generator": "meshy"}}, photo))
+    assert not is_photographed(draft({}, photo))
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import trimesh
 from handmade import cylinder, mug, subject, visual
 from manitwin.models.annotators.priors import load_priors
 from manitwin.models.annotators.rules import RulesAnnotator
-from manitwin.models.annotators.words import article, joined, size_words, write_captions
+from manitwin.models.annotators.words import article, is_metal, joined, size_words, write_captions
 from manitwin.twin.record import Language
 
 
@@ -47,6 +48,23 @@ def test_a_red_mug_is_described_as_one() -> None:
     assert "handle" in language.shape and "hot drinks" in language.function
     assert language.caption == "A red mug made of ceramic, about 12 x 10 x 8 cm in size, used for holding hot drinks."
     assert len(language.captions) >= 4 and len(set(language.captions)) == len(language.captions)
+
+
+def test_a_golden_can_in_a_photo_is_gold_and_a_cardboard_box_is_not() -> None:
+    can = cylinder(0.03, 0.12)
+    brown = [int(255 * (c / 255) ** 2.2) for c in (112, 84, 40)] + [255]  # a base colour is linear
+    seen = subject(can, "can", parts=(visual(can, baseColorFactor=brown),))
+    words = RulesAnnotator()
+    for photographed, material, color in (
+        (True, "tin-plated steel", "gold"), (False, "tin-plated steel", "brown"), (True, "cardboard", "brown"),
+    ):  # fmt: skip
+        language = words.describe(replace(seen, photographed=photographed), material, can.extents)
+        assert language.color == color
+
+
+def test_only_what_is_all_metal_is_metal() -> None:
+    assert all(is_metal(each) for each in ("steel", "tin-plated steel", "stainless steel", "brass or steel", "metal"))
+    assert not any(is_metal(each) for each in ("steel and plastic", "aluminium or plastic", "wood", "enamel"))
 
 
 def test_without_a_color_none_is_claimed() -> None:
