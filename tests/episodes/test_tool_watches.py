@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -11,12 +11,12 @@ from brick_episodes import panda, problem
 from manitwin.episodes.episode import world_of
 from manitwin.episodes.goals.evaluation import judge
 from manitwin.episodes.goals.goal import Literal
-from manitwin.episodes.goals.world_state import WorldState
+from manitwin.episodes.goals.world_state import ObjectState, WorldState
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.tool_watches import AimWatch, CutWatch, PushWatch, StirWatch, WipeWatch
 from manitwin.geometry.cavity import Opening
 from manitwin.geometry.poses import transform
-from manitwin.physics.sapien.contacts import ContactReader
+from manitwin.physics.sapien.contacts import ContactReader, Push
 from rigid_boxes import box
 
 STEP_S = 1 / 120
@@ -94,6 +94,52 @@ def test_a_push_is_touched_by_whom_it_is_asked_of_and_tells_how_high_it_rose() -
                 each.look(world.contacts, world.contacts.read(), 0.0)
     assert watches[1].events == ()
     assert watches[0].events[0].values["rise_m"] == pytest.approx(0.5**2 / 2 / 9.81 - 0.5 * STEP_S / 2, rel=0.02)
+
+
+@dataclass
+class Touches:
+    """A reader of contacts that tells of a touch as long as it is asked to."""
+
+    touched: bool = False
+
+    def push(self, contacts: object, subject: str, by: frozenset[str]) -> Push | None:
+        return Push(np.array([1.0, 0, 0]), np.zeros(3)) if self.touched else None
+
+
+def looked_at(watch: PushWatch, at: np.ndarray, way: list[tuple[float, float, bool, float]]) -> None:
+    """Show the watch a way of x, z (m), whether it is touched, and for how long (s); ``at (3,)`` is where its middle is."""
+    reader, time_s = Touches(), 0.0
+    for x_m, z_m, touched, lasts_s in way:
+        at[:] = (x_m, 0, z_m)
+        reader.touched = touched
+        for _ in range(round(lasts_s / STEP_S) + 1):
+            watch.look(reader, [], time_s)  # type: ignore[arg-type]
+            time_s += STEP_S
+
+
+PUT_ELSEWHERE = [(0.0, 0.02, False, 0.1), (0.0, 0.02, True, 0.1), (0.2, 0.1, True, 0.2), (0.3, 0.02, True, 0.1)]
+
+
+@pytest.mark.parametrize(
+    ("then", "expected"),
+    [
+        ([(0.4, 0.02, True, 0.1)], "lifted"),  # never let go
+        ([(0.3, 0.02, False, 0.1), (0.4, 0.02, True, 0.1)], "lifted"),  # for a moment
+        ([(0.3, 0.02, False, 0.4)], "not_touched"),
+        ([(0.3, 0.02, False, 0.4), (0.31, 0.02, True, 0.1)], "hardly_moved"),
+        ([(0.3, 0.02, False, 0.4), (0.4, 0.02, True, 0.1)], None),
+        ([(0.3, 0.02, False, 0.4), (0.35, 0.06, True, 0.1), (0.4, 0.02, True, 0.1)], "lifted"),
+    ],
+)
+def test_what_was_put_somewhere_is_pushed_from_there(
+    then: list[tuple[float, float, bool, float]], expected: str | None
+) -> None:
+    at = np.zeros(3)
+    watch = PushWatch("item", frozenset({"hand"}), at.copy)
+    looked_at(watch, at, PUT_ELSEWHERE + then)
+    item = ObjectState(box([0.04, 0.04, 0.04], 0.1), transform(None, at), np.eye(4), True)
+    state = WorldState({"item": item}, frozenset(), events=watch.events, places_m={"mark": at})
+    assert judge(state, Literal("pushed_to", "item", "mark", 0.02)).failure == expected
 
 
 @pytest.mark.parametrize(

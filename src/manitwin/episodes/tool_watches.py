@@ -14,12 +14,14 @@ from sapien import physx
 from scipy.spatial import ConvexHull
 
 from manitwin.episodes.events import Pose
+from manitwin.episodes.goals.spatial import MOST_RISE_M
 from manitwin.episodes.goals.tool_use import AIMED_M
 from manitwin.episodes.goals.world_state import Event
 from manitwin.geometry.cavity import Opening
 from manitwin.geometry.poses import inverse, transform_points
 from manitwin.physics.sapien.contacts import ContactReader
 
+LEFT_S, STILL_M = 0.25, 0.001
 SECTORS = 12
 STIRRED_BAND = (0.15, 1.0)  # of the rim's radius
 STIRRED_DEPTH = 0.3  # of the vessel's, below its rim
@@ -34,28 +36,43 @@ AIMED_RAD = 0.15
 
 @dataclass
 class PushWatch:
-    """Latches that ``subject`` was touched by bodies of the robot, and how high its ``center`` rose meanwhile."""
+    """Latches that ``subject`` was touched by bodies of the robot, how high its ``center`` rose and how far it went meanwhile.
+
+    What was lifted and stands again, touched by none of them for a quarter of a second, is looked at anew from there: a thing
+    may be put somewhere and pushed then.
+    """
 
     subject: str
     by: frozenset[str]
     center: Callable[[], np.ndarray]
     force_n: float = 0.0
-    _start_m: float | None = None
+    _start: np.ndarray | None = None
+    _now: np.ndarray | None = None
     _rise_m: float = 0.0
     _touched: bool = False
+    _left: tuple[float, np.ndarray] | None = None
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """One event where it was touched: ``rise_m``."""
-        return (Event("pushed", self.subject, None, {"rise_m": self._rise_m}),) if self._touched else ()
+        """One event where it was touched: ``rise_m``, and ``way_m`` from where it stood to where it is, level."""
+        if not self._touched or self._start is None or self._now is None:
+            return ()
+        way_m = float(np.linalg.norm((self._now - self._start)[:2]))
+        return (Event("pushed", self.subject, None, {"rise_m": self._rise_m, "way_m": way_m}),)
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
         """Look at the contacts of the last step."""
-        push, height_m = reader.push(contacts, self.subject, self.by), float(self.center()[2])
+        push, self._now = reader.push(contacts, self.subject, self.by), (center := self.center())
         self.force_n = 0.0 if push is None else float(np.linalg.norm(push.force_n))
         self._touched = self._touched or self.force_n > 0
-        self._start_m = height_m if self._start_m is None else self._start_m
-        self._rise_m = max(self._rise_m, height_m - self._start_m)
+        self._start = center if self._start is None else self._start
+        self._rise_m = max(self._rise_m, float(center[2] - self._start[2]))
+        if self._rise_m <= MOST_RISE_M or self.force_n > 0:
+            self._left = None
+        elif self._left is None or np.linalg.norm(center - self._left[1]) > STILL_M:
+            self._left = time_s, center
+        elif time_s - self._left[0] >= LEFT_S:
+            self._start, self._rise_m, self._touched, self._left = center, 0.0, False, None
 
 
 @dataclass

@@ -137,13 +137,18 @@ def test_upright_lifted_pushed_and_undisturbed() -> None:
     assert judge(state(raised), Literal("lifted", "item", value=0.05)).failure == "not_held"
     assert judge(state(raised), Literal("undisturbed", "item")).failure == "moved"
     marks = {"mark": np.array([0.3, 0, 0])}
-    push = Event("pushed", "item", None, {"rise_m": 0.002})
+    push = Event("pushed", "item", None, {"rise_m": 0.002, "way_m": 0.12})
     there = replace(state(thing(at(0.3, 0.01, 0.02))), places_m=marks, events=(push,))
     literal = Literal("pushed_to", "item", "mark", 0.011)
     assert judge(there, literal).holds
     assert judge(there, Literal("pushed_to", "item", "mark", 0.009)).failure == "beside_it"
     assert judge(replace(there, events=()), literal).failure == "not_touched"
-    assert judge(replace(there, events=(replace(push, values={"rise_m": 0.05}),)), literal).failure == "lifted"
+    assert (
+        judge(replace(there, events=(replace(push, values={"rise_m": 0.05, "way_m": 0.12}),)), literal).failure
+        == "lifted"
+    )
+    nudged = replace(push, values={"rise_m": 0.002, "way_m": 0.02})
+    assert judge(replace(there, events=(nudged,)), literal).failure == "hardly_moved"
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from held_skills import around, attempt, beside, goal_of, remote
 
 from manitwin.episodes.planning.closed_hand import fingertip_corners, first_corner
 from manitwin.episodes.planning.problem import Phase
+from manitwin.episodes.skills.press import pressed_place
 from manitwin.episodes.skills.registry import SKILLS
 from manitwin.geometry.poses import transform
 
@@ -62,3 +63,15 @@ def test_the_first_corner_of_a_tilted_hand_leads() -> None:
     level = np.diag([1.0, -1, -1])
     _, lead_m = first_corner(corners, level, down)
     assert lead_m < 1e-6  # level: all of them at once
+
+
+def test_the_place_is_the_one_that_looks_upward_by_then() -> None:
+    """A thing that was laid another way since is pressed at what looks upward now."""
+    over = transform(np.diag([1.0, -1, -1]), np.array([0.0, 0, 0.02]))
+    frames = (FRAMES[0], replace(FRAMES[0], frame_to_object=over @ FRAMES[0].frame_to_object))
+    standing = transform(translation=np.array([0.4, 0.1, 0.0]))
+    for pose, expected in ((standing, frames[0]), (standing @ over, frames[1])):
+        assert pressed_place(frames, pose) == pytest.approx(pose @ expected.frame_to_object)
+        assert pressed_place(frames, pose)[2, 2] > 0.8
+    on_edge = standing @ transform(np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]))
+    assert pressed_place(frames, on_edge) == pytest.approx(on_edge)

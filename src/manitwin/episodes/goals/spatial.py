@@ -27,7 +27,7 @@ SIDE_GAP_M = (0.0, 0.14)
 UPRIGHT_RAD = np.radians(10)
 OPENS_UPWARD = np.cos(np.radians(12))
 LEAST_INSIDE_M = 0.02
-MOST_RISE_M = 0.01
+MOST_RISE_M, LEAST_PUSH_M = 0.01, 0.03
 DISTURBED_M, DISTURBED_RAD = 0.01, np.radians(5)
 
 
@@ -165,23 +165,23 @@ def undisturbed(state: WorldState, literal: Literal) -> Judgement:
 def pushed_to(state: WorldState, literal: Literal) -> Judgement:
     """Judge that an object was pushed over a place, its centre of mass the value away at most, and rests there.
 
-    Pushed is what the robot's hand touched (an event) and what never rose by more than 1 cm.
+    Pushed is what the robot's hand touched (an event) and what went 3 cm or more since without rising by more than 1 cm.
     """
     assert literal.value is not None and literal.second is not None
     thing = state.of(literal.subject)
     off_m = float(np.linalg.norm(thing.center_of_mass_m[:2] - state.place(literal.second)[:2]))
-    rises_m = [
-        event.values["rise_m"] for event in state.events if (event.kind, event.subject) == ("pushed", literal.subject)
-    ]
+    pushes = [each.values for each in state.events if (each.kind, each.subject) == ("pushed", literal.subject)]
+    rise_m, way_m = (max((values[name] for values in pushes), default=0.0) for name in ("rise_m", "way_m"))
     return judged(
         {
             "beside_it": off_m <= literal.value,
-            "not_touched": bool(rises_m),
-            "lifted": max(rises_m, default=0.0) <= MOST_RISE_M,
+            "not_touched": bool(pushes),
+            "lifted": rise_m <= MOST_RISE_M,
+            "hardly_moved": way_m >= LEAST_PUSH_M,
             "not_released": not state.is_handled(literal.subject),
             "moving": thing.at_rest,
         },
-        {"off_m": off_m, "rise_m": max(rises_m, default=0.0)},
+        {"off_m": off_m, "rise_m": rise_m, "way_m": way_m},
     )
 
 

@@ -48,10 +48,14 @@ class Press(HeldSkill):
 
         None of a thing that lies so that no such place looks upward: a scene's may, and what another step has laid down.
         """
-        target, rng = scene.target, scene.rng
-        frame = pressed_frame(scene.frames[target.name], target.object_to_world)
+        target, rng, frames = scene.target, scene.rng, scene.frames[scene.target.name]
+        frame = pressed_frame(frames, target.object_to_world)
+
+        def watch(world: RobotWorld) -> PressWatch:
+            return PressWatch(target.name, scene.fingers, lambda: pressed_place(frames, world.pose_of(target.name)))
+
         if frame is None:
-            return HeldTask((), empty=True)
+            return HeldTask((), empty=True, watch=watch)
         place = target.object_to_world @ frame.frame_to_object
         heights_m = np.array([*np.linspace(ABOVE_M, NEAR_M, FREE_KNOTS), 0.008, 0.004, 0.0, -BELOW_M])
         paths: list[HeldPath] = []
@@ -65,13 +69,19 @@ class Press(HeldSkill):
             poses = [transform(rotation, place[:3, 3] - rotation @ corner + each * place[:3, 2]) for each in heights_m]
             paths.append(HeldPath(np.array(poses), frozenset({target.name}), FREE_KNOTS))
 
-        def watch(world: RobotWorld) -> PressWatch:
-            return PressWatch(target.name, scene.fingers, lambda: world.pose_of(target.name) @ frame.frame_to_object)
-
         asked_n = SIGNATURES[self.predicate].default
         assert asked_n is not None
         guard = Guard(FREE_KNOTS, asked_n + MORE_N, speed_m_s=SPEED_M_S)
         return HeldTask(tuple(paths), empty=True, duration_s=1.0, measured=1, ending="keep", guard=guard, watch=watch)
+
+
+def pressed_place(frames: tuple[TwinFrame, ...], object_to_world: np.ndarray) -> np.ndarray:
+    """Return the frame ``(4, 4)`` in the world that is pressed of what is at a pose now; its own where none looks upward.
+
+    Another step may have laid it down another way than it began.
+    """
+    frame = pressed_frame(frames, object_to_world)
+    return object_to_world if frame is None else object_to_world @ frame.frame_to_object
 
 
 def pressed_frame(frames: tuple[TwinFrame, ...], object_to_world: np.ndarray) -> TwinFrame | None:
