@@ -206,6 +206,12 @@ def test_events_are_judged_by_what_was_measured_and_only_of_their_subject() -> N
     assert judge(here, literal).failure == "not_touched"
     assert judge(replace(here, events=(press,)), literal).holds
     assert judge(replace(here, events=(press,)), Literal("pressed", "item", value=7.0)).failure == "weak"
+    grasped = replace(press, values={"force_n": 24.0, "off_m": 0.004, "angle_rad": 1.4})
+    judgement = judge(replace(here, events=(grasped, press)), literal)
+    assert judgement.holds, "one touch does it"
+    assert judgement.measured["force_n"] == 6.0
+    both = (grasped, replace(press, values={**press.values, "off_m": 0.02}))
+    assert judge(replace(here, events=both), literal).failure == "askew", "of the hardest"
     assert judge(replace(here, events=(replace(press, subject="vessel"),)), literal).failure == "not_touched"
     off = replace(press, values={**press.values, "off_m": 0.03})
     assert judge(replace(here, events=(off,)), literal).failure == "off"
