@@ -16,9 +16,8 @@ from manitwin.episodes.skills.held_skill import tip_of
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.world import RobotWorld
 
-SWINGS_S = (
-    8.0  # what hangs swings and what lies in a bowl rolls for longer than what stands rocks, and is still at each turn
-)
+SWINGS_S = 16.0
+"""What hangs swings and what lies in a bowl rolls for longer than what stands rocks, and is still at each turn."""
 
 
 def is_reached_already(start: Start, world: RobotWorld) -> bool:

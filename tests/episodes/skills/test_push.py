@@ -17,9 +17,10 @@ from manitwin.episodes.episode import run_episode, world_of
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
 from manitwin.episodes.settings import EpisodeSettings
-from manitwin.episodes.skills.push import MARK, strokes
+from manitwin.episodes.skills.push import MARK
 from manitwin.episodes.skills.registry import SKILLS
 from manitwin.episodes.skills.skill import SkillGoal, Surroundings
+from manitwin.episodes.skills.strokes import is_met, strokes
 from manitwin.episodes.tool_watches import PushWatch
 from manitwin.geometry.poses import transform, transform_points
 from rigid_boxes import above, block, box
@@ -44,6 +45,22 @@ def test_what_is_round_would_roll_and_is_not_pushed() -> None:
     for body, slides in ((rod, False), (bar, True)):
         spot = around(body, (), 0.5, 0.05)
         assert SKILLS["push"].suits(spot.pool, spot.twin(0), None) == slides
+
+
+def test_what_the_fingertips_would_pass_over_is_not_pushed_that_way() -> None:
+    """A spoon: a bowl of 22 mm at one end, a handle of 7 mm that its middle lies in."""
+    spoon = replace(
+        box([0.2, 0.04, 0.022], 0.05),
+        hulls=(block([-0.1, -0.02, 0], [-0.06, 0.02, 0.022]), block([-0.06, -0.02, 0], [0.1, 0.02, 0.007])),
+        center_of_mass_m=np.array([0.0, 0, 0.006]),
+    )
+    spot = around(spoon, (), 0.5, 0.05)
+    for way, meets in (([1.0, 0], True), ([-1.0, 0], False), ([0, 1.0], False)):
+        assert is_met(spot.objects[0], np.array(way)) == meets  # from behind the bowl alone
+    assert is_met(SPOT.objects[0], np.array([0.6, 0.8]))
+    for seed in range(4):
+        goal = goal_of(spot, seed)
+        assert goal.places_m[MARK][0] > 0.5, "away from the bowl"
 
 
 def test_what_lies_so_that_it_would_roll_is_not_pushed_though_it_could_be_as_it_stands() -> None:

@@ -18,7 +18,8 @@ from manitwin.episodes.planning.held_path import HeldPathPlanner
 from manitwin.episodes.planning.path_timing import joint_spline
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Motion, Phase
-from manitwin.episodes.skills.push import MARK, arc_to, strokes
+from manitwin.episodes.skills.push import MARK
+from manitwin.episodes.skills.strokes import arc_to, strokes
 from manitwin.episodes.tool_watches import PushWatch
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.physics.sapien.contacts import NONE_MEANT, MeantContacts
