@@ -23,6 +23,7 @@ OTHERS_RADIUS_FACTOR = 1.2
 OTHERS_ANGLE_FACTOR = 1.4
 """How much farther than the target the others may stand: what is beyond the arm's reach is in nobody's way."""
 NEARER_RADIUS_FACTOR = 0.75
+"""How much nearer to its base than its workspace an arm may still put something down."""
 POSES_TRIED, OTHERS_TRIED = 200, 20
 
 
@@ -82,7 +83,7 @@ class PlacingArea:
         return PlacingArea(wide, self.support)
 
     def beyond(self) -> PlacingArea:
-        """Return the room in which an arm may still put something down, which planning tells: nearer to its base as well."""
+        """Return where an arm may still put something down: wider, and nearer to its base. Planning tells whether it can."""
         workspace = self.wider().workspace
         return PlacingArea(replace(workspace, min_radius_m=workspace.min_radius_m * NEARER_RADIUS_FACTOR), self.support)
 

@@ -21,7 +21,7 @@ from manitwin.geometry.cavity import Opening
 from manitwin.geometry.poses import inverse, transform_points
 from manitwin.physics.sapien.contacts import ContactReader
 
-LEFT_S, STILL_M = 0.25, 0.001
+LEFT_S, STILL_M = 0.25, 0.001  # untouched for so long, moving no farther: what was lifted has been put somewhere
 SECTORS = 12
 STIRRED_BAND = (0.15, 1.0)  # of the rim's radius
 STIRRED_DEPTH = 0.3  # of the vessel's, below its rim

@@ -50,30 +50,27 @@ class Beside(Skill):
         for share in INSIDE_SHARES:
             for area in (around.area, around.area.beyond()):
                 for yaw in rng.uniform(-np.pi, np.pi, YAWS):
-                    plane_to_world = _about_z(yaw)
-                    turn = plane_to_world[:2, :2]
-                    angles = self._directions_rad(rng, share)
-                    offsets = np.column_stack([np.cos(angles), np.sin(angles)])
-                    places = middle + rng.uniform(0.02, reach_m, (PLACES, 1)) * offsets - turn @ center
-                    turned = corners @ turn.T
-                    gaps_m = separations_m(turned, beside, places)
-                    free = (gaps_m >= MIN_GAP_M) & (gaps_m <= self._most_gap_m * share)
-                    for each in taken:
-                        free[free] = separations_m(turned, each, places[free]) >= MIN_GAP_M
-                    for at in places[free]:
-                        if area.reaches(at, turned + at):
-                            yield transform(plane_to_world, np.array([*at, 0.0])) @ object_to_plane
-                            break  # what cannot be planned there is tried turned otherwise
+                    turn = _about_z(yaw)
+                    turned = corners @ turn[:2, :2].T
+                    places = middle + self._offsets_m(rng, share, reach_m) - turn[:2, :2] @ center
+                    near = separations_m(turned, beside, places) <= share * self._most_gap_m
+                    free = np.all([separations_m(turned, each, places) >= MIN_GAP_M for each in taken], axis=0)
+                    at = next((at for at in places[near & free] if area.reaches(at, turned + at)), None)
+                    if at is not None:  # one of each turn: what cannot be planned there is tried turned otherwise
+                        yield transform(turn, np.array([*at, 0.0])) @ object_to_plane
 
     @property
     def _most_gap_m(self) -> float:
         return NEAR_M if self.name == "near" else SIDE_GAP_M[1]
 
-    def _directions_rad(self, rng: np.random.Generator, share: float) -> np.ndarray:
+    def _offsets_m(self, rng: np.random.Generator, share: float, reach_m: float) -> np.ndarray:
+        """Draw ways ``(N, 2)`` from the partner's centre of mass to the target's, in a share of the sector."""
         if self.name == "near":
-            return rng.uniform(-np.pi, np.pi, PLACES)
-        side = SIDES[self.name]
-        return np.asarray(np.arctan2(side[1], side[0]) + share * SECTOR_RAD * rng.uniform(-1, 1, PLACES))
+            angles = rng.uniform(-np.pi, np.pi, PLACES)
+        else:
+            side = SIDES[self.name]
+            angles = np.arctan2(side[1], side[0]) + share * SECTOR_RAD * rng.uniform(-1, 1, PLACES)
+        return np.asarray(rng.uniform(0.02, reach_m, (PLACES, 1)) * np.column_stack([np.cos(angles), np.sin(angles)]))
 
 
 SIDE_SKILLS = tuple(Beside(name, predicate=name) for name in (*SIDES, "near"))

@@ -68,11 +68,9 @@ class Push(Skill):
             if float(way @ center) < MOST_INWARD * way_m * float(np.linalg.norm(center)):
                 continue
             hand = center - (np.linalg.norm(corners - center, axis=1).max() + BEHIND_M) * way / way_m
-            if not is_met(moved, way / way_m):
-                continue
             if not around.area.reaches(center + way, corners + way) or not around.area.wider().reaches(hand, corners):
                 continue
-            if all(separation_m(swept, each) >= MIN_GAP_M for each in taken):
+            if all(separation_m(swept, each) >= MIN_GAP_M for each in taken) and is_met(moved, way / way_m):
                 yield transform(None, np.array([*way, 0.0])) @ moved.object_to_world
 
     def set_goal(
