@@ -34,7 +34,7 @@ class FinishStage:
     gripper: Gripper
 
     name: ClassVar[str] = "finish"
-    version: ClassVar[str] = "9"
+    version: ClassVar[str] = "10"
     reads: ClassVar[tuple[str, ...]] = (
         "visual.glb", "solid.npz", "hulls.npz", "grasps.parquet", "photo.png?", "matte?", "naming?", "generation?", "geometry",
         "gate", "physical", "size", "collision", "language", "points", "frames_missing", GRASP_POINTS, "grasps",
@@ -105,7 +105,7 @@ def card_text(draft: Draft[Item]) -> CardText:
     mass, friction = physical["mass_kg"], physical["friction_static"]
     facts = (
         ("size", " x ".join(f"{100 * side:.1f}" for side in physical["extents_m"]) + " cm"),
-        ("mass", f"{_mass(mass['value'])} ({_mass(mass['low'])} to {_mass(mass['high'])})"),
+        ("mass", _mass_between(mass["value"], mass["low"], mass["high"])),
         ("friction", f"{friction['value']:.2f}"),
         ("grasps held", f"{grasps['verified']} of {grasps['simulated']}"),
     )
@@ -120,5 +120,12 @@ def card_text(draft: Draft[Item]) -> CardText:
     return CardText(language["category"], language["caption"], facts, footer, stamp)
 
 
+def _mass_between(value_kg: float, low_kg: float, high_kg: float) -> str:
+    value, low, high = (_mass(each) for each in (value_kg, low_kg, high_kg))
+    return value if low == value == high else f"{value} ({low} to {high})"
+
+
 def _mass(kilograms: float) -> str:
-    return f"{kilograms:.2f} kg" if kilograms >= 1 else f"{1000 * kilograms:.0f} g"
+    if kilograms >= 1:
+        return f"{kilograms:.2f} kg"
+    return f"{1000 * kilograms:.0f} g" if kilograms >= 0.01 else f"{1000 * kilograms:.2g} g"
