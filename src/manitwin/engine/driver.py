@@ -108,9 +108,9 @@ class Driver:
         if not self._running and (self.result.stopped is not None or not (any(self._queues.values()) or self._more)):
             return self.result.stopped is None and self._give_tables(self._tables.due_at_the_end())
         ended = [(ticket, reply, *self._running.pop(ticket)) for ticket, reply in self.executor.ended(self._wait_s())]
-        self._announcer.stages_advanced(
-            self.executor.parts(), {ticket: flight for ticket, (flight, _) in self._running.items()}
-        )
+        parts = self.executor.parts()
+        running = {ticket: self._running[ticket][0] for ticket in parts if ticket in self._running}
+        self._announcer.stages_advanced(parts, running)
         for ticket, reply, flight, needs in ended:
             self._outstanding[needs] -= 1
             self._budget.end(
