@@ -28,6 +28,7 @@ from manitwin.physics.sapien import hand_scene
 from manitwin.physics.sapien import trial as sapien_trial
 from manitwin.physics.sapien.trial import SapienTrial
 from manitwin.physics.trial import TrialSettings
+from manitwin.pipeline.second_opinion import cohens_kappa
 from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.twin.loaded_twin import Twin
 
@@ -145,12 +146,14 @@ def _plain_trials() -> Iterator[None]:
 def _compare(folders: list[Path], count: int) -> None:
     """Print how often the verdicts are those of the reference: of plain trials at today's step, and as they are run."""
     verdicts: dict[str, list[bool]] = {"reference": [], "plain": [], "as run": []}
+    is_jittered: list[bool] = []
     for folder in folders:
         twin, rng = Twin(folder), np.random.default_rng(0)
         grasps, gripper = twin.grasps(verified_only=False), load_gripper("panda")
         index = rng.choice(len(grasps), min(count, len(grasps)), replace=False)
         poses = grasps.gripper_to_object[index]
         moved = jittered(poses, grasps.depth_m[index], rng, sigma_deg=10.0, sigma_m=0.006)
+        is_jittered += [False] * len(poses) + [True] * len(moved)
         poses, body = np.concatenate([poses, moved]), twin.rigid_body()
         with _plain_trials():
             reference = SapienTrial().run(body, gripper, poses, replace(_settings(), **REFERENCE))  # type: ignore[arg-type]
@@ -158,10 +161,14 @@ def _compare(folders: list[Path], count: int) -> None:
         as_run = SapienTrial().run(body, gripper, poses, _settings())
         for name, results in zip(verdicts, (reference, plain, as_run), strict=True):
             verdicts[name] += [result.outcome == "held" for result in results]
-    truth = np.array(verdicts["reference"])
+    truth, jitter = np.array(verdicts["reference"]), np.array(is_jittered)
     for name in ("plain", "as run"):
-        agree = float((np.array(verdicts[name]) == truth).mean())
-        print(f"{name}: {100 * agree:.1f} % of {len(truth)} verdicts are the reference's (of which {truth.sum()} held)")
+        for kind, some in (("proposed", ~jitter), ("jittered", jitter)):
+            said, true = np.array(verdicts[name])[some], truth[some]
+            print(
+                f"{name}, {kind}: {100 * (said == true).mean():.1f} % of {len(true)} verdicts are the reference's (of which"
+                f" {true.sum()} held; {(said & ~true).sum()} held here alone), kappa {cohens_kappa(said, true) or 0.0:.2f}"
+            )
 
 
 def _one(job: tuple[Path, int]) -> float:
