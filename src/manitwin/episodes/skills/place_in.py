@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from manitwin.episodes.skills.dropping import rest_after_drop
 from manitwin.episodes.skills.skill import Skill, Surroundings, tries
-from manitwin.episodes.skills.within_rim import FREE_FALL_M, as_it_is, on_end, radius_on_end
+from manitwin.episodes.skills.within_rim import FREE_FALL_M, as_it_is, leaning, on_end, radius_on_end
 from manitwin.geometry.hull_distance import PlacedParts
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
@@ -18,7 +18,7 @@ from manitwin.scenes.layouts.stacking import Mouth, mouth_of, open_poses, put_in
 
 LEAST_DEPTH_M = 0.025  # of a vessel: what is put on a plate lies on it, and rolls off
 LEANING_FALL_M = 0.004  # above where a drop ended
-AS_IT_IS_TRIED, LYING_TRIED, ON_END_TRIED = 3, 4, 12
+AS_IT_IS_TRIED, LYING_TRIED, ON_END_TRIED, LEANING_TRIED = 3, 4, 12, 12
 ROUNDS = 5  # of tries; the next is only made where no pose of those before can be planned for
 RESTS_FIRST = 8  # of where drops ended, before the poses that they began in
 PERTURBED, OFF_M, OFF_RAD = 3, 0.005, np.radians(3)
@@ -75,6 +75,9 @@ class PlaceIn(Skill):
             by_turns = zip_longest(steadiest(chain(as_now, lying)), steadiest(ends))
             pairs = [pair for both in by_turns for pair in both if pair is not None]
             yield from self._steady(around, target, partner, [rest for rest, _ in pairs[:RESTS_FIRST]], rng)
+            leans = tries(lambda: leaning(body, standing, vessel, mouth, rng), LEANING_TRIED)
+            for rest, begun in steadiest(leans):
+                yield from self._steady(around, target, partner, [begun, rest], rng)
             for rest, begun in pairs:
                 falls_far = _farthest_m(body.parts.whole, begun, rest) > FAR_FALL_M
                 yield from self._steady(around, target, partner, [begun], rng, 2 if falls_far else 1)

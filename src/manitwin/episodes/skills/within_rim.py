@@ -1,4 +1,4 @@
-"""Poses of an object within a vessel's rim: on end, or turned as it lies now; lowered until something is near below it."""
+"""Poses of an object within a vessel's rim: on end, as it lies now, or between the two; lowered until something is near below it."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ LET_GO_M = 0.04  # the lower end is so deep below the rim: a hand that goes deep
 LEAST_ROOM_M = 0.004  # all around a thing on end
 FREE_FALL_M = 0.002  # above where a thing would come to rest by its shape
 ABOVE_RIM_M = 0.02  # where lowering begins
+END_M = 0.01  # of what leans, all that is no higher above its lowest point is its lower end
 
 
 def on_end(
@@ -39,10 +40,29 @@ def as_it_is(
     None where the rim is too narrow, or the thing would lie on it.
     """
     pose = _within(body, _yaw(rng) @ rotation, mouth, -ABOVE_RIM_M, rng)
-    lowered = None if pose is None else _lowered(body, pose, vessel, mouth)
-    if lowered is None or transform_points(lowered, body.parts.whole)[:, 2].min() > mouth.center_m[2]:
+    return None if pose is None else _lowered_below_rim(body, pose, vessel, mouth)
+
+
+def leaning(
+    body: PoolBody, rotation: np.ndarray, vessel: PlacedParts, mouth: Mouth, rng: np.random.Generator
+) -> np.ndarray | None:
+    """Draw a pose ``(4, 4)`` with a ``rotation (3, 3)`` tilted by up to a quarter turn, one end of its longer side down in the rim.
+
+    The side that is up stays above what leans so: a hand that took it from there is above the rim with it. None where the thing
+    would lie on the rim, or its centre of mass be beside the vessel.
+    """
+    side = rng.choice([-1.0, 1.0]) * _longer_side(body.parts.whole @ rotation.T)
+    tilt = Rotation.from_rotvec(rng.uniform(0, np.pi / 2) * np.cross([0.0, 0, 1], side)).as_matrix()
+    turned = _yaw(rng) @ tilt @ rotation
+    points, center = body.parts.whole @ turned.T, turned @ body.body.center_of_mass_m
+    lowest_m = points[:, 2].min()
+    end = points[points[:, 2] < lowest_m + END_M].mean(0)
+    around, out_m = rng.uniform(-np.pi, np.pi), RIM_SLACK * mouth.radius_m * np.sqrt(rng.random())
+    at = mouth.center_m[:2] - end[:2] + out_m * np.array([np.cos(around), np.sin(around)])
+    if np.linalg.norm(at + center[:2] - mouth.center_m[:2]) > mouth.radius_m:
         return None
-    return lowered
+    above = transform(turned, np.array([*at, mouth.center_m[2] + ABOVE_RIM_M - lowest_m]))
+    return _lowered_below_rim(body, above, vessel, mouth)
 
 
 def _within(
@@ -62,6 +82,18 @@ def _within(
 def _lowered(body: PoolBody, pose: np.ndarray, vessel: PlacedParts, mouth: Mouth) -> np.ndarray | None:
     lowered = lower(body, pose, [vessel], mouth.center_m[2] - 2 * mouth.depth_m)
     return None if lowered is None else transform(translation=np.array([0.0, 0, FREE_FALL_M])) @ lowered.pose
+
+
+def _lowered_below_rim(body: PoolBody, pose: np.ndarray, vessel: PlacedParts, mouth: Mouth) -> np.ndarray | None:
+    lowered = _lowered(body, pose, vessel, mouth)
+    if lowered is None or transform_points(lowered, body.parts.whole)[:, 2].min() > mouth.center_m[2]:
+        return None
+    return lowered
+
+
+def _longer_side(points: np.ndarray) -> np.ndarray:
+    """Return the level direction ``(3,)`` in which points ``(N, 3)`` extend the farthest."""
+    return np.array([*np.linalg.eigh(np.cov(points[:, :2].T))[1][:, 1], 0.0])
 
 
 def _yaw(rng: np.random.Generator) -> np.ndarray:
