@@ -51,7 +51,8 @@ class PlaceIn(Skill):
         a banana that balances on the rim of a bowl is no goal. Where a drop ended is one, and comes before where it began: a fork
         on end in a bowl falls to any side, over the rim or against the hand. Of those that lie, some as the target lies now, and
         those on end, by turns, the ones come first that move the least: the hand may meet the rim for all of one kind. Where
-        a hand has no room in a deep vessel things are let go at its rim: after the first rests come the poses before the drop.
+        a hand has no room in the vessel, things are let go leaning, tilted from how they lie now, so that a hand that took them
+        from above stays above the rim; or at the rim of a deep vessel: the poses before the drop.
         """
         assert partner is not None
         mouth = mouth_of(around.body(partner), around.objects[partner].object_to_world)

@@ -1,4 +1,4 @@
-"""Poses of an object within a vessel's rim: on end, as it lies now, or between the two; lowered until something is near below it."""
+"""Poses of an object within a vessel's rim: on end, as it lies now, or between the two; lowered until something is near below."""
 
 from __future__ import annotations
 
@@ -46,10 +46,10 @@ def as_it_is(
 def leaning(
     body: PoolBody, rotation: np.ndarray, vessel: PlacedParts, mouth: Mouth, rng: np.random.Generator
 ) -> np.ndarray | None:
-    """Draw a pose ``(4, 4)`` with a ``rotation (3, 3)`` tilted by up to a quarter turn, one end of its longer side down in the rim.
+    """Draw a pose ``(4, 4)`` with a ``rotation (3, 3)`` tilted by up to a quarter turn, an end of its longer side below the rim.
 
-    The side that is up stays above what leans so: a hand that took it from there is above the rim with it. None where the thing
-    would lie on the rim, or its centre of mass be beside the vessel.
+    What is its upper side now faces up: a hand that takes it from above is then above the rim, beside the higher end. None
+    where the thing would lie on the rim, or its centre of mass be beside the vessel.
     """
     side = rng.choice([-1.0, 1.0]) * _longer_side(body.parts.whole @ rotation.T)
     tilt = Rotation.from_rotvec(rng.uniform(0, np.pi / 2) * np.cross([0.0, 0, 1], side)).as_matrix()
