@@ -17,7 +17,7 @@ from manitwin.errors import UsageError
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose
-from rigid_boxes import above
+from rigid_boxes import above, box
 from twin_folders import twin_id
 
 DICE = (GRASPS["dice"],)
@@ -128,6 +128,34 @@ def test_into_a_deep_vessel_things_are_also_let_go_at_its_rim() -> None:
     low_m = np.array([transform_points(pose, dice)[:, 2].min() for pose in goal.poses])
     assert (low_m < 0.03).any()  # where it comes to rest
     assert (low_m > 0.16 + 0.004 - LET_GO_M - 0.01).any()  # where a hand that is wider than the pot can let it go
+
+
+def test_what_is_held_beside_its_heavy_end_leans_in_a_small_bowl_that_has_no_room_for_the_hand() -> None:
+    hammer = box([0.24, 0.03, 0.03], 0.3, 0.6, center_m=(0.08, 0, 0))
+    bowl, _ = deep_pot(0.05, 0.055)
+    lies, stands = transform(None, np.array([0, 0, 0.015])), np.eye(4)
+    names = twin_id(91), twin_id(90)
+    twins = (
+        PoolTwin(names[0], "0", "hammer", (StandingPose(0, lies, 1.0, 0.13),), False, ()),
+        PoolTwin(names[1], "0", "bowl", (StandingPose(0, stands, 1.0, 0.07, True),), True, ()),
+    )
+    pool = Pool(twins, {names[0]: hammer, names[1]: bowl}.__getitem__)
+    surroundings = around(
+        PlacedObject("object_00", names[0], hammer, transform(None, np.array([0.45, -0.2, 0.015]))),
+        PlacedObject("object_01", names[1], bowl, transform(None, np.array([0.5, 0.1, 0]))),
+        pool=pool,
+    )
+    goal = goal_of("place_in", surroundings)
+    assert goal is not None
+    across = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]])  # from above, closing across the length
+    held = Grasp("g0", above([0.07, 0, 0], across), 0.03)
+    on_end = [pose for pose in goal.poses if abs(pose[2, 0]) > 0.99]
+    upright = replace(goal, poses=tuple(on_end))
+    assert on_end and attempt(surroundings, upright, (held,)).outcome == "no_plan", (
+        "the hand is in the bowl, or in the table"
+    )
+    facts = attempt(surroundings, goal, (held,))
+    assert facts.outcome == "kept", (facts, facts.evaluation)
 
 
 def test_the_same_seed_gives_the_same_poses() -> None:
