@@ -241,7 +241,14 @@ class ProblemWorld:
         self.arm.hold(gripper_to_object)
         self._hand.hold(gripper_to_object)
 
-    def is_hand_free(self, phase: Phase, *grippers_to_world: np.ndarray) -> bool:
-        """Tell whether the hand, wherever its arm, is free at poses in a phase."""
-        self._hand.enter(phase)
+    def is_hand_free(
+        self,
+        phase: Phase,
+        *grippers_to_world: np.ndarray,
+        margin_m: float | None = None,
+        meant: frozenset[str] = frozenset(),
+        spare_m: float = 0.0,
+    ) -> bool:
+        """Tell whether the hand, wherever its arm, is free at poses in a phase; all else as ``CollisionWorld.enter`` takes it."""
+        self._hand.enter(phase, margin_m, meant, spare_m)
         return all(self._hand.is_free(pin.SE3ToXYZQUAT(pose_of(pose))) for pose in grippers_to_world)

@@ -56,6 +56,8 @@ class HeldKnots:
         parts, hands = self._parts, path.poses @ gripper_to_object
         if any(parts.known.out_of_reach(hands[k]) for k in (0, len(hands) // 2, -1)):
             return "path_unreachable"
+        if not self._is_hand_free(world, path, hands, spare_m):
+            return "path_blocked"
         failure: PlanFailure = "path_unreachable"
         seen: list[np.ndarray] = []
         for start in (near_rad, *parts.known.nearest(hands[0], STARTS)):
@@ -93,6 +95,19 @@ class HeldKnots:
             knots.append(knot)
         return np.array(knots)
 
+    def _is_hand_free(self, world: ProblemWorld, path: HeldPath, hands: np.ndarray, spare_m: float) -> bool:
+        """Tell whether the hand with what it holds is free at each pose, wherever its arm: far cheaper than to seek the joints.
+
+        From the end: there most paths come near to something.
+        """
+        margin_m = self._parts.settings.clearance_m
+        return all(
+            world.is_hand_free(
+                self._phase, hands[number], margin_m=margin_m, meant=_meant(world, path, number), spare_m=spare_m
+            )
+            for number in reversed(range(len(hands)))
+        )
+
     def _begin(
         self, world: ProblemWorld, path: HeldPath, hands: np.ndarray, first_rad: np.ndarray, spare_m: float
     ) -> np.ndarray | PlanFailure:
@@ -103,7 +118,10 @@ class HeldKnots:
         return self.onward(world, path.part(1, len(path.poses)), hands[1:], [first_rad], spare_m=spare_m)
 
     def _enter(self, world: ProblemWorld, path: HeldPath, number: int, spare_m: float) -> None:
-        meant = path.meant if number >= path.meant_from else frozenset[str]()
-        if world.problem.target.name in meant:
-            meant = meant | {STANDING}
-        world.arm.enter(self._phase, self._parts.settings.clearance_m, meant, spare_m)
+        world.arm.enter(self._phase, self._parts.settings.clearance_m, _meant(world, path, number), spare_m)
+
+
+def _meant(world: ProblemWorld, path: HeldPath, number: int) -> frozenset[str]:
+    """Return the names of what may be touched at a knot of a path."""
+    meant = path.meant if number >= path.meant_from else frozenset[str]()
+    return meant | {STANDING} if world.problem.target.name in meant else meant
