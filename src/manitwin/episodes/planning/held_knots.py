@@ -56,7 +56,7 @@ class HeldKnots:
         parts, hands = self._parts, path.poses @ gripper_to_object
         if any(parts.known.out_of_reach(hands[k]) for k in (0, len(hands) // 2, -1)):
             return "path_unreachable"
-        if not self._is_hand_free(world, path, hands, spare_m):
+        if not self.is_hand_free(world, path, gripper_to_object, spare_m):
             return "path_blocked"
         failure: PlanFailure = "path_unreachable"
         seen: list[np.ndarray] = []
@@ -70,6 +70,21 @@ class HeldKnots:
                 return joint_spline(knots)
             failure = later(failure, knots)
         return failure
+
+    def is_hand_free(
+        self, world: ProblemWorld, path: HeldPath, gripper_to_object: np.ndarray, spare_m: float = 0.0
+    ) -> bool:
+        """Tell whether the hand with what it holds is free at each pose, wherever its arm: far cheaper than to seek the joints.
+
+        From the end: there most paths come near to something.
+        """
+        hands, margin_m = path.poses @ gripper_to_object, self._parts.settings.clearance_m
+        return all(
+            world.is_hand_free(
+                self._phase, hands[number], margin_m=margin_m, meant=_meant(world, path, number), spare_m=spare_m
+            )
+            for number in reversed(range(len(hands)))
+        )
 
     def onward(
         self,
@@ -94,19 +109,6 @@ class HeldKnots:
                 return "path_blocked"
             knots.append(knot)
         return np.array(knots)
-
-    def _is_hand_free(self, world: ProblemWorld, path: HeldPath, hands: np.ndarray, spare_m: float) -> bool:
-        """Tell whether the hand with what it holds is free at each pose, wherever its arm: far cheaper than to seek the joints.
-
-        From the end: there most paths come near to something.
-        """
-        margin_m = self._parts.settings.clearance_m
-        return all(
-            world.is_hand_free(
-                self._phase, hands[number], margin_m=margin_m, meant=_meant(world, path, number), spare_m=spare_m
-            )
-            for number in reversed(range(len(hands)))
-        )
 
     def _begin(
         self, world: ProblemWorld, path: HeldPath, hands: np.ndarray, first_rad: np.ndarray, spare_m: float

@@ -25,7 +25,7 @@ from manitwin.geometry.poses import transform
 
 FROM_WHERE_IT_IS_RAD = 0.9  # to the first knot from where the arm has come to
 WITHDRAWN_M = 0.05
-MOST_PAIRS = 400  # of a grasp and a path, 1 to 5 ms each
+MOST_PAIRS = 400  # of a grasp and a path, beyond a look at the hand: 1 to 5 ms each
 SPARE_M = 0.015  # things move by as much as the jaws close on them, and as their weight comes on the jaws
 
 
@@ -94,7 +94,11 @@ class HeldPathPlanner:
             if failure is None and self._serves is not None:
                 used = replace(problem.grasps[candidate.index], gripper_to_object=candidate.gripper_to_object)
                 failure = None if self._serves(used) else "taker_blocked"
+            world.hold(candidate.gripper_to_object)
             for path in paths if failure is None else ():
+                if not self._knots.is_hand_free(world, path, candidate.gripper_to_object):
+                    failure = "path_blocked" if failure is None else later(failure, "path_blocked")
+                    continue
                 pairs += 1
                 pair = candidate.index, candidate.gripper_to_object, path
                 outcome = self._plan_pair(world, *pair, longest_s, rng, SPARE_M)
