@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from planning_problems import TABLE, above, grasps_from_above, problem, standing, wall
 
+from manitwin.episodes.planning import held_path
 from manitwin.episodes.planning.arm_planning import ArmPlanning
-from manitwin.episodes.planning.held_knots import HeldPath
+from manitwin.episodes.planning.held_knots import HeldKnots, HeldPath
 from manitwin.episodes.planning.held_path import SPARE_M, HeldPathPlanner
 from manitwin.episodes.planning.problem import Phase
 from manitwin.robots.load import load_robot
@@ -70,3 +71,24 @@ def test_spare_room_is_asked_of_the_arm_and_not_of_what_it_holds(parts, beside_a
     for spare_m in (0.0, SPARE_M):  # the brick is 4 mm above the table, the fingers 5 cm
         world.arm.enter(Phase.CARRY, 0.001, frozenset(), spare_m)
         assert world.arm.is_free(q), world.arm.touching(q)
+
+
+def test_where_the_hand_alone_is_in_the_way_no_joints_are_sought_and_none_would_serve(parts, beside_a_wall) -> None:
+    world, knots = parts.world_of(beside_a_wall, beside_a_wall.target.object_to_world), HeldKnots(parts, Phase.CARRY)
+    world.hold(above(0.08))
+    told = set[bool]()
+    for x_m in np.arange(0.35, 0.62, 0.01):
+        is_free = knots.is_hand_free(world, to(x_m), above(0.08))
+        world.arm.enter(Phase.CARRY, parts.settings.clearance_m)
+        joints = [parts.arm.inverse(pose @ above(0.08), parts.arm.home) for pose in to(x_m).poses]
+        assert is_free or not all(q is not None and world.arm.is_free(q) for q in joints)
+        told.add(is_free)
+    assert told == {True, False}
+
+
+def test_what_the_hand_alone_forbids_does_not_count_towards_the_most_that_are_tried(
+    parts, beside_a_wall, tight_x_m, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(held_path, "MOST_PAIRS", 1)
+    wide = to(tight_x_m - 0.05)
+    assert planned(parts, beside_a_wall, *(to(tight_x_m + 0.03),) * 3, wide) is wide
