@@ -78,12 +78,16 @@ class GraspPart(Record):
 
 
 class Material(Record):
-    """Contact properties of a surface material; ``source`` says where they are from."""
+    """Contact properties of a surface material; ``source`` says where they are from.
+
+    ``wall_m`` is how thick walls of open ware are made of it; None where they are not.
+    """
 
     friction_static: LowTypicalHigh
     friction_dynamic: LowTypicalHigh
     restitution: LowTypicalHigh
     density_kg_m3: LowTypicalHigh
+    wall_m: LowTypicalHigh | None = None
     source: str
 
 

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import trimesh
 
 from manitwin.config import Resource
 from manitwin.geometry.boxes import upright_extents
-from manitwin.geometry.ray_caster import local_thickness
-from manitwin.geometry.sampling import sample_surface
 from manitwin.models.annotators.likely_names import usual_of
 from manitwin.models.annotators.point_rules import select_points
 from manitwin.models.annotators.priors import Interval, Prior, lookup, unknown_prior
@@ -20,6 +17,7 @@ from manitwin.models.annotators.protocol import (
     SelectedPoints,
     Subject,
 )
+from manitwin.models.annotators.walls import density_by_wall, is_outer_skin, median_thickness
 from manitwin.models.annotators.words import describe
 from manitwin.twin.record import Language
 from manitwin.twin.record_values import Estimate
@@ -29,9 +27,6 @@ _SIZE_EXPONENT = (
     2.0  # mass grows about with the square of the size in a category: larger things have relatively thinner walls
 )
 _SAME_SIZE_SPREAD = 0.6  # of the category's spread of mass that is left among things of one size
-_SKIN_FACTOR = 3.0  # a mesh this many times thicker than the wall of such a thing is a closed outer skin
-_LEAST_SKIN_M = 0.008  # thicker in the median than both walls of any thin-walled thing (measured: 5 mm at most)
-_THICKNESS_SAMPLES = 800
 
 
 class RulesAnnotator:
@@ -72,12 +67,14 @@ class RulesAnnotator:
 def estimate_physical(subject: Subject, prior: Prior | None) -> PhysicalEstimates:
     """Return what the prior and the mesh say; ``prior`` is None where nobody has said what the thing is."""
     density: Estimate | None
+    bulk: Interval | None = None
     if prior is None:
         usual, prior = usual_of(subject.likely), unknown_prior()
         size, density = usual.longest_axis_m, usual.bulk_density_kg_m3
     else:
         size = prior.longest_axis_m.estimate(prior.source)
-        bulk = prior.bulk_density_kg_m3
+        by_wall = density_by_wall(prior, subject.solid, subject.seed) if subject.metric else None
+        bulk = by_wall or prior.bulk_density_kg_m3
         density = None if bulk is None else bulk.estimate(prior.source)
     extents = upright_extents(subject.solid.vertices)
     scale = 1.0 if subject.metric else size.value / float(extents.max())
@@ -86,7 +83,7 @@ def estimate_physical(subject: Subject, prior: Prior | None) -> PhysicalEstimate
         longest_axis_m=None if subject.metric else size,
         mass_kg=_unknown_mass(density, volume_m3)
         if prior.category == "unknown"
-        else _mass(prior, longest_m, volume_m3, 0.0 if subject.metric else _log_spread(prior.longest_axis_m)),
+        else _mass(prior, bulk, longest_m, volume_m3, 0.0 if subject.metric else _log_spread(prior.longest_axis_m)),
         bulk_density_kg_m3=density,
         friction_static=prior.friction_static.estimate(prior.source),
         friction_dynamic=prior.friction_dynamic.estimate(prior.source),
@@ -97,17 +94,17 @@ def estimate_physical(subject: Subject, prior: Prior | None) -> PhysicalEstimate
     )
 
 
-def _mass(prior: Prior, longest_m: float, volume_m3: float, size_spread: float) -> Estimate:
-    """Combine what such a thing of this size weighs with bulk density times volume, the narrower one counting more.
+def _mass(prior: Prior, bulk: Interval | None, longest_m: float, volume_m3: float, size_spread: float) -> Estimate:
+    """Combine what such a thing of this size weighs with ``bulk`` density times volume, the narrower one counting more.
 
     Both are taken as log-normal. A volume is as unsure as the size that it was scaled by, ``size_spread`` in natural logs, three
     times over (0: the size is known). The answer stays in the category's interval; its own interval is what both leave open, and
     where they contradict each other, or the size is a guess, it reaches as far beyond the answer as both together are unsure.
     """
     by_size = _scaled(prior.mass_kg, (longest_m / prior.longest_axis_m.typical) ** _SIZE_EXPONENT)
-    if prior.bulk_density_kg_m3 is None:
+    if bulk is None:
         return _clamped(by_size.typical, by_size, prior.mass_kg, prior.source)
-    by_volume = _scaled(prior.bulk_density_kg_m3, volume_m3)
+    by_volume = _scaled(bulk, volume_m3)
     weight_size = (_SAME_SIZE_SPREAD * _log_spread(by_size)) ** -2
     weight_volume = 1 / (_log_spread(by_volume) ** 2 + (3 * size_spread) ** 2)
     logs = weight_size * np.log(by_size.typical) + weight_volume * np.log(by_volume.typical)
@@ -157,14 +154,3 @@ def _wall_thickness(subject: Subject, prior: Prior, scale: float) -> float | Non
         return None
     thickness_m = scale * median_thickness(subject.solid, subject.seed)
     return prior.wall_thickness_m if is_outer_skin(thickness_m, prior.wall_thickness_m) else None
-
-
-def median_thickness(solid: trimesh.Trimesh, seed: int) -> float:
-    """Return the median thickness behind points all over a mesh, in its unit."""
-    points, normals, _ = sample_surface(solid, _THICKNESS_SAMPLES, np.random.default_rng(seed))
-    return float(np.median(local_thickness(solid, points, normals)))
-
-
-def is_outer_skin(thickness_m: float, wall_thickness_m: float) -> bool:
-    """Tell whether a mesh of that median thickness has only the outer side of such a wall: too thick to be the wall."""
-    return thickness_m > max(_SKIN_FACTOR * wall_thickness_m, _LEAST_SKIN_M)

@@ -12,8 +12,8 @@ from manitwin.errors import Rejected
 from manitwin.geometry.boxes import upright_extents
 from manitwin.models.annotators.priors import HEAVIEST_CONTENTS_KG_M3, Interval, load_materials, lookup
 from manitwin.models.annotators.protocol import Subject
-from manitwin.models.annotators.rules import is_outer_skin, median_thickness
 from manitwin.models.annotators.vlm.physical import PhysicalAnswer
+from manitwin.models.annotators.walls import is_outer_skin, median_thickness
 
 PROPORTION_FACTOR, PROPORTION_SHARE = 1.5, 0.1
 """A side may be off by this factor, or by this share of the longest one: eyes judge thin sides badly."""

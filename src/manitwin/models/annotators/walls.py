@@ -1,0 +1,99 @@
+"""Walls: how thick a mesh is, whether it is a closed skin, and what its wall tells of its matter: nobody moulds plastic thick.
+
+Such things as containers and cups are made of plastic, clay or sheet metal, whose densities differ by a factor of eight, but so
+do the walls that they are made with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from manitwin.geometry.ray_caster import local_thickness
+from manitwin.geometry.sampling import sample_surface
+from manitwin.models.annotators.priors import Interval, Prior, load_materials
+
+METALS = ("steel", "aluminium")
+"""What a prior means that says metal."""
+MEASURED_SPREAD = 0.25  # natural logs: how far a scan's median thickness and volume are off those of the thing
+LEAST_SHARE = 0.05  # a material that is less likely than this is left out of an interval that is meant to hold 90 %
+_SPREAD = 3.29  # standard deviations between the ends of an interval of 90 %
+_SKIN_FACTOR = 3.0  # a mesh this many times thicker than the wall of such a thing is a closed outer skin
+_LEAST_SKIN_M = 0.008  # thicker in the median than both walls of any thin-walled thing (measured: 5 mm at most)
+_THICKNESS_SAMPLES = 800
+
+
+def median_thickness(solid: trimesh.Trimesh, seed: int) -> float:
+    """Return the median thickness behind points all over a mesh, in its unit."""
+    points, normals, _ = sample_surface(solid, _THICKNESS_SAMPLES, np.random.default_rng(seed))
+    return float(np.median(local_thickness(solid, points, normals)))
+
+
+def is_outer_skin(thickness_m: float, wall_thickness_m: float) -> bool:
+    """Tell whether a mesh of that median thickness has only the outer side of such a wall: too thick to be the wall."""
+    return thickness_m > max(_SKIN_FACTOR * wall_thickness_m, _LEAST_SKIN_M)
+
+
+def density_by_wall(prior: Prior, solid: trimesh.Trimesh, seed: int) -> Interval | None:
+    """Return the bulk density (kg/m3) that the wall of a mesh in metres leaves of the materials that its prior names.
+
+    None where the prior names fewer than two that walls are made of, where such a thing is no open ware, and where the mesh is
+    thicker than the thickest of such walls: then it is no wall.
+    """
+    options = wall_materials(prior)
+    if (
+        len(options) < 2
+        or not prior.container
+        or prior.mass_distribution != "solid"
+        or prior.bulk_density_kg_m3 is None
+    ):
+        return None
+    thickness_m = median_thickness(solid, seed)
+    if thickness_m > max(each.wall_m.high for each in options.values()):
+        return None
+    return _left_open(list(options.values()), thickness_m, prior.bulk_density_kg_m3)
+
+
+@dataclass(frozen=True)
+class WallMaterial:
+    """A material that walls are made of: its density (kg/m3), usual walls (m), and how many such things are of it, relatively."""
+
+    density_kg_m3: Interval
+    wall_m: Interval
+    weight: float
+
+
+def wall_materials(prior: Prior) -> dict[str, WallMaterial]:
+    """Return the materials that a prior names and that walls are made of, all as usual; its metals share the vote of one."""
+    words = prior.material.replace(",", " ").split()
+    names = [(name, 1 / len(METALS)) for name in METALS if "metal" in words] + [(word, 1.0) for word in words]
+    known = load_materials()
+    return {
+        name: WallMaterial(known[name].density_kg_m3, walls, weight)
+        for name, weight in names
+        if name in known and (walls := known[name].wall_m) is not None
+    }
+
+
+def _left_open(options: Sequence[WallMaterial], thickness_m: float, within: Interval) -> Interval:
+    """Return the mean density by the likelihood of such a wall, all as log-normal, between those of all that it may well be.
+
+    ``within`` is what scans of such things have: of swollen sheet metal less than the metal.
+    """
+    spread = np.hypot([_log_spread(each.wall_m) for each in options], MEASURED_SPREAD)
+    away = np.log(thickness_m / np.array([each.wall_m.typical for each in options])) / spread
+    likelihood = np.array([each.weight for each in options]) * np.exp(-(away**2) / 2) / spread
+    shares = likelihood / likelihood.sum()
+    likely = [each.density_kg_m3 for each, share in zip(options, shares, strict=True) if share >= LEAST_SHARE]
+    typical = np.clip([each.density_kg_m3.typical for each in options], within.low, within.high)
+    beyond = float(np.exp(_SPREAD / 2 * MEASURED_SPREAD))
+    ends = [min(each.low for each in likely) / beyond, max(each.high for each in likely) * beyond]
+    low, high = np.clip(ends, within.low, within.high)
+    return Interval(low=float(low), typical=float(np.exp(shares @ np.log(typical))), high=float(high))
+
+
+def _log_spread(interval: Interval) -> float:
+    return float(np.log(interval.high / interval.low)) / _SPREAD
