@@ -67,7 +67,9 @@ def test_pads_press_around_the_middle_of_what_they_hold_wherever_it_is_in_the_op
 
 
 def test_selection_counts_a_load_twice_as_much_as_a_lever_and_calls_none_fit_that_asks_for_more_than_half() -> None:
-    merits = pad_merits(contacts(np.array([0.0, 0.1, 0.05]), np.array([6, 6, 6])), np.array([0.5, 0.0, 0.6]))
+    merits = pad_merits(
+        contacts(np.array([0.0, 0.1, 0.05]), np.array([6, 6, 6])), np.array([0.5, 0.0, 0.6]), np.zeros(3, bool)
+    )
     assert merits.cost[:2] == pytest.approx([1, 1])
     assert merits.fit.tolist() == [True, True, False]
 
@@ -111,15 +113,17 @@ def cloud(count: int, directions: np.ndarray, rng: np.random.Generator) -> np.nd
 def contacts(lever_m: np.ndarray, cells: np.ndarray) -> PadContacts:
     count = len(lever_m)
     width_m, apart_m = np.full(count, 0.03), np.full((count, 2), 0.016)
-    pads = PressedPads(np.zeros((count, 3)), width_m, -apart_m, apart_m)
-    return PadContacts(width_m, cells, np.full(count, 0.01), np.zeros(count), np.ones(count), lever_m, pads)
+    pads = PressedPads(np.zeros((count, 3)), width_m, -apart_m, apart_m, np.ones(count))
+    return PadContacts(width_m, cells, np.full(count, 0.01), np.zeros(count), np.ones(count), lever_m, pads, pads)
 
 
 def test_selection_prefers_short_levers_and_large_contacts() -> None:
     rng = np.random.default_rng(4)
     lever, cells = np.tile([0.01, 0.2], 200), np.repeat([6, 2], 200)
     poses = cloud(400, rng.normal(size=(50, 3)), rng)
-    chosen = select_likely(poses, np.full(400, 0.1), pad_merits(contacts(lever, cells), lever / 0.2), 50)
+    chosen = select_likely(
+        poses, np.full(400, 0.1), pad_merits(contacts(lever, cells), lever / 0.2, np.zeros(400, bool)), 50
+    )
     assert len(np.unique(chosen)) == 50
     assert (lever[chosen] < 0.05).all()
     assert (cells[chosen] >= 3).all()
@@ -130,7 +134,9 @@ def test_selection_fills_up_with_the_next_best_where_few_are_good() -> None:
     lever = np.concatenate([np.full(10, 0.01), np.linspace(0.1, 0.3, 90)])
     poses = cloud(100, rng.normal(size=(50, 3)), rng)
     ratio = np.where(lever < 0.05, 0.1, 2.0)
-    chosen = select_likely(poses, np.full(100, 0.1), pad_merits(contacts(lever, np.full(100, 6)), ratio), 30)
+    chosen = select_likely(
+        poses, np.full(100, 0.1), pad_merits(contacts(lever, np.full(100, 6)), ratio, np.zeros(100, bool)), 30
+    )
     assert chosen.tolist() == list(range(30))
 
 
@@ -140,7 +146,9 @@ def test_selection_points_into_four_octants_where_there_are_four() -> None:
     poses = cloud(400, directions, rng)
     octants = approach_octants(poses)
     lever = np.where(octants == octants[0], 0.01, 0.15)  # all the good ones in one octant
-    chosen = select_likely(poses, np.full(400, 0.1), pad_merits(contacts(lever, np.full(400, 6)), lever / 0.1), 60)
+    chosen = select_likely(
+        poses, np.full(400, 0.1), pad_merits(contacts(lever, np.full(400, 6)), lever / 0.1, np.zeros(400, bool)), 60
+    )
     assert len(np.unique(octants[chosen])) == 4
     assert (octants[chosen] == octants[0]).sum() >= 30
 

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.physics.grasp_filters import INSET, PadContacts, pad_contacts
 from manitwin.physics.mujoco.trial import MujocoTrial
-from manitwin.physics.pad_loads import PAD_ARM_M, load_share, torque_ratio
+from manitwin.physics.pad_loads import PAD_ARM_M, PressedPads, jams, load_share, torque_ratio
 from manitwin.physics.sapien.trial import SapienTrial
 from manitwin.physics.trial import GraspTrial
+from manitwin.physics.trial_recording import RecordingTrial
 from manitwin.robots.grippers.gripper import of_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
-from rigid_boxes import PANDA, above, block, box, try_one
+from rigid_boxes import PANDA, SETTINGS, above, block, box, try_one
 
 JAWS = of_kind(PANDA, ParallelGripper)
 FRICTION, FORCE_N = 0.75, 50.0  # the mean of 0.5 and the fingertips' 1.0
@@ -60,6 +64,21 @@ def test_moment_across_the_closing_axis_is_borne_by_opposite_ends_of_the_pads_an
     assert share(body, above([0, 0, 0])) == pytest.approx(expected)
 
 
+def test_pads_that_touch_with_a_quarter_of_their_area_bear_half_the_torque() -> None:
+    body, pose = box([0.02, 0.04, 0.04], 0.1, center_m=(0, 0.1, 0)), above([0, 0, 0])
+    whole = touched(body, pose).pads
+    quarter = replace(whole, touching=whole.touching / 4)
+
+    def torque(pads: PressedPads) -> float:
+        loads = {"mass_kg": body.mass_kg, "force_n": FORCE_N, "friction": FRICTION}
+        said = load_share(pads, pose[None], body.center_of_mass_m, **loads, flat=False)
+        return float(np.sqrt(said[0] ** 2 - force**2))
+
+    force = body.mass_kg * sum(LOAD_M_S2) / (2 * FRICTION * FORCE_N)
+    assert whole.touching[0] == 1
+    assert torque(quarter) == pytest.approx(2 * torque(whole))
+
+
 def test_pads_that_touch_at_one_end_bear_a_moment_one_way_only() -> None:
     # a wall with a step on each side: the +X pad (object's -X) presses at its far end, the -X pad at its near one
     hulls = (
@@ -88,3 +107,19 @@ def test_what_tips_out_of_the_pads_has_no_lever_but_too_large_a_share(engine: Gr
         result = try_one(engine, body, pose)
         assert result.outcome == ("drops" if beside_m == 0.3 else "held")
         assert beside_m == 0.3 or result.displacement_m < 0.0005
+
+
+@pytest.mark.parametrize("engine", [SapienTrial(), MujocoTrial()], ids=["sapien", "mujoco"])
+@pytest.mark.parametrize(("width_m", "turns_flat"), [(0.015, True), (0.06, False)])
+def test_pads_turn_flat_what_is_thinner_than_pad_over_friction_and_jam_on_the_rest(
+    engine: RecordingTrial, width_m: float, turns_flat: bool
+) -> None:
+    """A plate turned by t between pads of width d is w + d t wide: closing gives 2 F d/2 and costs 2 mu F w/2 for each radian."""
+    pad_m = 2 * JAWS.pad_half_extents_m[0]
+    assert jams(np.array([width_m]), pad_m, FRICTION)[0] != turns_flat
+    turned = above([0, 0, 0.038])
+    turned[:3, :3] = turned[:3, :3] @ Rotation.from_euler("z", 4, degrees=True).as_matrix()
+    recording = engine.record(box([width_m, 0.1, 0.1], 0.7), PANDA, turned, SETTINGS)
+    last = max(number for number, phase in enumerate(recording.phases) if phase == "close")
+    left_deg = np.degrees(np.arccos(min(1.0, float(np.abs(recording.object_to_hand[last, 0, :3]).max()))))
+    assert left_deg < 1 if turns_flat else left_deg > 3

@@ -88,11 +88,11 @@ def test_chosen_grasps_are_near_a_selected_point(bar: Draft) -> None:
 
 def test_counts_by_filter_fall_and_octants_are_several(bar: Draft) -> None:
     field = bar.field("proposals")
-    filters = ("raw", "after_pad", "after_collision", "after_association", "after_diversity")
+    filters = ("raw", "after_pad", "after_collision", "after_load", "after_association", "after_diversity")
     counts = [field["proposed_by_filter"][name] for name in filters]
     assert counts == sorted(counts, reverse=True)
     assert counts[-1] == 12
-    assert field["proposed"] == field["proposed_by_filter"]["after_collision"]
+    assert field["proposed"] == field["proposed_by_filter"]["after_load"]
     assert field["approach_octants"] >= 4
 
 

@@ -22,6 +22,9 @@ ACROSS, ALONG = 3, 5  # cells of a pad
 PAD_CELLS = ACROSS * ALONG
 INSET = 0.87  # the outermost rays lie inside the pad's edge
 SAME_CONTACT_M = 0.0015  # cells this close behind the first one touch too, as soft pads do
+PAD_GIVE_M = (
+    0.0005  # what pads give under the closing force: cells this close touch before the object has turned flat to them
+)
 # The pad filter: two cells of fifteen, contact centres at most 6 mm apart, normals inside the narrowed friction cone.
 MIN_CELLS, MAX_OFFSET_M, CONE_SAFETY = 2, 0.006, 1.5
 CLEARANCE_M = 0.0005
@@ -46,7 +49,7 @@ class PadContacts:
     smaller number of touching cells of the two pads, ``from_end_m`` the distance of a contact's centre from the end of its pad
     along the approach, the smaller of two, ``offset_m`` the distance of the two contacts' centres across the closing
     axis, ``alignment`` the smaller mean cosine of surface normal and closing axis, ``lever_m`` the distance of
-    the centre of mass from the line through the contacts, ``pads`` where they press.
+    the centre of mass from the line through the contacts, ``pads`` where they press, ``first`` where before anything turns.
     """
 
     width_m: np.ndarray
@@ -56,11 +59,12 @@ class PadContacts:
     alignment: np.ndarray
     lever_m: np.ndarray
     pads: PressedPads
+    first: PressedPads
 
     def take(self, index: np.ndarray) -> PadContacts:
         """Return the contacts at ``index``."""
-        some = {f.name: getattr(self, f.name)[index] for f in fields(self) if f.name != "pads"}
-        return PadContacts(pads=self.pads.take(index), **some)
+        some = {f.name: getattr(self, f.name)[index] for f in fields(self) if f.name not in ("pads", "first")}
+        return PadContacts(pads=self.pads.take(index), first=self.first.take(index), **some)
 
 
 def pad_contacts(
@@ -72,23 +76,33 @@ def pad_contacts(
 
 
 @dataclass(frozen=True)
-class _PadHits:
-    """What one pad of each of N grasps meets.
+class _Touched:
+    """``cells (N,)`` of a pad that touch, their ``center_m (N, 2)`` on the pad, ``least_m`` and ``most_m (N, 2)`` their ends."""
 
-    ``depth_m (N,)`` of the first cell's contact (inf: nothing), ``cells (N,)`` that touch, ``center_m (N, 2)`` of these on the
-    pad, ``least_m`` and ``most_m (N, 2)`` their ends there, ``alignment (N,)`` the mean cosine of their normals and the
-    closing axis.
-    """
-
-    depth_m: np.ndarray
     cells: np.ndarray
     center_m: np.ndarray
     least_m: np.ndarray
     most_m: np.ndarray
+
+    def take(self, index: np.ndarray) -> _Touched:
+        return _Touched(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
+
+
+@dataclass(frozen=True)
+class _PadHits:
+    """What one pad of each of N grasps meets.
+
+    ``depth_m (N,)`` of the first cell's contact (inf: nothing), ``soft`` and ``first`` the cells that touch as far as soft pads
+    conform and as far as they give at once, ``alignment (N,)`` the mean cosine of the soft ones' normals and the closing axis.
+    """
+
+    depth_m: np.ndarray
+    soft: _Touched
+    first: _Touched
     alignment: np.ndarray
 
     def take(self, index: np.ndarray) -> _PadHits:
-        return _PadHits(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
+        return _PadHits(self.depth_m[index], self.soft.take(index), self.first.take(index), self.alignment[index])
 
 
 def _pad_hits(gripper: ParallelGripper, gripper_to_object: np.ndarray, hulls: RayCaster, side: int) -> _PadHits:
@@ -106,17 +120,22 @@ def _pad_hits(gripper: ParallelGripper, gripper_to_object: np.ndarray, hulls: Ra
     distance, face = hulls.first_hits(starts.reshape(-1, 3), inwards)
     cosine = np.where(face >= 0, -(hulls.face_normals[face] * inwards).sum(1), 0.0).reshape(-1, len(grid))
     depth = distance.reshape(-1, len(grid))
-    first = depth.min(1)
-    touching = (depth <= first[:, None] + SAME_CONTACT_M) & np.isfinite(depth)
+    first_m = depth.min(1)
+    near = np.isfinite(depth)
+    soft = (depth <= first_m[:, None] + SAME_CONTACT_M) & near
+    at_once = (depth <= first_m[:, None] + PAD_GIVE_M) & near
+    alignment = (soft * cosine).sum(1) / np.maximum(soft.sum(1), 1)
+    return _PadHits(first_m, _touched(soft, grid), _touched(at_once, grid), alignment)
+
+
+def _touched(touching: np.ndarray, grid: np.ndarray) -> _Touched:
+    """Sum up which cells touch ``(N, C)`` of those at ``grid (C, 2)``."""
     count = touching.sum(1)
-    some = np.maximum(count, 1)
-    return _PadHits(
-        first,
+    return _Touched(
         count,
-        touching @ grid / some[:, None],
+        touching @ grid / np.maximum(count, 1)[:, None],
         np.where(touching[:, :, None], grid, np.inf).min(1),
         np.where(touching[:, :, None], grid, -np.inf).max(1),
-        (touching * cosine).sum(1) / some,
     )
 
 
@@ -128,26 +147,32 @@ def _both_pads(
     center_of_mass_m: np.ndarray,
 ) -> PadContacts:
     rotation, origin = gripper_to_object[:, :3, :3], gripper_to_object[:, :3, 3]
-    line = np.einsum("nij,nj->ni", rotation[:, :, 1:], (plus.center_m + minus.center_m) / 2) + origin
+    centers_m = (plus.soft.center_m, minus.soft.center_m)
+    line = np.einsum("nij,nj->ni", rotation[:, :, 1:], (centers_m[0] + centers_m[1]) / 2) + origin
     met = np.isfinite(plus.depth_m + minus.depth_m)
     width_m = np.where(met, gripper.opening_m - plus.depth_m - minus.depth_m, np.inf)
     off_m = np.subtract(minus.depth_m, plus.depth_m, out=np.zeros_like(width_m), where=met) / 2
-    pads = PressedPads(
+    return PadContacts(
+        width_m=width_m,
+        cells=np.minimum(plus.soft.cells, minus.soft.cells),
+        from_end_m=gripper.tip_depth_m
+        + gripper.pad_half_extents_m[1]
+        - np.maximum(centers_m[0][:, 1], centers_m[1][:, 1]),
+        offset_m=np.linalg.norm(centers_m[0] - centers_m[1], axis=1),
+        alignment=np.minimum(plus.alignment, minus.alignment),
+        lever_m=np.linalg.norm(np.cross(center_of_mass_m - line, rotation[:, :, 0]), axis=1),
+        pads=_pressed(plus.soft, minus.soft, width_m, off_m),
+        first=_pressed(plus.first, minus.first, width_m, off_m),
+    )
+
+
+def _pressed(plus: _Touched, minus: _Touched, width_m: np.ndarray, off_m: np.ndarray) -> PressedPads:
+    return PressedPads(
         middle_m=np.column_stack([off_m, (plus.center_m + minus.center_m) / 2]),
         width_m=width_m,
         least_apart_m=plus.least_m - minus.most_m,
         most_apart_m=plus.most_m - minus.least_m,
-    )
-    return PadContacts(
-        width_m=width_m,
-        cells=np.minimum(plus.cells, minus.cells),
-        from_end_m=gripper.tip_depth_m
-        + gripper.pad_half_extents_m[1]
-        - np.maximum(plus.center_m[:, 1], minus.center_m[:, 1]),
-        offset_m=np.linalg.norm(plus.center_m - minus.center_m, axis=1),
-        alignment=np.minimum(plus.alignment, minus.alignment),
-        lever_m=np.linalg.norm(np.cross(center_of_mass_m - line, rotation[:, :, 0]), axis=1),
-        pads=pads,
+        touching=np.minimum(plus.cells, minus.cells) / PAD_CELLS,
     )
 
 
@@ -176,7 +201,7 @@ class GraspFilter:
         """Keep the grasps ``(N, 4, 4)`` whose pads would touch well and whose open hand is free of the object."""
         gripper = self._gripper
         plus = _pad_hits(gripper, gripper_to_object, self._caster, 1)
-        met = np.flatnonzero((plus.cells >= MIN_CELLS) & (plus.alignment >= self._min_alignment))
+        met = np.flatnonzero((plus.soft.cells >= MIN_CELLS) & (plus.alignment >= self._min_alignment))
         minus = _pad_hits(
             gripper, gripper_to_object[met], self._caster, -1
         )  # half of all rays, where one pad is enough to tell
@@ -191,9 +216,12 @@ class GraspFilter:
         return FilteredGrasps(met[left], contacts.take(left), len(both))
 
 
-def pad_merits(contacts: PadContacts, load_share: np.ndarray) -> Merits:
-    """Rate grasps: fit ones touch with three cells or more and bear twice what is asked of them; levers and loads cost."""
-    weak = contacts.cells < GOOD_CELLS
+def pad_merits(contacts: PadContacts, load_share: np.ndarray, jammed: np.ndarray) -> Merits:
+    """Rate grasps: fit ones touch with three cells or more and bear twice what is asked of them; levers and loads cost.
+
+    ``jammed (N,)`` are those that stay on the pads' edges and are not borne by them: they are weak.
+    """
+    weak = (contacts.cells < GOOD_CELLS) | jammed
     cost = np.hypot(contacts.lever_m / POOR_LEVER_M, load_share / GOOD_LOAD_SHARE)
     return Merits(~weak & (load_share <= GOOD_LOAD_SHARE), weak, cost, GOOD_COST)
 

@@ -10,8 +10,8 @@ import trimesh
 
 from manitwin.models.graspers.postures import PostureGrasper
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
-from manitwin.models.graspers.screens import HandScreen, SealScreen
-from manitwin.models.graspers.surface_sampling import SuctionGrasper
+from manitwin.models.graspers.screens import HandScreen, PadScreen, SealScreen
+from manitwin.models.graspers.surface_sampling import AntipodalGrasper, SuctionGrasper
 from manitwin.robots.grippers.gripper import Gripper, load_gripper
 from manitwin.robots.grippers.hand_clearance import HandCollision
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
@@ -138,3 +138,15 @@ def test_object_wider_than_the_hand_says_so(hand: MultiFingerGripper) -> None:
     request = request_for(trimesh.creation.icosphere(3, 0.1), hand)
     raw = PostureGrasper().propose(request)
     assert HandScreen(request).why_none({"raw": len(raw), "after_collision": 0}).reason == "too_wide"
+
+
+def test_wide_things_are_held_where_what_touches_bears_them() -> None:
+    """A slab of 6 cm does not turn flat between pads: 8 kg at its edge ask for more than whole pads bear, 0.1 kg for little."""
+    panda = load_gripper("panda")
+    slab = trimesh.creation.box([0.3, 0.2, 0.06])
+    light, heavy = request_for(slab, panda, mass_kg=0.1), request_for(slab, panda, mass_kg=8.0)
+    raw = AntipodalGrasper().propose(light)
+    kept, none = PadScreen(light)(raw), PadScreen(heavy)(raw)
+    assert kept.counts["after_load"] == kept.counts["after_collision"] == len(kept.proposals) > 0
+    assert none.counts["after_load"] < none.counts["after_collision"] == kept.counts["after_collision"]
+    assert "check the mass" in PadScreen(heavy).why_none({**none.counts, "after_load": 0}).detail

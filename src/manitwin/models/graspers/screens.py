@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -12,7 +14,7 @@ from manitwin.geometry.sampling import sample_surface
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest, Screened
 from manitwin.physics.grasp_filters import GraspFilter, pad_merits
 from manitwin.physics.grasp_selection import Merits
-from manitwin.physics.pad_loads import PEAK_SLIDE_ACCELERATION_M_S2, load_share
+from manitwin.physics.pad_loads import PEAK_SLIDE_ACCELERATION_M_S2, jams, load_share
 from manitwin.physics.suction import lip_load, seal
 from manitwin.physics.trial import GRAVITY_M_S2
 from manitwin.physics.trial_phases import SLIDE_DIRECTIONS
@@ -25,6 +27,7 @@ from manitwin.robots.grippers.suction import SuctionGripper
 MIN_WIDTH_M = 0.0005  # thinner than this, a wall is not told from the surface's noise
 WIDTH_SAMPLES = 2000
 CLEARANCE_M = 0.0005
+MOST_JAMMED_SHARE = 0.75  # of what whole pads bear, where less than whole ones touch, and what touches does not bear it
 GOOD_LOAD = 0.5  # half of the limits: what is left over is for what the twin does not know
 # The arm at which friction under the closing force would just carry weight and slides. Of 600 grasps of six objects 93 % held
 # where it is under 10 mm, 62 % to 20 mm, 42 % beyond.
@@ -32,7 +35,7 @@ GOOD_ARM_M, WEAK_ARM_M = 0.010, 0.020
 
 
 class PadScreen:
-    """Keep grasps of a parallel gripper whose pads touch well and whose open hand is free of the object."""
+    """Keep grasps of a parallel gripper whose pads touch well and bear the object, and whose open hand is free of it."""
 
     def __init__(self, request: GraspRequest):
         self._request, self._gripper = request, of_kind(request.gripper, ParallelGripper)
@@ -44,16 +47,29 @@ class PadScreen:
         """Keep the proposals that pass, with the widths at the pads."""
         left = self._passes(raw.gripper_to_object)
         proposals = replace(raw.take(left.index), width_m=left.contacts.width_m)
-        share = load_share(
-            left.contacts.pads,
-            proposals.gripper_to_object,
-            self._request.center_of_mass_m,
+        contacts, asked = left.contacts, self._asked(proposals.gripper_to_object)
+        share, first = asked(contacts.pads), asked(contacts.first, flat=False)
+        jammed = jams(contacts.width_m, 2 * min(self._gripper.pad_half_extents_m), self._friction) & (first > 1)
+        borne = np.flatnonzero(~(jammed & (share > MOST_JAMMED_SHARE)))
+        counts = {
+            "raw": len(raw),
+            "after_pad": left.after_pad,
+            "after_collision": len(proposals),
+            "after_load": len(borne),
+        }
+        merits = pad_merits(contacts.take(borne), share[borne], jammed[borne])
+        return Screened(proposals.take(borne), merits, counts)
+
+    def _asked(self, gripper_to_object: np.ndarray) -> Callable[..., np.ndarray]:
+        """Return what tells the share of what pads bear in these grasps ``(N, 4, 4)``, given where they press."""
+        return partial(
+            load_share,
+            gripper_to_object=gripper_to_object,
+            center_of_mass_m=self._request.center_of_mass_m,
             mass_kg=self._request.mass_kg,
             force_n=self._gripper.force_n,
             friction=self._friction,
         )
-        counts = {"raw": len(raw), "after_pad": left.after_pad, "after_collision": len(proposals)}
-        return Screened(proposals, pad_merits(left.contacts, share), counts)
 
     def why_none(self, counts: dict[str, int]) -> Rejected:
         """Say why nothing is left, with the widths that were measured."""
@@ -73,6 +89,9 @@ class PadScreen:
             thick = f"thickest part that fits the stroke is {most * 1000:.2f} mm"
             return Rejected("too_thin", f"{thick}, thinner than the {MIN_WIDTH_M * 1000:.1f} mm that a grip needs")
         stages = ", ".join(f"{name} {count}" for name, count in counts.items())
+        if counts.get("after_collision"):
+            asked = f"at {request.mass_kg:.2g} kg every grasp asks for more than what touches bears by friction"
+            return Rejected("no_proposal", f"{asked} ({stages}); check the mass and the size")
         grips = f"grips are {least * 1000:.1f} mm wide and more"
         return Rejected("no_proposal", f"no grasp passes the filters ({stages}); {grips}")
 
