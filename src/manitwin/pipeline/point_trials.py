@@ -106,8 +106,10 @@ def answer(search: PointSearch, points: list[GraspPoint], spares: list[GraspPoin
     number = len(points)
     withdrawn: list[GraspPoint] = []
     spares = list(spares)
-    _search_where_short(search, points, searched)
+    _search_where_short(search, points, searched, points)
     for place, point in enumerate(list(points)):
+        if not search.outcomes_at(point, points)["held"]:
+            _search_where_short(search, points, searched, [point])  # a new point may have taken what it had
         if search.outcomes_at(point, points)["held"] or not search.short(point, points):
             continue
         others = [p for p in points if p.id != point.id]
@@ -117,8 +119,9 @@ def answer(search: PointSearch, points: list[GraspPoint], spares: list[GraspPoin
             confidence = min(DISPROVED, point.confidence)
             withdrawn.append(point.model_copy(update={"confidence": confidence, "verified": 0, "shortfall": reason}))
             points, number = [*points[:place], spare, *points[place + 1 :]], number + 1
-            searched.add(spare.id)
-    _search_where_short(search, points, searched)  # a new point may be the nearest of what was another one's
+            if spare.candidate in search.passed:
+                searched.add(spare.id)
+    _search_where_short(search, points, searched, points)  # a new point may be the nearest of what was another one's
     return {
         "grasp": [_counted(search, point, points).model_dump() for point in points],
         "withdrawn": [point.model_dump() for point in withdrawn],
@@ -141,8 +144,11 @@ def _next_best(search: PointSearch, name: str, others: list[GraspPoint], spares:
     return best
 
 
-def _search_where_short(search: PointSearch, points: list[GraspPoint], searched: set[str]) -> None:
-    for point in points:
+def _search_where_short(
+    search: PointSearch, points: list[GraspPoint], searched: set[str], some: list[GraspPoint]
+) -> None:
+    """Search at ``some`` of the points, those at which too little holds and that were not searched."""
+    for point in some:
         if point.id not in searched and search.short(point, points):
             searched.add(point.id)
             search.search(point, points)
