@@ -49,7 +49,8 @@ class PadContacts:
     smaller number of touching cells of the two pads, ``from_end_m`` the distance of a contact's centre from the end of its pad
     along the approach, the smaller of two, ``offset_m`` the distance of the two contacts' centres across the closing
     axis, ``alignment`` the smaller mean cosine of surface normal and closing axis, ``lever_m`` the distance of
-    the centre of mass from the line through the contacts, ``pads`` where they press, ``first`` where before anything turns.
+    the centre of mass from the line through the contacts, ``pads`` where they press once they are flat on the object,
+    ``unturned`` where before.
     """
 
     width_m: np.ndarray
@@ -59,12 +60,12 @@ class PadContacts:
     alignment: np.ndarray
     lever_m: np.ndarray
     pads: PressedPads
-    first: PressedPads
+    unturned: PressedPads
 
     def take(self, index: np.ndarray) -> PadContacts:
         """Return the contacts at ``index``."""
-        some = {f.name: getattr(self, f.name)[index] for f in fields(self) if f.name not in ("pads", "first")}
-        return PadContacts(pads=self.pads.take(index), first=self.first.take(index), **some)
+        some = {f.name: getattr(self, f.name)[index] for f in fields(self) if f.name not in ("pads", "unturned")}
+        return PadContacts(pads=self.pads.take(index), unturned=self.unturned.take(index), **some)
 
 
 def pad_contacts(
@@ -92,17 +93,18 @@ class _Touched:
 class _PadHits:
     """What one pad of each of N grasps meets.
 
-    ``depth_m (N,)`` of the first cell's contact (inf: nothing), ``soft`` and ``first`` the cells that touch as far as soft pads
-    conform and as far as they give at once, ``alignment (N,)`` the mean cosine of the soft ones' normals and the closing axis.
+    ``depth_m (N,)`` of the first cell's contact (inf: nothing), ``soft`` and ``unturned`` the cells that touch as far as soft
+    pads conform and as far as they give before the object turns, ``alignment (N,)`` the mean cosine of the soft ones' normals and
+    the closing axis.
     """
 
     depth_m: np.ndarray
     soft: _Touched
-    first: _Touched
+    unturned: _Touched
     alignment: np.ndarray
 
     def take(self, index: np.ndarray) -> _PadHits:
-        return _PadHits(self.depth_m[index], self.soft.take(index), self.first.take(index), self.alignment[index])
+        return _PadHits(self.depth_m[index], self.soft.take(index), self.unturned.take(index), self.alignment[index])
 
 
 def _pad_hits(gripper: ParallelGripper, gripper_to_object: np.ndarray, hulls: RayCaster, side: int) -> _PadHits:
@@ -123,9 +125,9 @@ def _pad_hits(gripper: ParallelGripper, gripper_to_object: np.ndarray, hulls: Ra
     first_m = depth.min(1)
     near = np.isfinite(depth)
     soft = (depth <= first_m[:, None] + SAME_CONTACT_M) & near
-    at_once = (depth <= first_m[:, None] + PAD_GIVE_M) & near
+    unturned = (depth <= first_m[:, None] + PAD_GIVE_M) & near
     alignment = (soft * cosine).sum(1) / np.maximum(soft.sum(1), 1)
-    return _PadHits(first_m, _touched(soft, grid), _touched(at_once, grid), alignment)
+    return _PadHits(first_m, _touched(soft, grid), _touched(unturned, grid), alignment)
 
 
 def _touched(touching: np.ndarray, grid: np.ndarray) -> _Touched:
@@ -162,7 +164,7 @@ def _both_pads(
         alignment=np.minimum(plus.alignment, minus.alignment),
         lever_m=np.linalg.norm(np.cross(center_of_mass_m - line, rotation[:, :, 0]), axis=1),
         pads=_pressed(plus.soft, minus.soft, width_m, off_m),
-        first=_pressed(plus.first, minus.first, width_m, off_m),
+        unturned=_pressed(plus.unturned, minus.unturned, width_m, off_m),
     )
 
 

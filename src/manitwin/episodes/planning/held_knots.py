@@ -53,11 +53,22 @@ class HeldKnots:
 
         The arm stays ``spare_m`` farther away from all around than it must.
         """
+        if not self.is_hand_free(world, path, gripper_to_object, spare_m):
+            return "path_blocked"
+        return self.joints_of(world, path, gripper_to_object, near_rad, spare_m)
+
+    def joints_of(
+        self,
+        world: ProblemWorld,
+        path: HeldPath,
+        gripper_to_object: np.ndarray,
+        near_rad: np.ndarray,
+        spare_m: float = 0.0,
+    ) -> CubicSpline | PlanFailure:
+        """Return what ``follow`` does, of a path along which the hand is known to be free."""
         parts, hands = self._parts, path.poses @ gripper_to_object
         if any(parts.known.out_of_reach(hands[k]) for k in (0, len(hands) // 2, -1)):
             return "path_unreachable"
-        if not self.is_hand_free(world, path, gripper_to_object, spare_m):
-            return "path_blocked"
         failure: PlanFailure = "path_unreachable"
         seen: list[np.ndarray] = []
         for start in (near_rad, *parts.known.nearest(hands[0], STARTS)):

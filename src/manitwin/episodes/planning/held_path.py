@@ -219,10 +219,13 @@ class HeldPathPlanner:
         rng: np.random.Generator,
         spare_m: float = 0.0,
     ) -> HeldPlan | PlanFailure | None:
-        """Plan one pose of a grasp with one path, cheapest first: path, approach, lift, carry, reach; None: no spare room."""
+        """Plan one pose of a grasp with one path along which the hand is free, cheapest first; None: no spare room.
+
+        Path, approach, lift, carry, reach.
+        """
         parts = self.parts
         world.hold(gripper_to_object)
-        joints = self._knots.follow(world, path, gripper_to_object, parts.arm.home)
+        joints = self._knots.joints_of(world, path, gripper_to_object, parts.arm.home)
         if not isinstance(joints, CubicSpline):
             return joints
         if spare_m:

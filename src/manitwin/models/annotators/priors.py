@@ -7,6 +7,7 @@ was made.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from functools import cache
@@ -34,6 +35,11 @@ Distribution = Literal["full", "solid", "shell"]
 """Full of its contents or of one matter; solid: the mesh is the matter itself; shell: hollow behind a closed skin."""
 
 
+DEVIATIONS_ACROSS = 3.29
+"""Standard deviations between the ends of an interval that holds 90 % of a log-normal value."""
+LEAST_LOG_SPREAD = 0.02
+
+
 class Interval(Record):
     """A usual value and the interval that nearly all (about 19 of 20) such things are in."""
 
@@ -46,6 +52,11 @@ class Interval(Record):
         if not 0 <= self.low <= self.typical <= self.high:
             raise ValueError(f"not in order: {self.low}, {self.typical}, {self.high}")
         return self
+
+    @property
+    def log_spread(self) -> float:
+        """The standard deviation of a value's natural logarithm, at least ``LEAST_LOG_SPREAD``."""
+        return max(math.log(self.high / self.low) / DEVIATIONS_ACROSS, LEAST_LOG_SPREAD)
 
     def estimate(self, source: str) -> Estimate:
         """Return the typical value with the interval around it, said by ``source``."""

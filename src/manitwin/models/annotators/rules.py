@@ -8,7 +8,7 @@ from manitwin.config import Resource
 from manitwin.geometry.boxes import upright_extents
 from manitwin.models.annotators.likely_names import usual_of
 from manitwin.models.annotators.point_rules import select_points
-from manitwin.models.annotators.priors import Interval, Prior, lookup, unknown_prior
+from manitwin.models.annotators.priors import DEVIATIONS_ACROSS, Interval, Prior, lookup, unknown_prior
 from manitwin.models.annotators.protocol import (
     AnnotatorQuestion,
     PhysicalEstimates,
@@ -22,7 +22,6 @@ from manitwin.models.annotators.words import describe
 from manitwin.twin.record import Language
 from manitwin.twin.record_values import Estimate
 
-_SPREAD = 3.29  # natural logs between low and high, in standard deviations: an interval of 90 %
 _SIZE_EXPONENT = (
     2.0  # mass grows about with the square of the size in a category: larger things have relatively thinner walls
 )
@@ -83,7 +82,7 @@ def estimate_physical(subject: Subject, prior: Prior | None) -> PhysicalEstimate
         longest_axis_m=None if subject.metric else size,
         mass_kg=_unknown_mass(density, volume_m3)
         if prior.category == "unknown"
-        else _mass(prior, bulk, longest_m, volume_m3, 0.0 if subject.metric else _log_spread(prior.longest_axis_m)),
+        else _mass(prior, bulk, longest_m, volume_m3, 0.0 if subject.metric else prior.longest_axis_m.log_spread),
         bulk_density_kg_m3=density,
         friction_static=prior.friction_static.estimate(prior.source),
         friction_dynamic=prior.friction_dynamic.estimate(prior.source),
@@ -105,12 +104,14 @@ def _mass(prior: Prior, bulk: Interval | None, longest_m: float, volume_m3: floa
     if bulk is None:
         return _clamped(by_size.typical, by_size, prior.mass_kg, prior.source)
     by_volume = _scaled(bulk, volume_m3)
-    weight_size = (_SAME_SIZE_SPREAD * _log_spread(by_size)) ** -2
-    weight_volume = 1 / (_log_spread(by_volume) ** 2 + (3 * size_spread) ** 2)
+    weight_size = (_SAME_SIZE_SPREAD * by_size.log_spread) ** -2
+    weight_volume = 1 / (by_volume.log_spread**2 + (3 * size_spread) ** 2)
     logs = weight_size * np.log(by_size.typical) + weight_volume * np.log(by_volume.typical)
     value = float(np.exp(logs / (weight_size + weight_volume)))
     source = "density*volume" if weight_volume > weight_size else prior.source
-    beyond = float(np.exp(_SPREAD / 2 * _mass_spread(_SAME_SIZE_SPREAD * _log_spread(by_size), by_volume, size_spread)))
+    beyond = float(
+        np.exp(DEVIATIONS_ACROSS / 2 * _mass_spread(_SAME_SIZE_SPREAD * by_size.log_spread, by_volume, size_spread))
+    )
     low = by_volume.low if value >= by_volume.low and not size_spread else min(by_volume.low, value / beyond)
     high = by_volume.high if value <= by_volume.high and not size_spread else max(by_volume.high, value * beyond)
     return _clamped(value, Interval(low=low, typical=value, high=high), prior.mass_kg, source)
@@ -121,7 +122,7 @@ def _mass_spread(spread_at_size: float, by_volume: Interval, size_spread: float)
 
     A wrong size moves both opinions the same way: the one with its square, the other with its cube.
     """
-    weights = np.array([spread_at_size**-2, _log_spread(by_volume) ** -2])
+    weights = np.array([spread_at_size**-2, by_volume.log_spread**-2])
     exponent = float(weights @ [_SIZE_EXPONENT, 3.0] / weights.sum())
     return float(np.sqrt(1 / weights.sum() + (exponent * size_spread) ** 2))
 
@@ -135,10 +136,6 @@ def _unknown_mass(density_kg_m3: Estimate | None, volume_m3: float) -> Estimate:
 
 def _scaled(interval: Interval, factor: float) -> Interval:
     return Interval(low=interval.low * factor, typical=interval.typical * factor, high=interval.high * factor)
-
-
-def _log_spread(interval: Interval) -> float:
-    return max(float(np.log(interval.high / interval.low)) / _SPREAD, 0.02)
 
 
 def _clamped(value: float, open_to: Interval, category: Interval, source: str) -> Estimate:

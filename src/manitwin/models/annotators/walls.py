@@ -14,13 +14,12 @@ import trimesh
 
 from manitwin.geometry.ray_caster import local_thickness
 from manitwin.geometry.sampling import sample_surface
-from manitwin.models.annotators.priors import Interval, Prior, load_materials
+from manitwin.models.annotators.priors import DEVIATIONS_ACROSS, Interval, Prior, load_materials
 
 METALS = ("steel", "aluminium")
 """What a prior means that says metal."""
 MEASURED_SPREAD = 0.25  # natural logs: how far a scan's median thickness and volume are off those of the thing
 LEAST_SHARE = 0.05  # a material that is less likely than this is left out of an interval that is meant to hold 90 %
-_SPREAD = 3.29  # standard deviations between the ends of an interval of 90 %
 _SKIN_FACTOR = 3.0  # a mesh this many times thicker than the wall of such a thing is a closed outer skin
 _LEAST_SKIN_M = 0.008  # thicker in the median than both walls of any thin-walled thing (measured: 5 mm at most)
 _THICKNESS_SAMPLES = 800
@@ -83,17 +82,13 @@ def _left_open(options: Sequence[WallMaterial], thickness_m: float, within: Inte
 
     ``within`` is what scans of such things have: of swollen sheet metal less than the metal.
     """
-    spread = np.hypot([_log_spread(each.wall_m) for each in options], MEASURED_SPREAD)
+    spread = np.hypot([each.wall_m.log_spread for each in options], MEASURED_SPREAD)
     away = np.log(thickness_m / np.array([each.wall_m.typical for each in options])) / spread
     likelihood = np.array([each.weight for each in options]) * np.exp(-(away**2) / 2) / spread
     shares = likelihood / likelihood.sum()
     likely = [each.density_kg_m3 for each, share in zip(options, shares, strict=True) if share >= LEAST_SHARE]
     typical = np.clip([each.density_kg_m3.typical for each in options], within.low, within.high)
-    beyond = float(np.exp(_SPREAD / 2 * MEASURED_SPREAD))
+    beyond = float(np.exp(DEVIATIONS_ACROSS / 2 * MEASURED_SPREAD))
     ends = [min(each.low for each in likely) / beyond, max(each.high for each in likely) * beyond]
     low, high = np.clip(ends, within.low, within.high)
     return Interval(low=float(low), typical=float(np.exp(shares @ np.log(typical))), high=float(high))
-
-
-def _log_spread(interval: Interval) -> float:
-    return float(np.log(interval.high / interval.low)) / _SPREAD

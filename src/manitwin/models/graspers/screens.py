@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -14,7 +12,7 @@ from manitwin.geometry.sampling import sample_surface
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest, Screened
 from manitwin.physics.grasp_filters import GraspFilter, pad_merits
 from manitwin.physics.grasp_selection import Merits
-from manitwin.physics.pad_loads import PEAK_SLIDE_ACCELERATION_M_S2, jams, load_share
+from manitwin.physics.pad_loads import PEAK_SLIDE_ACCELERATION_M_S2, PressedPads, jams, load_share
 from manitwin.physics.suction import lip_load, seal
 from manitwin.physics.trial import GRAVITY_M_S2
 from manitwin.physics.trial_phases import SLIDE_DIRECTIONS
@@ -47,9 +45,10 @@ class PadScreen:
         """Keep the proposals that pass, with the widths at the pads."""
         left = self._passes(raw.gripper_to_object)
         proposals = replace(raw.take(left.index), width_m=left.contacts.width_m)
-        contacts, asked = left.contacts, self._asked(proposals.gripper_to_object)
-        share, first = asked(contacts.pads), asked(contacts.first, flat=False)
-        jammed = jams(contacts.width_m, 2 * min(self._gripper.pad_half_extents_m), self._friction) & (first > 1)
+        contacts, poses = left.contacts, proposals.gripper_to_object
+        share, share_before_turning = self._load(contacts.pads, poses), self._load(contacts.unturned, poses, flat=False)
+        stays_askew = jams(contacts.width_m, 2 * min(self._gripper.pad_half_extents_m), self._friction)
+        jammed = stays_askew & (share_before_turning > 1)
         borne = np.flatnonzero(~(jammed & (share > MOST_JAMMED_SHARE)))
         counts = {
             "raw": len(raw),
@@ -60,15 +59,16 @@ class PadScreen:
         merits = pad_merits(contacts.take(borne), share[borne], jammed[borne])
         return Screened(proposals.take(borne), merits, counts)
 
-    def _asked(self, gripper_to_object: np.ndarray) -> Callable[..., np.ndarray]:
-        """Return what tells the share of what pads bear in these grasps ``(N, 4, 4)``, given where they press."""
-        return partial(
-            load_share,
-            gripper_to_object=gripper_to_object,
+    def _load(self, pads: PressedPads, gripper_to_object: np.ndarray, *, flat: bool = True) -> np.ndarray:
+        """Return the largest share ``(N,)`` of what the pads of grasps ``(N, 4, 4)`` bear that weight and slides need."""
+        return load_share(
+            pads,
+            gripper_to_object,
             center_of_mass_m=self._request.center_of_mass_m,
             mass_kg=self._request.mass_kg,
             force_n=self._gripper.force_n,
             friction=self._friction,
+            flat=flat,
         )
 
     def why_none(self, counts: dict[str, int]) -> Rejected:
@@ -89,9 +89,9 @@ class PadScreen:
             thick = f"thickest part that fits the stroke is {most * 1000:.2f} mm"
             return Rejected("too_thin", f"{thick}, thinner than the {MIN_WIDTH_M * 1000:.1f} mm that a grip needs")
         stages = ", ".join(f"{name} {count}" for name, count in counts.items())
-        if counts.get("after_collision"):
-            asked = f"at {request.mass_kg:.2g} kg every grasp asks for more than what touches bears by friction"
-            return Rejected("no_proposal", f"{asked} ({stages}); check the mass and the size")
+        if counts.get("after_collision") and not counts.get("after_load"):
+            heavy = f"at {request.mass_kg:.2g} kg friction holds it in none of the grasps, where the pads touch it"
+            return Rejected("no_proposal", f"{heavy} ({stages}); check the mass and the size")
         grips = f"grips are {least * 1000:.1f} mm wide and more"
         return Rejected("no_proposal", f"no grasp passes the filters ({stages}); {grips}")
 
