@@ -2,22 +2,53 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from manitwin.physics.mujoco.body import STIFF_SOLREF
-from manitwin.physics.mujoco.trial import FINGER_MASS_KG, SINK_M, MujocoTrial, even_impedance
-from manitwin.physics.sapien.trial import SapienTrial
-from rigid_boxes import SETTINGS, SLIDE_PEAK_M_S2, above, annulus, box, try_one
+from manitwin.physics.mujoco.hand_scene import FINGER_MASS_KG, SINK_M, even_impedance
+from manitwin.physics.mujoco.trial import MujocoTrial
+from manitwin.physics.robustness import jittered
+from manitwin.physics.sapien.trial import SapienTrial, finer_for_what_is_light
+from rigid_boxes import PANDA, SETTINGS, SLIDE_PEAK_M_S2, above, annulus, box, try_one
 
 SHEETS_M = [[0.005, 0.04, 0.04], [0.001, 0.04, 0.04], [0.0005, 0.04, 0.04]]
 BAR_M = [0.005, 0.2, 0.005]
 
 
 @pytest.mark.parametrize("extents_m", SHEETS_M)
-def test_sheet_of_a_gram_that_sapiens_fingers_tunnel_into_never_counts(extents_m: list[float]) -> None:
-    assert try_one(SapienTrial(), box(extents_m, 0.001), above([0, 0, 0])).outcome in {"penetrates", "misses"}
-    assert try_one(SapienTrial(), box(extents_m, 0.1), above([0, 0, 0])).outcome == "held", "heavy enough to resist"
+def test_sheet_that_sapiens_fingers_tunnel_into_never_counts(extents_m: list[float]) -> None:
+    assert try_one(SapienTrial(), box(extents_m, 0.0003), above([0, 0, 0])).outcome in {"penetrates", "misses"}
+    assert try_one(SapienTrial(), box(extents_m, 0.001), above([0, 0, 0])).outcome == "held", "heavy enough to resist"
+
+
+def test_step_is_as_small_as_the_closing_force_wants_of_what_is_light() -> None:
+    steps = {mass_kg: finer_for_what_is_light(SETTINGS, mass_kg) for mass_kg in (1.0, 0.06, 0.04, 0.02, 0.001)}
+    assert [round(1 / each.timestep_s) for each in steps.values()] == [240, 240, 480, 960, 960]
+    for each in steps.values():  # the same protocol: its frames, and the time that it has
+        assert each.frame_s == pytest.approx(SETTINGS.frame_s)
+        assert each.max_steps * each.timestep_s == pytest.approx(SETTINGS.max_steps * SETTINGS.timestep_s)
+    finer = replace(SETTINGS, timestep_s=1 / 1920)
+    assert finer_for_what_is_light(finer, 0.001) == finer, "what is asked for is not made coarser"
+    assert finer_for_what_is_light(replace(SETTINGS, force_n=10.0), 0.02) == replace(SETTINGS, force_n=10.0)
+
+
+@pytest.mark.parametrize("extents_m", [[0.008, 0.14, 0.008], [0.004, 0.14, 0.012]])
+def test_light_bars_held_askew_end_as_in_the_reference_and_in_the_other_engine(extents_m: list[float]) -> None:
+    # at 1/240 s pads kicked them about until they lost them: 20 of the 24 verdicts were those of the reference
+    bar, rng = box(extents_m, 0.012), np.random.default_rng(3)
+    poses = np.repeat(above([0, 0.02, 0])[None], 24, 0)
+    poses = jittered(poses, np.full(24, 0.01), rng, sigma_deg=20.0, sigma_m=0.004)
+    reference = replace(SETTINGS, timestep_s=1 / 960, solver_iterations=40, steps_per_frame=16, max_steps=8000)
+    said, true, other = (
+        [result.outcome == "held" for result in engine.run(bar, PANDA, poses, settings)]
+        for engine, settings in ((SapienTrial(), SETTINGS), (SapienTrial(), reference), (MujocoTrial(), SETTINGS))
+    )
+    assert sum(a == b for a, b in zip(said, true, strict=True)) >= 23
+    assert sum(a == b for a, b in zip(said, other, strict=True)) >= 22
+    assert sum(a == b for a, b in zip(true, other, strict=True)) >= 23, "and two engines agree about the truth"
 
 
 @pytest.mark.parametrize("extents_m", [BAR_M, *SHEETS_M])

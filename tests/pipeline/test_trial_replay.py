@@ -41,6 +41,18 @@ def test_a_grasp_that_held_holds_again_with_what_the_record_says(folder: Path) -
     assert (heavy.recording.result.outcome, heavy.recorded_outcome) == ("drops", "held")
 
 
+def test_what_the_first_engine_holds_and_the_confirming_one_refused_is_played_in_that_one(folder: Path) -> None:
+    table = pq.read_table(folder / "grasps.parquet")
+    outcomes = ["slips", *table["outcome"].to_pylist()[1:]]
+    place = table.schema.get_field_index("outcome")
+    pq.write_table(table.set_column(place, table.schema.field(place), [outcomes]), folder / "grasps.parquet")
+    change(folder, lambda record: record["grasps"]["trial"].update(confirmed_by=None))
+    assert replay_trial(Twin(folder), "panda", "panda-0000").engine == "sapien", "none had to confirm it"
+    change(folder, lambda record: record["grasps"]["trial"].update(confirmed_by="mujoco"))
+    assert replay_trial(Twin(folder), "panda", "panda-0000").engine == "mujoco"
+    assert replay_trial(Twin(folder), "panda", "panda-0001").engine == "sapien"
+
+
 @pytest.mark.parametrize(
     ("gripper", "grasp", "said"),
     [

@@ -18,6 +18,7 @@ from manitwin.models.annotators.given import KeepsGiven
 from manitwin.models.annotators.protocol import Annotator
 from manitwin.models.matting.learned import Network, find_network, require_working
 from manitwin.models.registry import create, target, without_url
+from manitwin.physics.confirmed_trial import ConfirmedTrial
 from manitwin.pipeline.assembly import assemble, name_hint
 from manitwin.pipeline.candidates import CandidatesStage
 from manitwin.pipeline.caption import CaptionStage
@@ -130,15 +131,16 @@ def _trials(gripper: Gripper, suffix: str, config: BuildConfig) -> list[Stage]:
     kind = KINDS[gripper.kind]
     simulator = create("simulator", kind.simulator(config), config)
     grasper = create("grasper", kind.grasper(config), config)
+    second = kind.second_simulator(config)
+    other = None if second is None else create("simulator", second, config)
+    trial = simulator if other is None else ConfirmedTrial(simulator, other)
     stages: list[Stage] = [
         GraspsStage(config.grasps, grasper, gripper, suffix),
-        VerifyStage(config.verify, simulator, gripper, suffix),
+        VerifyStage(config.verify, trial, gripper, suffix),
     ]
     if not suffix:
-        stages.append(PointTrialsStage(config.grasps, config.verify, grasper, simulator, gripper))
-    second = kind.second_simulator(config)
-    if config.second_opinion.enabled and second is not None:
-        other = create("simulator", second, config)
+        stages.append(PointTrialsStage(config.grasps, config.verify, grasper, trial, gripper))
+    if config.second_opinion.enabled and other is not None:
         stages.append(SecondOpinionStage(config.second_opinion, config.verify, simulator, other, gripper, suffix))
     if config.robustness.enabled:
         stages.append(RobustnessStage(config.robustness, config.verify, simulator, gripper, suffix))

@@ -32,7 +32,7 @@ ROBUSTNESS = "robustness{}"
 class RobustnessStage:
     """Try each held grasp again and again; writes ``held (N,)`` and ``trials (N,)``, zero trials where it never held."""
 
-    version = "5"
+    version = "6"
     needs: Resource = "cpu"
 
     def __init__(

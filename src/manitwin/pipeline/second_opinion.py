@@ -33,7 +33,7 @@ class SecondOpinionStage:
     with both engines' verdicts.
     """
 
-    version = "5"
+    version = "6"
     needs: Resource = "cpu"
 
     def __init__(

@@ -45,24 +45,31 @@ class ReplayedTrial:
 def replay_trial(twin: Twin, gripper_name: str, grasp_id: str) -> ReplayedTrial:
     """Try one grasp of a twin again with the settings, mass and friction of its record.
 
-    Hulls and poses are those of the files, rounded, so that what was on the edge may end otherwise. Raises UsageError where
-    there is no such grasp, or its gripper or engine is none that comes with the package.
+    What the first engine holds and the record does not is tried in the engine that had to confirm it. Hulls and poses are
+    those of the files, rounded, so that what was on the edge may end otherwise. Raises UsageError where there is no such grasp,
+    or its gripper or engine is none that comes with the package.
     """
     summary, gripper = summary_of(twin, gripper_name), known_gripper(twin, gripper_name)
-    where = ENGINES.get((gripper.kind, summary.trial.engine))
-    if where is None:
-        raise UsageError(
-            f"trials of the engine {summary.trial.engine} with a {gripper.kind} gripper cannot be recorded"
-        )
+    engine, confirmed_by = summary.trial.engine, summary.trial.confirmed_by
+    trial = _recording_trial(gripper, engine)
     pose, joints_rad, outcome = _grasp(twin, gripper_name, grasp_id)
     body = twin.rigid_body()
     if gripper.kind == "suction":  # a cup feels what hulls smooth over
         body = replace(body, surface=_surface(twin))
-    module, name = where.split(":")
-    trial = cast(RecordingTrial, getattr(import_module(module), name)())
     settings = settings_of_trial(twin, summary.trial, gripper)
     recording = trial.record(body, gripper, pose, settings, joints_rad)
-    return ReplayedTrial(recording, gripper, pose, summary.trial.engine, outcome)
+    if outcome != "held" and recording.result.outcome == "held" and confirmed_by is not None:
+        engine = confirmed_by
+        recording = _recording_trial(gripper, engine).record(body, gripper, pose, settings, joints_rad)
+    return ReplayedTrial(recording, gripper, pose, engine, outcome)
+
+
+def _recording_trial(gripper: Gripper, engine: str) -> RecordingTrial:
+    where = ENGINES.get((gripper.kind, engine))
+    if where is None:
+        raise UsageError(f"trials of the engine {engine} with a {gripper.kind} gripper cannot be recorded")
+    module, name = where.split(":")
+    return cast(RecordingTrial, getattr(import_module(module), name)())
 
 
 def summary_of(twin: Twin, gripper_name: str) -> GraspSummary:

@@ -11,6 +11,7 @@ import numpy as np
 from manitwin.config import Resource, VerifyConfig
 from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
+from manitwin.physics.confirmed_trial import ConfirmedTrial
 from manitwin.physics.trial import GraspTrial, TrialResult, TrialSettings
 from manitwin.pipeline.grasps import PROPOSALS, UNFILTERED
 from manitwin.pipeline.gripper_kinds import KINDS
@@ -29,7 +30,7 @@ class VerifyStage:
     gripper rejects the object; another gripper does not.
     """
 
-    version = "4"
+    version = "5"
     needs: Resource = "cpu"
 
     def __init__(self, settings: VerifyConfig, trial: GraspTrial, gripper: Gripper, suffix: str = ""):
@@ -74,6 +75,7 @@ def describe(trial: GraspTrial, settings: TrialSettings, object_friction: float)
     numbers = {name: value for name, value in asdict(settings).items() if name in Trial.model_fields}
     return Trial(
         engine=trial.name,
+        confirmed_by=trial.confirmed_by if isinstance(trial, ConfirmedTrial) else None,
         object_friction=object_friction,
         combine="average",
         slide_distance_m=settings.slide_m,

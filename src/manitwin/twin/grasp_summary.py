@@ -12,7 +12,11 @@ Outcome = Literal["held", "collides", "unreachable", "misses", "penetrates", "dr
 
 
 class Trial(Record):
-    """The settings of the grasp trial: a success rate means nothing without them."""
+    """The settings of the grasp trial: a success rate means nothing without them.
+
+    ``timestep_s`` is the engine's own for what is not light. ``confirmed_by`` is the engine that has to hold, too, a grasp in
+    which the object moved; None where there is none.
+    """
 
     engine: str
     finger_friction: Finite
@@ -25,6 +29,7 @@ class Trial(Record):
     stable_frames: int
     max_displacement_m: Finite
     slide_distance_m: Finite
+    confirmed_by: str | None = None
 
 
 class SecondOpinion(Record):
