@@ -1,11 +1,12 @@
 """Cut the object out of composites whose mask is known, and print what was accepted, how right it is, and what it cost.
 
     python benchmarks/matting.py [--part held-out|tuning|calibration] [--first 0] [--count 300] [--jobs 1] [--network isnet]
-                                 [--variant plain|labelled|matched|small] [--photos FOLDER] [--sheet PNG]
+                                 [--variant plain|labelled|matched|small] [--named] [--photos FOLDER] [--sheet PNG]
 
 The pictures are made here (``composites.py``), of templates on grounds of the project's own making; the held-out part has other
 seeds and other grounds than the part that thresholds were set on. A composite of one whole thing is to be accepted; one that
 the frame cuts, or with several things, is to be rejected. IoU is that of the matte (alpha above a half) with the truth.
+With ``--named`` the name is given, so that the outline of its template counts where a cut-out is doubtful by itself.
 With ``--photos`` a folder's photos are cut out besides; ``--sheet`` draws what was accepted of them.
 """
 
@@ -30,9 +31,12 @@ from scipy.stats import spearmanr
 from manitwin.config import MattingConfig
 from manitwin.errors import Rejected
 from manitwin.formats.image_file import read_image
+from manitwin.models.generators.templates.fitting.explains import outline_of
 from manitwin.models.matting import matte_photo
+from manitwin.models.matting.explained import explained
 from manitwin.models.matting.learned import Network, find_network
-from manitwin.models.matting.matte import decided, study_photo
+from manitwin.models.matting.matte import MIN_CONFIDENCE, decided
+from manitwin.models.matting.study import study_photo
 from manitwin.twin.shares import wilson_interval
 
 RIGHT_IOU = 0.95
@@ -51,16 +55,19 @@ class Judged:
     cpu_s: float
 
 
-def judged_by_number(part: Part, number: int, variant: Variant, network: str | None) -> Judged:
+def judged_by_number(part: Part, number: int, variant: Variant, network: str | None, named: bool) -> Judged:
     """Make one composite and cut it out, in whatever process."""
     cv2.setNumThreads(1)
-    return judge(composite(part, number, variant), find_network(network) if network else None)
+    return judge(composite(part, number, variant), find_network(network) if network else None, named)
 
 
-def judge(picture: Composite, network: Network | None) -> Judged:
+def judge(picture: Composite, network: Network | None, named: bool) -> Judged:
     """Cut one composite out; what was rejected is judged too."""
     start = time.process_time()
     study = study_photo(picture.rgb, network=network)
+    explains = outline_of(picture.category) if named else None
+    if explains is not None and study.confidence < MIN_CONFIDENCE:
+        study = explained(picture.rgb, study, explains, min_confidence=MIN_CONFIDENCE)
     cpu_s = time.process_time() - start
     try:
         decided(study, "composite")
@@ -165,6 +172,7 @@ def main() -> None:
         default="plain",
         help="with a label, partly of the ground's colour, or small and compressed",
     )
+    parser.add_argument("--named", action="store_true", help="the outline of the template of the name counts")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--network", help="isnet or an ONNX file, as --matting of manitwin build")
     parser.add_argument("--photos", type=Path)
@@ -174,7 +182,9 @@ def main() -> None:
     network = find_network(given.network) if given.network else None
     if given.count:
         with ProcessPoolExecutor(given.jobs, mp_context=get_context("spawn")) as pool:
-            work = partial(judged_by_number, given.part, variant=given.variant, network=given.network)
+            work = partial(
+                judged_by_number, given.part, variant=given.variant, network=given.network, named=given.named
+            )
             report(list(pool.map(work, range(given.first, given.first + given.count), chunksize=4)))
     if given.photos is not None:
         photos(given.photos, network, given.sheet)

@@ -28,7 +28,7 @@ from template_photos import TemplatePhoto, photograph
 
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.matting import belief
-from manitwin.models.matting.matte import drawn, judged_candidates
+from manitwin.models.matting.study import drawn, judged_candidates
 
 FOLDS, SEED = 5, 0
 PHOTOS_FROM = 1_000_000  # numbers of template photos, beyond those of composites

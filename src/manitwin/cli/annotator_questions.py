@@ -171,7 +171,7 @@ def _photos(twin: Twin, config: BuildConfig, folder: Path) -> tuple[Path, ...]:
     """Return the photo that a twin was made of, cut out again; none where it was made of several, or of something else."""
     if twin.record.source.kind != "image":
         return ()
-    rgba, _ = PhotoStage(config.matting).cut_out(twin.folder / twin.record.source.file)
+    rgba, _ = PhotoStage(config.matting).cut_out(twin.folder / twin.record.source.file, twin.record.name)
     Image.fromarray(rgba).save(folder / "photo.png", compress_level=1)
     return (folder / "photo.png",)
 

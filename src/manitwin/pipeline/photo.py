@@ -12,6 +12,7 @@ from manitwin.config import MattingConfig, Resource
 from manitwin.engine.stage import Draft
 from manitwin.errors import InputError, Rejected
 from manitwin.formats.image_file import read_image
+from manitwin.models.generators.templates.fitting.explains import outline_of
 from manitwin.models.matting import matte_photo
 from manitwin.models.matting.learned import Network
 from manitwin.models.matting.object_network import built_in_model
@@ -22,7 +23,7 @@ class PhotoStage:
     """Write ``photo.png`` (RGBA, upright, alpha is the matte) and the field ``matte``."""
 
     name: ClassVar[str] = "photo"
-    version: ClassVar[str] = "11"
+    version: ClassVar[str] = "12"
     reads: ClassVar[tuple[str, ...]] = ()
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "matte")
     needs: ClassVar[Resource] = "cpu"
@@ -38,12 +39,12 @@ class PhotoStage:
         """Read and matte; raises InputError, or Rejected where no single object can be told from the background."""
         if draft.payload.file is None:
             raise InputError("empty", "no image file; give one")
-        rgba, field = self.cut_out(Path(draft.payload.file))
+        rgba, field = self.cut_out(Path(draft.payload.file), draft.payload.name)
         _save(rgba, folder / "photo.png")
         return {"matte": field | self._network_field()}
 
-    def cut_out(self, path: Path) -> tuple[np.ndarray, dict[str, Any]]:
-        """Return a photo ``(H, W, 4) uint8`` with its matte, and what is known of that."""
+    def cut_out(self, path: Path, name: str | None) -> tuple[np.ndarray, dict[str, Any]]:
+        """Return a photo ``(H, W, 4) uint8`` of what a person called ``name`` with its matte, and what is known of that."""
         settings = self.settings
         photo = read_image(path, frame=settings.frame, max_side_px=settings.photo_side_px)
         matte = matte_photo(
@@ -54,6 +55,7 @@ class PhotoStage:
             min_area_share=settings.min_area_share,
             second_object_share=settings.second_object_share,
             network=self.network,
+            explains=outline_of(name, photo.focal_mm),
         )
         return np.ascontiguousarray(matte.rgba), {
             "method": matte.method,
@@ -77,7 +79,7 @@ class PhotosStage(PhotoStage):
     One that cannot be cut out is left out, with a finding; the field ``matte`` is that of the least sure of the others.
     """
 
-    version: ClassVar[str] = "4"
+    version: ClassVar[str] = "5"
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "photos/", "matte")
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
@@ -88,7 +90,7 @@ class PhotosStage(PhotoStage):
         for number, file in enumerate(draft.payload.files):
             path = Path(file)
             try:
-                rgba, field = self.cut_out(path)
+                rgba, field = self.cut_out(path, draft.payload.name)
             except InputError:  # no photo: what was given is not what was meant
                 raise
             except Rejected as answer:

@@ -111,10 +111,11 @@ def _grasps(grasps: GraspSummary) -> str:
             )
         )
     trial = grasps.trial
+    confirmed = "" if trial.confirmed_by is None else f" (what moved also in {trial.confirmed_by})"
     note = (
-        f"Trial: {trial.engine}, {number(trial.force_n)} N, friction of the fingers {number(trial.finger_friction)} and of the"
-        f" object {number(trial.object_friction)}, {trial.combine}; held and slid {number(100 * trial.slide_distance_m)} cm"
-        " along six directions."
+        f"Trial: {trial.engine}{confirmed}, {number(trial.force_n)} N, friction of the fingers"
+        f" {number(trial.finger_friction)} and of the object {number(trial.object_friction)}, {trial.combine}; held and slid"
+        f" {number(100 * trial.slide_distance_m)} cm along six directions."
     )
     heads = ("gripper", "hold", "share", "without filters", "robustness, median", "held again", "failures")
     return table("Grasps", heads, rows, note)

@@ -18,7 +18,7 @@ from manitwin.models.matting.belief import (
     doubts_of,
     probability,
 )
-from manitwin.models.matting.matte import study_photo
+from manitwin.models.matting.study import study_photo
 
 
 def test_every_feature_has_a_weight_and_none_but_the_maker_s_is_negative() -> None:

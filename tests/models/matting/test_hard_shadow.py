@@ -10,7 +10,7 @@ import pytest
 
 from manitwin.errors import Rejected
 from manitwin.models.matting import matte_photo
-from manitwin.models.matting.matte import study_photo
+from manitwin.models.matting.study import study_photo
 
 SIZE = (384, 512)
 LENS_PX = 0.7  # the blur of a photo in focus

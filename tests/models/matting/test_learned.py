@@ -13,7 +13,7 @@ from manitwin.errors import UsageError
 from manitwin.formats.isolated import Limits, run_isolated
 from manitwin.models.matting import learned, matte_photo
 from manitwin.models.matting.learned import find_network, learned_alpha, require_working
-from manitwin.models.matting.matte import study_photo
+from manitwin.models.matting.study import study_photo
 from manitwin.models.weights.store import FOLDER
 from tiny_networks import tiny_network
 

@@ -11,7 +11,8 @@ import pytest
 from manitwin.errors import Rejected
 from manitwin.formats.image_file import read_image
 from manitwin.models.matting import matte_photo
-from manitwin.models.matting.matte import MIN_CONFIDENCE, study_photo
+from manitwin.models.matting.matte import MIN_CONFIDENCE
+from manitwin.models.matting.study import study_photo
 
 SIZE = (300, 400)
 

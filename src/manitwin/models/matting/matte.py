@@ -11,19 +11,14 @@ from scipy import ndimage
 
 from manitwin.config import MattingConfig
 from manitwin.errors import Rejected
-from manitwin.models.matting.belief import WHOLE, features, probability
-from manitwin.models.matting.candidates import NETWORKS, Candidate, alike, at_size, candidates, completed
 from manitwin.models.matting.causes import CAUSES, REMEDY, cause_of
-from manitwin.models.matting.confidence import MatteScores, frame_cause
-from manitwin.models.matting.enlarged import enlarged
-from manitwin.models.matting.fine_outline import fine_outline
-from manitwin.models.matting.learned import Network, learned_alpha
-from manitwin.models.matting.object_network import in_two_looks, object_share
+from manitwin.models.matting.confidence import frame_cause
+from manitwin.models.matting.explained import Explains, explained
+from manitwin.models.matting.learned import Network
 from manitwin.models.matting.outline import dilated, without_small_holes
-from manitwin.models.matting.segmentation import Segmentation, segment
+from manitwin.models.matting.study import Judged, Study, largest_piece, study_photo
 
 TRANSPARENT_SHARE = 0.02
-PLAIN_NOISE_LAB = 4.0
 MIN_CONFIDENCE = MattingConfig().min_confidence
 LIKELY = 0.5  # that pieces are things: the photo is rejected in any case, and that is the cause
 
@@ -44,113 +39,6 @@ class Matte:
     agreement: dict[str, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Judged:
-    """A candidate with its ``features``."""
-
-    candidate: Candidate
-    features: np.ndarray
-
-    @property
-    def confidence(self) -> float:
-        """How likely the candidate is right."""
-        return probability(self.features)
-
-    @property
-    def of_pieces(self) -> float:
-        """How likely it is that what was found is no background, be it one piece or several."""
-        return probability(np.where(WHOLE, 0.0, self.features))
-
-
-@dataclass(frozen=True)
-class Study:
-    """What was found in a photo before anything is decided.
-
-    ``found`` is that of the rules, ``judged`` every candidate, the likeliest first, ``alpha (H, W) uint8`` the first at the
-    photo's size, empty where there is none, ``shares`` (h, w) what each of the ``NETWORKS`` says, filled within its outline.
-    """
-
-    found: Segmentation
-    judged: list[Judged]
-    alpha: np.ndarray
-    shares: list[np.ndarray]
-
-    @property
-    def confidence(self) -> float:
-        """The confidence in ``alpha``, 0 where nothing was found."""
-        return self.judged[0].confidence if self.judged else 0.0
-
-    @property
-    def plain(self) -> bool:
-        """Whether smooth surfaces explain the border."""
-        background = self.found.background
-        return background.noise_lab < PLAIN_NOISE_LAB and background.unexplained < 0.05
-
-    @property
-    def agreement(self) -> dict[str, float]:
-        """The agreement of each opinion with the mask, by the opinion's name."""
-        chosen = self.judged[0].candidate.found
-        said = {
-            "rules": alike(chosen.mask, self.found.mask),
-            "colours": chosen.known_to_colours,
-        }
-        for name, share in zip(NETWORKS, self.shares, strict=False):
-            said[name] = alike(chosen.mask, at_size(share, chosen.mask.shape) > 0.5)
-        return {name: round(value, 4) for name, value in said.items()}
-
-
-def study_photo(rgb: np.ndarray, *, working_side_px: int = 512, network: Network | None = None) -> Study:
-    """Find the object in ``rgb`` (H, W, 3) uint8 upright sRGB and judge what was found; nothing is rejected here.
-
-    A ``network`` is asked besides the built-in one. Raises Unavailable without the built-in network's weights, BadReply where
-    the given one cannot be run.
-    """
-    found, judged, shares = judged_candidates(rgb, working_side_px=working_side_px, network=network)
-    if not judged:
-        return Study(found, [], np.zeros(rgb.shape[:2], np.uint8), shares)
-    judged = sorted(judged, key=lambda each: -each.confidence)
-    return Study(found, judged, drawn(rgb, judged[0].candidate.found.mask, working_side_px), shares)
-
-
-def judged_candidates(
-    rgb: np.ndarray, *, working_side_px: int = 512, network: Network | None = None
-) -> tuple[Segmentation, list[Judged], list[np.ndarray]]:
-    """Return what the rules found, every candidate with its features, and each network's share of object, as ``study_photo``.
-
-    Of two networks the one counts that speaks better for a candidate. A photo smaller than ``working_side_px`` is ``enlarged``.
-    """
-    photo_side_px = max(rgb.shape[:2])
-    rgb = enlarged(rgb, working_side_px)
-    found = segment(_scaled(rgb, working_side_px))
-    if _longest_side(found.mask) < 0.5 * max(found.mask.shape) and max(rgb.shape[:2]) > 1.2 * working_side_px:
-        found = segment(_scaled(rgb, 2 * working_side_px))  # a small thing is looked at again, closer
-    asked = (None,) if network is None else (network, None)
-    shares = [completed(network_share(rgb, max(found.mask.shape), each), found) for each in asked]
-    made = candidates(found, shares, zoom=photo_side_px / max(found.mask.shape))
-    judged = []
-    for each in made:
-        others = [other for other in made if other is not each and other.independent]
-        beside = [Judged(each, features(each, others, share)) for share in shares]
-        judged.append(max(beside, key=lambda one: one.confidence))
-    return found, judged, shares
-
-
-def network_share(rgb: np.ndarray, side_px: int, network: Network | None) -> np.ndarray:
-    """Return the share of object (h, w) of each pixel of ``rgb``, at most ``side_px`` large, as a network has it."""
-    if network is None:
-        return object_share(_scaled(rgb, side_px))
-    return in_two_looks(_scaled(rgb, max(side_px, *network.side_px)), lambda seen: learned_alpha(network, seen))
-
-
-def drawn(rgb: np.ndarray, mask: np.ndarray, working_side_px: int = 512) -> np.ndarray:
-    """Return the largest piece of a mask (any size) as alpha (H, W) uint8 at the size of ``rgb``, with a soft outline."""
-    seen = enlarged(rgb, working_side_px)
-    alpha = fine_outline(seen, _largest(mask))
-    if max(seen.shape[:2]) <= 2 * working_side_px:  # of larger photos the first look is finer than is needed
-        alpha = fine_outline(seen, alpha > 127)
-    return alpha if seen is rgb else cv2.resize(alpha, rgb.shape[1::-1], interpolation=cv2.INTER_AREA)
-
-
 def matte_photo(
     image: np.ndarray,
     name: str,
@@ -160,13 +48,15 @@ def matte_photo(
     min_area_share: float = 0.002,
     second_object_share: float = 0.12,
     network: Network | None = None,
+    explains: Explains | None = None,
 ) -> Matte:
     """Find the object in ``image`` (H, W, 3 or 4) uint8 upright sRGB; ``name`` is used in messages only.
 
     A real alpha channel (more than 2 % transparent) is believed. Else two ways of looking each propose a mask: rules (smooth
     surfaces grown from the border, flooded up to the photo's edges, and colours) and the built-in network, and a third, where
     it is given, ``network``; the likeliest is taken, by its scores and by how far opinions agree with it: ``flat_border`` is the
-    rules' where smooth surfaces explain the border, ``grabcut`` the rules' where they do not, ``network`` a network's.
+    rules' where smooth surfaces explain the border, ``grabcut`` the rules' where they do not, ``network`` a network's. Where none
+    is believed and ``explains`` is given, one that it explains may be (``explained``).
 
     Raises Rejected: ``no_object``, ``several_objects``, ``low_confidence_matte``, naming cause and remedy.
     """
@@ -174,6 +64,8 @@ def matte_photo(
         return _given_matte(image, name, min_area_share, second_object_share)
     rgb = np.ascontiguousarray(image[..., :3])
     study = study_photo(rgb, working_side_px=working_side_px, network=network)
+    if explains is not None and study.confidence < min_confidence:
+        study = explained(rgb, study, explains, min_confidence=min_confidence, working_side_px=working_side_px)
     chosen = decided(
         study,
         name,
@@ -185,7 +77,7 @@ def matte_photo(
         rgba=np.dstack([rgb, study.alpha]),
         method="network" if chosen.candidate.by_network else "flat_border" if study.plain else "grabcut",
         confidence=round(chosen.confidence, 4),
-        findings=tuple(_findings(chosen.candidate.scores, chosen.candidate.found)),
+        findings=tuple(_findings(chosen)),
         scores={key: round(value, 4) for key, value in asdict(chosen.candidate.scores).items()},
         agreement=study.agreement,
     )
@@ -212,23 +104,13 @@ def decided(
     return study.judged[0]
 
 
-def _scaled(rgb: np.ndarray, side_px: int) -> np.ndarray:
-    scale = side_px / max(rgb.shape[:2])
-    return cv2.resize(rgb, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) if scale < 1 else rgb
-
-
-def _longest_side(mask: np.ndarray) -> int:
-    rows, columns = np.nonzero(mask)
-    return int(max(np.ptp(rows), np.ptp(columns))) + 1 if len(rows) else 0
-
-
 def _given_matte(image: np.ndarray, name: str, min_area_share: float, second_object_share: float) -> Matte:
     mask = image[..., 3] > 127
     if mask.mean() < min_area_share:
         raise Rejected("no_object", f"{name}: its alpha channel is empty; export it with the object opaque", "generate")
     _reject_several(name, mask, second_object_share)
     # specular pixels that a cut-out tool took for background are holes
-    closed = _largest(without_small_holes(mask))
+    closed = largest_piece(without_small_holes(mask))
     alpha = np.where(closed & ~mask, 255, np.where(dilated(closed, 2), image[..., 3], 0)).astype(np.uint8)
     # what a file keeps under transparent pixels is anything: the nearest opaque colour takes its place
     nearest = ndimage.distance_transform_edt(image[..., 3] < 250, return_distances=False, return_indices=True)
@@ -262,13 +144,12 @@ def _reject_several(name: str, mask: np.ndarray, second_object_share: float) -> 
         )
 
 
-def _largest(mask: np.ndarray) -> np.ndarray:
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
-    return labels == 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax())
-
-
-def _findings(scores: MatteScores, found: Segmentation) -> list[str]:
-    findings = []
+def _findings(chosen: Judged) -> list[str]:
+    scores, found, findings = chosen.candidate.scores, chosen.candidate.found, []
+    if chosen.is_explained:
+        findings.append(
+            f"doubtful by itself ({chosen.by_itself:.2f}), but its outline is that of the thing it is said to be"
+        )
     if scores.uncut < 1:
         findings.append("the image border touches the object")
     if scores.whole < 1:

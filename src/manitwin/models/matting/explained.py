@@ -1,0 +1,49 @@
+"""A doubtful cut-out whose outline is that of the thing that the photo is said to show: a second, independent opinion.
+
+A shadow taken for a part, a part left out or a hole filled has no such outline by accident. What a shape tells nothing of is
+asked of the photo as before: whether the frame cuts the thing, it falls apart, or other things stand beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, replace
+
+import numpy as np
+
+from manitwin.models.matting.candidates import AGREEING, alike
+from manitwin.models.matting.study import Judged, Study, drawn
+
+Explains = Callable[[np.ndarray], bool]
+"""Tells of a cut-out ``rgba (H, W, 4) uint8`` whether it has the outline of the thing that it is said to be."""
+NOT_TOLD_BY_SHAPE = ("complete", "whole", "uncut")
+LEAST_SCORE = 0.9
+
+
+def explained(
+    rgb: np.ndarray, study: Study, explains: Explains, *, min_confidence: float, working_side_px: int = 512
+) -> Study:
+    """Return the study of a photo ``rgb (H, W, 3) uint8`` with a candidate first that a shape ``explains``.
+
+    The likeliest is asked first, and none that would not reach ``min_confidence`` even so; where none is explained, or they are
+    doubted for what shapes do not tell, the study is returned as it is.
+    """
+    asked: list[Judged] = []
+    for each in study.judged:
+        would_be = replace(each, is_explained=True)
+        if would_be.confidence < min_confidence:
+            break
+        mask = each.candidate.found.mask
+        if _has_other_doubts(each) or any(alike(mask, other.candidate.found.mask) > AGREEING for other in asked):
+            continue
+        asked.append(each)
+        alpha = study.alpha if each is study.judged[0] else drawn(rgb, mask, working_side_px)
+        if explains(np.dstack([rgb, alpha])):
+            others = [other for other in study.judged if other is not each]
+            return replace(study, judged=[would_be, *others], alpha=alpha)
+    return study
+
+
+def _has_other_doubts(judged: Judged) -> bool:
+    scores = asdict(judged.candidate.scores)
+    return min(scores[name] for name in NOT_TOLD_BY_SHAPE) < LEAST_SCORE
