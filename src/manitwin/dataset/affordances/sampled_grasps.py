@@ -11,6 +11,9 @@ from manitwin.errors import UsageError
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
 from manitwin.models.graspers.screens import PadScreen
 from manitwin.models.graspers.surface_sampling import AntipodalGrasper
+from manitwin.physics.confirmed_trial import ConfirmedTrial
+from manitwin.physics.mujoco.trial import MujocoTrial
+from manitwin.physics.sapien.trial import SapienTrial
 from manitwin.pipeline.trial_replay import settings_of_trial
 from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.robots.grippers.parallel import ParallelGripper
@@ -34,8 +37,6 @@ def sample_grasps(twin: Twin, solid: trimesh.Trimesh, trials: int, rng: np.rando
     overlap the object, is left out before. Raises UsageError for a twin whose gripper has no
     parallel jaws or is not one that is shipped, or whose record tells no trial that can be run.
     """
-    from manitwin.physics.sapien.trial import SapienTrial  # the engine loads where it is needed
-
     summary = twin.record.grasps
     assert summary is not None
     gripper = load_gripper(summary.gripper)
@@ -60,5 +61,6 @@ def sample_grasps(twin: Twin, solid: trimesh.Trimesh, trials: int, rng: np.rando
     proposed = GraspProposals.joined(found)
     chosen = proposed.take(np.sort(rng.permutation(len(proposed))[:trials]))
     settings = settings_of_trial(twin, summary.trial, gripper)
-    results = SapienTrial().run(body, gripper, chosen.gripper_to_object, settings)
+    trial = ConfirmedTrial(SapienTrial(), MujocoTrial())  # held is what it is in a build
+    results = trial.run(body, gripper, chosen.gripper_to_object, settings)
     return SampledGrasps(chosen, np.array([result.outcome == "held" for result in results], bool))
