@@ -12,12 +12,12 @@ from dataclasses import asdict, replace
 import numpy as np
 
 from manitwin.models.matting.candidates import AGREEING, alike
+from manitwin.models.matting.causes import LOW_SCORE
 from manitwin.models.matting.study import Judged, Study, drawn
 
 Explains = Callable[[np.ndarray], bool]
 """Tells of a cut-out ``rgba (H, W, 4) uint8`` whether it has the outline of the thing that it is said to be."""
 NOT_TOLD_BY_SHAPE = ("complete", "whole", "uncut")
-LEAST_SCORE = 0.9
 
 
 def explained(
@@ -46,4 +46,4 @@ def explained(
 
 def _has_other_doubts(judged: Judged) -> bool:
     scores = asdict(judged.candidate.scores)
-    return min(scores[name] for name in NOT_TOLD_BY_SHAPE) < LEAST_SCORE
+    return min(scores[name] for name in NOT_TOLD_BY_SHAPE) < LOW_SCORE
