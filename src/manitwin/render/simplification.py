@@ -31,17 +31,18 @@ def simplified(vertices: np.ndarray, faces: np.ndarray, tolerance_m: float) -> n
     if not len(faces):
         return faces
     kept = _of_open_edges(faces, len(vertices))
-    quadrics = _quadrics(vertices, faces)
+    quadrics, products = _quadrics(vertices, faces), _products(vertices)
     for number in range(_ROUNDS):
         shuffle = (np.arange(1, len(vertices) + 1) * (number + 1) * _GOLDEN) % 1.0
-        moves = _round(vertices, faces, quadrics, kept, tolerance_m**2, shuffle)
+        moves = _round(vertices, faces, quadrics, products, kept, tolerance_m**2, shuffle)
         moved = np.flatnonzero(moves != np.arange(len(moves)))
         np.add.at(quadrics, moves[moved], quadrics[moved])  # several may move into one
-        there = len(np.unique(faces))
+        there = np.zeros(len(vertices), bool)
+        there[faces] = True
         faces = moves[faces]
         a, b, c = faces.T
         faces = faces[(a != b) & (b != c) & (c != a)]
-        if len(moved) < _LEAST_GAIN * there:
+        if len(moved) < _LEAST_GAIN * np.count_nonzero(there):
             break
     return faces
 
@@ -64,6 +65,12 @@ def _quadrics(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return quadrics
 
 
+def _products(vertices: np.ndarray) -> np.ndarray:
+    """Return what the quadratic forms of ``_quadrics`` are multiplied with at each vertex ``(V, 10)``."""
+    homogeneous = np.column_stack([vertices, np.ones(len(vertices))])
+    return np.asarray(homogeneous[:, _ROW] * homogeneous[:, _COLUMN] * np.where(_ROW == _COLUMN, 1, 2))
+
+
 def _of_open_edges(faces: np.ndarray, count: int) -> np.ndarray:
     """Tell which vertices lie on edges that have not exactly two triangles; returns ``(count,) bool``."""
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
@@ -77,6 +84,7 @@ def _round(
     vertices: np.ndarray,
     faces: np.ndarray,
     quadrics: np.ndarray,
+    products: np.ndarray,
     kept: np.ndarray,
     most: float,
     shuffle: np.ndarray,
@@ -90,12 +98,11 @@ def _round(
     start, end = faces.ravel(), faces[:, [1, 2, 0]].ravel()
     free = ~kept[start]
     start, end = start[free], end[free]
-    homogeneous = np.column_stack([vertices, np.ones(len(vertices))])
-    products = homogeneous[:, _ROW] * homogeneous[:, _COLUMN] * np.where(_ROW == _COLUMN, 1, 2)
-    cost = (quadrics[start] * products[end]).sum(1)
+    cost = (np.take(quadrics, start, axis=0) * np.take(products, end, axis=0)).sum(1)
+    cheap = cost < most
+    start, end, cost = start[cheap], end[cheap], cost[cheap]
     length = ((vertices[end] - vertices[start]) ** 2).sum(1)
     order = np.lexsort((end, cost + 1e-4 * length, start))  # of equal ones the nearest
-    order = order[cost[order] < most]
     start, end, cost = start[order], end[order], cost[order]
     moves, price = np.arange(len(vertices)), np.full(len(vertices), np.inf)
     for _ in range(_TRIES):
@@ -117,18 +124,30 @@ def _keeps_shape(vertices: np.ndarray, faces: np.ndarray, start: np.ndarray, end
     """Tell for each vertex and the one it would move into whether no triangle turns over or becomes a sliver."""
     goal = np.full(len(vertices), -1)
     goal[start] = end
+    to = goal[faces]
+    face, corner = np.nonzero(to >= 0)
+    to = to[face, corner]
+    stays = (faces[face] != to[:, None]).all(1)  # those with both ends fall away
+    face, corner, to = face[stays], corner[stays], to[stays]
+    now = np.take(vertices.T, faces[face].T, axis=1)  # (3, 3, M): of each coordinate the corners
+    then = now.copy()
+    then[:, corner, np.arange(len(face))] = np.take(vertices.T, to, axis=1)
+    before, after = _doubled_normals(now), _doubled_normals(then)
+    longest = sum(_dot(side, side) for side in (then[:, i] - then[:, i - 1] for i in range(3)))
+    area = np.sqrt(_dot(after, after))
+    bad = _dot(before, after) < _LEAST_COSINE * np.sqrt(_dot(before, before)) * area
+    bad |= area < _FLATTEST * longest
     good = np.ones(len(vertices), bool)
-    for corner in range(3):
-        to = goal[faces[:, corner]]
-        moving = np.flatnonzero(to >= 0)
-        moving = moving[(faces[moving] != to[moving, None]).all(1)]  # those with both ends fall away
-        now = vertices[faces[moving]]
-        then = now.copy()
-        then[:, corner] = vertices[to[moving]]
-        before, after = (np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]) for t in (now, then))
-        longest = sum(((then[:, i] - then[:, i - 1]) ** 2).sum(1) for i in range(3))
-        area = np.linalg.norm(after, axis=1)
-        bad = (before * after).sum(1) < _LEAST_COSINE * np.linalg.norm(before, axis=1) * area
-        bad |= area < _FLATTEST * longest
-        good[faces[moving[bad], corner]] = False
+    good[faces[face[bad], corner[bad]]] = False
     return good[start]
+
+
+def _doubled_normals(corners: np.ndarray) -> np.ndarray:
+    """Return the normals ``(3, M)`` of triangles ``(3 coordinates, 3 corners, M)``, twice as long as their areas are large."""
+    (a, b, c), (d, e, f) = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return np.stack([b * f - c * e, c * d - a * f, a * e - b * d])
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the scalar products ``(M,)`` of vectors ``(3, M)``."""
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
