@@ -69,22 +69,28 @@ def _welded_and_simplified(part: trimesh.Trimesh, tolerance_m: float) -> trimesh
     if material.baseColorTexture is not None or material.metallicRoughnessTexture is not None:
         return part
     vertices, faces = weld_equal(np.asarray(part.vertices), np.asarray(part.faces))
-    used, faces = np.unique(simplified(vertices, faces, tolerance_m), return_inverse=True)
-    lean = make_part(vertices[used], faces.reshape(-1, 3), material=material, name=part.metadata["name"])
+    used, faces = _used(simplified(vertices, faces, tolerance_m), len(vertices))
+    lean = make_part(vertices[used], faces, material=material, name=part.metadata["name"])
     return with_creased_normals(lean)
 
 
 def _simplified(s: RenderSurface, tolerance_m: float) -> RenderSurface:
     """Return a surface with fewer vertices; vertices of seams and creases, where they come twice, stay."""
-    faces = simplified(s.vertices, s.faces, tolerance_m)
-    used, faces = np.unique(faces, return_inverse=True)
+    used, faces = _used(simplified(s.vertices, s.faces, tolerance_m), len(s.vertices))
     return replace(
         s,
         vertices=s.vertices[used],
         normals=s.normals[used],
         uv=s.uv[used],
-        faces=faces.reshape(-1, 3).astype(np.uint32),
+        faces=faces.astype(np.uint32),
     )
+
+
+def _used(faces: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the indices of those of ``count`` vertices that faces ``(F, 3)`` have, and the faces over these alone."""
+    there = np.zeros(count, bool)
+    there[faces] = True
+    return np.flatnonzero(there), (np.cumsum(there) - 1)[faces]
 
 
 def _with_small_textures(s: RenderSurface, most_px: int) -> RenderSurface:
@@ -105,10 +111,10 @@ def _shadow_caster(parts: Sequence[trimesh.Trimesh], both_sides: bool, tolerance
 
 def _bare_surface(vertices: np.ndarray, faces: np.ndarray) -> RenderSurface:
     """Return a bare mesh, ``(V, 3)`` and ``(F, 3)``, as a grey surface without shading normals."""
-    used, faces = np.unique(faces, return_inverse=True)
+    used, faces = _used(faces, len(vertices))
     return RenderSurface(
         vertices=vertices[used].astype(np.float32),
-        faces=faces.reshape(-1, 3).astype(np.uint32),
+        faces=faces.astype(np.uint32),
         normals=np.tile(np.array([0, 0, 1], np.float32), (len(used), 1)),
         uv=np.zeros((len(used), 2), np.float32),
         color=(0.5, 0.5, 0.5),
