@@ -20,7 +20,7 @@ before = resident_mb()
 return_free_memory()
 print(before - resident_mb())
 """
-KEPT = FREED.replace("6_000", "2_000")
+KEPT = FREED.replace("6_000", "600")
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")

@@ -26,9 +26,6 @@ from manitwin.render.surfaces import RenderSurface, render_surface, triangle_mes
 
 BACKDROP = (233, 235, 238)  # light enough to be no colour, dark enough that white things stand out
 SUPERSAMPLE = 2  # SAPIEN's edges are not antialiased; twice the size each way removes the steps that are seen
-KEPT_PX = 2_000_000
-"""So many pixels in all have the cameras, one a picture's size, that are kept ready, the last used. Each pixel takes 17 bytes;
-pictures of cards have another size for each object."""
 SHADERS = Path(__file__).parent / "shaders"
 DARKENING_RADIUS = 0.035  # of the picture's height: how far a nearer surface throws its soft shade
 DARKENING_STRENGTH = 2.6
@@ -63,7 +60,9 @@ class Renderer:
     def __init__(self) -> None:
         self.device: RenderDevice = require_renderer()
         self._sapien, self._scene = render_scene({"Color": "R8G8B8A8Unorm"})
-        self._cameras: dict[tuple[int, int], tuple[Any, Any]] = {}
+        self._size: tuple[int, int] | None = None
+        self._camera: Any = None
+        self._mount: Any = None
 
     def render(
         self,
@@ -82,9 +81,10 @@ class Renderer:
         points = np.concatenate([s.vertices for s in surfaces])
         low, high = points.min(0), points.max(0)
         center, scale = (low + high) / 2, 2 / float(np.linalg.norm(high - low))  # a sphere of radius 1 holds everything
-        entities = [self._entity(s, center, scale) for s in surfaces]
-        for entity in entities:
-            self._scene.add_entity(entity)
+        entities = []
+        while surfaces:  # none is kept beside what SAPIEN makes of it: textures are large
+            entities.append(self._entity(surfaces.pop(0), center, scale))
+            self._scene.add_entity(entities[-1])
         try:
             return [self._shoot(camera, center, scale, background, supersample) for camera in cameras]
         finally:
@@ -93,7 +93,7 @@ class Renderer:
 
     def close(self) -> None:
         """Give back what the driver holds."""
-        self._cameras.clear()
+        self._camera = self._mount = None
         self._scene.clear()
         del self._scene
 
@@ -105,21 +105,22 @@ class Renderer:
         entity.add_component(body)
         return entity
 
-    def _camera(self, width: int, height: int) -> tuple[Any, Any]:
-        found = self._cameras.pop((width, height), None)
-        if found is None:
-            while self._cameras and width * height + sum(w * h for w, h in self._cameras) > KEPT_PX:
-                self._scene.remove_entity(self._cameras.pop(next(iter(self._cameras)))[1])
-            found = self._sapien.render.RenderCameraComponent(width, height, str(SHADERS)), self._sapien.Entity()
-            found[1].add_component(found[0])
-            self._scene.add_entity(found[1])
-        self._cameras[width, height] = found
-        return found
+    def _camera_of(self, width: int, height: int) -> tuple[Any, Any]:
+        """Return a camera and what carries it; the one before stays where it has the same size. Each pixel takes 25 bytes."""
+        if self._size != (width, height):
+            if self._mount is not None:
+                self._scene.remove_entity(self._mount)
+            self._camera = self._sapien.render.RenderCameraComponent(width, height, str(SHADERS))
+            self._mount = self._sapien.Entity()
+            self._mount.add_component(self._camera)
+            self._scene.add_entity(self._mount)
+            self._size = width, height
+        return self._camera, self._mount
 
     def _shoot(
         self, camera: Camera, center: np.ndarray, scale: float, background: tuple[int, int, int], k: int
     ) -> Frame:
-        component, entity = self._camera(camera.width_px * k, camera.height_px * k)
+        component, entity = self._camera_of(camera.width_px * k, camera.height_px * k)
         position = (camera.position - center) * scale
         distance = float(np.linalg.norm(position))
         near, far = max(0.02, distance - 1.05), distance + 1.05

@@ -12,6 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 import trimesh
+from PIL import Image
 
 from manitwin.formats.meshes.textures import make_part, material_of, pbr_material, uv_of
 from manitwin.formats.meshes.triangles import with_creased_normals
@@ -50,9 +51,9 @@ def render_surface(part: trimesh.Trimesh) -> RenderSurface:
     factor = np.asarray(material.baseColorFactor)[:3] / 255
     color_map = mask = None
     if uv is not None and material.baseColorTexture is not None:
-        color_map = _tinted(shrunk(np.asarray(material.baseColorTexture.convert("RGB")), MAX_TEXTURE_PX), factor)
+        color_map = _tinted(shrunk(_rgb(material.baseColorTexture), MAX_TEXTURE_PX), factor)
     if uv is not None and material.metallicRoughnessTexture is not None:
-        mask = shrunk(np.asarray(material.metallicRoughnessTexture.convert("RGB")), MAX_TEXTURE_PX)
+        mask = shrunk(_rgb(material.metallicRoughnessTexture), MAX_TEXTURE_PX)
     metallic, roughness = float(material.metallicFactor), float(material.roughnessFactor)
     vertices, faces, normals = np.asarray(part.vertices), np.asarray(part.faces), np.asarray(part.vertex_normals)
     uv_down = np.zeros((len(vertices), 2)) if uv is None else uv * [1, -1] + [0, 1]
@@ -93,6 +94,10 @@ def srgb_to_linear(value: np.ndarray) -> np.ndarray:
 def linear_to_srgb(value: np.ndarray) -> np.ndarray:
     """Encode linear values in [0, 1] as sRGB (IEC 61966-2-1)."""
     return np.where(value <= 0.0031308, value * 12.92, 1.055 * np.maximum(value, 0.0031308) ** (1 / 2.4) - 0.055)
+
+
+def _rgb(image: Image.Image) -> np.ndarray:
+    return np.asarray(image if image.mode == "RGB" else image.convert("RGB"))  # of which Pillow makes another copy
 
 
 def _tinted(image: np.ndarray, factor: np.ndarray) -> np.ndarray:

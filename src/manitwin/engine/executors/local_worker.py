@@ -13,7 +13,7 @@ from typing import TextIO
 from manitwin.engine.executors.stage_notes import parts_noted
 from manitwin.engine.jobs import Job, Reply, RunStage, WorkerSetup
 from manitwin.engine.worker import Worker
-from manitwin.engine.worker_processes import die_with, limit_memory, one_thread_each, return_free_memory
+from manitwin.engine.worker_processes import die_with, keep_imported, limit_memory, one_thread_each, return_free_memory
 from manitwin.formats.printable import printable_line
 
 STACK_LINES = 12
@@ -39,6 +39,7 @@ def start(setup: WorkerSetup, stacks: str, driver: int) -> None:
     os.dup2(_stack_file.fileno(), 2)
     limit_memory(setup.memory_gb)
     _worker = Worker(setup)
+    keep_imported()
 
 
 def do(ticket: int, job: Job) -> Reply:

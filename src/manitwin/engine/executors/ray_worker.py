@@ -11,7 +11,7 @@ from pathlib import Path
 
 from manitwin.engine.jobs import Job, Reply, WorkerSetup
 from manitwin.engine.worker import Worker
-from manitwin.engine.worker_processes import limit_memory, one_thread_each, return_free_memory
+from manitwin.engine.worker_processes import keep_imported, limit_memory, one_thread_each, return_free_memory
 from manitwin.errors import UsageError
 from manitwin.formats.installation import installed_version
 
@@ -32,6 +32,7 @@ class RayWorker:
             raise UsageError(f"this node has manitwin {here} and the driver {wanted_version}; install the same on all")
         one_thread_each()
         limit_memory(setup.memory_gb)
+        keep_imported()
         self._setup = setup
         self._idle: queue.SimpleQueue[Worker] = queue.SimpleQueue()
         self._stack = _stack_folder() / f"{os.getpid()}.txt"
