@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import msgpack._cmsgpack
@@ -94,3 +96,21 @@ def test_the_doctor_names_the_packages_of_missing_libraries(monkeypatch: pytest.
 
 def test_an_import_that_fails_for_another_reason_keeps_its_own_remedy() -> None:
     assert import_remedy(ImportError("No module named 'coal'"), "pip install it") == "pip install it"
+
+
+def test_a_library_that_is_left_out_is_not_found_and_comes_back() -> None:
+    program = """
+from manitwin.formats.installation import left_out
+import sys
+with left_out("wave"):
+    try:
+        import wave
+    except ModuleNotFoundError as error:
+        print(error.name)
+import wave
+with left_out("wave"):
+    import wave as again
+print(again is sys.modules["wave"])
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["wave", "True"]

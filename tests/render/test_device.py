@@ -82,3 +82,9 @@ def test_remedy_is_the_system_s_own_command(
         device.require_renderer()
     assert command in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_renderer_loads_no_kinematics() -> None:
+    program = "import sys; from manitwin.render.device import render_scene; render_scene({}); print('pinocchio' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"

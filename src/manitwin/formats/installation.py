@@ -9,7 +9,9 @@ from __future__ import annotations
 import os
 import re
 import subprocess
+import sys
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 ELF = b"\x7fELF"
@@ -50,6 +52,23 @@ def names_shared_library(error: ImportError) -> bool:
 def import_remedy(error: ImportError, otherwise: str) -> str:
     """Return the remedy of a failed import: the doctor where a shared library is missing, else what the caller knows."""
     return "manitwin doctor says which of this system's packages have it" if names_shared_library(error) else otherwise
+
+
+@contextmanager
+def left_out(name: str) -> Iterator[None]:
+    """Have a library that is not imported yet taken for not installed by what is imported in the ``with`` statement.
+
+    For what another one would load and can do without. A None in ``sys.modules`` makes an import raise ModuleNotFoundError
+    (Python's reference, "The module cache").
+    """
+    if name in sys.modules:
+        yield
+        return
+    sys.modules[name] = None  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        del sys.modules[name]
 
 
 def elf_files(folder: Path) -> Iterator[Path]:

@@ -21,6 +21,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from manitwin.errors import ManiTwinError, RendererMissing, UsageError
+from manitwin.formats.installation import left_out
 
 RUN = logging.getLogger("manitwin.run")
 SWITCH = "MANITWIN_RENDER_DEVICE"
@@ -76,7 +77,7 @@ class RenderDevice:
 def render_scene(picture_formats: Mapping[str, str]) -> tuple[Any, Any]:
     """Return SAPIEN's module and an empty scene of it that renders, its pictures in these formats; raises RendererMissing."""
     require_renderer()
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), left_out("pinocchio"):  # 45 MB: SAPIEN has one of its own, which nothing here calls
         warnings.simplefilter("ignore")  # SAPIEN warns of drivers that it looks for and does not need
         import sapien
         import sapien.render
