@@ -106,7 +106,7 @@ class Renderer:
         return entity
 
     def _camera_of(self, width: int, height: int) -> tuple[Any, Any]:
-        """Return a camera and what carries it; the one before stays where it has the same size. Each pixel takes 25 bytes."""
+        """Return a camera and what carries it; the one before stays where it has the same size. Each pixel takes 17 bytes."""
         if self._size != (width, height):
             if self._mount is not None:
                 self._scene.remove_entity(self._mount)
