@@ -1,11 +1,16 @@
-"""What worker processes do about their memory."""
+"""What worker processes do about their memory and their threads."""
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+from multiprocessing.connection import Connection
 
+import numpy as np
 import pytest
+
+from manitwin.engine.worker_processes import ONE_THREAD, WorkerContext
 
 FREED = """
 from manitwin.engine.worker_processes import return_free_memory
@@ -28,3 +33,24 @@ KEPT = FREED.replace("6_000", "600")
 def test_freed_memory_is_given_back_where_it_is_much(program: str, least_mb: float, most_mb: float) -> None:
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert least_mb < float(done.stdout) < most_mb
+
+
+def tell_threads(answer: Connection) -> None:
+    """Answer with the number of threads that are there once matrices were multiplied."""
+    matrix = np.ones((600, 600))
+    answer.send(float((matrix @ matrix)[0, 0]) / 600 * len(os.listdir("/proc/self/task")))
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+def test_linear_algebra_of_a_worker_has_one_thread_though_it_was_loaded_before_the_worker_began(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name in ONE_THREAD:
+        monkeypatch.delenv(name, raising=False)
+    context = WorkerContext()
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=tell_threads, args=(sender,))
+    process.start()
+    assert receiver.recv() == 1
+    process.join()
+    assert not set(ONE_THREAD) & set(os.environ), "this process stays as it was"

@@ -13,7 +13,7 @@ from typing import TextIO
 from manitwin.engine.executors.stage_notes import parts_noted
 from manitwin.engine.jobs import Job, Reply, RunStage, WorkerSetup
 from manitwin.engine.worker import Worker
-from manitwin.engine.worker_processes import die_with, keep_imported, limit_memory, one_thread_each, return_free_memory
+from manitwin.engine.worker_processes import die_with, keep_imported, limit_memory, return_free_memory
 from manitwin.formats.printable import printable_line
 
 STACK_LINES = 12
@@ -29,7 +29,6 @@ _stack_file: TextIO | None = None
 def start(setup: WorkerSetup, stacks: str, driver: int) -> None:
     """Prepare this process: it dies with its driver, at once when it is told to, and within its limit of memory."""
     global _worker, _stack_file
-    one_thread_each()
     die_with(driver)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # pebble's own handler waits for native code to return
     _stack_file = (Path(stacks) / f"{os.getpid()}.txt").open("a")
