@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -24,20 +25,25 @@ from manitwin.render.cameras import Camera
 from manitwin.twin.grasp_table import JOINTS
 from manitwin.twin.import_record import ImportRecord, read_import_record
 
-_solid: tuple[bytes, int, trimesh.Trimesh] | None = None
-"""The last solid that was loaded, with the digest of its file and its own: one stage after the other wants it."""
+KEPT_SOLIDS = 4
+"""A worker has the stages of so many items in turn where two work: of each of two, one is done and one waits beside it."""
+_solids: OrderedDict[bytes, tuple[int, trimesh.Trimesh]] = OrderedDict()
+"""The solids that were loaded last by the digests of their files, with their own: one stage after the other wants them."""
 
 
 def load_solid(path: Path) -> trimesh.Trimesh:
     """Load the watertight mesh of ``solid.npz``; what was made of it for another stage (rays, its opening) comes with it."""
-    global _solid
     content = path.read_bytes()
     digest = hashlib.blake2b(content, digest_size=16).digest()
-    if _solid is None or _solid[0] != digest or _solid[1] != hash(_solid[2]):  # the last: somebody has changed it
+    known = _solids.pop(digest, None)
+    if known is None or known[0] != hash(known[1]):  # the last: somebody has changed it
         with np.load(io.BytesIO(content)) as arrays:
             mesh = trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
-        _solid = digest, hash(mesh), mesh
-    return _solid[2]
+        known = hash(mesh), mesh
+    _solids[digest] = known
+    while len(_solids) > KEPT_SOLIDS:
+        _solids.popitem(last=False)
+    return known[1]
 
 
 def load_hulls(path: Path) -> tuple[np.ndarray, ...]:
