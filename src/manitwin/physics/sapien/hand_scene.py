@@ -83,7 +83,14 @@ class HandScene:
     def advance(self, loads_m_s2: np.ndarray) -> None:
         """Take one step for each row of accelerations ``(N, 3)``."""
         set_target, step = self.load.set_drive_velocity_target, self.system.step
-        for target in (loads_m_s2 / LOAD_RATE_PER_S).astype(np.float32):
+        targets = (loads_m_s2 / LOAD_RATE_PER_S).astype(np.float32)
+        if (targets == targets[:1]).all():  # while the hand closes, and where it waits
+            for target in targets[:1]:
+                set_target(target, NO_SPIN)
+            for _ in targets:
+                step()
+            return
+        for target in targets:
             set_target(target, NO_SPIN)
             step()
 

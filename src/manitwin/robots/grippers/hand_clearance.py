@@ -51,10 +51,14 @@ class HandCollision:
 
     def _box_overlaps(self, box_to_object: np.ndarray, half_m: np.ndarray) -> np.ndarray:
         axes, center = box_to_object[:, :3, :3].astype(np.float32), box_to_object[:, :3, 3].astype(np.float32)
-        reach = (np.abs(axes) @ half_m.astype(np.float32))[:, None]
-        near = ((center[:, None] + reach >= self._low) & (center[:, None] - reach <= self._high)).all(2)
+        reach = np.abs(axes) @ half_m.astype(np.float32)
+        near: np.ndarray = np.ones((len(center), len(self._hulls)), dtype=bool)
+        for axis in range(3):  # one by one: NumPy is slow over a last axis of three
+            near &= (center[:, axis] + reach[:, axis])[:, None] >= self._low[:, axis]
+            near &= (center[:, axis] - reach[:, axis])[:, None] <= self._high[:, axis]
         hit = np.zeros(len(center), dtype=bool)
-        for number, (vertices, equations) in enumerate(self._hulls):
+        for number in np.flatnonzero(near.any(0)):
+            vertices, equations = self._hulls[number]
             pairs = np.flatnonzero(near[:, number] & ~hit)
             for start in range(0, len(pairs), PAIRS_AT_ONCE):
                 some = pairs[start : start + PAIRS_AT_ONCE]
