@@ -105,13 +105,17 @@ def framing_camera(
     """
     azimuth, elevation = np.deg2rad(azimuth_deg), np.deg2rad(elevation_deg)
     backward = np.array([np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
-    center = (points.min(0) + points.max(0)) / 2
+    center = np.array([(along.min() + along.max()) / 2 for along in points.T])
     rotation = look_at(center + backward, center)[:3, :3]
     seen = (points - center) @ rotation
     tangent_y = FILL * np.tan(np.deg2rad(fov_y_deg) / 2)
     tangents = np.array([tangent_y * width_px / height_px, tangent_y])
     # |x - cx| <= t (d - z) for all points bounds d and cx from both sides; the least d is where both bounds meet.
-    upper, lower = (seen[:, :2] + seen[:, 2:] * tangents).max(0), (seen[:, :2] - seen[:, 2:] * tangents).min(0)
+    depths = [seen[:, 2] * tangent for tangent in tangents]
+    upper, lower = (
+        np.array([(seen[:, axis] + depth).max() for axis, depth in enumerate(depths)]),
+        np.array([(seen[:, axis] - depth).min() for axis, depth in enumerate(depths)]),
+    )
     distance = float(((upper - lower) / (2 * tangents)).max())
     offset = np.append((upper + lower) / 2, distance)
     pose = np.eye(4)

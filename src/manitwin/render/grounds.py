@@ -62,7 +62,11 @@ def ground_of_pixels(pixels: np.ndarray) -> tuple[int, int, int]:
 
 def shown_object(picture: np.ndarray) -> np.ndarray:
     """Return where a picture ``(H, W, 3) uint8`` differs from its plain ground, the colour of its corner; ``(H, W) bool``."""
-    return np.asarray(np.abs(picture.astype(int) - picture[0, 0].astype(int)).max(axis=2) > _GROUND_TOLERANCE)
+    far = [
+        cv2.absdiff(np.ascontiguousarray(picture[..., c]), float(picture[0, 0, c])) > _GROUND_TOLERANCE
+        for c in range(3)
+    ]
+    return np.asarray(far[0] | far[1] | far[2])
 
 
 def marker_color(pictures: Sequence[np.ndarray]) -> MarkerColor:

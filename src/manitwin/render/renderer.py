@@ -155,8 +155,11 @@ class Frame:
 
     def over(self, old: tuple[int, int, int], new: tuple[int, int, int]) -> np.ndarray:
         """Return ``rgb`` over another background than the one that it was drawn over."""
-        moved = (1 - self.coverage)[..., None] * (np.array(new, np.float32) - np.array(old, np.float32))
-        return np.rint(np.clip(self.rgb + moved, 0, 255)).astype(np.uint8)
+        empty, picture = 1 - self.coverage, np.empty_like(self.rgb)
+        for channel, step in enumerate(np.array(new, np.float32) - np.array(old, np.float32)):
+            moved = self.rgb[..., channel] + empty * step
+            picture[..., channel] = np.rint(np.clip(moved, 0, 255, out=moved), out=moved)
+        return picture
 
 
 def reduced_frame(
@@ -183,9 +186,12 @@ def reduced_frame(
     nearness = np.float32(1 / nearest) + _averaged(buffer, size) * np.float32(1 / farthest - 1 / nearest)
     at_center = np.zeros_like(coverage)
     np.divide(coverage, nearness - empty * np.float32(1 / farthest), out=at_center, where=seen)
-    lit = _averaged(color, size)[..., :3] * depth_shade(at_center, seen, radius)[..., None]
-    rgb = lit + empty[..., None] * np.array(background, dtype=np.float32)
-    return Frame(np.rint(np.minimum(rgb, 255)).astype(np.uint8), coverage, at_center)
+    small, shade = _averaged(color, size), depth_shade(at_center, seen, radius)
+    rgb = np.empty((*coverage.shape, 3), np.uint8)
+    for channel, ground in enumerate(np.array(background, dtype=np.float32)):  # NumPy is slow over a last axis of three
+        lit = small[..., channel] * shade + empty * ground
+        rgb[..., channel] = np.rint(np.minimum(lit, 255, out=lit), out=lit)
+    return Frame(rgb, coverage, at_center)
 
 
 def _averaged(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
