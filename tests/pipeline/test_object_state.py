@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from manitwin.pipeline.object_state import KEPT_SOLIDS, load_solid
+from manitwin.pipeline.object_state import KEPT, load_solid
 
 
 def written(folder: Path, size_m: float) -> Path:
@@ -18,8 +18,8 @@ def written(folder: Path, size_m: float) -> Path:
 
 
 def test_stages_of_items_in_turn_find_their_solids_as_they_left_them(tmp_path: Path) -> None:
-    paths = [written(tmp_path, 0.1 * number) for number in range(1, KEPT_SOLIDS + 2)]
-    in_turn = paths[:KEPT_SOLIDS]
+    paths = [written(tmp_path, 0.1 * number) for number in range(1, KEPT + 2)]
+    in_turn = paths[:KEPT]
     first = [load_solid(path) for path in in_turn]
     assert all(load_solid(path) is solid for path, solid in zip(in_turn, first, strict=True))
     load_solid(paths[-1])

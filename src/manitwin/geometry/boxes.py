@@ -105,7 +105,8 @@ def smallest_enclosing_circle(points: np.ndarray) -> tuple[np.ndarray, float]:
 
 def _next_outside(points: np.ndarray, first: int, end: int, center: np.ndarray, reach: float) -> int:
     """Return the first of the points from ``first`` on that is farther than ``reach`` from a centre; ``end`` where none is."""
-    outside = np.linalg.norm(points[first:end] - center, axis=1) > reach
+    away = points[first:end] - center
+    outside = np.sqrt(away[:, 0] * away[:, 0] + away[:, 1] * away[:, 1]) > reach
     return first + int(outside.argmax()) if outside.any() else end
 
 

@@ -13,12 +13,11 @@ from PIL import Image
 from manitwin.config import CandidatesConfig, Resource
 from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
-from manitwin.formats.glb import read_glb
 from manitwin.geometry.candidate_sampling import sample_candidates
 from manitwin.geometry.cavity import find_opening
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import sample_surface
-from manitwin.pipeline.object_state import load_solid, pictures
+from manitwin.pipeline.object_state import load_solid, load_visual, pictures
 from manitwin.pipeline.views import write_webp
 from manitwin.render.cameras import Camera, project
 from manitwin.render.grounds import marker_color
@@ -48,7 +47,7 @@ class CandidatesStage:
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Choose and mark the candidates; raises Rejected where the solid does not follow the surface that is seen."""
         solid = load_solid(draft.path("solid.npz"))
-        caster = RayCaster(merged(read_glb(draft.path("visual.glb"))))
+        caster = RayCaster(merged(load_visual(draft.path("visual.glb"))))
         scale = draft.field("physical")["scale_applied"]
         cameras = [Camera.from_json(value).scaled(scale) for value in draft.field("cameras")]
         positions, normals, visible = choose_candidates(

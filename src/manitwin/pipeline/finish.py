@@ -11,14 +11,13 @@ from PIL import Image
 
 from manitwin.config import NO_SETTINGS, Resource, Section
 from manitwin.engine.stage import Draft
-from manitwin.formats.glb import read_glb
 from manitwin.geometry.grasp_diversity import farthest_grasps
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.pipeline.grasps import GRASP_POINTS
 from manitwin.pipeline.guesses import filled_in
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.joint_checks import joint_checks
-from manitwin.pipeline.object_state import load_hulls, load_solid, object_name
+from manitwin.pipeline.object_state import load_hulls, load_solid, load_visual, object_name
 from manitwin.pipeline.quality import quality_checks
 from manitwin.render.card import CardText, make_card
 from manitwin.render.card_panels import CardGrasp, CardPoint
@@ -52,7 +51,7 @@ class FinishStage:
         physical = draft.field("physical")
         mass = MassCenter(np.array(physical["center_of_mass_m"]), float(physical["center_of_mass_uncertainty_m"]))
         card = make_card(
-            parts=read_glb(draft.path("visual.glb")),
+            parts=load_visual(draft.path("visual.glb")),
             solid=load_solid(draft.path("solid.npz")),
             hulls=load_hulls(draft.path("hulls.npz")),
             points=_card_points(draft.field("points") | draft.field(GRASP_POINTS)),

@@ -11,7 +11,6 @@ import trimesh
 
 from manitwin.engine.stage import Draft
 from manitwin.errors import InputError
-from manitwin.formats.glb import read_glb
 from manitwin.formats.meshes.read import read_mesh
 from manitwin.geometry.articulation import ArticulatedBody
 from manitwin.geometry.mass_properties import solid_mass_properties, with_triangle_slack
@@ -20,7 +19,7 @@ from manitwin.geometry.poses import transform_points
 from manitwin.geometry.repair.cascade import repair
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.object_state import load_hulls, read_given
+from manitwin.pipeline.object_state import load_hulls, load_visual, read_given
 from manitwin.twin.link_records import Articulation, Link
 
 _ROUNDING = 1e-9  # of the mass
@@ -130,7 +129,7 @@ def link_table(draft: Draft[Item], articulation: Articulation, labels: np.ndarra
 
 def visual_labels(draft: Draft[Item], articulation: Articulation) -> np.ndarray:
     """Return the link of each face of visual.glb."""
-    meshes = read_glb(draft.path("visual.glb"))
+    meshes = load_visual(draft.path("visual.glb"))
     vertices, faces = trimesh.util.append_faces([m.vertices for m in meshes], [m.faces for m in meshes])
     return face_links(draft, articulation, trimesh.Trimesh(vertices, faces, process=False))
 

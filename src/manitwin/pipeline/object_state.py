@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -25,25 +25,40 @@ from manitwin.render.cameras import Camera
 from manitwin.twin.grasp_table import JOINTS
 from manitwin.twin.import_record import ImportRecord, read_import_record
 
-KEPT_SOLIDS = 4
+KEPT = 4
 """A worker has the stages of so many items in turn where two work: of each of two, one is done and one waits beside it."""
-_solids: OrderedDict[bytes, tuple[int, trimesh.Trimesh]] = OrderedDict()
-"""The solids that were loaded last by the digests of their files, with their own: one stage after the other wants them."""
+_meshes: dict[str, OrderedDict[bytes, tuple[list[int], list[trimesh.Trimesh]]]] = {
+    "solid": OrderedDict(), "visual": OrderedDict()
+}  # fmt: skip
+"""The meshes that were loaded last by the digests of their files, with their own: one stage after the other wants them."""
 
 
 def load_solid(path: Path) -> trimesh.Trimesh:
     """Load the watertight mesh of ``solid.npz``; what was made of it for another stage (rays, its opening) comes with it."""
-    content = path.read_bytes()
-    digest = hashlib.blake2b(content, digest_size=16).digest()
-    known = _solids.pop(digest, None)
-    if known is None or known[0] != hash(known[1]):  # the last: somebody has changed it
+
+    def read(content: bytes) -> list[trimesh.Trimesh]:
         with np.load(io.BytesIO(content)) as arrays:
-            mesh = trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
-        known = hash(mesh), mesh
-    _solids[digest] = known
-    while len(_solids) > KEPT_SOLIDS:
-        _solids.popitem(last=False)
-    return known[1]
+            return [trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)]
+
+    return _loaded("solid", path, read)[0]
+
+
+def load_visual(path: Path) -> list[trimesh.Trimesh]:
+    """Load the parts of ``visual.glb`` or ``canonical.glb``, the same ones for stage after stage: nobody changes them."""
+    return list(_loaded("visual", path, lambda content: read_glb(path)))
+
+
+def _loaded(kind: str, path: Path, read: Callable[[bytes], list[trimesh.Trimesh]]) -> list[trimesh.Trimesh]:
+    content, known = path.read_bytes(), _meshes[kind]
+    digest = hashlib.blake2b(content, digest_size=16).digest()
+    hashes, meshes = known.pop(digest, ([], []))
+    if not meshes or hashes != [hash(mesh) for mesh in meshes]:  # the last: somebody has changed one
+        meshes = read(content)
+        hashes = [hash(mesh) for mesh in meshes]
+    known[digest] = hashes, meshes
+    while len(known) > KEPT:
+        known.popitem(last=False)
+    return meshes
 
 
 def load_hulls(path: Path) -> tuple[np.ndarray, ...]:
@@ -85,7 +100,7 @@ def read_subject(
     return Subject(
         name=object_name(draft),
         solid=load_solid(draft.path(solid)),
-        parts=tuple(read_glb(draft.path(visual))),
+        parts=tuple(load_visual(draft.path(visual))),
         metric=metric,
         views=pictures(draft.path("views/"), "rgb"),
         cameras=tuple(Camera.from_json(value).scaled(scale) for value in draft.field("cameras")),

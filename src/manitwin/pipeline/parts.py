@@ -11,13 +11,12 @@ import trimesh
 
 from manitwin.config import NO_SETTINGS, Resource
 from manitwin.engine.stage import Draft
-from manitwin.formats.glb import read_glb
 from manitwin.geometry.distance import closest_faces
 from manitwin.geometry.parts.segmentation import carried_over, segmented
 from manitwin.geometry.parts.shape import measure_shape
 from manitwin.models.annotators.part_names import part_name
 from manitwin.models.annotators.priors import Prior, lookup
-from manitwin.pipeline.object_state import load_solid, object_name, read_given
+from manitwin.pipeline.object_state import load_solid, load_visual, object_name, read_given
 from manitwin.twin.part_records import NO_PART, Part
 
 PARTS_FILE = "parts.npz"
@@ -52,7 +51,7 @@ class PartsStage:
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Write ``parts.npz`` and return the table ``parts``, empty where no parts are told."""
-        solid, meshes = load_solid(draft.path("solid.npz")), read_glb(draft.path("visual.glb"))
+        solid, meshes = load_solid(draft.path("solid.npz")), load_visual(draft.path("visual.glb"))
         visual = trimesh.Trimesh(
             *trimesh.util.append_faces([m.vertices for m in meshes], [m.faces for m in meshes]), process=False
         )

@@ -12,7 +12,7 @@ from PIL import Image, WebPImagePlugin
 
 from manitwin.config import Resource, ViewsConfig
 from manitwin.engine.stage import Draft
-from manitwin.formats.glb import read_glb
+from manitwin.pipeline.object_state import load_visual
 from manitwin.render.cameras import Camera, orbit_cameras
 from manitwin.render.grounds import ground_for
 from manitwin.render.renderer import BACKDROP, shared_renderer
@@ -43,7 +43,7 @@ class ViewsStage:
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Draw the views; raises RendererMissing where nothing renders."""
-        parts = read_glb(draft.path("canonical.glb"))
+        parts = load_visual(draft.path("canonical.glb"))
         cameras, pictures = draw_views(parts, self.settings, self._size_px)
         (folder / "views").mkdir(parents=True, exist_ok=True)
         for index, picture in enumerate(pictures):

@@ -188,8 +188,10 @@ def _grounded(parts: list[trimesh.Trimesh], mesh: trimesh.Trimesh, camera: Camer
     """Draw parts over the shade that ``mesh`` throws on the ground."""
     frame = shared_renderer().render(parts, [camera])[0]
     shade = ground_shadow(mesh, camera)
-    behind = (1 - frame.coverage)[..., None] * (1 - shade)[..., None]
-    return np.rint(np.clip(frame.rgb - behind * np.array(BACKDROP), 0, 255)).astype(np.uint8)
+    behind, picture = ((1 - frame.coverage) * (1 - shade)).astype(float), np.empty_like(frame.rgb)
+    for channel, ground in enumerate(BACKDROP):
+        picture[..., channel] = np.rint(np.clip(frame.rgb[..., channel] - behind * ground, 0, 255))
+    return picture
 
 
 def gripper_fork(boxes: Boxes, rod_m: float) -> trimesh.Trimesh:

@@ -62,10 +62,8 @@ def ground_of_pixels(pixels: np.ndarray) -> tuple[int, int, int]:
 
 def shown_object(picture: np.ndarray) -> np.ndarray:
     """Return where a picture ``(H, W, 3) uint8`` differs from its plain ground, the colour of its corner; ``(H, W) bool``."""
-    far = [
-        cv2.absdiff(np.ascontiguousarray(picture[..., c]), float(picture[0, 0, c])) > _GROUND_TOLERANCE
-        for c in range(3)
-    ]
+    channels = [picture[..., channel].astype(np.int16) for channel in range(3)]
+    far = [np.abs(channel - channel[0, 0]) > _GROUND_TOLERANCE for channel in channels]
     return np.asarray(far[0] | far[1] | far[2])
 
 

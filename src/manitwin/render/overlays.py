@@ -23,7 +23,9 @@ def visible_edges(mesh: trimesh.Trimesh, camera: Camera, depth: np.ndarray) -> n
     and it lies no deeper than the depth picture says.
     """
     facing = ((mesh.triangles_center - camera.position) * mesh.face_normals).sum(1) < 0
-    edges = np.unique(np.sort(mesh.faces[facing][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    ends = np.sort(mesh.faces[facing][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    # one integer an edge sorts much faster than rows
+    edges = np.stack(np.divmod(np.unique(ends[:, 0] * len(mesh.vertices) + ends[:, 1]), len(mesh.vertices)), axis=1)
     pixels, z = project(np.asarray(mesh.vertices), camera)
     length = np.linalg.norm(pixels[edges[:, 0]] - pixels[edges[:, 1]], axis=1)
     count = np.ceil(length * _FINE).astype(int) + 1
