@@ -1,4 +1,4 @@
-"""The solid that stage after stage loads."""
+"""The meshes that stage after stage loads."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from manitwin.pipeline.object_state import KEPT, load_solid
+from manitwin.formats.glb import write_glb
+from manitwin.pipeline.object_state import KEPT, load_solid, load_visual
+from manitwin.render.surfaces import plain_part
 
 
 def written(folder: Path, size_m: float) -> Path:
@@ -30,3 +32,12 @@ def test_a_solid_that_somebody_changed_is_read_again(tmp_path: Path) -> None:
     path = written(tmp_path, 0.1)
     load_solid(path).vertices[0] += 1.0
     assert np.allclose(load_solid(path).extents, 0.1)
+
+
+def test_parts_are_the_same_ones_for_stage_after_stage_until_their_file_is_another(tmp_path: Path) -> None:
+    path, box = tmp_path / "visual.glb", trimesh.creation.box((0.1, 0.1, 0.1))
+    path.write_bytes(write_glb([plain_part(box, (200, 10, 10))]))
+    (first,) = load_visual(path)
+    assert load_visual(path)[0] is first
+    path.write_bytes(write_glb([plain_part(box.apply_scale(2.0), (200, 10, 10))]))
+    assert np.allclose(load_visual(path)[0].extents, 0.2)
