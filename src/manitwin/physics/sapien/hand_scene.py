@@ -84,14 +84,10 @@ class HandScene:
         """Take one step for each row of accelerations ``(N, 3)``."""
         set_target, step = self.load.set_drive_velocity_target, self.system.step
         targets = (loads_m_s2 / LOAD_RATE_PER_S).astype(np.float32)
-        if (targets == targets[:1]).all():  # while the hand closes, and where it waits
-            for target in targets[:1]:
+        is_constant = bool((targets == targets[:1]).all())  # while the hand closes, and where it waits
+        for number, target in enumerate(targets):
+            if number == 0 or not is_constant:
                 set_target(target, NO_SPIN)
-            for _ in targets:
-                step()
-            return
-        for target in targets:
-            set_target(target, NO_SPIN)
             step()
 
     def squeeze(self) -> None:
