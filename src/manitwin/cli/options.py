@@ -87,7 +87,7 @@ SecondOpinion = Annotated[
     ),
 ]
 Quick = Annotated[
-    bool, typer.Option("--quick", help="One engine, one trial a grasp: no second opinion, no robustness.")
+    bool, typer.Option("--quick", help="One trial a grasp: no second opinion, no robustness.")
 ]
 Link = Annotated[
     str | None,
