@@ -86,9 +86,7 @@ SecondOpinion = Annotated[
         "--second-opinion", help="The second engine tries all grasps that held, or a sample of 20 of them."
     ),
 ]
-Quick = Annotated[
-    bool, typer.Option("--quick", help="One trial a grasp: no second opinion, no robustness.")
-]
+Quick = Annotated[bool, typer.Option("--quick", help="One trial a grasp: no second opinion, no robustness.")]
 Link = Annotated[
     str | None,
     typer.Option(

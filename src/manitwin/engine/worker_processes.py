@@ -17,7 +17,7 @@ from typing import Any
 
 PR_SET_PDEATHSIG = 1  # prctl(2)
 ONE_THREAD = {"OMP_NUM_THREADS": "1", "LP_NUM_THREADS": "0"}
-KEPT_BYTES = 64 << 20  # what a stage may take and give back without that it is mapped again for the next one
+KEPT_BYTES = 64 << 20  # free memory that stays mapped for the next stage
 
 
 @contextmanager
@@ -58,7 +58,7 @@ def one_thread_each() -> None:
 
 @contextmanager
 def one_thread_in_new_processes() -> Iterator[None]:
-    """Do so for processes that are started in the ``with`` statement, and leave this one as it is.
+    """Keep processes that are started in the ``with`` statement to one thread each, and leave this one as it is.
 
     A spawned process has loaded NumPy before anything of ours runs in it, and NumPy's linear algebra starts its threads as it is
     loaded: on two cores they waited for each other during a sixth of a twin's CPU time.
@@ -99,7 +99,7 @@ class _AllocatorState(ctypes.Structure):
 
 
 def keep_imported() -> None:
-    """Tell the collector that all which is there now stays: it looks through what comes after alone, in milliseconds."""
+    """Exempt all objects that exist now from garbage collection, which then looks through later ones only, in milliseconds."""
     gc.freeze()
 
 

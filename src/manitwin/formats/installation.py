@@ -56,9 +56,9 @@ def import_remedy(error: ImportError, otherwise: str) -> str:
 
 @contextmanager
 def left_out(name: str) -> Iterator[None]:
-    """Have a library that is not imported yet taken for not installed by what is imported in the ``with`` statement.
+    """Make imports of a library fail in the ``with`` statement as if it were not installed; one that is loaded already stays.
 
-    For what another one would load and can do without. A None in ``sys.modules`` makes an import raise ModuleNotFoundError
+    For an optional dependency of another library that costs memory and is not used. A None in ``sys.modules`` makes an import raise ModuleNotFoundError
     (Python's reference, "The module cache").
     """
     if name in sys.modules:

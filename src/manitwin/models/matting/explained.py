@@ -1,7 +1,7 @@
 """A doubtful cut-out whose outline is that of the thing that the photo is said to show: a second, independent opinion.
 
-A shadow taken for a part, a part left out or a hole filled has no such outline by accident. What a shape tells nothing of is
-asked of the photo as before: whether the frame cuts the thing, it falls apart, or other things stand beside it.
+With a shadow taken for a part, a part left out or a hole filled a mask hardly has the outline of a template. A shape does not
+tell whether the frame cuts the thing, whether it falls apart and whether other things stand beside it: there the scores decide.
 """
 
 from __future__ import annotations
