@@ -31,9 +31,9 @@ from scipy.stats import spearmanr
 from manitwin.config import MattingConfig
 from manitwin.errors import Rejected
 from manitwin.formats.image_file import read_image
-from manitwin.models.generators.templates.fitting.explains import outline_of
+from manitwin.models.generators.templates.fitting.outline_check import template_outline_check
 from manitwin.models.matting import matte_photo
-from manitwin.models.matting.explained import explained
+from manitwin.models.matting.explained import explained_first
 from manitwin.models.matting.learned import Network, find_network
 from manitwin.models.matting.matte import MIN_CONFIDENCE, decided
 from manitwin.models.matting.study import study_photo
@@ -65,9 +65,9 @@ def judge(picture: Composite, network: Network | None, named: bool) -> Judged:
     """Cut one composite out; what was rejected is judged too."""
     start = time.process_time()
     study = study_photo(picture.rgb, network=network)
-    explains = outline_of(picture.category) if named else None
+    explains = template_outline_check(picture.category) if named else None
     if explains is not None and study.confidence < MIN_CONFIDENCE:
-        study = explained(picture.rgb, study, explains, min_confidence=MIN_CONFIDENCE)
+        study = explained_first(picture.rgb, study, explains, min_confidence=MIN_CONFIDENCE)
     cpu_s = time.process_time() - start
     try:
         decided(study, "composite")

@@ -1,4 +1,4 @@
-"""Why no grasp held: counted, and explained by friction or by the centre of mass where one number says so."""
+"""Who tries the grasps of which gripper, and why none held: by friction or the centre of mass where one number says so."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ import numpy as np
 import pytest
 
 from grasp_drafts import PANDA, box_draft, proposed_draft, run_all
-from manitwin.config import VerifyConfig
+from manitwin.config import BuildConfig, SecondOpinionConfig, VerifyConfig
 from manitwin.errors import Rejected
 from manitwin.geometry.poses import transform
+from manitwin.physics.confirmed_trial import ConfirmedTrial
 from manitwin.physics.sapien.trial import SapienTrial
 from manitwin.physics.trial import TrialResult
 from manitwin.pipeline.gripper_kinds import nearest_lever_m, why_none_held
-from manitwin.pipeline.verify import VerifyStage
+from manitwin.pipeline.point_trials import PointTrialsStage
+from manitwin.pipeline.recipe import stages_for
+from manitwin.pipeline.verify import VerifyStage, describe, trial_settings
 from rigid_boxes import FROM_ABOVE, SETTINGS, above, box
 
 DROPPED = TrialResult("drops", 0.03, 0.0, 0.0, (50.0, 50.0), 200)
@@ -78,3 +81,14 @@ def test_long_bar_gripped_at_its_end_only_is_rejected_as_out_of_reach_by_the_rea
     detail = real_rejection(tmp_path, [0.03, 0.4, 0.03], 2.0, [[0, 0.19, 0.015], [0, -0.18, 0.015]])
     assert "centre of mass out of reach: 180 mm" in detail
     assert "slippery" not in detail
+
+
+def test_both_engines_judge_what_moved_in_parallel_jaws_in_a_quick_build_too() -> None:
+    config = BuildConfig(grippers=("panda", "suction"), second_opinion=SecondOpinionConfig(enabled=False))
+    by_name = {stage.name: stage for stage in stages_for("mesh", config)}
+    verify, points, suction = (by_name[name] for name in ("verify", "point_trials", "verify-suction"))
+    assert isinstance(verify, VerifyStage) and isinstance(points, PointTrialsStage) and isinstance(suction, VerifyStage)
+    assert isinstance(verify.trial, ConfirmedTrial) and isinstance(points.trial, ConfirmedTrial)
+    settings = trial_settings(config.verify, verify.gripper)
+    assert describe(verify.trial, settings, 0.4).confirmed_by == "mujoco"
+    assert describe(suction.trial, settings, 0.4).confirmed_by is None, "a closed form has one answer"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,10 @@ from PIL import Image
 
 from manitwin.config import GenerateConfig, MattingConfig
 from manitwin.engine.stage import Draft
-from manitwin.errors import InputError, Unsupported
+from manitwin.errors import InputError, Rejected, Unsupported
 from manitwin.formats.glb import read_glb
 from manitwin.models.generators.lift import LiftGenerator
+from manitwin.pipeline import photo
 from manitwin.pipeline.generate import GenerateStage
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.photo import PhotoStage
@@ -27,9 +29,9 @@ def _draft(**item: str | None) -> Draft:
 
 
 def test_sample_photo_becomes_a_standing_bottle(tmp_path: Path) -> None:
-    photo, generate = PhotoStage(MattingConfig()), GenerateStage(GenerateConfig(), LiftGenerator())
+    cut_out, generate = PhotoStage(MattingConfig()), GenerateStage(GenerateConfig(), LiftGenerator())
     draft = _draft(file=str(SAMPLE))
-    draft.fields.update(photo.run(draft, tmp_path))
+    draft.fields.update(cut_out.run(draft, tmp_path))
     draft.paths["photo.png"] = tmp_path / "photo.png"
     fields = generate.run(draft, tmp_path)
     json.dumps({**draft.fields, **fields}, allow_nan=False)
@@ -44,6 +46,24 @@ def test_sample_photo_becomes_a_standing_bottle(tmp_path: Path) -> None:
     # modelled: 0.2 m high, radius 0.0325 m, seen from 13 degrees above
     assert part.extents == pytest.approx([0.325, 0.325, 1.0], abs=0.02)
     assert part.volume == pytest.approx(np.pi / 4 * 0.325**2 * 0.80, rel=0.08)
+
+
+def test_name_that_a_person_gave_speaks_for_a_doubtful_cut_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str | None] = []
+
+    def check_of(name: str | None, focal_mm: float | None) -> Callable[[np.ndarray], bool] | None:
+        asked.append(name)
+        return None if name is None else lambda rgba: True
+
+    monkeypatch.setattr(photo, "template_outline_check", check_of)
+    doubting = PhotoStage(MattingConfig(min_confidence=0.985))
+    with pytest.raises(Rejected, match="cannot be told from the background"):
+        doubting.run(_draft(file=str(SAMPLE)), tmp_path)
+    assert not list(tmp_path.iterdir())
+    field = doubting.run(_draft(file=str(SAMPLE), name="bottle"), tmp_path)["matte"]
+    assert asked == [None, "bottle"]
+    assert field["confidence"] > 0.985
+    assert any(finding.startswith("doubtful by itself") for finding in field["findings"])
 
 
 def test_frame_of_an_animation_is_a_setting(tmp_path: Path) -> None:

@@ -58,8 +58,8 @@ def import_remedy(error: ImportError, otherwise: str) -> str:
 def left_out(name: str) -> Iterator[None]:
     """Make imports of a library fail in the ``with`` statement as if it were not installed; one that is loaded already stays.
 
-    For an optional dependency of another library that costs memory and is not used. A None in ``sys.modules`` makes an import raise ModuleNotFoundError
-    (Python's reference, "The module cache").
+    For an optional dependency of another library that costs memory and is not used. A None in ``sys.modules`` makes an import
+    raise ModuleNotFoundError (Python's reference, "The module cache").
     """
     if name in sys.modules:
         yield

@@ -12,7 +12,7 @@ from manitwin.config import MattingConfig, Resource
 from manitwin.engine.stage import Draft
 from manitwin.errors import InputError, Rejected
 from manitwin.formats.image_file import read_image
-from manitwin.models.generators.templates.fitting.explains import outline_of
+from manitwin.models.generators.templates.fitting.outline_check import template_outline_check
 from manitwin.models.matting import matte_photo
 from manitwin.models.matting.learned import Network
 from manitwin.models.matting.object_network import built_in_model
@@ -55,7 +55,7 @@ class PhotoStage:
             min_area_share=settings.min_area_share,
             second_object_share=settings.second_object_share,
             network=self.network,
-            explains=outline_of(name, photo.focal_mm),
+            explains=template_outline_check(name, photo.focal_mm),
         )
         return np.ascontiguousarray(matte.rgba), {
             "method": matte.method,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from manitwin.errors import Rejected
-from manitwin.models.generators.templates.fitting.explains import outline_of
+from manitwin.models.generators.templates.fitting.outline_check import template_outline_check
 from manitwin.models.matting import matte_photo
 from manitwin.models.matting.study import EXPLAINED_ODDS, study_photo
 
@@ -82,7 +82,7 @@ def test_shape_speaks_for_no_thing_beside_another_or_cut_by_the_frame(
 
 
 def test_outline_of_a_template_is_told_from_one_with_a_shadow_or_without_a_part() -> None:
-    explains = outline_of("plate")
+    explains = template_outline_check("plate")
     assert explains is not None
     whole = np.zeros((400, 400), np.uint8)
     cv2.ellipse(whole, (200, 200), (150, 70), 0, 0, 360, 255, -1)
@@ -94,5 +94,5 @@ def test_outline_of_a_template_is_told_from_one_with_a_shadow_or_without_a_part(
 
 
 def test_what_has_no_template_has_no_outline() -> None:
-    assert outline_of(None) is None
-    assert outline_of("figurine of a cat") is None
+    assert template_outline_check(None) is None
+    assert template_outline_check("figurine of a cat") is None

@@ -20,7 +20,7 @@ Explains = Callable[[np.ndarray], bool]
 NOT_TOLD_BY_SHAPE = ("complete", "whole", "uncut")
 
 
-def explained(
+def explained_first(
     rgb: np.ndarray, study: Study, explains: Explains, *, min_confidence: float, working_side_px: int = 512
 ) -> Study:
     """Return the study of a photo ``rgb (H, W, 3) uint8`` with a candidate first that a shape ``explains``.

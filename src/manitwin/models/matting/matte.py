@@ -13,7 +13,7 @@ from manitwin.config import MattingConfig
 from manitwin.errors import Rejected
 from manitwin.models.matting.causes import CAUSES, REMEDY, cause_of
 from manitwin.models.matting.confidence import frame_cause
-from manitwin.models.matting.explained import Explains, explained
+from manitwin.models.matting.explained import Explains, explained_first
 from manitwin.models.matting.learned import Network
 from manitwin.models.matting.outline import dilated, without_small_holes
 from manitwin.models.matting.study import Judged, Study, largest_piece, study_photo
@@ -56,7 +56,7 @@ def matte_photo(
     surfaces grown from the border, flooded up to the photo's edges, and colours) and the built-in network, and a third, where
     it is given, ``network``; the likeliest is taken, by its scores and by how far opinions agree with it: ``flat_border`` is the
     rules' where smooth surfaces explain the border, ``grabcut`` the rules' where they do not, ``network`` a network's. Where none
-    is believed and ``explains`` is given, one that it explains may be (``explained``).
+    is believed and ``explains`` is given, one that it explains may be (``explained_first``).
 
     Raises Rejected: ``no_object``, ``several_objects``, ``low_confidence_matte``, naming cause and remedy.
     """
@@ -65,7 +65,7 @@ def matte_photo(
     rgb = np.ascontiguousarray(image[..., :3])
     study = study_photo(rgb, working_side_px=working_side_px, network=network)
     if explains is not None and study.confidence < min_confidence:
-        study = explained(rgb, study, explains, min_confidence=min_confidence, working_side_px=working_side_px)
+        study = explained_first(rgb, study, explains, min_confidence=min_confidence, working_side_px=working_side_px)
     chosen = decided(
         study,
         name,

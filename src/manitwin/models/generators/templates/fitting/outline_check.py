@@ -12,7 +12,7 @@ MOST_OUTLINE, LEAST_IOU = 0.001, 0.9
 """The mean distance of the outlines, of the box's side, and the overlap of the areas."""
 
 
-def outline_of(name: str | None, focal_mm: float | None = None) -> Callable[[np.ndarray], bool] | None:
+def template_outline_check(name: str | None, focal_mm: float | None = None) -> Callable[[np.ndarray], bool] | None:
     """Return what tells of a cut-out ``rgba (H, W, 4) uint8`` whether its outline is that of a template of this name.
 
     ``focal_mm`` is the lens as 35 mm equivalent where it is known. None where there is no template of that name.
