@@ -68,7 +68,7 @@ def draw_thing(rng: np.random.Generator, beside: Thing | None, part: Part) -> Th
         height_px=HEIGHT_PX,
     )
     frame = shared_renderer().render(parts, [camera], background=(0, 0, 0))[0]
-    rgb = linear(frame.rgb) * np.float32(rng.uniform(0.75, 1.15))
+    rgb = premultiplied(frame.rgb, frame.coverage) * np.float32(rng.uniform(0.75, 1.15))
     rgb *= _printed(rng, frame.coverage) * _sided(rng)[None, :, None]
     clear = category in CLEAR and rng.random() < 0.5
     return Thing(rgb, frame.coverage, vertices, made.mesh.faces, camera, category, clear)
@@ -129,6 +129,16 @@ def overlaps(things: list[Thing], placements: list[np.ndarray], other: Thing, pl
         bool((mask & (cv2.warpAffine(t.coverage, p, size) > 0.1)).any())
         for t, p in zip(things, placements, strict=True)
     )
+
+
+def premultiplied(rgb: np.ndarray, coverage: np.ndarray) -> np.ndarray:
+    """Return the linear light (H, W, 3) that what covers each pixel sends, times its ``coverage`` (H, W).
+
+    ``rgb (H, W, 3) uint8`` is sRGB averaged with a black background: read as linear light as it is, it would give all things a
+    dark fringe.
+    """
+    share = np.maximum(coverage, 1 / 255)[..., None]
+    return linear(np.rint(np.minimum(rgb / share, 255)).astype(np.uint8)) * coverage[..., None]
 
 
 def linear(rgb: np.ndarray) -> np.ndarray:

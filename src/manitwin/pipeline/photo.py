@@ -16,6 +16,7 @@ from manitwin.models.generators.templates.fitting.outline_check import template_
 from manitwin.models.matting import matte_photo
 from manitwin.models.matting.learned import Network
 from manitwin.models.matting.object_network import built_in_model
+from manitwin.models.matting.outline_network import outline_model
 from manitwin.pipeline.item import Item
 
 
@@ -23,7 +24,7 @@ class PhotoStage:
     """Write ``photo.png`` (RGBA, upright, alpha is the matte) and the field ``matte``."""
 
     name: ClassVar[str] = "photo"
-    version: ClassVar[str] = "12"
+    version: ClassVar[str] = "13"
     reads: ClassVar[tuple[str, ...]] = ()
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "matte")
     needs: ClassVar[Resource] = "cpu"
@@ -33,7 +34,7 @@ class PhotoStage:
         self.settings = settings.model_copy(update={"network": None})
         self.network = network
         self.backend: str = "rules+network"
-        self.model: str | None = built_in_model() if network is None else network.model
+        self.model: str | None = f"{built_in_model() if network is None else network.model}, {outline_model()}"
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Read and matte; raises InputError, or Rejected where no single object can be told from the background."""
@@ -79,7 +80,7 @@ class PhotosStage(PhotoStage):
     One that cannot be cut out is left out, with a finding; the field ``matte`` is that of the least sure of the others.
     """
 
-    version: ClassVar[str] = "5"
+    version: ClassVar[str] = "6"
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "photos/", "matte")
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:

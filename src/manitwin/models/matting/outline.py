@@ -1,4 +1,4 @@
-"""Edges of a photo, the flood of its background up to them, and the soft outline at full resolution."""
+"""Edges of a photo, and the flood of its background up to them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import cv2
 import numpy as np
 
 from manitwin.models.matting.background import Background, connected_to
-from manitwin.models.matting.guided_filter import guided_filter
 
 OBJECT_DISTANCE = 6.0  # of a border pixel's Mahalanobis distance: what the background's fit takes for explained
 
@@ -90,17 +89,3 @@ def flood(free: np.ndarray, seed: np.ndarray, ball_px: int, regrow_px: int) -> n
         reached = (dilated(reached, 1) & free) | reached
     inner = slice(ball_px + 1, -ball_px - 1)
     return reached[inner, inner]
-
-
-def soft_outline(rgb: np.ndarray, mask: np.ndarray, band_px: int) -> np.ndarray:
-    """Refine a mask (any size) to alpha (H, W) uint8 at the photo's resolution.
-
-    ``guided_filter`` in a band around the outline: the alpha's edge follows the photo's edge.
-    """
-    height, width = rgb.shape[:2]
-    coarse = cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
-    guide = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY).astype(np.float32) / 255
-    alpha = guided_filter(guide, coarse, band_px, 1e-3)
-    inside, outside = eroded(coarse > 0.5, band_px), ~dilated(coarse > 0.5, band_px)
-    alpha = np.where(inside, 1, np.where(outside, 0, np.clip((alpha - 0.15) / 0.7, 0, 1)))
-    return (alpha * 255 + 0.5).astype(np.uint8)
