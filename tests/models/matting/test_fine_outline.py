@@ -140,3 +140,12 @@ def test_the_band_follows_the_photos_size() -> None:
     assert band_px((512, 640, 3), (512, 640)) == 2
     assert band_px((1024, 768), (512, 384)) == 4
     assert outline_model().startswith("outline-network sha256:")
+
+
+def test_the_outline_of_a_noisy_photo_has_no_specks_and_no_pinholes() -> None:
+    coverage = ring(14.0)
+    photo = photographed(coverage, (0.42, 0.42, 0.42), plain(0.5))
+    grain = np.random.default_rng(3).normal(0, 9, photo.shape)
+    found = fine_outline(np.clip(photo + grain, 0, 255).astype(np.uint8), coverage > 0.5) > 127
+    pieces = [cv2.connectedComponentsWithStats(m.astype(np.uint8), connectivity=4)[2][1:, 4] for m in (found, ~found)]
+    assert min(pieces[0].min(), pieces[1].min()) >= 16
