@@ -24,7 +24,7 @@ NEAR_PX, AROUND_PX, STEP_PX = 11, 9, 3
 """Sides of the two patches, odd, and how many pixels one of the second's is wide."""
 VALUES = 5
 """Of each pixel of a patch; one more, the contrast of both sides, is asked where the patch is."""
-AT_ONCE = 16384
+AT_ONCE = 4096
 LEAST_CONTRAST_LAB = 5.0
 COLOUR_LAB, LIGHT_LAB, CONTRAST_LAB = 20.0, 25.0, 40.0
 """That count as one to the network."""
