@@ -7,7 +7,8 @@
 ``outline_network.npz`` lies in src/manitwin/models/matting. ``draw`` wants this package, ``train`` scikit-learn besides (1.9 was
 used), whose perceptron it fits; what every twentieth picture says is left out and printed. A picture is seen with the masks that
 the rules and the object network find in it, and, at another size and sometimes sharpened, with its truth at up to half the
-size, bent and swollen by up to some pixels; with ``--bent-only``, which takes a fifth of the time, only so.
+size, bent and swollen by up to some pixels; with ``--bent-only``, which takes a fifth of the time, only so. The pictures with
+which the weights in the package were made had other random numbers in their second part: drawn again, they differ a little.
 """
 
 from __future__ import annotations

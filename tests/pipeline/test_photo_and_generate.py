@@ -30,6 +30,8 @@ def _draft(**item: str | None) -> Draft:
 
 def test_sample_photo_becomes_a_standing_bottle(tmp_path: Path) -> None:
     cut_out, generate = PhotoStage(MattingConfig()), GenerateStage(GenerateConfig(), LiftGenerator())
+    assert cut_out.model is not None
+    assert [model.split()[0] for model in cut_out.model.split(", ")] == ["object-network", "outline-network"]
     draft = _draft(file=str(SAMPLE))
     draft.fields.update(cut_out.run(draft, tmp_path))
     draft.paths["photo.png"] = tmp_path / "photo.png"

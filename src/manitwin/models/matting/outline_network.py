@@ -33,7 +33,7 @@ COLOUR_LAB, LIGHT_LAB, CONTRAST_LAB = 20.0, 25.0, 40.0
 def share_near_outline(rgb: np.ndarray, mask: np.ndarray, band_px: int) -> np.ndarray:
     """Return how likely each pixel (H, W) of ``rgb`` (H, W, 3) uint8 is object, in [0, 1], by a rough ``mask`` (any size).
 
-    Pixels farther than ``band_px`` from the mask's outline stay as they are.
+    Pixels more than ``band_px`` and one from the mask's outline stay as they are.
     """
     height, width = rgb.shape[:2]
     rough = cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
@@ -61,7 +61,8 @@ def outline_values(rgb: np.ndarray, rough: np.ndarray, band_px: int) -> tuple[np
 
     ``rough`` (H, W) float32 is the mask at the size of ``rgb``. The values: the mask; where the colour lies on the way from the
     ground's to the object's, and how far beside it; how much lighter it is than the ground, and how far from its hue and chroma;
-    the contrast of both. The object's colour is that of the nearest pixels well inside, the ground's the mean just outside.
+    the contrast of both. The object's colour is that of the nearest pixels well inside, the ground's the mean just outside. Each
+    is shifted to lie around zero, as perceptrons want it.
     """
     solid = rough > 0.5
     depth = cv2.distanceTransform(solid.astype(np.uint8), cv2.DIST_L2, 5)
