@@ -19,7 +19,7 @@ if TYPE_CHECKING:  # what only a build needs takes 2 CPU-seconds to import
     from manitwin.dataset.index.rebuild import Rebuilt
     from manitwin.dataset.statistics.report import WrittenReport
     from manitwin.engine.drive import ExecutorName, RunOptions, RunReport
-    from manitwin.engine.events import ItemEnded, OnStage
+    from manitwin.engine.events import OnStage
     from manitwin.episodes.collect import AttemptTotals
     from manitwin.episodes.environment.environment import TaskEnvironment
     from manitwin.episodes.environment.start_noise import StartNoise
@@ -87,31 +87,12 @@ def build(
         inputs, out, texts=texts, count=count, views=views, turns_deg=turns_deg, strict=strict, jobs=jobs, config=config,
         defaults=defaults, flags=flags,
     )  # fmt: skip
-    from manitwin.dataset.index.parts import IndexTables
-    from manitwin.engine.drive import drive
-    from manitwin.pipeline.build_report import BuildReport, ItemResult
-    from manitwin.pipeline.recipe import TwinRecipe, estimate_usd, log_choices
+    from manitwin.dataset.build import build_requested
 
-    settings, root = request.settings, request.root
-    there: dict[int, bool] = {}
-    log_choices(settings)
-
-    def started(items: int, opened: int) -> None:
-        on_estimate(estimate_usd(settings))
-        on_start(items, opened)
-
-    def ended(event: ItemEnded) -> None:
-        there[event.task.number] = event.found
-        on_result(ItemResult.of(event.row(), root, event.found))
-
-    run = drive(
-        TwinRecipe(settings, IndexTables()), request.items, root, settings.run,
-        configuration=settings.model_dump(mode="json"), executor=executor, address=address,
-        max_cost_usd=settings.services.max_cost_usd, remarks=request.notes.remarks, on_start=started, on_stage=on_stage,
-        on_ended=ended,
+    return build_requested(
+        request, executor=executor, address=address, on_estimate=on_estimate, on_start=on_start, on_stage=on_stage,
+        on_result=on_result,
     )  # fmt: skip
-    found = frozenset(number for number, was_there in there.items() if was_there)
-    return BuildReport(str(out), run, request.notes.folders, frozenset(there), found)
 
 
 def load(folder: str | Path, verify: bool = False) -> Twin:

@@ -10,7 +10,8 @@ from multiprocessing.connection import Connection
 import numpy as np
 import pytest
 
-from manitwin.engine.worker_processes import ONE_THREAD, WorkerContext
+from manitwin.engine.process_bounds import ONE_THREAD
+from manitwin.engine.worker_processes import WorkerContext
 
 FREED = """
 from manitwin.engine.worker_processes import return_free_memory

@@ -27,6 +27,8 @@ INTERRUPTED_STATUS = 130
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 NATIVE_PATIENCE_S = 1.5
 """So long native code, in which Python answers no signal, may go on after one: DuckDB's or pyarrow's, say."""
+WATCH = "interrupts"
+"""The name of the thread that ends a command in native code; it waits for a signal, and holds no lock."""
 TRACKER_WARNING = "ignore:resource_tracker"
 """What keeps multiprocessing's resource tracker from telling of semaphores that it removes (``PYTHONWARNINGS``)."""
 
@@ -154,7 +156,7 @@ class Interrupts:
                     if self._seen == 0 and not self._over:
                         self._leave_at_once()
 
-        threading.Thread(target=watch, daemon=True, name="interrupts").start()
+        threading.Thread(target=watch, daemon=True, name=WATCH).start()
 
     def say(self) -> None:
         """Say once that the command was interrupted: straight to stderr, so that a second signal can do it anywhere."""

@@ -119,8 +119,12 @@ MOST_VARIATIONS = 100_000
 
 @dataclass(frozen=True)
 class BuildRequest:
-    """The arguments of ``build``, checked; nothing is written yet. ``items`` are read, and noted, as they are iterated."""
+    """The arguments of ``build``, checked; nothing is written yet. ``items`` are read, and noted, as they are iterated.
 
+    ``out`` is the data set as it was given.
+    """
+
+    out: str
     settings: BuildConfig
     root: DatasetRoot
     items: Iterator[Item]
@@ -174,4 +178,4 @@ def request_build(
         turns_deg=turns_deg,
         refusal=refusal(settings),
     )
-    return BuildRequest(settings, root, items, notes)
+    return BuildRequest(str(out), settings, root, items, notes)

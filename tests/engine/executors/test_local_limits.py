@@ -85,7 +85,7 @@ def test_an_item_that_is_too_large_is_rejected_in_a_run_of_processes(tmp_path: P
 def test_programs_of_a_stage_are_not_limited_by_its_memory() -> None:
     program = """
 import resource, subprocess, sys
-from manitwin.engine.worker_processes import limit_memory
+from manitwin.engine.process_bounds import limit_memory
 from manitwin.models.generators import supervisor
 before = resource.getrlimit(resource.RLIMIT_DATA)
 limit_memory(1.5)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from functools import wraps
 from itertools import islice
 from pathlib import Path
@@ -14,16 +15,21 @@ from manitwin.cli.arguments import degrees_of
 from manitwin.cli.causes import print_causes
 from manitwin.cli.console import err_console, error_console, out_console, print_error, print_estimate
 from manitwin.cli.documents import Json, print_document
+from manitwin.cli.interrupt import WATCH
 
 if TYPE_CHECKING:
+    from manitwin.engine.drive import ExecutorName
     from manitwin.engine.events import StageEvent
     from manitwin.pipeline.build_report import BuildReport, ItemResult
+    from manitwin.pipeline.settings import BuildRequest
 
 STYLES = {"accepted": "green", "rejected": "yellow", "unfinished": "red", "duplicate": "dim"}
 MOST_LINES = 50
 """So many inputs that were there already, or wait, have a line of their own at the end."""
 MOST_RECORDS = 1000
 """The grasps of so many twins are added up at the end: each record is read for it; `manitwin stats` does it for any number."""
+OF_WORKERS = ("manitwin.dataset.build", "manitwin.engine.executors.local_worker")
+"""The modules that import what a worker needs."""
 RUN_RENAMED = "`manitwin run` is `manitwin build` now; the old name goes with the next version"
 
 
@@ -64,8 +70,8 @@ def build(
     if dry_run:
         _print_dry_run(inputs or [], out, arguments, said, as_json=json)
         return
-    arguments |= {"executor": executor, "address": address}
-    report = _watched_build(inputs or [], out, lines=lines, **arguments, **said)
+    request = _request(inputs or [], out, arguments, said)
+    report = _watched_build(request, lines=lines, executor=cast("ExecutorName", executor), address=address)
     _print_report(report, lines)
     if json:
         from manitwin.cli.causes import causes_of
@@ -90,19 +96,30 @@ def _print_dry_run(
     inputs: list[Path], out: str, arguments: dict[str, Any], said: dict[str, Any], *, as_json: bool
 ) -> None:
     from manitwin.cli.dry_run import plan_build, print_plan
-    from manitwin.pipeline.settings import Flags, request_build
 
-    defaults = {name: said.pop(name) for name in options.OF_INPUTS}
-    request = request_build(inputs, out, **arguments, defaults=defaults, flags=cast(Flags, said))
+    request = _request(inputs, out, arguments, said)
     print_plan(plan_build(request.items, request.root, request.settings, request.notes.remarks), out, as_json=as_json)
 
 
-def _watched_build(inputs: list[Path], out: str, *, lines: bool, **arguments: Any) -> BuildReport:
-    """Build while a person watches; ``arguments`` are those of ``api.build``."""
-    from manitwin.api import build as build_twins
-    from manitwin.cli.progress import WatchedRun
+def _request(inputs: list[Path], out: str, arguments: dict[str, Any], said: dict[str, Any]) -> BuildRequest:
+    """Check what was said; ``arguments`` are those of ``request_build``, ``said`` defaults of the inputs and flags."""
+    from manitwin.engine.process_bounds import one_thread_each
 
-    if arguments["executor"] != "ray":
+    one_thread_each()  # before NumPy is loaded: with its threads this process could not be forked
+    from manitwin.pipeline.settings import Flags, request_build
+
+    defaults = {name: said[name] for name in options.OF_INPUTS}
+    flags = {name: value for name, value in said.items() if name not in defaults}
+    return request_build(inputs, out, **arguments, defaults=defaults, flags=cast(Flags, flags))
+
+
+def _watched_build(request: BuildRequest, *, lines: bool, executor: ExecutorName, address: str | None) -> BuildReport:
+    """Build while a person watches."""
+    from manitwin.cli.progress import WatchedRun
+    from manitwin.dataset.build import build_requested
+    from manitwin.engine.fork_server import forked_workers
+
+    if executor != "ray":
         from manitwin.render.device import require_renderer
 
         require_renderer()
@@ -119,9 +136,11 @@ def _watched_build(inputs: list[Path], out: str, *, lines: bool, **arguments: An
         if lines:
             _print_result(result)
 
-    with WatchedRun("inputs", out) as watched:
-        return build_twins(
-            inputs, out, **arguments, on_estimate=print_estimate, on_start=watched.start, on_stage=staged, on_result=ended
+    forked = forked_workers(OF_WORKERS, [WATCH]) if executor == "local" else nullcontext()
+    with forked, WatchedRun("inputs", request.out) as watched:  # forked before threads show how far it is
+        return build_requested(
+            request, executor=executor, address=address, on_estimate=print_estimate, on_start=watched.start, on_stage=staged,
+            on_result=ended,
         )  # fmt: skip
 
 

@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import TextIO
 
 from manitwin.engine.executors.stage_notes import parts_noted
+from manitwin.engine.fork_server import parent_of_workers
 from manitwin.engine.jobs import Job, Reply, RunStage, WorkerSetup
+from manitwin.engine.process_bounds import die_with, limit_memory
 from manitwin.engine.worker import Worker
-from manitwin.engine.worker_processes import die_with, keep_imported, limit_memory, return_free_memory
+from manitwin.engine.worker_processes import keep_imported, return_free_memory
 from manitwin.formats.printable import printable_line
 
 STACK_LINES = 12
@@ -29,7 +31,7 @@ _stack_file: TextIO | None = None
 def start(setup: WorkerSetup, stacks: str, driver: int) -> None:
     """Prepare this process: it dies with its driver, at once when it is told to, and within its limit of memory."""
     global _worker, _stack_file
-    die_with(driver)
+    die_with(parent_of_workers(driver))
     signal.signal(signal.SIGTERM, signal.SIG_DFL)  # pebble's own handler waits for native code to return
     _stack_file = (Path(stacks) / f"{os.getpid()}.txt").open("a")
     faulthandler.enable(_stack_file)

@@ -10,8 +10,9 @@ import time
 from pathlib import Path
 
 from manitwin.engine.jobs import Job, Reply, WorkerSetup
+from manitwin.engine.process_bounds import limit_memory, one_thread_each
 from manitwin.engine.worker import Worker
-from manitwin.engine.worker_processes import keep_imported, limit_memory, one_thread_each, return_free_memory
+from manitwin.engine.worker_processes import keep_imported, return_free_memory
 from manitwin.errors import UsageError
 from manitwin.formats.installation import installed_version
 

@@ -1,0 +1,180 @@
+"""A process that forks the workers from what it has imported: they start at once, and share the memory of that.
+
+It is forked itself, from a program that has imported what its workers need as it needs it too. multiprocessing's own fork
+server is a fresh process, which would import all of it again. Only a program that knows all of its threads may do this, and
+where another one runs, workers are spawned: a lock that a thread holds in that moment is held in the fork for ever.
+"""
+
+from __future__ import annotations
+
+import atexit
+import gc
+import logging
+import os
+import signal
+import socket
+import sys
+import threading
+import warnings
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from importlib import import_module
+from multiprocessing import connection, forkserver, resource_tracker
+from multiprocessing.context import ForkServerProcess
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import Any, NoReturn
+
+from manitwin.engine.process_bounds import die_with, one_thread_each
+
+RUN = logging.getLogger("manitwin.run")
+LAST_PYTHON = (3, 13)
+"""Later ones have a fork server that wants a key as well."""
+BREAK_IN_FORKS = ("sapien", "torch", "ray")
+"""Libraries that have drivers, devices or connections open, once they are loaded."""
+THREADS_THAT_MAY_RUN = frozenset({"jemalloc_bg_thd"})
+"""Arrow's allocator holds its own locks during a fork, and does without the thread after it (``jemalloc_prefork``)."""
+
+_state: Any = forkserver._forkserver
+_forked_by: int | None = None
+
+
+def why_not_forked(idle_threads: Collection[str] = ()) -> str | None:
+    """Return what keeps this process from being forked; None: nothing.
+
+    ``idle_threads`` are the names of Python's threads that hold no lock.
+    """
+    if not sys.platform.startswith("linux") or sys.version_info[:2] > LAST_PYTHON:
+        return f"this is {sys.platform} with Python {sys.version_info.major}.{sys.version_info.minor}"
+    loaded = [name for name in BREAK_IN_FORKS if sys.modules.get(name) is not None]
+    if loaded:
+        return f"{', '.join(loaded)} is loaded"
+    if threading.current_thread() is not threading.main_thread():
+        return "this is not the main thread"
+    others = {each.name for each in threading.enumerate()} - {threading.main_thread().name, *idle_threads}
+    running = [name for name in _thread_names() if name not in THREADS_THAT_MAY_RUN]
+    if others or len(running) > threading.active_count():
+        return f"other threads run: {', '.join(sorted(others)) or f'{len(running)} of {running[0]}'}"
+    return None
+
+
+@contextmanager
+def forked_workers(modules: Iterable[str], idle_threads: Collection[str] = ()) -> Iterator[None]:
+    """Import modules, and have the workers that are started in the ``with`` statement forked from this process as it is now.
+
+    Where that is not safe they are spawned. ``idle_threads`` are the names of Python's threads that hold no lock.
+    """
+    for name in modules:
+        import_module(name)
+    why_not = why_not_forked(idle_threads)
+    if why_not is not None:
+        RUN.debug("each worker imports what it needs: %s", why_not)
+        yield
+        return
+    _start()
+    try:
+        yield
+    finally:
+        _stop()
+
+
+def start_forked(process: BaseProcess) -> Any:
+    """Start a process from the server and return what multiprocessing knows it by; None where no server runs."""
+    if not _runs():
+        return None
+    try:
+        return ForkServerProcess._Popen(process)
+    except (EOFError, OSError):  # it was killed just now
+        _stop()
+        return None
+
+
+def parent_of_workers(driver: int) -> int:
+    """Return the process that has started this worker: the server that forked it, or else the driver."""
+    return driver if _forked_by is None else _forked_by
+
+
+def _thread_names() -> list[str]:
+    return [path.read_text().strip() for path in Path("/proc/self/task").glob("*/comm")]
+
+
+def _start() -> None:
+    """Fork the server, and tell multiprocessing of it."""
+    resource_tracker.ensure_running()
+    address = connection.arbitrary_address("AF_UNIX")  # type: ignore[attr-defined]
+    driver = os.getpid()
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(address)
+        if not address.startswith("\0"):
+            os.chmod(address, 0o600)
+        listener.listen()
+        alive, kept = os.pipe()  # the server ends when nobody has the second end any more
+        gc.freeze()  # else the first collection of each worker would write into all objects, which copies their memory
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # of Python 3.12 and later: idle threads are threads
+            server = os.fork()
+        if server == 0:
+            os.close(kept)
+            _serve(driver, listener.detach(), alive)
+        gc.unfreeze()
+        os.close(alive)
+    _state._forkserver_address, _state._forkserver_alive_fd, _state._forkserver_pid = address, kept, server
+
+
+def _serve(driver: int, listener: int, alive: int) -> NoReturn:
+    """Fork workers until the driver ends."""
+    global _forked_by
+    try:
+        die_with(driver)
+        _forget_program()
+        one_thread_each()
+        _forked_by = os.getpid()
+        forkserver.main(listener, alive, [])
+    finally:
+        os._exit(1)
+
+
+def _forget_program() -> None:
+    """Drop what a program would not have passed on to a process that it spawned: handlers of signals, of its log, of its end.
+
+    SIGINT stays blocked, as ``spared_from_interrupts`` has it.
+    """
+    atexit._clear()
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    signal.set_wakeup_fd(-1)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
+    for logger in (logging.getLogger(), *map(logging.getLogger, logging.Logger.manager.loggerDict)):
+        logger.handlers = [each for each in logger.handlers if isinstance(each, logging.NullHandler)]
+
+
+def _runs() -> bool:
+    """Tell whether there is a server; of one that was killed nothing is known any more."""
+    if _state._forkserver_pid is None:
+        return False
+    try:
+        ended, _ = os.waitpid(_state._forkserver_pid, os.WNOHANG)
+    except ChildProcessError:
+        ended = _state._forkserver_pid
+    if ended:
+        _forget_server()
+    return not ended
+
+
+def _stop() -> None:
+    """End the server, and with it all workers that are left."""
+    if _runs():
+        server = _state._forkserver_pid
+        _forget_server()
+        with suppress(ProcessLookupError, ChildProcessError):
+            os.kill(server, signal.SIGKILL)
+            os.waitpid(server, 0)
+
+
+def _forget_server() -> None:
+    os.close(_state._forkserver_alive_fd)
+    address = _state._forkserver_address
+    if not address.startswith("\0"):
+        Path(address).unlink(missing_ok=True)
+    _state._forkserver_address = _state._forkserver_alive_fd = _state._forkserver_pid = None
