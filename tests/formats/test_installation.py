@@ -114,3 +114,28 @@ print(again is sys.modules["wave"])
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ["wave", "True"]
+
+
+def test_a_library_that_is_put_off_is_loaded_once_something_of_it_is_used() -> None:
+    program = """
+from manitwin.formats.installation import put_off
+import sys
+put_off("xml", "Reader")
+put_off("no_such_library")
+import xml
+from xml import Reader
+print(type(xml).__name__, Reader.__name__, "no_such_library" in sys.modules)
+print(xml.__all__, type(xml).__name__)
+from xml.dom import minidom
+print(minidom.__name__)
+put_off("json")
+import json
+print(type(json).__name__)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == [
+        "_PutOff Reader False",
+        "['dom', 'parsers', 'sax', 'etree'] module",
+        "xml.dom.minidom",
+        "_PutOff",
+    ]

@@ -88,3 +88,34 @@ def test_a_renderer_loads_no_kinematics() -> None:
     program = "import sys; from manitwin.render.device import render_scene; render_scene({}); print('pinocchio' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
+
+
+def test_one_process_of_a_run_looks_for_the_device_and_tells_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    probed: list[str | None] = []
+
+    def probe(driver_file: str | None, *, picture: bool) -> tuple[str | None, str]:
+        probed.append(driver_file)
+        return (None, "no device") if len(probed) == 1 else ("llvmpipe", "")
+
+    def forget() -> None:  # as another process knows nothing
+        for name in (*device.LOADER_VARIABLES, device.FOUND):
+            monkeypatch.delenv(name, raising=False)
+
+    monkeypatch.setattr(device, "_probe", probe)
+    monkeypatch.setattr(
+        device.glob, "glob", lambda pattern: ["/lvp_icd.json"] if pattern.startswith("/usr/share") else []
+    )
+    with device.looked_for_once():
+        forget()
+        with pytest.raises(RendererMissing):
+            device.require_renderer()
+        found = device.require_renderer()
+        forget()
+        assert device.require_renderer() == found and len(probed) == 2, "what was found is kept, what was not is not"
+        assert os.environ[device.LOADER_VARIABLES[0]] == "/lvp_icd.json"
+        forget()
+        monkeypatch.setenv(device.SWITCH, "cpu")
+        device.require_renderer()
+        assert len(probed) == 3, "another question"
+    assert device.FOUND_AT not in os.environ
+    forget()

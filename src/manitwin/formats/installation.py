@@ -12,7 +12,11 @@ import subprocess
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib.util import find_spec, module_from_spec
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 ELF = b"\x7fELF"
 NO_METADATA = "0+unknown"
@@ -54,21 +58,63 @@ def import_remedy(error: ImportError, otherwise: str) -> str:
     return "manitwin doctor says which of this system's packages have it" if names_shared_library(error) else otherwise
 
 
+@dataclass(frozen=True)
+class _LeftOut:
+    """Finds that a library is not installed."""
+
+    name: str
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> None:
+        """Raise ModuleNotFoundError for the library; of others nothing is known here."""
+        if name == self.name:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+
 @contextmanager
 def left_out(name: str) -> Iterator[None]:
     """Make imports of a library fail in the ``with`` statement as if it were not installed; one that is loaded already stays.
 
-    For an optional dependency of another library that costs memory and is not used. A None in ``sys.modules`` makes an import
-    raise ModuleNotFoundError (Python's reference, "The module cache").
+    For an optional dependency of another library that costs memory and is not used. A None in ``sys.modules`` would do for
+    Python's own imports, but modules in Cython (pyarrow) take it for the library.
     """
-    if name in sys.modules:
-        yield
-        return
-    sys.modules[name] = None  # type: ignore[assignment]
+    finder = _LeftOut(name)
+    sys.meta_path.insert(0, finder)
     try:
         yield
     finally:
-        del sys.modules[name]
+        sys.meta_path.remove(finder)
+
+
+class _PutOff(ModuleType):
+    """A module that is executed when something of it is asked for."""
+
+    def __getattr__(self, name: str) -> Any:
+        spec = self.__spec__
+        assert spec is not None and spec.loader is not None
+        self.__class__ = ModuleType  # type: ignore[assignment]
+        try:
+            spec.loader.exec_module(self)
+        except BaseException:
+            sys.modules.pop(spec.name, None)
+            raise
+        return getattr(self, name)
+
+
+def put_off(name: str, *classes: str) -> None:
+    """Have a library loaded once something of it is used, not as another one imports it; what is loaded or missing stays so.
+
+    ``classes`` are those that the other one imports for its annotations: they stand for nothing until the library is loaded.
+    For a program that owns its process, while it has one thread, and where nobody imports what is below the library before it.
+    ``importlib.util.LazyLoader`` would load at the import statement, which asks for the module's ``__spec__``.
+    """
+    spec = None if name in sys.modules else find_spec(name)
+    if spec is None or spec.loader is None:
+        return
+    module = module_from_spec(spec)
+    module.__class__ = _PutOff
+    for each in classes:
+        setattr(module, each, type(each, (), {}))
+    sys.modules[name] = module
 
 
 def elf_files(folder: Path) -> Iterator[Path]:

@@ -8,6 +8,7 @@ started from here.
 
 from __future__ import annotations
 
+import fcntl
 import glob
 import json
 import logging
@@ -15,8 +16,10 @@ import os
 import platform
 import subprocess
 import sys
+import tempfile
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -28,6 +31,9 @@ SWITCH = "MANITWIN_RENDER_DEVICE"
 """Set to ``cpu`` to leave GPUs alone (some hang: vla-evaluation-harness#112); ``auto`` otherwise."""
 
 FOUND = "MANITWIN_RENDER_DEVICE_FOUND"
+FOUND_AT = "MANITWIN_RENDER_DEVICE_FOUND_AT"
+"""Names the file in which the processes of a run leave each other what the first of them found."""
+
 LOADER_VARIABLES = ("VK_DRIVER_FILES", "VK_ICD_FILENAMES")
 """What the Vulkan loader reads: the first since 1.3.207, the second before (LoaderInterfaceArchitecture.md)."""
 
@@ -96,14 +102,51 @@ def require_renderer() -> RenderDevice:
     known = json.loads(os.environ.get(FOUND, "null"))
     if known is not None and known["question"] == question:
         return RenderDevice(**known["device"])
-    device = _first_working(question["switch"] == "cpu")
-    why = f"{SWITCH}=cpu" if question["switch"] == "cpu" else "the first that renders, GPUs before the CPU"
-    RUN.info("renderer: %s, driver %s (%s)", device.name, device.driver_file or "chosen by the loader", why)
+    device = _found_together(question)
     if device.driver_file is not None:
         for name in LOADER_VARIABLES:
             os.environ[name] = device.driver_file
             question[name] = device.driver_file
     os.environ[FOUND] = json.dumps({"question": question, "device": asdict(device)})
+    return device
+
+
+@contextmanager
+def looked_for_once() -> Iterator[None]:
+    """Have one process alone look for the device, of this one and all that are started in the ``with`` statement.
+
+    The first that needs it does; others that need it meanwhile wait.
+    """
+    with tempfile.TemporaryDirectory(prefix="manitwin-") as folder:
+        os.environ[FOUND_AT] = os.path.join(folder, "device.json")
+        try:
+            yield
+        finally:
+            del os.environ[FOUND_AT]
+
+
+def _found_together(question: dict[str, str | None]) -> RenderDevice:
+    """Return what another process of this run found for the same question, or look, and leave it to the others."""
+    place = os.environ.get(FOUND_AT)
+    if place is None:
+        return _looked_for(question)
+    with open(place, "a+", encoding="utf-8") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)  # until the file is closed, or its process ends
+        file.seek(0)
+        said = file.read()
+        known = json.loads(said) if said.endswith("}") else None  # a process was killed while it wrote
+        if known is not None and known["question"] == question:
+            return RenderDevice(**known["device"])
+        device = _looked_for(question)
+        file.truncate(0)
+        file.write(json.dumps({"question": question, "device": asdict(device)}))
+        return device
+
+
+def _looked_for(question: dict[str, str | None]) -> RenderDevice:
+    device = _first_working(question["switch"] == "cpu")
+    why = f"{SWITCH}=cpu" if question["switch"] == "cpu" else "the first that renders, GPUs before the CPU"
+    RUN.info("renderer: %s, driver %s (%s)", device.name, device.driver_file or "chosen by the loader", why)
     return device
 
 
