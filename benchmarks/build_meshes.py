@@ -4,6 +4,7 @@
 
 DATA holds ``manifest.csv`` with the columns file, kind and category; meshes are taken as metric, named by their category.
 Objects without a twin or a grasp count as 0 of 100. CPU seconds are those of the worker, by stage, as run.json keeps them.
+Workers are forked as those of the command line are where NumPy has one thread (OPENBLAS_NUM_THREADS=1), and spawned elsewhere.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ from pathlib import Path
 import numpy as np
 
 import manitwin
+from manitwin.cli.commands.build import OF_WORKERS
 from manitwin.cli.run_summary import grasp_lines, summarize_grasps
+from manitwin.engine.fork_server import forked_workers
 from manitwin.twin.store import read_record
 
 GRASPS_WANTED = 100
@@ -108,13 +111,14 @@ def main() -> None:
     arguments = parser.parse_args()
     only = set(filter(None, arguments.only.split(",")))
     manifest = write_manifest(arguments.data, arguments.out, arguments.kind, only)
-    report = manitwin.build(
-        manifest,
-        arguments.out / "twins",
-        jobs=arguments.jobs,
-        quick=arguments.quick,
-        on_result=lambda r: print(".", end="", flush=True),
-    )
+    with forked_workers(OF_WORKERS):
+        report = manitwin.build(
+            manifest,
+            arguments.out / "twins",
+            jobs=arguments.jobs,
+            quick=arguments.quick,
+            on_result=lambda r: print(".", end="", flush=True),
+        )
     print()
     print_summary(print_table(report.results, arguments.kind))
     print(*grasp_lines(summarize_grasps(report.records())), sep="\n")

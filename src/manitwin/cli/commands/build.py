@@ -16,6 +16,7 @@ from manitwin.cli.causes import print_causes
 from manitwin.cli.console import err_console, error_console, out_console, print_error, print_estimate
 from manitwin.cli.documents import Json, print_document
 from manitwin.cli.interrupt import WATCH
+from manitwin.formats.installation import left_out, put_off
 
 if TYPE_CHECKING:
     from manitwin.engine.drive import ExecutorName
@@ -106,6 +107,8 @@ def _request(inputs: list[Path], out: str, arguments: dict[str, Any], said: dict
     from manitwin.engine.process_bounds import one_thread_each
 
     one_thread_each()  # before NumPy is loaded: with its threads this process could not be forked
+    put_off("networkx", "Graph")  # a tenth of the imports, which trimesh asks for and few things use
+    put_off("collada")  # a twentieth, which reads one format of nine
     from manitwin.pipeline.settings import Flags, request_build
 
     defaults = {name: said[name] for name in options.OF_INPUTS}
@@ -118,26 +121,38 @@ def _watched_build(request: BuildRequest, *, lines: bool, executor: ExecutorName
     from manitwin.cli.progress import WatchedRun
     from manitwin.dataset.build import build_requested
     from manitwin.engine.fork_server import forked_workers
+    from manitwin.engine.stage import INPUT
+    from manitwin.render.device import looked_for_once, require_renderer
 
-    if executor != "ray":
-        from manitwin.render.device import require_renderer
-
+    if executor == "inline":
         require_renderer()
     waits: set[str] = set()
+    asked: list[bool] = []
+
+    def require_device_once() -> None:
+        """End a build that has begun its work and could not draw; one that finds all of it done needs no device."""
+        if executor == "local" and not asked:
+            asked.append(True)
+            require_renderer()
 
     def staged(event: StageEvent) -> None:
         watched.progress.stage(event)
+        if getattr(event, "state", None) == "done" and event.stage != INPUT:
+            require_device_once()
         if getattr(event, "state", None) == "waiting" and event.stage not in waits:
             waits.add(event.stage)
             err_console.print(f"{event.stage} waits: {event.detail}")  # type: ignore[union-attr]
 
     def ended(result: ItemResult) -> None:
         watched.progress.ended(result.item, result.status, result.reused)
+        if not result.reused:
+            require_device_once()
         if lines:
             _print_result(result)
 
     forked = forked_workers(OF_WORKERS, [WATCH]) if executor == "local" else nullcontext()
-    with forked, WatchedRun("inputs", request.out) as watched:  # forked before threads show how far it is
+    # pandas is 30 MB in each worker that Arrow takes where it finds it; forked before threads show how far it is
+    with left_out("pandas"), looked_for_once(), forked, WatchedRun("inputs", request.out) as watched:
         return build_requested(
             request, executor=executor, address=address, on_estimate=print_estimate, on_start=watched.start, on_stage=staged,
             on_result=ended,
