@@ -16,6 +16,8 @@ from typing import Any
 from manitwin.engine.fork_server import start_forked
 from manitwin.engine.process_bounds import one_thread_in_new_processes
 
+LARGE_BYTES = 2 << 20  # blocks from this size on are mapped each by itself
+M_MMAP_THRESHOLD = -3  # mallopt(3)
 KEPT_BYTES = 64 << 20  # free memory that stays mapped for the next stage
 
 
@@ -49,6 +51,17 @@ class _AllocatorState(ctypes.Structure):
 def keep_imported() -> None:
     """Exempt all objects that exist now from garbage collection, which then looks through later ones only, in milliseconds."""
     gc.freeze()
+
+
+def map_large_blocks() -> None:
+    """Have large blocks of memory go back to the system as they are freed; elsewhere than with glibc nothing is done.
+
+    By itself glibc raises its limit for that to the largest block that was freed, up to 32 MB (mallopt(3)): arrays and textures
+    then leave holes between what stays, which a stage that needs much comes on top of.
+    """
+    library = ctypes.CDLL(None)
+    if hasattr(library, "mallopt"):
+        library.mallopt(M_MMAP_THRESHOLD, LARGE_BYTES)
 
 
 def return_free_memory() -> None:

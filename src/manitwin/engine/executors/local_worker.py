@@ -15,7 +15,7 @@ from manitwin.engine.fork_server import parent_of_workers
 from manitwin.engine.jobs import Job, Reply, RunStage, WorkerSetup
 from manitwin.engine.process_bounds import die_with, limit_memory
 from manitwin.engine.worker import Worker
-from manitwin.engine.worker_processes import keep_imported, return_free_memory
+from manitwin.engine.worker_processes import keep_imported, map_large_blocks, return_free_memory
 from manitwin.formats.printable import printable_line
 
 STACK_LINES = 12
@@ -40,6 +40,7 @@ def start(setup: WorkerSetup, stacks: str, driver: int) -> None:
     os.dup2(_stack_file.fileno(), 2)
     limit_memory(setup.memory_gb)
     _worker = Worker(setup)
+    map_large_blocks()
     keep_imported()
 
 

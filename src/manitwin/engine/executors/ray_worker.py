@@ -12,7 +12,7 @@ from pathlib import Path
 from manitwin.engine.jobs import Job, Reply, WorkerSetup
 from manitwin.engine.process_bounds import limit_memory, one_thread_each
 from manitwin.engine.worker import Worker
-from manitwin.engine.worker_processes import keep_imported, return_free_memory
+from manitwin.engine.worker_processes import keep_imported, map_large_blocks, return_free_memory
 from manitwin.errors import UsageError
 from manitwin.formats.installation import installed_version
 
@@ -33,6 +33,7 @@ class RayWorker:
             raise UsageError(f"this node has manitwin {here} and the driver {wanted_version}; install the same on all")
         one_thread_each()
         limit_memory(setup.memory_gb)
+        map_large_blocks()
         keep_imported()
         self._setup = setup
         self._idle: queue.SimpleQueue[Worker] = queue.SimpleQueue()
