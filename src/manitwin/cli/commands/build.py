@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from contextlib import nullcontext
 from functools import wraps
 from itertools import islice
@@ -109,11 +110,15 @@ def _request(inputs: list[Path], out: str, arguments: dict[str, Any], said: dict
     one_thread_each()  # before NumPy is loaded: with its threads this process could not be forked
     put_off("networkx", "Graph")  # a tenth of the imports, which trimesh asks for and few things use
     put_off("collada")  # a twentieth, which reads one format of nine
-    from manitwin.pipeline.settings import Flags, request_build
+    gc.disable()  # imports leave next to nothing to be collected, and a twentieth of their time went into looking for it
+    try:
+        from manitwin.pipeline.settings import Flags, request_build
 
-    defaults = {name: said[name] for name in options.OF_INPUTS}
-    flags = {name: value for name, value in said.items() if name not in defaults}
-    return request_build(inputs, out, **arguments, defaults=defaults, flags=cast(Flags, flags))
+        defaults = {name: said[name] for name in options.OF_INPUTS}
+        flags = {name: value for name, value in said.items() if name not in defaults}
+        return request_build(inputs, out, **arguments, defaults=defaults, flags=cast(Flags, flags))
+    finally:
+        gc.enable()
 
 
 def _watched_build(request: BuildRequest, *, lines: bool, executor: ExecutorName, address: str | None) -> BuildReport:
