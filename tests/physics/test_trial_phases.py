@@ -13,7 +13,7 @@ from manitwin.physics import trial_phases
 from manitwin.physics.mujoco.trial import MujocoTrial
 from manitwin.physics.sapien.trial import SapienTrial
 from manitwin.physics.trial import GraspTrial
-from manitwin.physics.trial_phases import HandContacts, SharedTarget, run_phases
+from manitwin.physics.trial_phases import HandContacts, SharedTarget, run_brief_phases, run_phases
 from rigid_boxes import SETTINGS, SLIDE_PEAK_M_S2, above, box, try_one
 
 GRAVITY = np.array([0, 0, -9.81])
@@ -106,6 +106,47 @@ def test_sure_grasp_is_loaded_once_along_each_direction() -> None:
     most = np.concatenate([slides.max(0), -slides.min(0)])
     assert most == pytest.approx(SLIDE_PEAK_M_S2, rel=1e-3), "all six directions, at the full peak"
     assert result.steps == len(scene.loads)
+
+
+PEAK_STEPS, BRIEF_STEPS = 48, 48
+
+
+def test_what_is_still_as_the_lift_is_hardest_is_loaded_as_much_in_less_time() -> None:
+    scene, whole = Rigid(), Rigid()
+    result = run_brief_phases(scene, np.eye(3), SETTINGS)
+    run_phases(whole, np.eye(3), SETTINGS)
+    assert result is not None and result.outcome == "held"
+    lift, rest = np.split(scene.loads[CLOSE_STEPS:], [PEAK_STEPS])
+    assert lift == pytest.approx(whole.loads[CLOSE_STEPS : CLOSE_STEPS + PEAK_STEPS])
+    assert lift[:, 2].min() == whole.loads[CLOSE_STEPS : CLOSE_STEPS + LIFT_STEPS, 2].min(), "the peak is among it"
+    slides = rest[STABLE_STEPS:] - GRAVITY
+    assert len(slides) == 3 * BRIEF_STEPS
+    most = np.concatenate([slides.max(0), -slides.min(0)])
+    assert most == pytest.approx(SLIDE_PEAK_M_S2, rel=5e-3), "all six directions, at the full peak"
+
+
+def test_what_is_still_is_carried_on_at_the_speed_it_had() -> None:
+    way: list[tuple[float, np.ndarray]] = []
+    scene = Rigid()
+    run_brief_phases(scene, np.eye(3), SETTINGS, lambda phase, time_s, hand_m: way.append((time_s, hand_m)))
+    went = path_m(np.concatenate([np.tile(GRAVITY, (CLOSE_STEPS, 1)), scene.loads[CLOSE_STEPS:]]))
+    for time_s, hand_m in way:
+        assert hand_m == pytest.approx(went[round(time_s / SETTINGS.timestep_s) - 1], abs=3e-4)
+    assert way[-1][1][2] > 0.15
+
+
+def test_what_moves_as_it_is_lifted_goes_through_the_whole_trial() -> None:
+    scene = Rigid(moved_m=lambda step: 0.00051 * (step > CLOSE_STEPS))
+    result = run_brief_phases(scene, np.eye(3), SETTINGS)
+    assert result is not None and result.outcome == "held"
+    assert len(scene.loads) == STABLE + 3 * SLIDE_STEPS
+
+
+@pytest.mark.parametrize(("moved_m", "sure"), [(0.00049, True), (0.00051, False)])
+def test_what_moves_in_brief_slides_has_no_verdict_by_them(moved_m: float, sure: bool) -> None:
+    before = CLOSE_STEPS + PEAK_STEPS + STABLE_STEPS
+    result = run_brief_phases(Rigid(moved_m=lambda step: moved_m * (step > before)), np.eye(3), SETTINGS)
+    assert (result is not None) == sure
 
 
 @pytest.mark.parametrize(("moved_m", "slides"), [(0.0019, 6), (0.0021, 12)])
@@ -214,6 +255,7 @@ def test_full_repetition_gives_the_same_verdicts(engine: GraspTrial, monkeypatch
     trials += [(box([0.03, 0.2, 0.03], 1.0), above([0, y, 0])) for y in (0.0, 0.05, 0.06)]
     early = [try_one(engine, body, pose) for body, pose in trials]
     monkeypatch.setattr(trial_phases, "SURE_SHARE", 0.0)
+    monkeypatch.setattr(trial_phases, "STILL_M", 0.0)
     full = [try_one(engine, body, pose) for body, pose in trials]
     assert [result.outcome for result in early] == [result.outcome for result in full]
     assert {"held", "slips"} <= {result.outcome for result in full}

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from manitwin.geometry.poses import transform
+from manitwin.physics import trial_phases
 from manitwin.physics.mujoco.trial import MujocoTrial
 from manitwin.physics.sapien.fingers import ArticulatedTrial
 from manitwin.physics.sapien.trial import SapienTrial
@@ -31,7 +32,8 @@ def test_a_recorded_trial_is_that_of_run(engine: SapienTrial | MujocoTrial, shar
     assert recording.object_to_hand.shape == (count, 4, 4) and recording.hand_m.shape == (count, 3)
 
 
-def test_hand_goes_up_by_the_lift_and_out_along_each_axis() -> None:
+def test_hand_goes_up_by_the_lift_and_out_along_each_axis(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(trial_phases, "STILL_M", 0.0)  # else the hand does not stop at the end of the lift
     recording = SapienTrial().record(box(CUBE_M, 0.5), PANDA, above([0, 0, 0]), SETTINGS)
     phases = np.array(recording.phases)
     assert list(dict.fromkeys(recording.phases)) == ["open", "close", "lift", "hold", "slide"]

@@ -16,6 +16,7 @@ import pytest
 from access_requests import asked
 
 from manitwin.errors import TwinError, UsageError
+from manitwin.physics import trial_phases
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import Twin
 from manitwin.web import trial_player
@@ -36,7 +37,8 @@ def rows(values: list[float]) -> np.ndarray:
     return np.array(values).reshape(-1, 7)
 
 
-def test_document_has_hand_object_and_boxes_at_each_state(twin: Twin) -> None:
+def test_document_has_hand_object_and_boxes_at_each_state(twin: Twin, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(trial_phases, "STILL_M", 0.0)  # else the hand does not stop at the end of the lift
     told = trial_document(twin, "panda", "panda-0000")
     count = len(told["time_s"])
     assert (told["outcome"], told["recorded_outcome"]) == ("held", "held")

@@ -33,7 +33,7 @@ class SecondOpinionStage:
     with both engines' verdicts.
     """
 
-    version = "6"
+    version = "7"
     needs: Resource = "cpu"
 
     def __init__(

@@ -30,7 +30,7 @@ class VerifyStage:
     gripper rejects the object; another gripper does not.
     """
 
-    version = "5"
+    version = "6"
     needs: Resource = "cpu"
 
     def __init__(self, settings: VerifyConfig, trial: GraspTrial, gripper: Gripper, suffix: str = ""):

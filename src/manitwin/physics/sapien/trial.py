@@ -13,7 +13,7 @@ import numpy as np
 from manitwin.geometry.poses import inverse
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.physics.trial import TrialResult, TrialSettings
-from manitwin.physics.trial_phases import run_phases
+from manitwin.physics.trial_phases import run_brief_phases, run_phases
 from manitwin.physics.trial_recording import TrialRecorder, TrialRecording
 from manitwin.robots.grippers.gripper import Gripper, of_kind
 from manitwin.robots.grippers.hand_clearance import HandReach
@@ -105,12 +105,17 @@ def _try_one(
     if not near.any():
         return TrialResult("misses", 0.0, 0.0, 0.0, (0.0, 0.0), 0)  # nothing to simulate: nothing touches the object
 
-    def simulate(some: np.ndarray) -> tuple[TrialResult, np.ndarray]:
+    def simulate(some: np.ndarray, *, briefly: bool = True) -> tuple[TrialResult, np.ndarray]:
         """Return what became of the object with some of its shapes, and the poses at which it was looked at."""
         chosen = [shape for shape, is_in in zip(shapes, some, strict=True) if is_in]
         scene = HandScene(body, chosen, object_to_hand, settings, lambda scene: FixedHand(scene, gripper, settings))
         watch = None if recorder is None else recorder.watch(scene)
-        return run_phases(scene, object_to_hand[:3, :3], settings, watch), np.array(scene.looks)
+        run = run_brief_phases if briefly else run_phases
+        result = run(scene, object_to_hand[:3, :3], settings, watch)
+        if result is not None:
+            return result, np.array(scene.looks)
+        del scene, watch  # its shapes are free for the next one when it is gone
+        return simulate(some, briefly=False)
 
     result, looks = simulate(near)
     if near.all() or _stayed_out(reach, gaps, gripper, looks):
