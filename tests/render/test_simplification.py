@@ -72,3 +72,38 @@ def test_nothing_is_left_of_nothing_and_no_tolerance_changes_nothing_round() -> 
     assert simplified(np.zeros((0, 3)), np.zeros((0, 3), int), 0.001).shape == (0, 3)
     ball = trimesh.creation.icosphere(2, 0.05)
     assert len(simplified(ball.vertices, ball.faces, 1e-9)) == len(ball.faces)
+
+
+def test_open_edges_that_may_move_keep_their_line() -> None:
+    """A box without its top, cut into many triangles: its rim is a square of four corners afterwards."""
+    sheet = trimesh.creation.box([0.1, 0.1, 0.1]).subdivide().subdivide()
+    sheet.update_faces(sheet.triangles_center[:, 2] < 0.0499)
+    lean = of(sheet.vertices, simplified(sheet.vertices, sheet.faces, 1e-5, keep_open_edges=False))
+    assert len(lean.faces) == 10
+    assert lean.area == pytest.approx(sheet.area, rel=1e-9)
+    np.testing.assert_allclose(np.ptp(lean.vertices, axis=0), 0.1, atol=1e-9)
+
+
+def test_vertices_of_a_seam_move_together_and_along_it() -> None:
+    """A tube whose texture goes once around: where it begins and ends no gap opens, and coordinates stay those of places."""
+    around, along = 64, 40
+    angle, height = np.meshgrid(np.linspace(0, 1, around + 1), np.linspace(0, 1, along + 1))
+    uv = np.column_stack([angle.ravel(), height.ravel()])
+    places = (np.arange(along + 1)[:, None] * around + np.arange(around + 1) % around).ravel()
+    vertices = np.column_stack(
+        [0.05 * np.cos(2 * np.pi * (uv[:, 0] % 1)), 0.05 * np.sin(2 * np.pi * (uv[:, 0] % 1)), uv[:, 1]]
+    )
+    corner = (np.arange(along)[:, None] * (around + 1) + np.arange(around)).ravel()
+    right, up = corner + 1, corner + around + 1
+    faces = np.concatenate([np.stack([corner, right, up + 1], 1), np.stack([corner, up + 1, up], 1)])
+    lean = simplified(vertices, faces, 0.0005, places=places, keep_open_edges=False)
+    assert len(lean) < 0.2 * len(faces)
+    edges = np.sort(places[lean][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    unique, uses = np.unique(edges, axis=0, return_counts=True)
+    assert uses.max() == 2
+    assert np.isin(
+        np.unique(vertices[[int(np.flatnonzero(places == p)[0]) for p in unique[uses == 1].ravel()], 2]), (0, 1)
+    ).all()
+    assert np.abs(np.ptp(uv[lean][..., 0], axis=1)).max() < 0.5  # no triangle runs the long way round in the texture
+    doubled = uv[lean][..., 1].mean() - vertices[lean][..., 2].mean()
+    assert doubled == pytest.approx(0.0, abs=1e-12)

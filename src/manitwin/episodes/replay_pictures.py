@@ -28,9 +28,9 @@ from manitwin.scenes.furniture_pictures import TEXTURE_VARIANTS, add_furniture
 from manitwin.scenes.scene import Furniture, SurfaceBox
 from manitwin.scenes.twin_looks import simplified_twin_looks
 
-TOLERANCE_M, FINE_PX = 0.0004, 640
-"""Of simplified surfaces: a third of a pixel's width at 1 m in a picture of so many pixels."""
-MOST_TOLERANCE_M, MOST_OF_OBJECTS_M = 0.002, 0.0008
+TOLERANCE_M, FINE_PX = 0.0008, 640
+"""Of simplified surfaces, most of which stay far below: two thirds of a pixel's width at 1 m in a picture of so many pixels."""
+MOST_TOLERANCE_M, MOST_OF_OBJECTS_M = 0.004, 0.0016
 """Of a robot's links and of objects, which may be thin and are seen from nearby, in pictures of fewer pixels."""
 FIXTURE_MATERIAL = "metal"
 GRANULE_RGBA = (205, 150, 60, 255)  # grains, more or less

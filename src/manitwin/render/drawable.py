@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 import trimesh
 
-from manitwin.formats.meshes.textures import make_part, material_of
+from manitwin.formats.meshes.textures import make_part, material_of, uv_of
 from manitwin.formats.meshes.triangles import with_creased_normals
 from manitwin.geometry.poses import rotation_between
 from manitwin.geometry.ray_caster import RayCaster
@@ -44,46 +44,64 @@ def drawable(
 
     Textures get at most ``most_texture_px`` a side; None: ``SMALL_TEXTURE_PX`` where the surfaces are simplified, else as they
     are. Faces that nobody sees from behind get one side only. With a ``tolerance_m`` the surfaces are simplified by about that
-    much, and what throws the shadow more: takes a CPU-second for 30,000 triangles, and a frame a third of the time.
+    much, and those without textures and of one material are one; what throws the shadow is simplified more.
     """
     both_sides = shows_back_faces(parts)
     if tolerance_m > 0:
-        parts = [_welded_and_simplified(part, tolerance_m) for part in parts]
+        lean = [_simplified(part, tolerance_m) for part in _joined_by_material(parts)]
+        parts = [part for part in lean if len(part.faces)] or parts  # what is as small as the tolerance vanishes
+        if most_texture_px is None:
+            most_texture_px = SMALL_TEXTURE_PX
     surfaces = [render_surface(part) if both_sides else front_faces(render_surface(part)) for part in parts]
-    if tolerance_m > 0:
-        surfaces = [_simplified(each, tolerance_m) for each in surfaces]
-    if most_texture_px is None and tolerance_m > 0:
-        most_texture_px = SMALL_TEXTURE_PX
     if most_texture_px is not None:
         surfaces = [_with_small_textures(each, most_texture_px) for each in surfaces]
     return Drawable(tuple(surfaces), _shadow_caster(parts, both_sides, tolerance_m))
 
 
-def _welded_and_simplified(part: trimesh.Trimesh, tolerance_m: float) -> trimesh.Trimesh:
-    """Return a part without textures with fewer vertices and one a place and crease; another one as it is.
+def _joined_by_material(parts: Sequence[trimesh.Trimesh]) -> list[trimesh.Trimesh]:
+    """Return parts of which those without textures and of one material are one: each part costs as it is drawn."""
+    alike: dict[object, list[trimesh.Trimesh]] = {}
+    for part in parts:
+        material = material_of(part)
+        look: object = id(part)
+        if not _is_textured(part):
+            color = np.asarray(material.baseColorFactor).tolist()
+            look = (*color, float(material.metallicFactor), float(material.roughnessFactor))
+        alike.setdefault(look, []).append(part)
+    return [_joined(each) for each in alike.values()]
 
-    Many files have three vertices for each triangle. Creases are found again in what is left, so that they need not stay
-    where they are as the seams of textures must.
-    """
+
+def _joined(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+    if len(parts) == 1:
+        return parts[0]
+    whole = merged(parts)
+    return make_part(whole.vertices, whole.faces, material=material_of(parts[0]), name=parts[0].metadata["name"])
+
+
+def _is_textured(part: trimesh.Trimesh) -> bool:
     material = material_of(part)
-    if material.baseColorTexture is not None or material.metallicRoughnessTexture is not None:
-        return part
-    vertices, faces = weld_equal(np.asarray(part.vertices), np.asarray(part.faces))
-    used, faces = _used(simplified(vertices, faces, tolerance_m), len(vertices))
-    lean = make_part(vertices[used], faces, material=material, name=part.metadata["name"])
-    return with_creased_normals(lean)
+    return material.baseColorTexture is not None or material.metallicRoughnessTexture is not None
 
 
-def _simplified(s: RenderSurface, tolerance_m: float) -> RenderSurface:
-    """Return a surface with fewer vertices; vertices of seams and creases, where they come twice, stay."""
-    used, faces = _used(simplified(s.vertices, s.faces, tolerance_m), len(s.vertices))
-    return replace(
-        s,
-        vertices=s.vertices[used],
-        normals=s.normals[used],
-        uv=s.uv[used],
-        faces=faces.astype(np.uint32),
-    )
+def _simplified(part: trimesh.Trimesh, tolerance_m: float) -> trimesh.Trimesh:
+    """Return a part with fewer vertices.
+
+    One with textures has the seams and normals of its file. Others get one vertex for each point and their creases found
+    again, which need not stay where they are: many files have three vertices for each triangle.
+    """
+    rows, faces = np.asarray(part.vertices), np.asarray(part.faces)
+    uv = uv_of(part) if _is_textured(part) else None
+    if uv is not None:
+        rows = np.column_stack([rows, uv, part.vertex_normals])
+    rows, faces = weld_equal(rows, faces)
+    places = weld_equal(rows[:, :3], np.arange(len(rows)))[1]
+    lean = simplified(rows[:, :3], faces, tolerance_m, places=places, keep_open_edges=False)
+    used, faces = _used(lean, len(rows))
+    rows = rows[used]
+    material, name = material_of(part), part.metadata["name"]
+    if uv is not None:
+        return make_part(rows[:, :3], faces, material=material, name=name, uv=rows[:, 3:5], normals=rows[:, 5:])
+    return with_creased_normals(make_part(rows, faces, material=material, name=name))
 
 
 def _used(faces: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -104,7 +122,7 @@ def _shadow_caster(parts: Sequence[trimesh.Trimesh], both_sides: bool, tolerance
     whole = merged(list(parts))
     vertices, faces = weld_equal(np.asarray(whole.vertices), np.asarray(whole.faces))
     if tolerance_m > 0:
-        faces = simplified(vertices, faces, max(tolerance_m, SHADOW_TOLERANCE_M))
+        faces = simplified(vertices, faces, max(tolerance_m, SHADOW_TOLERANCE_M), keep_open_edges=False)
     turned = faces[:, ::-1]
     return _bare_surface(vertices, np.concatenate([turned, faces]) if both_sides else turned)
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import trimesh
 
@@ -93,10 +94,10 @@ class SceneRenderer:
         self._entities: dict[str, tuple[int, Any]] = {}
         self._casters: dict[str, Any] = {}
         self._cameras: dict[tuple[str, int, int, int], tuple[Any, Any]] = {}
-        self._backdrop = np.zeros(3) if surroundings is None else np.array(surroundings.backdrop, float)
+        backdrop = np.zeros(3) if surroundings is None else np.array(surroundings.backdrop, np.float32)
+        self._backdrop_seen = np.rint((1 - np.arange(256, dtype=np.float32) / 255)[:, None] * backdrop).astype(np.uint8)
         self._add_lights(lighting, shadows)
-        if surroundings is not None:
-            self._add_floor(surroundings)
+        self._floor_to_add = surroundings
         _open_renderers.add(self)
 
     def __enter__(self) -> SceneRenderer:
@@ -156,6 +157,9 @@ class SceneRenderer:
 
     def render(self, cameras: Sequence[Camera], *, geometry: bool = False) -> list[SceneFrame]:
         """Draw the scene from each camera (``camera_to_object`` is its pose in the world), with ``geometry`` all of a frame."""
+        if self._floor_to_add is not None:  # after what hides it: it is shaded only where it is seen
+            self._add_floor(self._floor_to_add)
+            self._floor_to_add = None
         color = [self._camera("scene", i, camera, SUPERSAMPLE) for i, camera in enumerate(cameras)]
         numbers = [self._camera("geometry", i, camera, 1) for i, camera in enumerate(cameras)] if geometry else []
         self._scene.update_render()
@@ -170,10 +174,11 @@ class SceneRenderer:
 
     def _rgb(self, component: Any, camera: Camera) -> np.ndarray:
         picture = component.get_picture("Color")[: camera.height_px, : camera.width_px]  # the rest of it is not drawn
-        if picture[..., 3].min() == 255:
-            return np.ascontiguousarray(picture[..., :3])
-        empty = (1 - picture[..., 3:].astype(np.float32) / 255) * self._backdrop.astype(np.float32)
-        return np.rint(np.minimum(picture[..., :3] + empty, 255)).astype(np.uint8)
+        opacity = picture[..., 3]
+        rgb = cv2.cvtColor(picture, cv2.COLOR_RGBA2RGB)
+        if opacity.min() == 255:
+            return np.asarray(rgb)
+        return np.asarray(cv2.add(rgb, cv2.LUT(cv2.merge([opacity] * 3), self._backdrop_seen[None])))
 
     def _geometry(self, component: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         normals, entity = component.get_picture("WorldNormal"), component.get_picture("Segmentation")[..., 0]
