@@ -16,12 +16,12 @@ from manitwin.episodes.cameras import named_cameras
 from manitwin.episodes.recording import Recording
 from manitwin.episodes.replay_pictures import (
     FINE_PX,
+    MOST_OF_OBJECTS_M,
     EpisodeReplay,
-    link_drawables,
     link_poses,
-    link_visuals,
     tolerance_of,
 )
+from manitwin.episodes.robot_looks import link_drawables, link_visuals
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform, transform_points
 from manitwin.geometry.ray_caster import RayCaster
@@ -196,7 +196,11 @@ def test_links_for_small_pictures_have_fewer_triangles_and_look_alike() -> None:
     assert 0 < np.abs(fine - lean).mean() < 1.0
     assert (np.abs(fine - lean).max(-1) > 60).mean() < 0.002  # a pixel's width of an edge here and there
     faces = [
-        sum(len(each.faces) for link in link_drawables(panda.urdf, tolerance_of(px)).values() for each in link.surfaces)
+        sum(
+            len(each.faces)
+            for link in link_drawables(panda.urdf, tolerance_of(px), MOST_OF_OBJECTS_M).values()
+            for each in link.surfaces
+        )
         for px in (FINE_PX, SIZE)
     ]
     assert faces[1] < 0.5 * faces[0]

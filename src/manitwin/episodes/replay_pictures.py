@@ -10,10 +10,9 @@ from types import TracebackType
 import numpy as np
 import trimesh
 
-from manitwin.assets.asset_files import AssetFiles
-from manitwin.assets.readers.urdf_shapes import LinkShapes
 from manitwin.episodes.cameras import NamedCamera
 from manitwin.episodes.recording import Recording
+from manitwin.episodes.robot_looks import link_drawables
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.geometry.rigid_body import StaticBox
@@ -40,32 +39,6 @@ TABLE = Furniture(
     boxes=(SurfaceBox(name="table", center_m=(0.4, 0.0, -0.02), half_extents_m=(0.65, 0.7, 0.02), material="wood"),),
 )
 """What an episode without a scene stands on."""
-
-
-@lru_cache(maxsize=4)
-def link_visuals(urdf: str) -> dict[str, tuple[trimesh.Trimesh, ...]]:
-    """Return the visual parts of a URDF's links that have any, by name, in the links' frames.
-
-    COLLADA files keep their own colours, STL files and plain shapes have those of the URDF. Raises AssetError where a mesh
-    cannot be read.
-    """
-    tree = UrdfTree.of_text(urdf)
-    shapes = LinkShapes(tree, Path("robot.urdf"), AssetFiles(Path(Path.cwd().anchor)))
-    parts = {name: tuple(shapes.visual(link, np.eye(4))) for name, link in tree.links.items()}
-    return {name: found for name, found in parts.items() if found}
-
-
-@lru_cache(maxsize=4)
-def link_drawables(urdf: str, tolerance_m: float, fingers: frozenset[str] = frozenset()) -> dict[str, Drawable]:
-    """Return the links that have visual parts, ready to be drawn, simplified by about a tolerance; kept for the next call.
-
-    Links of ``fingers``, which a camera on the hand sees from nearby, are simplified as objects are.
-    """
-    fine_m = min(tolerance_m, MOST_OF_OBJECTS_M)
-    return {
-        link: drawable(parts, tolerance_m=fine_m if link in fingers else tolerance_m)
-        for link, parts in link_visuals(urdf).items()
-    }
 
 
 def link_poses(robot: Robot, joint_positions_rad: np.ndarray, hand: np.ndarray) -> dict[str, np.ndarray]:
@@ -118,7 +91,8 @@ class EpisodeReplay:
         for name, thing in zip(self._objects, objects, strict=True):
             ready = thing if isinstance(thing, Drawable) else drawable(thing, tolerance_m=TOLERANCE_M)
             self._renderer.add(name, ready)
-        links = link_drawables(robot.urdf, tolerance_of(picture_px), _moved_by(robot.urdf, robot.finger_joints))
+        tolerance_m, fingers = tolerance_of(picture_px), _moved_by(robot.urdf, robot.finger_joints)
+        links = link_drawables(robot.urdf, tolerance_m, min(tolerance_m, MOST_OF_OBJECTS_M), fingers)
         self._links = list(links)
         for link, visual in links.items():
             self._renderer.add(f"{robot.name}/{link}", visual)

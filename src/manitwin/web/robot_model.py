@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import trimesh
 
-from manitwin.episodes.replay_pictures import link_visuals
+from manitwin.episodes.robot_looks import link_visuals
 from manitwin.formats.glb import write_glb
 from manitwin.formats.meshes.textures import make_part, material_of, pbr_material
 from manitwin.formats.meshes.triangles import with_creased_normals

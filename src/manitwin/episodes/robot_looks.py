@@ -1,0 +1,114 @@
+"""What a robot's links look like: the visual shapes of its URDF, simplified for pictures of a size and kept on disk.
+
+Reading COLLADA and simplifying takes some CPU seconds for an arm; what comes out is a megabyte or two.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from manitwin.assets.asset_files import AssetFiles
+from manitwin.assets.readers.urdf_shapes import LinkShapes
+from manitwin.render.drawable import Drawable, drawable
+from manitwin.render.drawable_file import drawables_from_bytes, drawables_to_bytes
+from manitwin.robots.urdf import UrdfTree
+
+LOOKS_VERSION = "1"
+"""Another one whenever reading or simplifying links gives other surfaces: what is kept is then made again."""
+WHOLE_FILES = (".dae", ".stl")
+"""Formats of meshes whose colours, but for textures, are in the file itself."""
+MOST_BYTES = 64 << 20
+
+
+@lru_cache(maxsize=4)
+def link_visuals(urdf: str) -> dict[str, tuple[trimesh.Trimesh, ...]]:
+    """Return the visual parts of a URDF's links that have any, by name, in the links' frames.
+
+    COLLADA files keep their own colours, STL files and plain shapes have those of the URDF. Raises AssetError where a mesh
+    cannot be read.
+    """
+    tree = UrdfTree.of_text(urdf)
+    shapes = LinkShapes(tree, Path("robot.urdf"), AssetFiles(Path(Path.cwd().anchor)))
+    parts = {name: tuple(shapes.visual(link, np.eye(4))) for name, link in tree.links.items()}
+    return {name: found for name, found in parts.items() if found}
+
+
+@lru_cache(maxsize=4)
+def link_drawables(
+    urdf: str, tolerance_m: float, fine_m: float, fingers: frozenset[str] = frozenset()
+) -> dict[str, Drawable]:
+    """Return the links that have visual parts, ready to be drawn, simplified by about a tolerance; kept for the next run.
+
+    Links of ``fingers``, which a camera on the hand sees from nearby, are simplified by ``fine_m``. Raises AssetError where a
+    mesh cannot be read.
+    """
+    kept = _kept_file(urdf, tolerance_m, fine_m, fingers)
+    found = None if kept is None else _read(kept)
+    if found is not None:
+        return found
+    made = {
+        link: drawable(parts, tolerance_m=fine_m if link in fingers else tolerance_m)
+        for link, parts in link_visuals(urdf).items()
+    }
+    content = None if kept is None else drawables_to_bytes(made)
+    if kept is not None and content is not None:
+        _write(kept, content)
+    return made
+
+
+def looks_folder() -> Path:
+    """Return ``$XDG_CACHE_HOME/manitwin/robot_looks``, ``~/.cache`` by default (XDG Base Directory Specification)."""
+    base = os.environ.get("XDG_CACHE_HOME", "")
+    return (Path(base) if os.path.isabs(base) else Path.home() / ".cache") / "manitwin" / "robot_looks"
+
+
+def _kept_file(urdf: str, tolerance_m: float, fine_m: float, fingers: frozenset[str]) -> Path | None:
+    """Return where the looks of a robot are kept, by the content of all that decides them; None where that cannot be told.
+
+    A file of another format may have its colours in files beside it.
+    """
+    digest = hashlib.sha256(json.dumps([LOOKS_VERSION, tolerance_m, fine_m, sorted(fingers), urdf]).encode())
+    try:
+        for mesh in UrdfTree.of_text(urdf).element.iterfind("./link/visual/geometry/mesh"):
+            path = Path(mesh.get("filename").removeprefix("file://"))
+            if path.suffix.lower() not in WHOLE_FILES:
+                return None
+            digest.update(hashlib.sha256(path.read_bytes()).digest())
+        return looks_folder() / f"{digest.hexdigest()}.npz"
+    except (OSError, RuntimeError):  # reading the mesh says what is wrong; no home
+        return None
+
+
+def _read(path: Path) -> dict[str, Drawable] | None:
+    """Return what is kept; None where there is nothing, or what is there is damaged: it is then made and written again."""
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            return None
+        return drawables_from_bytes(path.read_bytes())
+    except (OSError, ValueError):
+        return None
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Keep looks, whole or not at all: several processes may do so at once. Without a folder to write to nothing is kept."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=".", delete=False) as stream:
+            unfinished = Path(stream.name)
+            try:
+                stream.write(content)
+                stream.close()
+                unfinished.replace(path)
+            except BaseException:
+                unfinished.unlink(missing_ok=True)
+                raise
+    except OSError:
+        return

@@ -1,0 +1,76 @@
+"""Drawables without textures as one file of arrays, so that what was simplified once is read the next time."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Mapping
+
+import numpy as np
+
+from manitwin.render.drawable import Drawable
+from manitwin.render.surfaces import RenderSurface
+
+ARRAYS = {"vertices": (np.float32, 3), "faces": (np.uint32, 3), "normals": (np.float32, 3), "uv": (np.float32, 2)}
+"""Of a surface: the type of each and its columns."""
+NUMBERS = 5
+"""Of a surface: its linear colour (3), how metallic and how rough it is."""
+
+
+def drawables_to_bytes(things: Mapping[str, Drawable]) -> bytes | None:
+    """Return the content of a NumPy archive (.npz) of things by name; None where one of them has a texture."""
+    arrays: dict[str, np.ndarray] = {}
+    for place, thing in enumerate(things.values()):
+        surfaces = (*thing.surfaces, thing.shadow)  # the last one throws the shadow
+        for number, surface in enumerate(surfaces):
+            if any(each is not None for each in (surface.color_map, surface.roughness_map, surface.metallic_map)):
+                return None
+            name = f"{place}.{number}"
+            arrays |= {f"{name}.{kind}": getattr(surface, kind) for kind in ARRAYS}
+            arrays[f"{name}.numbers"] = np.array([*surface.color, surface.metallic, surface.roughness])
+    counts = {name: len(thing.surfaces) + 1 for name, thing in things.items()}
+    stream = io.BytesIO()
+    arrays["counts"] = np.frombuffer(json.dumps(counts).encode(), np.uint8)
+    np.savez(stream, **arrays)  # type: ignore[arg-type]
+    return stream.getvalue()
+
+
+def drawables_from_bytes(content: bytes) -> dict[str, Drawable]:
+    """Return the things by name that ``drawables_to_bytes`` was given; raises ValueError where the content is damaged."""
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+            counts = json.loads(arrays["counts"].tobytes())
+            found = {}
+            for place, (name, count) in enumerate(counts.items()):
+                *surfaces, shadow = (_surface(arrays, f"{place}.{number}") for number in range(count))
+                found[name] = Drawable(tuple(surfaces), shadow)
+            return found
+    except (KeyError, TypeError, AttributeError, EOFError, OSError, zipfile.BadZipFile) as error:
+        raise ValueError(f"no file of drawables: {error}") from error
+
+
+def _surface(arrays: Mapping[str, np.ndarray], name: str) -> RenderSurface:
+    """Return one surface; raises ValueError where its arrays do not belong together."""
+    read = {kind: arrays[f"{name}.{kind}"] for kind in ARRAYS}
+    for kind, (dtype, columns) in ARRAYS.items():
+        array = read[kind]
+        if array.dtype != dtype or array.ndim != 2 or array.shape[1] != columns:
+            raise ValueError(f"{name}.{kind} is {array.dtype} {array.shape}, not {np.dtype(dtype)} (N, {columns})")
+        if kind != "faces" and (len(array) != len(read["vertices"]) or not np.isfinite(array).all()):
+            raise ValueError(f"{name}.{kind} does not fit the vertices")
+    if len(read["faces"]) and int(read["faces"].max()) >= len(read["vertices"]):
+        raise ValueError(f"{name}.faces name vertices that are not there")
+    numbers = arrays[f"{name}.numbers"]
+    if numbers.shape != (NUMBERS,) or not np.isfinite(numbers).all():
+        raise ValueError(f"{name}.numbers are not {NUMBERS} finite ones")
+    red, green, blue, metallic, roughness = numbers.tolist()
+    return RenderSurface(
+        **read,
+        color=(red, green, blue),
+        color_map=None,
+        metallic=metallic,
+        metallic_map=None,
+        roughness=roughness,
+        roughness_map=None,
+    )
