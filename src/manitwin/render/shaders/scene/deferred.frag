@@ -201,7 +201,7 @@ vec3 shown(vec3 position, vec3 n, vec3 albedo, float metallic, float roughness, 
   float nv = clamp(dot(n, v), 1e-6, 1);
   vec3 diffuse = albedo * (1 - metallic), fresnel = mix(vec3(0.04), albedo, metallic);
   float sky = skyShare(samplerDirectionalLightDepths[0], shadowBuffer.directionalLightBuffers[0].viewMatrix,
-                       shadowBuffer.directionalLightBuffers[0].projectionMatrix, position, n, turn, last);
+                       shadowBuffer.directionalLightBuffers[0].projectionMatrix, position, n, turn, min(last, turn + 1));
   vec2 share = reflected(roughness, nv);
   float mirroredHeight = 2 * dot(n, v) * n.z - v.z;
   vec3 color = glow(n.z, 1) * diffuse + glow(mirroredHeight, roughness) * (fresnel * share.x + share.y);
