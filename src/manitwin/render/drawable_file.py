@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import zipfile
 from collections.abc import Mapping
 
@@ -29,9 +28,9 @@ def drawables_to_bytes(things: Mapping[str, Drawable]) -> bytes | None:
             name = f"{place}.{number}"
             arrays |= {f"{name}.{kind}": getattr(surface, kind) for kind in ARRAYS}
             arrays[f"{name}.numbers"] = np.array([*surface.color, surface.metallic, surface.roughness])
-    counts = {name: len(thing.surfaces) + 1 for name, thing in things.items()}
+    arrays["names"] = np.array(list(things), np.str_)
+    arrays["counts"] = np.array([len(thing.surfaces) + 1 for thing in things.values()], np.int64)
     stream = io.BytesIO()
-    arrays["counts"] = np.frombuffer(json.dumps(counts).encode(), np.uint8)
     np.savez(stream, **arrays)  # type: ignore[arg-type]
     return stream.getvalue()
 
@@ -40,9 +39,9 @@ def drawables_from_bytes(content: bytes) -> dict[str, Drawable]:
     """Return the things by name that ``drawables_to_bytes`` was given; raises ValueError where the content is damaged."""
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-            counts = json.loads(arrays["counts"].tobytes())
             found = {}
-            for place, (name, count) in enumerate(counts.items()):
+            told = zip(arrays["names"].tolist(), arrays["counts"].tolist(), strict=True)
+            for place, (name, count) in enumerate(told):
                 *surfaces, shadow = (_surface(arrays, f"{place}.{number}") for number in range(count))
                 found[name] = Drawable(tuple(surfaces), shadow)
             return found
