@@ -91,6 +91,18 @@ def test_wrong_use_is_one_line_and_makes_no_data_set(
     assert not (tmp_path / "data").exists()
 
 
+def test_without_a_driver_that_renders_nothing_is_begun(
+    tmp_path: Path, manifest: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("MANITWIN_RENDER_DEVICE_FOUND", raising=False)
+    monkeypatch.setenv("VK_DRIVER_FILES", "/nowhere.json")
+    monkeypatch.setenv("VK_ICD_FILENAMES", "/nowhere.json")
+    done = manitwin("build", "list.csv", "-o", "data", folder=tmp_path)
+    assert done.returncode == 4, done.stdout
+    assert "no Vulkan device can render (/nowhere.json" in done.stderr and done.stderr.count("\n") == 1
+    assert not (tmp_path / "data").exists()
+
+
 def test_a_bad_manifest_removes_no_ledger_that_another_run_made_meanwhile(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -75,12 +76,17 @@ def test_another_mesh_tolerance_or_version_is_made_anew(
     assert len(kept()) == 4
 
 
-@pytest.mark.parametrize("damage", ["cut", "empty", "foreign", "faces"])
+@pytest.mark.parametrize("damage", ["cut", "empty", "foreign", "faces", "header", "pickle"])
 def test_a_damaged_file_is_made_again(arm: str, damage: str) -> None:
     made = looks(arm)
     (file,) = kept()
     whole = file.read_bytes()
-    if damage == "faces":
+    if damage == "header":  # of an array: it cannot be parsed, which is none of zipfile's errors
+        with zipfile.ZipFile(file, "w") as archive:
+            archive.writestr("names.npy", np.lib.format.magic(1, 0) + b"\x08\x00{'a': (\n")
+    elif damage == "pickle":
+        np.savez(file, names=np.array([{}], object))
+    elif damage == "faces":
         with np.load(file) as arrays:
             changed = {name: array.copy() for name, array in arrays.items()}
         changed["0.0.faces"][0, 0] = 1 << 20
@@ -91,12 +97,14 @@ def test_a_damaged_file_is_made_again(arm: str, damage: str) -> None:
     assert file.read_bytes() == whole and kept() == [file]
 
 
-def test_without_a_folder_to_write_to_nothing_is_kept(
-    arm: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_without_a_folder_to_write_to_nothing_is_kept_and_that_is_said(
+    arm: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    assert set(looks(arm)) == {"base", "finger"}
+    with caplog.at_level("WARNING", "manitwin.run"):
+        assert set(looks(arm)) == {"base", "finger"}
+    assert "robot's looks are not kept" in caplog.text
 
 
 def test_formats_that_take_colours_from_files_beside_them_are_not_kept(arm: str, tmp_path: Path) -> None:
@@ -112,5 +120,5 @@ def test_things_with_textures_are_not_written_and_arrays_have_to_fit(arm: str) -
     surface = made["base"].surfaces[0]
     textured = Drawable((surface.__class__(**{**vars(surface), "color_map": np.zeros((2, 2, 4), np.uint8)}),), surface)
     assert drawables_to_bytes({"base": textured}) is None
-    with pytest.raises(ValueError, match="pickled"):
+    with pytest.raises(ValueError, match=r"no \.npz"):
         drawables_from_bytes(b"nothing")

@@ -119,3 +119,19 @@ def test_one_process_of_a_run_looks_for_the_device_and_tells_the_others(monkeypa
         assert len(probed) == 3, "another question"
     assert device.FOUND_AT not in os.environ
     forget()
+
+
+@pytest.mark.parametrize("named", ["", "/nowhere/a.json:/nowhere/b.json"])
+def test_without_any_driver_nothing_is_begun(monkeypatch: pytest.MonkeyPatch, named: str) -> None:
+    for name in (*device.LOADER_VARIABLES, device.FOUND):
+        monkeypatch.delenv(name, raising=False)
+    if named:
+        monkeypatch.setenv(device.LOADER_VARIABLES[0], named)
+    monkeypatch.setattr(device.glob, "glob", lambda pattern: [])
+    with pytest.raises(RendererMissing, match="no Vulkan device can render"):
+        device.require_driver()
+
+
+def test_a_driver_that_is_there_is_not_tried_before_it_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(device, "_probe", lambda *_, **__: pytest.fail("it was tried"))
+    device.require_driver()

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import tempfile
+import logging
 from functools import lru_cache
 from pathlib import Path
 
@@ -17,15 +16,18 @@ import trimesh
 
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.readers.urdf_shapes import LinkShapes
+from manitwin.errors import UsageError
+from manitwin.formats.user_folders import cache_home
 from manitwin.render.drawable import Drawable, drawable
-from manitwin.render.drawable_file import drawables_from_bytes, drawables_to_bytes
+from manitwin.render.drawable_file import MOST_BYTES, drawables_from_bytes, drawables_to_bytes
 from manitwin.robots.urdf import UrdfTree
+from manitwin.twin.store import write_bytes_atomically
 
+RUN = logging.getLogger("manitwin.run")
 LOOKS_VERSION = "1"
 """Another one whenever reading or simplifying links gives other surfaces: what is kept is then made again."""
 WHOLE_FILES = (".dae", ".stl")
 """Formats of meshes whose colours, but for textures, are in the file itself."""
-MOST_BYTES = 64 << 20
 
 
 @lru_cache(maxsize=4)
@@ -66,8 +68,7 @@ def link_drawables(
 
 def looks_folder() -> Path:
     """Return ``$XDG_CACHE_HOME/manitwin/robot_looks``, ``~/.cache`` by default (XDG Base Directory Specification)."""
-    base = os.environ.get("XDG_CACHE_HOME", "")
-    return (Path(base) if os.path.isabs(base) else Path.home() / ".cache") / "manitwin" / "robot_looks"
+    return cache_home() / "robot_looks"
 
 
 def _kept_file(urdf: str, tolerance_m: float, fine_m: float, fingers: frozenset[str]) -> Path | None:
@@ -90,25 +91,14 @@ def _kept_file(urdf: str, tolerance_m: float, fine_m: float, fingers: frozenset[
 def _read(path: Path) -> dict[str, Drawable] | None:
     """Return what is kept; None where there is nothing, or what is there is damaged: it is then made and written again."""
     try:
-        if path.stat().st_size > MOST_BYTES:
-            return None
-        return drawables_from_bytes(path.read_bytes())
+        with path.open("rb") as stream:
+            return drawables_from_bytes(stream.read(MOST_BYTES))
     except (OSError, ValueError):
         return None
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Keep looks, whole or not at all: several processes may do so at once. Without a folder to write to nothing is kept."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=".", delete=False) as stream:
-            unfinished = Path(stream.name)
-            try:
-                stream.write(content)
-                stream.close()
-                unfinished.replace(path)
-            except BaseException:
-                unfinished.unlink(missing_ok=True)
-                raise
-    except OSError:
-        return
+        write_bytes_atomically(path, content)
+    except (OSError, UsageError) as error:  # the looks are there all the same
+        RUN.warning("%s: a robot's looks are not kept (%s); look at the folder and the disk", path, error)

@@ -1,4 +1,4 @@
-"""One array of a .npz archive, read without trust: no pickles, no more than a limit, whatever its entries claim."""
+"""Arrays of a .npz archive, read without trust: no pickles, no more than a limit, whatever its entries claim."""
 
 from __future__ import annotations
 
@@ -50,6 +50,23 @@ def read_npz_array(path: Path, names: Sequence[str], limit_bytes: int, refuse: R
     except _BROKEN as error:
         cause = printable_line(str(error).splitlines()[0] if str(error) else type(error).__name__, max_characters=120)
         raise refuse(f"{path}: is no .npz that can be read ({cause}); {remedy}") from error
+
+
+def npz_arrays(content: bytes, limit_bytes: int) -> dict[str, np.ndarray]:
+    """Return all arrays of an archive by name, of at most ``limit_bytes`` unpacked together; else raises ValueError."""
+    found, left_bytes = {}, limit_bytes
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            for name in archive.namelist():
+                with archive.open(name) as stream:
+                    unpacked = stream.read(left_bytes + 1)
+                left_bytes -= len(unpacked)
+                if left_bytes < 0:
+                    raise ValueError(f"more than {limit_bytes} bytes")
+                found[name.removesuffix(".npy")] = _array(unpacked)
+    except _BROKEN as error:
+        raise ValueError(f"no .npz that can be read: {error}") from error
+    return found
 
 
 def _array(content: bytes) -> np.ndarray:

@@ -111,6 +111,13 @@ def require_renderer() -> RenderDevice:
     return device
 
 
+def require_driver() -> None:
+    """Raise RendererMissing where no driver is there to be tried; one that is there is not tried, which takes a process."""
+    named, ways = _ways(_switch() == "cpu")
+    if not ways or (named is not None and not any(map(os.path.exists, named.split(os.pathsep)))):
+        require_renderer()
+
+
 @contextmanager
 def looked_for_once() -> Iterator[None]:
     """Have one process alone look for the device, of this one and all that are started in the ``with`` statement.
@@ -164,18 +171,22 @@ def _switch() -> str:
     return value
 
 
-def _first_working(cpu_only: bool) -> RenderDevice:
-    """Probe the ways to a device in the order of preference and return the first that renders."""
-    ways: list[str | None] = []
+def _ways(cpu_only: bool) -> tuple[str | None, list[str | None]]:
+    """Return the driver files that the user named, and the drivers to be tried in turn (None: the loader's own choice)."""
     named = next((os.environ[name] for name in LOADER_VARIABLES if os.environ.get(name)), None)
     if cpu_only and named is not None and "lvp" not in named:
         named = None  # the switch is the stronger word
     if named is not None:
-        ways.append(None)  # the user chose the driver: no other is tried
-    else:
-        if not cpu_only and (glob.glob("/dev/nvidia[0-9]*") or glob.glob("/dev/dri/renderD*") or glob.glob("/dev/dxg")):
-            ways.append(None)
-        ways += sorted(path for folder in ICD_FOLDERS for path in glob.glob(f"{folder}/lvp_icd*.json"))
+        return named, [None]  # no other is tried
+    ways: list[str | None] = []
+    if not cpu_only and (glob.glob("/dev/nvidia[0-9]*") or glob.glob("/dev/dri/renderD*") or glob.glob("/dev/dxg")):
+        ways.append(None)
+    return None, [*ways, *sorted(path for folder in ICD_FOLDERS for path in glob.glob(f"{folder}/lvp_icd*.json"))]
+
+
+def _first_working(cpu_only: bool) -> RenderDevice:
+    """Probe the ways to a device in the order of preference and return the first that renders."""
+    named, ways = _ways(cpu_only)
     causes = []
     for driver_file in ways:
         name, cause = _probe(driver_file, picture=driver_file is None and named is None)

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import io
-import zipfile
 from collections.abc import Mapping
 
 import numpy as np
 
+from manitwin.formats.npz_file import npz_arrays
 from manitwin.render.drawable import Drawable
 from manitwin.render.surfaces import RenderSurface
 
 ARRAYS = {"vertices": (np.float32, 3), "faces": (np.uint32, 3), "normals": (np.float32, 3), "uv": (np.float32, 2)}
 """Of a surface: the type of each and its columns."""
+MOST_BYTES = 64 << 20
 NUMBERS = 5
 """Of a surface: its linear colour (3), how metallic and how rough it is."""
 
@@ -37,16 +38,15 @@ def drawables_to_bytes(things: Mapping[str, Drawable]) -> bytes | None:
 
 def drawables_from_bytes(content: bytes) -> dict[str, Drawable]:
     """Return the things by name that ``drawables_to_bytes`` was given; raises ValueError where the content is damaged."""
+    arrays, found = npz_arrays(content, MOST_BYTES), {}
     try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-            found = {}
-            told = zip(arrays["names"].tolist(), arrays["counts"].tolist(), strict=True)
-            for place, (name, count) in enumerate(told):
-                *surfaces, shadow = (_surface(arrays, f"{place}.{number}") for number in range(count))
-                found[name] = Drawable(tuple(surfaces), shadow)
-            return found
-    except (KeyError, TypeError, AttributeError, EOFError, OSError, zipfile.BadZipFile) as error:
-        raise ValueError(f"no file of drawables: {error}") from error
+        told = zip(arrays["names"].tolist(), arrays["counts"].tolist(), strict=True)
+        for place, (name, count) in enumerate(told):
+            *surfaces, shadow = (_surface(arrays, f"{place}.{number}") for number in range(count))
+            found[name] = Drawable(tuple(surfaces), shadow)
+    except (KeyError, TypeError) as error:
+        raise ValueError(f"no file of drawables: {error!r}") from error
+    return found
 
 
 def _surface(arrays: Mapping[str, np.ndarray], name: str) -> RenderSurface:

@@ -127,10 +127,12 @@ def _watched_build(request: BuildRequest, *, lines: bool, executor: ExecutorName
     from manitwin.dataset.build import build_requested
     from manitwin.engine.fork_server import forked_workers
     from manitwin.engine.stage import INPUT
-    from manitwin.render.device import looked_for_once, require_renderer
+    from manitwin.render.device import looked_for_once, require_driver, require_renderer
 
     if executor == "inline":
         require_renderer()
+    elif executor == "local":
+        require_driver()  # what renders is looked for by the first stage that draws
     waits: set[str] = set()
     asked: list[bool] = []
 

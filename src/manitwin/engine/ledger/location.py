@@ -13,6 +13,7 @@ from pathlib import Path
 from manitwin.engine.ledger.ledger import LEDGER
 from manitwin.engine.ledger.reading import read_ledger
 from manitwin.errors import UsageError
+from manitwin.formats.user_folders import cache_home
 from manitwin.twin.dataset_root import DatasetRoot
 
 CONFIG = "config.json"
@@ -59,8 +60,7 @@ def cache_folder(root: DatasetRoot) -> Path:
     """Return where a worker keeps copies of what lies at a URL; of a local data set nothing is copied."""
     if root.local is not None:
         return root.local
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return home / "manitwin" / _digest(root.url)
+    return cache_home() / _digest(root.url)
 
 
 def _digest(url: str) -> str:

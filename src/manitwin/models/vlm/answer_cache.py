@@ -12,6 +12,7 @@ from pathlib import Path
 from manitwin.engine.charges import counted, note_rehearsal
 from manitwin.errors import BadReply
 from manitwin.formats.json_file import read_json_object
+from manitwin.formats.user_folders import cache_home
 from manitwin.models.vlm.client import Around, ChatClient
 from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage, question_digest
 
@@ -21,8 +22,7 @@ _MAX_BYTES = 16 << 20
 
 def default_folder() -> Path:
     """Return ``$XDG_CACHE_HOME/manitwin/vlm``, ``~/.cache`` by default (XDG Base Directory Specification)."""
-    base = os.environ.get("XDG_CACHE_HOME", "")
-    return (Path(base) if os.path.isabs(base) else Path.home() / ".cache") / "manitwin" / "vlm"
+    return cache_home() / "vlm"
 
 
 class Cached(Around):
