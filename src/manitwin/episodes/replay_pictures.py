@@ -19,7 +19,7 @@ from manitwin.geometry.rigid_body import StaticBox
 from manitwin.render.drawable import Drawable, drawable
 from manitwin.render.procedural_textures import procedural_texture, textured_box
 from manitwin.render.scene_lighting import STUDIO, Lighting
-from manitwin.render.scene_renderer import COARSE_PX, SceneFrame, SceneRenderer, ShadowRegion
+from manitwin.render.scene_renderer import SceneFrame, SceneRenderer, ShadowRegion
 from manitwin.robots.links import links_of_urdf, poses_at
 from manitwin.robots.robot import Robot
 from manitwin.robots.urdf import UrdfTree
@@ -86,7 +86,7 @@ class EpisodeReplay:
         ``seed`` chooses the furniture's textures. Raises RendererMissing, AssetError, UsageError.
         """
         self._robot = robot
-        self._renderer = SceneRenderer(lighting, shadows=ShadowRegion(coarse=picture_px <= COARSE_PX))
+        self._renderer = SceneRenderer(lighting, shadows=ShadowRegion().for_pictures_of(picture_px))
         self._objects = [f"object_{index:02d}" for index in range(len(objects))]
         for name, thing in zip(self._objects, objects, strict=True):
             ready = thing if isinstance(thing, Drawable) else drawable(thing, tolerance_m=TOLERANCE_M)

@@ -24,7 +24,7 @@ from manitwin.robots.urdf import UrdfTree
 from manitwin.twin.store import write_bytes_atomically
 
 RUN = logging.getLogger("manitwin.run")
-LOOKS_VERSION = "1"
+LOOKS_VERSION = "2"
 """Another one whenever reading or simplifying links gives other surfaces: what is kept is then made again."""
 WHOLE_FILES = (".dae", ".stl")
 """Formats of meshes whose colours, but for textures, are in the file itself."""
@@ -57,7 +57,7 @@ def link_drawables(
     if found is not None:
         return found
     made = {
-        link: drawable(parts, tolerance_m=fine_m if link in fingers else tolerance_m)
+        link: drawable(parts, tolerance_m=fine_m if link in fingers else tolerance_m, hidden_left_out=True)
         for link, parts in link_visuals(urdf).items()
     }
     content = None if kept is None else drawables_to_bytes(made)

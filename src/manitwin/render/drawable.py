@@ -17,6 +17,7 @@ from manitwin.geometry.repair.welding import weld_equal
 from manitwin.render.raycast import merged
 from manitwin.render.simplification import simplified
 from manitwin.render.surfaces import RenderSurface, front_faces, render_surface, shrunk
+from manitwin.render.visibility import faces_seen_from_outside
 
 SMALL_TEXTURE_PX = 1024  # of simplified things; the 2048 of a twin's take four times the memory and time to upload
 SHADOW_TOLERANCE_M = 0.001
@@ -38,13 +39,18 @@ class Drawable:
 
 
 def drawable(
-    parts: Sequence[trimesh.Trimesh], *, tolerance_m: float = 0.0, most_texture_px: int | None = None
+    parts: Sequence[trimesh.Trimesh],
+    *,
+    tolerance_m: float = 0.0,
+    most_texture_px: int | None = None,
+    hidden_left_out: bool = False,
 ) -> Drawable:
     """Prepare the visual parts of a thing; raises TypeError for a mesh without a PBRMaterial.
 
     Textures get at most ``most_texture_px`` a side; None: ``SMALL_TEXTURE_PX`` where the surfaces are simplified, else as they
     are. Faces that nobody sees from behind get one side only. With a ``tolerance_m`` the surfaces are simplified by about that
-    much, and those without textures and of one material are one; what throws the shadow is simplified more.
+    much, and those without textures and of one material are one; what throws the shadow is simplified more. With
+    ``hidden_left_out`` faces that cannot be seen from outside are left out too, as the inside of a robot's link.
     """
     both_sides = shows_back_faces(parts)
     if tolerance_m > 0:
@@ -53,9 +59,15 @@ def drawable(
         if most_texture_px is None:
             most_texture_px = SMALL_TEXTURE_PX
     surfaces = [render_surface(part) if both_sides else front_faces(render_surface(part)) for part in parts]
+    whole = merged(list(parts))
+    if hidden_left_out:
+        seen = [
+            faces_seen_from_outside(whole, from_behind=behind) for behind in ((False, True) if both_sides else (False,))
+        ]
+        surfaces = _seen_alone(surfaces, *seen)
     if most_texture_px is not None:
         surfaces = [_with_small_textures(each, most_texture_px) for each in surfaces]
-    return Drawable(tuple(surfaces), _shadow_caster(parts, both_sides, tolerance_m))
+    return Drawable(tuple(surfaces), _shadow_caster(whole, both_sides, tolerance_m, hidden_left_out))
 
 
 def _joined_by_material(parts: Sequence[trimesh.Trimesh]) -> list[trimesh.Trimesh]:
@@ -118,13 +130,42 @@ def _with_small_textures(s: RenderSurface, most_px: int) -> RenderSurface:
     return replace(s, color_map=color, roughness_map=roughness, metallic_map=metallic)
 
 
-def _shadow_caster(parts: Sequence[trimesh.Trimesh], both_sides: bool, tolerance_m: float) -> RenderSurface:
-    whole = merged(list(parts))
+def _seen_alone(
+    surfaces: list[RenderSurface], front: np.ndarray, back: np.ndarray | None = None
+) -> list[RenderSurface]:
+    """Return surfaces with those faces alone of which a side is seen: ``(F,) bool`` each over all of them, None: one side."""
+    lean, first = [], 0
+    for surface in surfaces:
+        count = len(surface.faces) if back is None else len(surface.faces) // 2  # the second half are the backs
+        of_this = slice(first, first + count)
+        kept = front[of_this] if back is None else np.concatenate([front[of_this], back[of_this]])
+        first += count
+        if kept.any():
+            used, faces = _used(surface.faces[kept], len(surface.vertices))
+            lean.append(
+                replace(
+                    surface,
+                    vertices=surface.vertices[used],
+                    normals=surface.normals[used],
+                    uv=surface.uv[used],
+                    faces=faces.astype(np.uint32),
+                )
+            )
+    return lean
+
+
+def _shadow_caster(
+    whole: trimesh.Trimesh, both_sides: bool, tolerance_m: float, hidden_left_out: bool
+) -> RenderSurface:
     vertices, faces = weld_equal(np.asarray(whole.vertices), np.asarray(whole.faces))
     if tolerance_m > 0:
         faces = simplified(vertices, faces, max(tolerance_m, SHADOW_TOLERANCE_M), keep_open_edges=False)
-    turned = faces[:, ::-1]
-    return _bare_surface(vertices, np.concatenate([turned, faces]) if both_sides else turned)
+    sides = [faces[:, ::-1], faces] if both_sides else [faces[:, ::-1]]
+    if hidden_left_out:
+        bare = trimesh.Trimesh(vertices, faces, process=False)
+        seen = [faces_seen_from_outside(bare, from_behind=behind) for behind in (False, True)[: len(sides)]]
+        sides = [side[shown] for side, shown in zip(sides, seen, strict=True)]
+    return _bare_surface(vertices, np.concatenate(sides))
 
 
 def _bare_surface(vertices: np.ndarray, faces: np.ndarray) -> RenderSurface:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import atexit
 import weakref
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,13 +32,14 @@ SHADERS = Path(__file__).parent / "shaders"
 SUPERSAMPLE = 2  # shaders/scene lights blocks of 2 x 2
 NEAR_M, FAR_M = 0.01, 30.0
 MAX_LIGHTS = 5  # shaders/scene has room for six, of which one looks down for the sky
-SHADOW_MAP_PX, HEIGHT_MAP_PX = 1024, 512
-COARSE_PX = 128
-"""Pictures of so many pixels a side show no shadow's edge that is finer than two texels of half these maps."""
+SHADOW_MAP_PX = 1024
+"""A side of the map of shadows at most; that of heights has half as many."""
+SHADOW_TEXELS_A_PIXEL = 2.5
+"""So many a side of the map of shadows for each of a picture's: what is seen across a picture is a good third of the region."""
 PICTURE_FORMATS = {
     "Color": "R8G8B8A8Unorm",
     "Albedo": "R8G8B8A8Unorm",
-    "Normal": "R16G16B16A16Sfloat",
+    "Normal": "R8G8B8A8Unorm",
     "WorldNormal": "R32G32B32A32Sfloat",
     "Distance": "R32Sfloat",
 }
@@ -55,11 +56,15 @@ class Surroundings:
 
 @dataclass(frozen=True)
 class ShadowRegion:
-    """The ball in which shadows are drawn; the smaller, the sharper. World frame, metres. ``coarse``: with half the texels."""
+    """The ball in which shadows are drawn; the smaller, the sharper. World frame, metres. ``map_px``: a side of their map."""
 
     center_m: tuple[float, float, float] = (0.3, 0.0, 0.3)
     radius_m: float = 1.3
-    coarse: bool = False
+    map_px: int = SHADOW_MAP_PX
+
+    def for_pictures_of(self, picture_px: int) -> ShadowRegion:
+        """Return this region with as many texels as pictures of ``picture_px`` a side show."""
+        return replace(self, map_px=min(round(SHADOW_TEXELS_A_PIXEL * picture_px), SHADOW_MAP_PX))
 
 
 @dataclass(frozen=True)
@@ -215,10 +220,10 @@ class SceneRenderer:
         lighting = lighting.exposed()
         self._scene.set_ambient_light(lighting.ambient.tolist())
         # the order is the shader's: one that looks down, one with shadows, the others
-        self._add_shadowed(np.array([0.0, 0.0, -1.0]), np.zeros(3), region, HEIGHT_MAP_PX)
+        self._add_shadowed(np.array([0.0, 0.0, -1.0]), np.zeros(3), region, region.map_px // 2)
         for light in sorted(lighting.lights, key=lambda light: not light.casts_shadow):
             if light.casts_shadow:
-                self._add_shadowed(light.direction, light.color, region, SHADOW_MAP_PX)
+                self._add_shadowed(light.direction, light.color, region, region.map_px)
             else:
                 self._scene.add_directional_light(light.direction.tolist(), light.color.tolist())
 
@@ -231,7 +236,7 @@ class SceneRenderer:
             shadow_scale=region.radius_m,
             shadow_near=-2 * region.radius_m,
             shadow_far=2 * region.radius_m,
-            shadow_map_size=map_px // 2 if region.coarse else map_px,
+            shadow_map_size=map_px,
         )
 
     def _add_floor(self, surroundings: Surroundings) -> None:

@@ -93,11 +93,12 @@ const float SMOOTH = 0.97;       // cosine between normals of a pixel's samples,
 const float STEP = 1.5;          // of the depths of a plane's samples: so much farther apart they still are one surface's
 const float FLATTEST = 0.02;     // cosine between a plane and the view below which its depths may differ no more
 
-// Points of a disc (Vogel 1979, golden angle). The samples of a pixel, two each way, turn them by sixteenths of a turn, so
-// that a pixel has four times as many.
-const int TAPS = 4;
-const vec2 DISC[TAPS] = vec2[](vec2(0.3536, 0.0000), vec2(-0.4516, 0.4137), vec2(0.0691, -0.7876), vec2(0.5688, 0.7419));
-const vec2 TURNS[4] = vec2[](vec2(1, 0), vec2(0.9239, 0.3827), vec2(0.7071, 0.7071), vec2(0.3827, 0.9239));
+// Where a pixel looks around it, in radii: three ways for shadows, six for the sky, each time at four texels. The samples of a
+// pixel turn them, so that it has four times as many. Of the six three look at a wall that is parallel to an axis, all four alike.
+const vec2 TRIANGLE[3] = vec2[](vec2(0.62, 0), vec2(-0.31, 0.5369), vec2(-0.31, -0.5369));
+const vec2 HEXAGON[6] = vec2[](vec2(0.3671, 0.0984), vec2(0.2122, 0.7921), vec2(-0.4101, 0.4101),
+                               vec2(-0.9176, -0.2459), vec2(-0.1242, -0.4636), vec2(0.5091, -0.5091));
+const vec2 TURNS[4] = vec2[](vec2(1, 0), vec2(0.5, 0.8660), vec2(0.8660, 0.5), vec2(0, 1));
 
 mat2 turned(int number) {
   vec2 turn = TURNS[number];
@@ -106,7 +107,7 @@ mat2 turned(int number) {
 
 // The share of a light that arrives at p. Depths are compared with the surface's own plane at each texel, so that a plane
 // never shades itself (Isidoro 2006, "Shadow Mapping: GPU-based Tips and Techniques", receiver plane depth bias). Where the
-// first turn of the disc finds all lit, or nothing, the others up to the last one are not asked.
+// first turn of the triangle finds all lit, or nothing, the others up to the last one are not asked.
 float lightShare(sampler2D depths, mat4 view, mat4 proj, vec3 p, vec3 n, int turn, int last) {
   vec3 scale = vec3(proj[0][0], proj[1][1], proj[2][2]);
   vec3 at = (view * vec4(p, 1)).xyz * scale + proj[3].xyz;
@@ -115,41 +116,40 @@ float lightShare(sampler2D depths, mat4 view, mat4 proj, vec3 p, vec3 n, int tur
   vec2 slope = -facing.xy / (abs(facing.z) > 0.02 ? facing.z : 0.02);
   slope *= min(1, STEEPEST / max(length(slope), 1e-3));
   vec2 size = vec2(textureSize(depths, 0)), toTexel = 0.5 * size, perTexel = 2 / size;
-  vec2 gradient = slope * scale.z / scale.xy;
-  float radius = SHADOW_RADIUS * abs(scale.x), lit = 0, base = at.z - SHADOW_BIAS * abs(scale.z) - dot(gradient, at.xy);
-  float asked = 0;
-  for (; turn <= last && (asked == 0 || (lit > 0 && lit < asked)); ++turn) {
+  vec2 gradient = slope * scale.z / scale.xy, step2 = 0.5 * gradient * perTexel;
+  vec4 corners = vec4(step2.y - step2.x, step2.x + step2.y, step2.x - step2.y, -step2.x - step2.y);  // as textureGather has them
+  float radius = SHADOW_RADIUS * abs(scale.x), base = at.z - SHADOW_BIAS * abs(scale.z) - dot(gradient, at.xy);
+  float lit = 0, asked = 0;
+  for (; turn <= last && (asked == 0 || (lit > 0.001 && lit < asked - 0.001)); ++turn) {
     mat2 turning = turned(turn);
-    for (int k = 0; k < TAPS; ++k) {
-      ivec2 texel = ivec2((at.xy + radius * (turning * DISC[k]) + 1) * toTexel);
-      float plane = base + dot(gradient, (vec2(texel) + 0.5) * perTexel - 1);
-      lit += texelFetch(depths, texel, 0).x < plane ? 0 : 1;
+    for (int k = 0; k < 3; ++k) {
+      vec2 there = (at.xy + radius * (turning * TRIANGLE[k]) + 1) * toTexel, part = fract(there - 0.5);
+      vec4 planes = base + dot(gradient, (there - part + 0.5) * perTexel - 1) + corners;
+      vec4 passes = step(planes, textureGather(depths, there / size));
+      lit += mix(mix(passes.w, passes.z, part.x), mix(passes.x, passes.y, part.x), part.y);
     }
-    asked += TAPS;
+    asked += 3;
   }
   return lit / asked;
 }
 
 // The share of the sky that p sees past the heights around it: horizon-based, after Bavoil et al. 2008, with one sample a
-// direction. The map looks straight down on the scene.
-float skyShare(sampler2D heights, mat4 view, mat4 proj, vec3 p, vec3 n, int turn, int last) {
+// direction, between four texels. The map looks straight down on the scene.
+float skyShare(sampler2D heights, mat4 view, mat4 proj, vec3 p, vec3 n, int turn) {
   p += n * (0.004 + 0.5 * SKY_RADIUS * length(n.xy));
   vec3 at = (view * vec4(p, 1)).xyz * vec3(proj[0][0], proj[1][1], proj[2][2]) + proj[3].xyz;
   if (any(greaterThan(abs(at.xy), vec2(0.9))) || at.z > 1) return 1;
-  vec2 toTexel = 0.5 * vec2(textureSize(heights, 0));
-  float radius = SKY_RADIUS * abs(proj[0][0]), toMetres = 1 / abs(proj[2][2]), hidden = 0, asked = 0;
-  for (; turn <= last; ++turn) {
-    mat2 turning = turned(turn);
-    for (int k = 0; k < TAPS; ++k) {
-      vec2 way = turning * DISC[k];
-      float top = texelFetch(heights, ivec2((at.xy + radius * way + 1) * toTexel), 0).x;
-      float above = max((at.z - top) * toMetres - SKY_BIAS, 0);
-      float slope = above / (SKY_RADIUS * length(DISC[k]) + 0.004);
-      hidden += slope * inversesqrt(1 + slope * slope) / (1 + above * above / (SKY_REACH * SKY_REACH));
-    }
-    asked += TAPS;
+  float radius = SKY_RADIUS * abs(proj[0][0]), toMetres = 1 / abs(proj[2][2]), hidden = 0;
+  vec2 size = vec2(textureSize(heights, 0));
+  mat2 turning = turned(turn);
+  for (int k = 0; k < 6; ++k) {
+    vec2 there = 0.5 * (at.xy + radius * (turning * HEXAGON[k]) + 1), part = fract(there * size - 0.5);
+    vec4 above = max((at.z - textureGather(heights, there)) * toMetres - SKY_BIAS, 0);
+    vec4 slope = above / (SKY_RADIUS * length(HEXAGON[k]) + 0.004);
+    vec4 hides = slope * inversesqrt(1 + slope * slope) / (1 + above * above / (SKY_REACH * SKY_REACH));
+    hidden += mix(mix(hides.w, hides.z, part.x), mix(hides.x, hides.y, part.x), part.y);
   }
-  return 1 - hidden / asked;
+  return 1 - hidden / 6;
 }
 
 // Diffuse and specular reflection of a directional light: Lambert, and GGX with Smith's masking as of Karis 2013, "Real
@@ -185,6 +185,11 @@ vec3 exposed(vec3 x) {
   return mix(x, 1 - 0.3 * exp2((0.7 - x) * (1.442695 / 0.3)), step(vec3(0.7), x));
 }
 
+// Of the surface at a pixel of the buffers, and its roughness, below zero for a floor that fades with distance.
+vec4 normalAt(ivec2 at) {
+  return texelFetch(samplerNormal, at, 0) * 2 - 1;
+}
+
 vec3 inWorld(vec2 at, float depth) {
   vec4 inCamera = cameraBuffer.projectionMatrixInverse * vec4(at / textureSize(samplerGbufferDepth, 0) * 2 - 1, depth, 1);
   return (cameraBuffer.viewMatrixInverse * vec4(inCamera.xyz / inCamera.w, 1)).xyz;
@@ -201,7 +206,7 @@ vec3 shown(vec3 position, vec3 n, vec3 albedo, float metallic, float roughness, 
   float nv = clamp(dot(n, v), 1e-6, 1);
   vec3 diffuse = albedo * (1 - metallic), fresnel = mix(vec3(0.04), albedo, metallic);
   float sky = skyShare(samplerDirectionalLightDepths[0], shadowBuffer.directionalLightBuffers[0].viewMatrix,
-                       shadowBuffer.directionalLightBuffers[0].projectionMatrix, position, n, turn, min(last, turn + 1));
+                       shadowBuffer.directionalLightBuffers[0].projectionMatrix, position, n, turn);
   vec2 share = reflected(roughness, nv);
   float mirroredHeight = 2 * dot(n, v) * n.z - v.z;
   vec3 color = glow(n.z, 1) * diffuse + glow(mirroredHeight, roughness) * (fresnel * share.x + share.y);
@@ -221,11 +226,11 @@ vec3 shown(vec3 position, vec3 n, vec3 albedo, float metallic, float roughness, 
 
 void main() {
   ivec2 first = 2 * ivec2(gl_FragCoord.xy);
-  vec4 depth = vec4(texelFetch(samplerGbufferDepth, first, 0).x, texelFetch(samplerGbufferDepth, first + ivec2(1, 0), 0).x,
-                    texelFetch(samplerGbufferDepth, first + ivec2(0, 1), 0).x,
-                    texelFetch(samplerGbufferDepth, first + ivec2(1, 1), 0).x);
-  vec4 n0 = texelFetch(samplerNormal, first, 0), n1 = texelFetch(samplerNormal, first + ivec2(1, 0), 0);
-  vec4 n2 = texelFetch(samplerNormal, first + ivec2(0, 1), 0), n3 = texelFetch(samplerNormal, first + ivec2(1, 1), 0);
+  vec4 depth = textureGather(samplerGbufferDepth, (vec2(first) + 1) / textureSize(samplerGbufferDepth, 0)).wzxy;
+  vec4 a0 = texelFetch(samplerAlbedo, first, 0), a1 = texelFetch(samplerAlbedo, first + ivec2(1, 0), 0);
+  vec4 a2 = texelFetch(samplerAlbedo, first + ivec2(0, 1), 0), a3 = texelFetch(samplerAlbedo, first + ivec2(1, 1), 0);
+  vec4 n0 = normalAt(first), n1 = normalAt(first + ivec2(1, 0));
+  vec4 n2 = normalAt(first + ivec2(0, 1)), n3 = normalAt(first + ivec2(1, 1));
   float middle = 0.25 * (depth.x + depth.y + depth.z + depth.w);
   vec3 center = inWorld(vec2(first) + 1, middle);
 
@@ -239,22 +244,19 @@ void main() {
 
   vec4 sum = vec4(0);
   for (int i = 0; i < samples; ++i) {
-    ivec2 at = first + ivec2(i & 1, i >> 1);
-    float here = texelFetch(samplerGbufferDepth, at, 0).x;
-    vec4 stored = texelFetch(samplerAlbedo, at, 0), normal = texelFetch(samplerNormal, at, 0);
-    vec4 s1 = texelFetch(samplerAlbedo, first + ivec2(1, 0), 0), s2 = texelFetch(samplerAlbedo, first + ivec2(0, 1), 0);
-    vec4 s3 = texelFetch(samplerAlbedo, first + ivec2(1, 1), 0);
-    vec3 albedo = stored.rgb * stored.rgb, position = even ? center : inWorld(vec2(at) + 0.5, here);
+    float here = i == 0 ? depth.x : i == 1 ? depth.y : i == 2 ? depth.z : depth.w;
+    vec4 stored = i == 0 ? a0 : i == 1 ? a1 : i == 2 ? a2 : a3, normal = i == 0 ? n0 : i == 1 ? n1 : i == 2 ? n2 : n3;
+    vec3 albedo = stored.rgb * stored.rgb, position = even ? center : inWorld(vec2(first + ivec2(i & 1, i >> 1)) + 0.5, here);
     vec2 matter = vec2(stored.a, abs(normal.w));
     vec3 n = normal.xyz;
     if (even) {
-      albedo = 0.25 * (albedo + s1.rgb * s1.rgb + s2.rgb * s2.rgb + s3.rgb * s3.rgb);
-      matter = 0.25 * (matter + vec2(s1.a + s2.a + s3.a, abs(n1.w) + abs(n2.w) + abs(n3.w)));
-      n = normalize(n0.xyz + n1.xyz + n2.xyz + n3.xyz);
+      albedo = 0.25 * (albedo + a1.rgb * a1.rgb + a2.rgb * a2.rgb + a3.rgb * a3.rgb);
+      matter = 0.25 * (matter + vec2(a1.a + a2.a + a3.a, abs(n1.w) + abs(n2.w) + abs(n3.w)));
+      n += n1.xyz + n2.xyz + n3.xyz;
     }
     float there = here < 1 ? 1 : 0;
     if (normal.w < 0) there *= 1 - smoothstep(FADE_FROM, FADE_TO, length(position.xy));
-    sum += vec4(shown(position, n, albedo, matter.x, matter.y, even ? 0 : i, even ? 3 : i), 1) * there;
+    sum += vec4(shown(position, normalize(n), albedo, matter.x, matter.y, even ? 0 : i, even ? 1 : i), 1) * there;
   }
   outColor = sum / max(samples, 1);
 }

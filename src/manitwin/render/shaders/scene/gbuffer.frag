@@ -8,7 +8,7 @@ layout(location = 0) in vec3 inNormal;  // in the world's axes
 layout(location = 1) in vec2 inUV;
 
 layout(location = 0) out vec4 outAlbedo;  // square roots of it: 8 bits, finer in the dark; and metallic
-layout(location = 1) out vec4 outNormal;  // and roughness, below zero for a floor that fades with distance
+layout(location = 1) out vec4 outNormal;  // and roughness, below zero for a floor that fades with distance; halved, and up by 0.5
 
 const int COLOR_TEXTURE = 1, ROUGHNESS_TEXTURE = 2, METALLIC_TEXTURE = 8;  // bits of textureMask
 
@@ -18,5 +18,5 @@ void main() {
   float roughness = (mask & ROUGHNESS_TEXTURE) != 0 ? texture(roughnessTexture, inUV).r : materialBuffer.roughness;
   float metallic = (mask & METALLIC_TEXTURE) != 0 ? texture(metallicTexture, inUV).r : materialBuffer.metallic;
   outAlbedo = vec4(sqrt(albedo), metallic);
-  outNormal = vec4(normalize(inNormal), materialBuffer.emission.a > 0 ? -roughness : roughness);
+  outNormal = 0.5 * vec4(normalize(inNormal), materialBuffer.emission.a > 0 ? -roughness : roughness) + 0.5;
 }

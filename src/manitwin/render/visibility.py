@@ -1,0 +1,50 @@
+"""Which faces of a thing can be seen from outside it: the others need not be drawn."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.geometry.repair.thickening import fibonacci_sphere
+
+DIRECTIONS = 128
+SPACING_M = 0.008
+_FEWEST, _MOST = 1, 24  # parts of a triangle's longest side between places
+_INWARD = 0.02  # of the way to the triangle's middle: no place is on its border
+_OFF_SURFACE_M = 2e-5  # above it, where rays begin
+_GRAZING = 0.02  # cosine to the normal, below which a ray would run along its own face
+
+
+def faces_seen_from_outside(mesh: trimesh.Trimesh, *, from_behind: bool = False) -> np.ndarray:
+    """Tell of each face ``(F,) bool`` whether its outward side, or its back, is seen from outside the thing.
+
+    Rays go in 128 directions, 14 degrees apart, from places of each side that are 8 mm apart (or a 24th of its length where it
+    is longer than 19 cm); a side is seen where one of them leaves the thing. What is only seen through a narrower gap, as the
+    ground of a deep hole, counts as not seen.
+    """
+    caster, side = RayCaster(mesh), -1.0 if from_behind else 1.0
+    normals = side * caster.face_normals
+    places, of_face = _places(np.asarray(mesh.triangles))
+    seen = np.zeros(len(normals), bool)
+    for direction in fibonacci_sphere(DIRECTIONS):
+        asked = np.flatnonzero((~seen & (normals @ direction > _GRAZING))[of_face])
+        origins = places[asked] + _OFF_SURFACE_M * normals[of_face[asked]]
+        _, met = caster.first_hits(origins, np.broadcast_to(direction, origins.shape))
+        seen[of_face[asked[met < 0]]] = True
+    return seen
+
+
+def _places(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return points ``(P, 3)`` of triangles ``(F, 3, 3)``, on a grid with its corners on theirs, and of which one each is."""
+    longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(1)
+    parts = np.clip(np.ceil(longest / SPACING_M), _FEWEST, _MOST).astype(int)
+    points, of_face = [], []
+    for count in np.unique(parts):
+        first, second = np.nonzero(np.add.outer(np.arange(count + 1), np.arange(count + 1)) <= count)
+        weights = np.column_stack([first, second, count - first - second]) / count
+        weights = (1 - _INWARD) * weights + _INWARD / 3
+        these = np.flatnonzero(parts == count)
+        points.append(np.einsum("pc,fcx->fpx", weights, triangles[these]).reshape(-1, 3))
+        of_face.append(np.repeat(these, len(weights)))
+    return np.concatenate(points), np.concatenate(of_face)
