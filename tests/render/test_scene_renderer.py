@@ -22,7 +22,7 @@ from manitwin.render.procedural_textures import ProceduralTexture, textured_box
 from manitwin.render.raycast import cast_camera
 from manitwin.render.scene_lighting import WHITE_PAPER, DirectionalLight, Lighting
 from manitwin.render.scene_renderer import SceneRenderer, Surroundings
-from manitwin.render.surfaces import plain_part, triangle_mesh_shape
+from manitwin.render.surfaces import plain_part, scene_shape
 
 SIZE = 160
 DIRECTION = np.array([0.6, 0.0, -0.8])
@@ -277,9 +277,9 @@ def test_thing_that_is_shown_again_is_uploaded_once_and_looks_the_same(monkeypat
 
     def counted(*arguments: Any, **options: Any) -> Any:
         made.append(arguments)
-        return triangle_mesh_shape(*arguments, **options)
+        return scene_shape(*arguments, **options)
 
-    monkeypatch.setattr(scene_renderer, "triangle_mesh_shape", counted)
+    monkeypatch.setattr(scene_renderer, "scene_shape", counted)
     thing = drawable([plain_part(THINGS["ring"][0], (200, 80, 40))])
     frames = []
     for _ in range(2):

@@ -100,7 +100,7 @@ class Renderer:
     def _entity(self, s: RenderSurface, center: np.ndarray, scale: float) -> Any:
         vertices = ((s.vertices - center) * scale).astype(np.float32)
         body = self._sapien.render.RenderBodyComponent()
-        body.attach(triangle_mesh_shape(self._sapien.render, replace(s, vertices=vertices), mipmaps=False))
+        body.attach(triangle_mesh_shape(self._sapien.render, replace(s, vertices=vertices)))
         entity = self._sapien.Entity()
         entity.add_component(body)
         return entity

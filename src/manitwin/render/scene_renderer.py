@@ -26,7 +26,7 @@ from manitwin.render.cameras import Camera, sapien_axes
 from manitwin.render.device import render_scene
 from manitwin.render.drawable import Drawable, drawable
 from manitwin.render.scene_lighting import STUDIO, Lighting
-from manitwin.render.surfaces import plain_part, render_surface, triangle_mesh_shape
+from manitwin.render.surfaces import plain_part, render_surface, scene_shape
 
 SHADERS = Path(__file__).parent / "shaders"
 SUPERSAMPLE = 2  # shaders/scene lights blocks of 2 x 2
@@ -248,7 +248,7 @@ class SceneRenderer:
         floor = plain_part(
             trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False), surroundings.floor, roughness=0.9
         )
-        shape = triangle_mesh_shape(self._sapien.render, render_surface(floor), mipmaps=False)
+        shape = scene_shape(self._sapien.render, render_surface(floor))
         shape.material.set_emission([0.0, 0.0, 0.0, 1.0])  # tells the shader to fade it
         body = self._sapien.render.RenderBodyComponent()
         body.attach(shape)
@@ -265,8 +265,8 @@ class _Uploaded:
 
 def _uploaded(render: Any, thing: Drawable) -> _Uploaded:
     if thing not in _shapes:
-        surfaces = tuple(triangle_mesh_shape(render, each, mipmaps=True) for each in thing.surfaces)
-        _shapes[thing] = _Uploaded(surfaces, triangle_mesh_shape(render, thing.shadow, mipmaps=False))
+        surfaces = tuple(scene_shape(render, each) for each in thing.surfaces)
+        _shapes[thing] = _Uploaded(surfaces, scene_shape(render, thing.shadow))
     return _shapes[thing]
 
 

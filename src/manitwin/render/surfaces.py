@@ -108,24 +108,52 @@ def _tinted(image: np.ndarray, factor: np.ndarray) -> np.ndarray:
     return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2RGBA))
 
 
-def triangle_mesh_shape(render: Any, s: RenderSurface, *, mipmaps: bool) -> Any:
-    """Return a surface as a shape of the module ``sapien.render``.
+def triangle_mesh_shape(render: Any, s: RenderSurface) -> Any:
+    """Return a surface as a shape of the module ``sapien.render``."""
+    material, roughness, metallic = _material(render, s)
+    if s.color_map is not None:
+        material.base_color_texture = _texture(render, s.color_map, "R8G8B8A8Unorm", srgb=True)
+    if roughness is not None:
+        material.roughness_texture = _texture(render, roughness, "R8Unorm")
+    if metallic is not None:
+        material.metallic_texture = _texture(render, metallic, "R8Unorm")
+    return render.RenderShapeTriangleMesh(s.vertices, s.faces, s.normals, s.uv, material)
 
-    ``mipmaps`` are for scenes, where textures are much finer than the pixels; the driver averages them in sRGB, which
-    darkens what is both fine and rich in contrast a little.
+
+def scene_shape(render: Any, s: RenderSurface) -> Any:
+    """Return a surface as a shape of the module ``sapien.render`` for ``shaders/scene``, with textures as that reads them.
+
+    Textures have mipmaps, since they are much finer than the pixels. lavapipe averages sRGB slowly: colours are square roots of
+    linear ones, and their averages a little darker than those of light. Where there are colours, the roughness is their alpha.
     """
+    material, roughness, metallic = _material(render, s)
+    if s.color_map is not None:
+        colors = np.dstack(
+            [cv2.LUT(s.color_map[..., :3], _ROOTS[None, :, None]), np.full(s.color_map.shape[:2], 255, np.uint8)]
+        )
+        if roughness is not None:
+            size = colors.shape[1::-1]
+            colors[..., 3] = roughness if roughness.shape == size[::-1] else cv2.resize(roughness, size)
+            material.set_emission([1.0, 0.0, 0.0, 0.0])  # tells the shader of it
+        material.base_color_texture = _texture(render, colors, "R8G8B8A8Unorm", mipmaps=True)
+    elif roughness is not None:
+        material.roughness_texture = _texture(render, roughness, "R8Unorm", mipmaps=True)
+    if metallic is not None:
+        material.metallic_texture = _texture(render, metallic, "R8Unorm", mipmaps=True)
+    return render.RenderShapeTriangleMesh(s.vertices, s.faces, s.normals, s.uv, material)
+
+
+_ROOTS = np.rint(np.sqrt(srgb_to_linear(np.arange(256) / 255)) * 255).astype(np.uint8)
+
+
+def _material(render: Any, s: RenderSurface) -> tuple[Any, np.ndarray | None, np.ndarray | None]:
+    """Return a surface's material without textures, and its maps of roughness and metallic where they are not even."""
     material = render.RenderMaterial()
     material.base_color = [*s.color, 1.0]
     material.specular = SPECULAR
     roughness, material.roughness = _map_or_value(s.roughness_map, s.roughness)
     metallic, material.metallic = _map_or_value(s.metallic_map, s.metallic)
-    if s.color_map is not None:
-        material.base_color_texture = _texture(render, s.color_map, "R8G8B8A8Unorm", srgb=True, mipmaps=mipmaps)
-    if roughness is not None:
-        material.roughness_texture = _texture(render, roughness, "R8Unorm", srgb=False, mipmaps=mipmaps)
-    if metallic is not None:
-        material.metallic_texture = _texture(render, metallic, "R8Unorm", srgb=False, mipmaps=mipmaps)
-    return render.RenderShapeTriangleMesh(s.vertices, s.faces, s.normals, s.uv, material)
+    return material, roughness, metallic
 
 
 def front_faces(s: RenderSurface) -> RenderSurface:
@@ -143,7 +171,7 @@ def _map_or_value(image: np.ndarray | None, value: float) -> tuple[np.ndarray | 
     return image, value
 
 
-def _texture(render: Any, image: np.ndarray, pixel_format: str, *, srgb: bool, mipmaps: bool) -> Any:
+def _texture(render: Any, image: np.ndarray, pixel_format: str, *, srgb: bool = False, mipmaps: bool = False) -> Any:
     array = np.ascontiguousarray(image if image.ndim == 3 else image[..., None])
     levels = min(image.shape[:2]).bit_length() if mipmaps else 1
     return render.RenderTexture2D(array=array, format=pixel_format, mipmap_levels=levels, srgb=srgb)

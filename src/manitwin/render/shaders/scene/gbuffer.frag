@@ -14,9 +14,13 @@ const int COLOR_TEXTURE = 1, ROUGHNESS_TEXTURE = 2, METALLIC_TEXTURE = 8;  // bi
 
 void main() {
   int mask = materialBuffer.textureMask;
-  vec3 albedo = (mask & COLOR_TEXTURE) != 0 ? texture(colorTexture, inUV).rgb : materialBuffer.baseColor.rgb;
-  float roughness = (mask & ROUGHNESS_TEXTURE) != 0 ? texture(roughnessTexture, inUV).r : materialBuffer.roughness;
+  vec4 color = vec4(sqrt(materialBuffer.baseColor.rgb), materialBuffer.roughness);
+  if ((mask & COLOR_TEXTURE) != 0) {  // of square roots, and with roughness where the material says so
+    vec4 texel = texture(colorTexture, inUV);
+    color = vec4(texel.rgb, materialBuffer.emission.r > 0 ? texel.a : color.a);
+  }
+  if ((mask & ROUGHNESS_TEXTURE) != 0) color.a = texture(roughnessTexture, inUV).r;
   float metallic = (mask & METALLIC_TEXTURE) != 0 ? texture(metallicTexture, inUV).r : materialBuffer.metallic;
-  outAlbedo = vec4(sqrt(albedo), metallic);
-  outNormal = 0.5 * vec4(normalize(inNormal), materialBuffer.emission.a > 0 ? -roughness : roughness) + 0.5;
+  outAlbedo = vec4(color.rgb, metallic);
+  outNormal = 0.5 * vec4(normalize(inNormal), materialBuffer.emission.a > 0 ? -color.a : color.a) + 0.5;
 }
