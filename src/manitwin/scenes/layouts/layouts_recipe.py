@@ -75,7 +75,7 @@ class ScenePicturesStage:
     """Draw a scene from its cameras: colours, depth, normals and instance ids."""
 
     name = "pictures"
-    version = "5"
+    version = "6"
     reads: tuple[str, ...] = (SCENE,)
     writes: tuple[str, ...] = (PICTURES,)
     needs: Resource = "cpu"

@@ -19,7 +19,7 @@ from manitwin.formats.image_file import read_image
 from manitwin.formats.label_picture import label_picture
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.render.false_colors import depth_picture, id_color, ids_picture
-from manitwin.render.scene_renderer import SceneFrame, SceneRenderer
+from manitwin.render.scene_renderer import SceneFrame, SceneRenderer, ShadowRegion
 from manitwin.scenes.furniture_pictures import add_furniture, lighting_of
 from manitwin.scenes.layouts.layouts_recipe import PICTURES
 from manitwin.scenes.layouts.layouts_run import CONTACT_SHEET, accepted_scenes
@@ -51,7 +51,8 @@ def scene_pictures(
     """
     if not record.cameras:
         raise UsageError(f"scene {record.scene_id}: no cameras in its record; sample it again")
-    with SceneRenderer(lighting_of(record.ambient, record.lights)) as renderer:
+    shadows = ShadowRegion().for_pictures_of(max(width_px, height_px))
+    with SceneRenderer(lighting_of(record.ambient, record.lights), shadows=shadows) as renderer:
         for thing in record.objects:
             pose = transform(rotation_from_quaternion_wxyz(np.array(thing.quaternion_wxyz)), np.array(thing.position_m))
             renderer.add(thing.name, twin_looks(twin_folder(thing.twin_id), max(width_px, height_px)), pose)
