@@ -13,7 +13,6 @@ from manitwin.models.classifiers.efficientnet_lite import DEVIATION, MEAN, load_
 from manitwin.models.matting import object_network
 from manitwin.models.matting.object_network import (
     BLOCKS,
-    CHANNELS,
     MIXES,
     SIDE_PX,
     WAYS,
@@ -95,7 +94,7 @@ def test_the_layers_are_those_of_a_feature_pyramid(file: str) -> None:
         return np.stack([ndimage.map_coordinates(plane, [rows, columns], order=1, mode="nearest") for plane in x])
 
     y = convolved("top", convolved("lateral4", seen[4]))
-    for level in reversed(range(len(CHANNELS) - 1)):
+    for level in reversed(range(len(BLOCKS) - 1)):
         y = doubled(convolved(f"narrow{level}", y, active=False)) + convolved(f"lateral{level}", seen[level])
         for mix in range(MIXES):
             y = convolved(f"mix{level}.{mix}", y)

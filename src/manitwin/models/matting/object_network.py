@@ -31,7 +31,6 @@ WAYS = ((288, False), (384, False), (384, True))
 """To look: the picture's side in pixels, and whether it is mirrored."""
 BLOCKS = (0, 2, 4, 10, 15)
 """Of the encoder, after which the picture is 1/2, 1/4, 1/8, 1/16 and 1/32 as large."""
-CHANNELS = (24, 32, 48, 64, 96)
 MIXES = 2
 """Convolutions at each size but the smallest."""
 MARGIN = 0.2
@@ -73,7 +72,7 @@ def _seen(rgb: np.ndarray, side_px: int, mirrored: bool) -> np.ndarray:
     shrinks = max(rgb.shape[:2]) > side_px
     picture = cv2.resize(rgb, (side_px, side_px), interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
     picture = picture[:, ::-1] if mirrored else picture
-    network = _network(side_px)
+    network = _network()
     network.setInput(((picture.astype(np.float32) - MEAN) / DEVIATION).transpose(2, 0, 1)[None].copy())
     share = np.asarray(network.forward()[0, 0], np.float32)
     share = np.ascontiguousarray(share[:, ::-1]) if mirrored else share
@@ -81,8 +80,9 @@ def _seen(rgb: np.ndarray, side_px: int, mirrored: bool) -> np.ndarray:
 
 
 @cache
-def _network(side_px: int) -> cv2.dnn.Net:
-    content = network_bytes(load_weights(), [decoder_weights(name) for name in WEIGHTS_FILES], side_px)
+def _network() -> cv2.dnn.Net:
+    """Return the network for pictures of any size: one for each would take 70 MB more."""
+    content = network_bytes(load_weights(), [decoder_weights(name) for name in WEIGHTS_FILES])
     return cv2.dnn.readNetFromONNX(np.frombuffer(content, np.uint8))
 
 
@@ -102,28 +102,23 @@ def _decoder_file(name: str) -> bytes:
     return (files("manitwin.models.matting") / name).read_bytes()
 
 
-def network_bytes(
-    encoder: dict[str, np.ndarray], decoders: Sequence[dict[str, np.ndarray]], side_px: int = SIDE_PX
-) -> bytes:
-    """Return encoder and decoders as ONNX: input ``(1, 3, side_px, side_px)`` as the encoder's, output the mean share of object.
+def network_bytes(encoder: dict[str, np.ndarray], decoders: Sequence[dict[str, np.ndarray]]) -> bytes:
+    """Return encoder and decoders as ONNX: input ``(1, 3, S, S)`` as the encoder's, output the mean share of object.
 
-    ``side_px`` is a multiple of 32.
+    The file states S as ``SIDE_PX``; OpenCV takes any multiple of 32.
     """
-    graph, values = trunk(encoder, side_px)
-    shares = [_decoded(graph, values, decoder, f"decoder{place}", side_px) for place, decoder in enumerate(decoders)]
+    graph, values = trunk(encoder, SIDE_PX)
+    shares = [_decoded(graph, values, decoder, f"decoder{place}") for place, decoder in enumerate(decoders)]
     weight = graph.weight("mean.weight", np.float32(1 / len(shares)).reshape(1))
     parts = [graph.node("Mul", [share, weight], f"mean.part{place}") for place, share in enumerate(shares)]
     total = parts[0]
     for place, part in enumerate(parts[1:]):
         total = graph.node("Add", [total, part], f"mean.sum{place}")
-    return graph.to_bytes(total, (1, 1, side_px, side_px))
+    return graph.to_bytes(total, (1, 1, SIDE_PX, SIDE_PX))
 
 
-def _decoded(
-    graph: OnnxGraph, values: dict[str, str], decoder: dict[str, np.ndarray], prefix: str, side_px: int
-) -> str:
+def _decoded(graph: OnnxGraph, values: dict[str, str], decoder: dict[str, np.ndarray], prefix: str) -> str:
     """Add a decoder over the encoder's ``values`` to the graph; return the name of its share of object."""
-    sides = [side_px // 2 ** (level + 1) for level in range(len(BLOCKS))]
 
     def convolved(name: str, value: str, *, active: bool = True) -> str:
         kernel = decoder[f"{name}.weight"].astype(np.float32)
@@ -136,17 +131,17 @@ def _decoded(
         graph.node("Conv", [value, *weights], f"{output}.sum", kernel_shape=[side, side], pads=[side // 2] * 4)
         return graph.node("Relu", [f"{output}.sum"], output) if active else f"{output}.sum"
 
-    def resized(name: str, value: str, channels: int, side: int) -> str:
-        none = [graph.weight(f"{name}.{kind}", np.zeros(0, np.float32)) for kind in ("region", "scales")]
-        sizes = graph.weight(f"{name}.sizes", np.array([1, channels, side, side], np.int64))
+    def twice_as_large(name: str, value: str) -> str:
+        region = graph.weight(f"{name}.region", np.zeros(0, np.float32))
+        twice = graph.weight(f"{name}.scales", np.array([1, 1, 2, 2], np.float32))
         how = {"mode": "linear", "coordinate_transformation_mode": "half_pixel"}
-        return graph.node("Resize", [value, *none, sizes], f"{name}.larger", **how)
+        return graph.node("Resize", [value, region, twice], f"{name}.larger", **how)
 
     laterals = [convolved(f"lateral{level}", values[f"_blocks.{block}"]) for level, block in enumerate(BLOCKS)]
     value = convolved("top", laterals[-1])
     for level in reversed(range(len(BLOCKS) - 1)):
         narrowed = convolved(f"narrow{level}", value, active=False)
-        larger = resized(f"{prefix}.level{level}", narrowed, CHANNELS[level], sides[level])
+        larger = twice_as_large(f"{prefix}.level{level}", narrowed)
         value = graph.node("Add", [larger, laterals[level]], f"{prefix}.level{level}.joined")
         for mix in range(MIXES):
             value = convolved(f"mix{level}.{mix}", value)
