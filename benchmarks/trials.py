@@ -137,12 +137,13 @@ def _plain_trials() -> Iterator[None]:
     """Keep all hulls, close for the whole time, lift all the way and repeat all slides."""
     margin, share, rest = sapien_trial.REACH_MARGIN_M, trial_phases.SURE_SHARE, trial_phases.CLOSED_SPEED_M_S
     sapien_trial.REACH_MARGIN_M, trial_phases.SURE_SHARE, trial_phases.CLOSED_SPEED_M_S = 10.0, 0.0, 0.0
-    still, trial_phases.STILL_M = trial_phases.STILL_M, 0.0
+    brief = trial_phases.REST_M, trial_phases.TURNED_RAD
+    trial_phases.REST_M = trial_phases.TURNED_RAD = 0.0
     try:
         yield
     finally:
         sapien_trial.REACH_MARGIN_M, trial_phases.SURE_SHARE, trial_phases.CLOSED_SPEED_M_S = margin, share, rest
-        trial_phases.STILL_M = still
+        trial_phases.REST_M, trial_phases.TURNED_RAD = brief
 
 
 def _compare(folders: list[Path], count: int) -> None:

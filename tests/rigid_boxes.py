@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import trimesh
 
 from manitwin.geometry.poses import transform
 from manitwin.geometry.rigid_body import RigidBody
+from manitwin.physics import trial_phases
 from manitwin.physics.trial import GraspTrial, TrialResult, TrialSettings
 from manitwin.robots.grippers.gripper import load_gripper
 
@@ -54,3 +56,9 @@ def block(low_m: list[float], high_m: list[float]) -> np.ndarray:
 def try_one(engine: GraspTrial, body: RigidBody, pose: np.ndarray, settings: TrialSettings = SETTINGS) -> TrialResult:
     """The result of a single grasp with the Panda."""
     return engine.run(body, PANDA, pose[None], settings)[0]
+
+
+def as_a_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let no trial be brief."""
+    monkeypatch.setattr(trial_phases, "REST_M", 0.0)
+    monkeypatch.setattr(trial_phases, "TURNED_RAD", 0.0)

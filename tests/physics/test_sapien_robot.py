@@ -10,8 +10,8 @@ from sapien import physx
 
 from manitwin.geometry.poses import inverse, transform
 from manitwin.physics.sapien.robot import SapienRobot
+from manitwin.physics.shared_target import SharedTarget
 from manitwin.physics.trial import TrialSettings
-from manitwin.physics.trial_phases import SharedTarget
 from manitwin.robots.links import links_of_urdf
 from manitwin.robots.load import load_robot, shipped_robots
 from manitwin.robots.robot import Robot

@@ -12,7 +12,7 @@ from manitwin.physics.mujoco.hand_scene import FINGER_MASS_KG, SINK_M, even_impe
 from manitwin.physics.mujoco.trial import MujocoTrial
 from manitwin.physics.robustness import jittered
 from manitwin.physics.sapien.trial import SapienTrial, finer_for_what_is_light
-from rigid_boxes import PANDA, SETTINGS, SLIDE_PEAK_M_S2, above, annulus, box, try_one
+from rigid_boxes import PANDA, SETTINGS, SLIDE_PEAK_M_S2, above, annulus, as_a_whole, box, try_one
 
 SHEETS_M = [[0.005, 0.04, 0.04], [0.001, 0.04, 0.04], [0.0005, 0.04, 0.04]]
 BAR_M = [0.005, 0.2, 0.005]
@@ -90,8 +90,9 @@ def test_faces_of_many_hulls_are_pressed_with_the_closing_force(mass_kg: float, 
 @pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
 @pytest.mark.parametrize("mass_kg", [0.1, 0.5, 1.0])
 def test_load_beside_the_pads_below_the_limit_of_friction_does_not_creep_in_mujoco(
-    mass_kg: float, share: float
+    mass_kg: float, share: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    as_a_whole(monkeypatch)  # in brief strokes drives give less
     # four corners of each pad, 13 mm from its middle, carry a moment of 0.95 Nm; below it nothing gives but the fingers' drives
     moment_nm = 2 * 0.75 * 50.0 * float(np.hypot(0.00875, 0.00925))
     lever_m = min(0.12, share * moment_nm / (mass_kg * (9.81 + SLIDE_PEAK_M_S2)))

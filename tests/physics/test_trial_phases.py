@@ -12,9 +12,10 @@ from scipy.spatial.transform import Rotation
 from manitwin.physics import trial_phases
 from manitwin.physics.mujoco.trial import MujocoTrial
 from manitwin.physics.sapien.trial import SapienTrial
+from manitwin.physics.shared_target import SharedTarget
 from manitwin.physics.trial import GraspTrial
-from manitwin.physics.trial_phases import HandContacts, SharedTarget, run_brief_phases, run_phases
-from rigid_boxes import SETTINGS, SLIDE_PEAK_M_S2, above, box, try_one
+from manitwin.physics.trial_phases import HandContacts, run_brief_phases, run_phases
+from rigid_boxes import SETTINGS, SLIDE_PEAK_M_S2, above, as_a_whole, box, try_one
 
 GRAVITY = np.array([0, 0, -9.81])
 CLOSE_STEPS, LIFT_STEPS, STABLE_STEPS, SLIDE_STEPS = 1 + 192, 192, 12, 96
@@ -108,10 +109,10 @@ def test_sure_grasp_is_loaded_once_along_each_direction() -> None:
     assert result.steps == len(scene.loads)
 
 
-PEAK_STEPS, BRIEF_STEPS = 48, 48
+PEAK_STEPS, LOOK_STEPS, BRIEF_STEPS = 48, 16, 21
 
 
-def test_what_is_still_as_the_lift_is_hardest_is_loaded_as_much_in_less_time() -> None:
+def test_what_rests_as_the_lift_is_hardest_is_loaded_as_much_in_less_time() -> None:
     scene, whole = Rigid(), Rigid()
     result = run_brief_phases(scene, np.eye(3), SETTINGS)
     run_phases(whole, np.eye(3), SETTINGS)
@@ -125,28 +126,46 @@ def test_what_is_still_as_the_lift_is_hardest_is_loaded_as_much_in_less_time() -
     assert most == pytest.approx(SLIDE_PEAK_M_S2, rel=5e-3), "all six directions, at the full peak"
 
 
-def test_what_is_still_is_carried_on_at_the_speed_it_had() -> None:
+def test_what_rests_is_carried_on_at_the_speed_it_had() -> None:
     way: list[tuple[float, np.ndarray]] = []
     scene = Rigid()
     run_brief_phases(scene, np.eye(3), SETTINGS, lambda phase, time_s, hand_m: way.append((time_s, hand_m)))
     went = path_m(np.concatenate([np.tile(GRAVITY, (CLOSE_STEPS, 1)), scene.loads[CLOSE_STEPS:]]))
     for time_s, hand_m in way:
         assert hand_m == pytest.approx(went[round(time_s / SETTINGS.timestep_s) - 1], abs=3e-4)
-    assert way[-1][1][2] > 0.15
+    since_peak_s = way[-1][0] - (CLOSE_STEPS + PEAK_STEPS) * SETTINGS.timestep_s
+    speed_m_s = 30 * 0.25**2 * 0.75**2 * SETTINGS.lift_m / SETTINGS.lift_time_s
+    assert way[-1][1][2] > speed_m_s * since_peak_s
 
 
-def test_what_moves_as_it_is_lifted_goes_through_the_whole_trial() -> None:
-    scene = Rigid(moved_m=lambda step: 0.00051 * (step > CLOSE_STEPS))
+def test_what_moved_as_it_was_lifted_goes_on_at_an_even_speed_where_it_has_come_to_rest() -> None:
+    scene = Rigid(moved_m=lambda step: 0.005 * (step > CLOSE_STEPS + 40))
     result = run_brief_phases(scene, np.eye(3), SETTINGS)
     assert result is not None and result.outcome == "held"
-    assert len(scene.loads) == STABLE + 3 * SLIDE_STEPS
+    assert len(scene.loads) == CLOSE_STEPS + PEAK_STEPS + LOOK_STEPS + STABLE_STEPS + 3 * BRIEF_STEPS
 
 
-@pytest.mark.parametrize(("moved_m", "sure"), [(0.00049, True), (0.00051, False)])
-def test_what_moves_in_brief_slides_has_no_verdict_by_them(moved_m: float, sure: bool) -> None:
+def test_what_comes_to_rest_as_the_hand_slows_down_is_lifted_all_the_way() -> None:
+    creeping = 0.00021 / LOOK_STEPS
+    scene = Rigid(moved_m=lambda step: creeping * min(max(0, step - CLOSE_STEPS), LIFT_STEPS / 2))
+    result = run_brief_phases(scene, np.eye(3), SETTINGS)
+    assert result is not None and result.outcome == "held"
+    assert len(scene.loads) == STABLE + 3 * BRIEF_STEPS
+
+
+@pytest.mark.parametrize(("moved_m", "strokes"), [(0.00019, 0), (0.00021, 3), (0.00101, 6), (0.0021, 12)])
+def test_what_moves_in_brief_strokes_goes_through_whole_ones(moved_m: float, strokes: int) -> None:
     before = CLOSE_STEPS + PEAK_STEPS + STABLE_STEPS
-    result = run_brief_phases(Rigid(moved_m=lambda step: moved_m * (step > before)), np.eye(3), SETTINGS)
-    assert (result is not None) == sure
+    scene = Rigid(moved_m=lambda step: moved_m * (step > before))
+    result = run_brief_phases(scene, np.eye(3), SETTINGS)
+    assert result is not None and result.outcome == "held"
+    assert result.displacement_m == pytest.approx(moved_m)
+    assert len(scene.loads) == before + (BRIEF_STEPS if strokes else 3 * BRIEF_STEPS) + strokes * SLIDE_STEPS
+
+
+def test_what_does_not_hold_briefly_has_no_verdict_by_that() -> None:
+    scene = Rigid(moved_m=lambda step: 0.011 * (step > CLOSE_STEPS + PEAK_STEPS + STABLE_STEPS))
+    assert run_brief_phases(scene, np.eye(3), SETTINGS) is None
 
 
 @pytest.mark.parametrize(("moved_m", "slides"), [(0.0019, 6), (0.0021, 12)])
@@ -255,14 +274,14 @@ def test_full_repetition_gives_the_same_verdicts(engine: GraspTrial, monkeypatch
     trials += [(box([0.03, 0.2, 0.03], 1.0), above([0, y, 0])) for y in (0.0, 0.05, 0.06)]
     early = [try_one(engine, body, pose) for body, pose in trials]
     monkeypatch.setattr(trial_phases, "SURE_SHARE", 0.0)
-    monkeypatch.setattr(trial_phases, "STILL_M", 0.0)
+    as_a_whole(monkeypatch)
     full = [try_one(engine, body, pose) for body, pose in trials]
     assert [result.outcome for result in early] == [result.outcome for result in full]
     assert {"held", "slips"} <= {result.outcome for result in full}
     held = [(a, b) for a, b in zip(early, full, strict=True) if a.outcome == "held"]
     assert held[0][0].steps < held[0][1].steps, "a sure grasp is not loaded twice"
     creeping = [(a, b) for a, b in held if b.displacement_m > 0.2 * SETTINGS.max_displacement_m]
-    assert any(a.steps == b.steps for a, b in creeping), "one that creeps is"
+    assert any(a.steps > 0.8 * b.steps for a, b in creeping), "one that creeps is"
 
 
 def test_settings_allow_the_whole_protocol_in_the_steps_of_the_paper() -> None:

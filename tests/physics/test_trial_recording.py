@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from manitwin.geometry.poses import transform
-from manitwin.physics import trial_phases
 from manitwin.physics.mujoco.trial import MujocoTrial
 from manitwin.physics.sapien.fingers import ArticulatedTrial
 from manitwin.physics.sapien.trial import SapienTrial
@@ -14,7 +13,7 @@ from manitwin.physics.suction_trial import SuctionTrial
 from manitwin.physics.trial import TrialSettings
 from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
-from rigid_boxes import FROM_ABOVE, PANDA, SETTINGS, SLIDE_PEAK_M_S2, above, box
+from rigid_boxes import FROM_ABOVE, PANDA, SETTINGS, SLIDE_PEAK_M_S2, above, as_a_whole, box
 
 LIMIT_KG = 2 * 0.75 * 50 / (9.81 + SLIDE_PEAK_M_S2)
 CUBE_M = [0.04, 0.04, 0.04]
@@ -33,7 +32,7 @@ def test_a_recorded_trial_is_that_of_run(engine: SapienTrial | MujocoTrial, shar
 
 
 def test_hand_goes_up_by_the_lift_and_out_along_each_axis(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(trial_phases, "STILL_M", 0.0)  # else the hand does not stop at the end of the lift
+    as_a_whole(monkeypatch)  # else the hand does not stop at the end of the lift
     recording = SapienTrial().record(box(CUBE_M, 0.5), PANDA, above([0, 0, 0]), SETTINGS)
     phases = np.array(recording.phases)
     assert list(dict.fromkeys(recording.phases)) == ["open", "close", "lift", "hold", "slide"]
@@ -43,7 +42,8 @@ def test_hand_goes_up_by_the_lift_and_out_along_each_axis(monkeypatch: pytest.Mo
     assert recording.hand_m[-1] == pytest.approx(out, abs=1e-9)
 
 
-def test_hand_comes_back_from_each_slide_of_a_grasp_at_the_limit() -> None:
+def test_hand_comes_back_from_each_slide_of_a_grasp_at_the_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    as_a_whole(monkeypatch)  # brief strokes before go out only
     recording = SapienTrial().record(box(CUBE_M, 0.98 * LIMIT_KG), PANDA, above([0, 0, 0]), SETTINGS)
     assert recording.result.outcome == "held"
     slides = recording.hand_m[np.array(recording.phases) == "slide"] - [0, 0, SETTINGS.lift_m]

@@ -16,7 +16,6 @@ import pytest
 from access_requests import asked
 
 from manitwin.errors import TwinError, UsageError
-from manitwin.physics import trial_phases
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import Twin
 from manitwin.web import trial_player
@@ -24,6 +23,7 @@ from manitwin.web.application import application
 from manitwin.web.served_files import TwinFolders
 from manitwin.web.trial_document import trial_document
 from manitwin.web.trial_player import TrialPlayer
+from rigid_boxes import as_a_whole
 
 Viewed = tuple[Path, list[str]]
 
@@ -38,7 +38,7 @@ def rows(values: list[float]) -> np.ndarray:
 
 
 def test_document_has_hand_object_and_boxes_at_each_state(twin: Twin, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(trial_phases, "STILL_M", 0.0)  # else the hand does not stop at the end of the lift
+    as_a_whole(monkeypatch)  # else the hand does not stop at the end of the lift
     told = trial_document(twin, "panda", "panda-0000")
     count = len(told["time_s"])
     assert (told["outcome"], told["recorded_outcome"]) == ("held", "held")

@@ -25,17 +25,18 @@ SLIDE_DIRECTIONS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1
 # than a fifth of the limit after six strokes, one failed in the other six, so such a grasp is not asked again. After three
 # strokes, half as much may have moved: the same rate of creep.
 LOADED_ONCE, LOADED_TWICE, SURE_SHARE = (0, 2, 4), 6, 0.2
-# What has not moved when the peak of the lift is over has borne the most that a lift asks for: the hand goes on at an even
-# speed. It is then loaded once along each direction by strokes of the same accelerations and half the time, in which it may
-# move as fast as in three whole ones. What does not hold so is no verdict: such a grasp goes through the whole trial.
-PEAK_SHARE, STILL_M, STILL_RAD = 0.25, 0.0005, 0.03
-BRIEF_STROKE_S, STEADY_SHARE = 0.2, 0.05
+# What comes to rest under the peak of the lift's load, before the hand slows down, has borne the most that a lift asks for: the
+# hand goes on at an even speed. Strokes of the same accelerations and a fifth of the time load it once along each direction.
+# What stays in them is held, what does not goes through whole strokes as well: a box heavier than friction carries moves by the
+# square of their time, so that less is allowed. What is lost so is no verdict: such a grasp goes through the whole trial. What
+# has turned far is not tried briefly.
+PEAK_SHARE, EVEN_SHARE, REST_M, REST_RAD = 0.25, 0.5, 0.0002, 0.02  # the last two between two looks
+BRIEF_STROKE_S = 0.0875  # of 21 steps of 1/240 s one is at the peak; of 24 none is nearer than 0.6 %
+STEADY_SHARE, TURNED_RAD = 0.02, 0.15
 CLOSED_SPEED_M_S, CLOSED_SPEED_RAD_S = (
     0.001,
     0.01,
 )  # what moves less in a hand that presses with all its force is at rest
-STILL_SHARE = 0.01  # of the closing speed: slower fingers have been stopped, and do not just lag behind their target
-MET_M = 1e-6  # pads this close have met
 Phase = Literal["open", "close", "lift", "hold", "slide"]
 TrialWatch = Callable[[Phase, float, np.ndarray], None]
 """Called after each advance with the phase, the time (s) and how far the hand was moved ``(3,)``, along the object's axes."""
@@ -95,13 +96,13 @@ def run_phases(
 def run_brief_phases(
     scene: TrialScene, object_to_hand: np.ndarray, settings: TrialSettings, watch: TrialWatch | None = None
 ) -> TrialResult | None:
-    """Run the phases as ``run_phases`` does, but briefly for what is still; None where that tells nothing.
+    """Run the phases as ``run_phases`` does, but briefly for what comes to rest; None where that tells nothing.
 
     The trial is then to be run again, from its beginning.
     """
-    phases = _Phases(scene, object_to_hand, settings, watch, may_coast=True)
+    phases = _Phases(scene, object_to_hand, settings, watch, may_be_brief=True)
     result = phases.run()
-    return None if phases.coasting_m_s.any() and result.outcome != "held" else result
+    return None if phases.was_brief and result.outcome != "held" else result
 
 
 class _Phases:
@@ -111,9 +112,9 @@ class _Phases:
         object_to_hand: np.ndarray,
         settings: TrialSettings,
         watch: TrialWatch | None,
-        may_coast: bool = False,
+        may_be_brief: bool = False,
     ):
-        self.may_coast = may_coast
+        self.may_be_brief, self.was_brief = may_be_brief, False
         self.scene, self.object_to_hand, self.settings, self.watch = scene, object_to_hand, settings, watch
         self.phase: Phase = "open"
         self.hand_m, self.coasting_m_s = np.zeros(3), np.zeros(3)
@@ -174,7 +175,7 @@ class _Phases:
         reference = self.scene.center_of_mass_m()
         path = np.array([0, 0, settings.lift_m])
         limit_m = settings.max_lift_displacement_m
-        self._move(path, settings.lift_time_s, reference, limit_m, "drops", may_coast=self.may_coast)
+        self._move(path, settings.lift_time_s, reference, limit_m, "drops", may_coast=self.may_be_brief)
 
     def _wait_for_stable_frames(self) -> None:
         settings, self.phase = self.settings, "hold"
@@ -196,8 +197,7 @@ class _Phases:
         reference = self.scene.center_of_mass_m()
         self.displacement_m = 0.0
         strokes = [sign * settings.slide_m * direction for direction in SLIDE_DIRECTIONS for sign in (1, -1)]
-        if self.coasting_m_s.any():
-            self._slide_briefly(strokes, reference)
+        if self.may_be_brief and self._turned_rad() < TURNED_RAD and self._stays_in_brief_strokes(strokes, reference):
             return
         sure_m, order = SURE_SHARE * settings.max_displacement_m, list(range(len(strokes)))
         for number in LOADED_ONCE:
@@ -213,14 +213,17 @@ class _Phases:
             self._move(strokes[number], settings.slide_time_s, reference, settings.max_displacement_m, "slips")
         self._check_hold("slips")
 
-    def _slide_briefly(self, strokes: list[np.ndarray], reference: np.ndarray) -> None:
-        """Load the object once along each direction by brief strokes, in which it has to stay where it is."""
-        settings = self.settings
+    def _stays_in_brief_strokes(self, strokes: list[np.ndarray], reference: np.ndarray) -> bool:
+        """Load the object once along each direction by brief strokes, and tell whether it stays where it is."""
+        settings, self.was_brief = self.settings, True
         shorter = min(1.0, BRIEF_STROKE_S / settings.slide_time_s)
-        most_m = STEADY_SHARE * settings.max_displacement_m
+        path, time_s, limit_m = shorter**2, shorter * settings.slide_time_s, settings.max_displacement_m
         for number in LOADED_ONCE:
-            self._move(shorter**2 * strokes[number], shorter * settings.slide_time_s, reference, most_m, "slips")
+            self._move(path * strokes[number], time_s, reference, limit_m, "slips")
+            if self.displacement_m >= STEADY_SHARE * limit_m:
+                return False
         self._check_hold("slips")
+        return True
 
     def _move(
         self,
@@ -234,12 +237,12 @@ class _Phases:
     ) -> None:
         """Move the hand along an object-frame path with a quintic profile; fail where the object lags behind it.
 
-        Where it ``may_coast`` and the object is still when the peak is over, the hand keeps its speed from there on.
+        Where it ``may_coast`` and the object is at rest after the peak, the hand keeps its speed from there on.
         """
         count = round(time_s / self.settings.timestep_s)
         u = (np.arange(count) + 0.5) / count
         profile = (60 * u - 180 * u**2 + 120 * u**3) / time_s**2
-        start_m, done = self.hand_m, 0
+        start_m, done, before = self.hand_m, 0, self._look() if may_coast else None
         for loads in _chunks(
             self._loads(profile[:, None] * path_m), CHECK_EVERY_FRAMES * self.settings.steps_per_frame
         ):
@@ -251,11 +254,19 @@ class _Phases:
             self.displacement_m = max(self.displacement_m, moved)
             if not moved <= limit_m:
                 raise _Failed(outcome)
-            if may_coast and done >= PEAK_SHARE * count:
-                if self.displacement_m < STILL_M and self._turned_rad() < STILL_RAD:
-                    self.coasting_m_s = _speed_on_path(done / count) / time_s * path_m
+            if before is not None and done <= EVEN_SHARE * count:
+                at_rest, before = self._rests_since(before), self._look()
+                if at_rest and done >= PEAK_SHARE * count:
+                    self.coasting_m_s, self.was_brief = _speed_on_path(done / count) / time_s * path_m, True
                     return
-                may_coast = False
+
+    def _look(self) -> tuple[np.ndarray, np.ndarray]:
+        return self.scene.center_of_mass_m(), self.scene.object_rotation()
+
+    def _rests_since(self, before: tuple[np.ndarray, np.ndarray]) -> bool:
+        """Tell whether the object has hardly moved since a look."""
+        (place, rotation), (now, turned) = before, self._look()
+        return float(np.linalg.norm(now - place)) < REST_M and rotation_angle_rad(turned @ rotation.T) < REST_RAD
 
     def _turned_rad(self) -> float:
         """Return how far the object has turned in the closed hand."""
@@ -300,35 +311,3 @@ def _speed_on_path(u: float) -> float:
 
 def _chunks(rows: np.ndarray, size: int) -> Iterator[np.ndarray]:
     return (rows[start : start + size] for start in range(0, len(rows), size))
-
-
-class SharedTarget:
-    """The one position target of both fingers of a closing parallel hand; it never presses with more than the closing force.
-
-    The mechanical coupling of the real hand does the same; two independently saturated fingers have no lateral stiffness
-    and drift by centimetres.
-
-    Coordinates are the distances (m) of the pads from the plane between them. Pads that meet (``met_m`` and less) have
-    nothing between them, whatever they overlap: the target goes back to where it was, as a gripper opens again that
-    reports an empty hand. Without this, fingers that have tunnelled into a thin and light object hold it. ``presses`` tells
-    whether the fingers have come to a stop, as far behind the target as the closing force pushes.
-    """
-
-    def __init__(self, opening_m: float, settings: TrialSettings, met_m: float = MET_M):
-        self.value_m = self._open_m = opening_m / 2
-        self._met_m, self._met, self.presses = met_m, False, False
-        self._before_m: float | None = None
-        self._press_m = settings.force_n / settings.finger_stiffness_n_m
-        self._ramp_m = settings.close_speed_m_s * settings.frame_s
-
-    def move_on(self, mean_position_m: float) -> float:
-        """Move on by one frame and return the target; ``mean_position_m`` is that of the two fingers."""
-        self._met = self._met or mean_position_m <= self._met_m
-        if self._met:
-            self.value_m, self.presses = self._open_m, False
-            return self.value_m
-        goal_m = self.value_m - self._ramp_m
-        self.value_m = max(goal_m, mean_position_m - self._press_m)
-        stopped = self._before_m is not None and abs(mean_position_m - self._before_m) < STILL_SHARE * self._ramp_m
-        self._before_m, self.presses = mean_position_m, stopped and self.value_m > goal_m
-        return self.value_m

@@ -32,7 +32,7 @@ ROBUSTNESS = "robustness{}"
 class RobustnessStage:
     """Try each held grasp again and again; writes ``held (N,)`` and ``trials (N,)``, zero trials where it never held."""
 
-    version = "7"
+    version = "8"
     needs: Resource = "cpu"
 
     def __init__(

@@ -33,7 +33,7 @@ class SecondOpinionStage:
     with both engines' verdicts.
     """
 
-    version = "7"
+    version = "8"
     needs: Resource = "cpu"
 
     def __init__(

@@ -30,7 +30,7 @@ class VerifyStage:
     gripper rejects the object; another gripper does not.
     """
 
-    version = "6"
+    version = "7"
     needs: Resource = "cpu"
 
     def __init__(self, settings: VerifyConfig, trial: GraspTrial, gripper: Gripper, suffix: str = ""):

@@ -15,8 +15,9 @@ from manitwin.physics.mujoco.body import (
     contact_parameters,
     new_spec,
 )
+from manitwin.physics.shared_target import SharedTarget
 from manitwin.physics.trial import TrialSettings
-from manitwin.physics.trial_phases import HandContacts, SharedTarget
+from manitwin.physics.trial_phases import HandContacts
 from manitwin.robots.grippers.parallel import ParallelGripper
 
 IMPEDANCE_RATIO = 1000.0  # friction yields so many times less than the normal force: as good as nothing

@@ -17,16 +17,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from manitwin.geometry.poses import inverse
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.physics.trial import TrialResult, TrialSettings
-from manitwin.physics.trial_phases import run_phases
+from manitwin.physics.trial_phases import TrialWatch, run_brief_phases, run_phases
 from manitwin.physics.trial_recording import TrialRecorder, TrialRecording
 from manitwin.robots.grippers.gripper import Gripper, of_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
+
+if TYPE_CHECKING:
+    import mujoco
 
 TIMESTEP_S, STEPS_PER_FRAME = 0.001, 16
 
@@ -47,15 +51,11 @@ class MujocoTrial:
         """Try the grasps ``gripper_to_object (N, 4, 4)``; of ``settings``, the engine's own numbers are the frozen ones."""
         if not len(gripper_to_object):
             return []
-        from manitwin.physics.mujoco.hand_scene import HandScene, hand_model
+        from manitwin.physics.mujoco.hand_scene import hand_model
 
         settings, hand = frozen(settings), of_kind(gripper, ParallelGripper)
         model = hand_model(body, hand, settings)
-        results = []
-        for object_to_hand in (inverse(pose) for pose in gripper_to_object):
-            scene = HandScene(model, hand, object_to_hand, settings)
-            results.append(run_phases(scene, object_to_hand[:3, :3], settings))
-        return results
+        return [_try_one(model, hand, inverse(pose), settings) for pose in gripper_to_object]
 
     def record(
         self,
@@ -66,13 +66,34 @@ class MujocoTrial:
         joints_rad: np.ndarray | None = None,
     ) -> TrialRecording:
         """Try one grasp ``gripper_to_object (4, 4)`` as ``run`` does, and return its states."""
-        from manitwin.physics.mujoco.hand_scene import HandScene, hand_model
+        from manitwin.physics.mujoco.hand_scene import hand_model
 
         settings, hand, recorder = frozen(settings), of_kind(gripper, ParallelGripper), TrialRecorder()
         object_to_hand = inverse(gripper_to_object)
-        scene = HandScene(hand_model(body, hand, settings), hand, object_to_hand, settings)
-        result = run_phases(scene, object_to_hand[:3, :3], settings, recorder.watch(scene))
-        return recorder.recording(result, object_to_hand, scene.hand_joints())
+        result = _try_one(hand_model(body, hand, settings), hand, object_to_hand, settings, recorder)
+        return recorder.recording(result, object_to_hand, np.full(2, hand.opening_m / 2))
+
+
+def _try_one(
+    model: mujoco.MjModel,
+    gripper: ParallelGripper,
+    object_to_hand: np.ndarray,
+    settings: TrialSettings,
+    recorder: TrialRecorder | None = None,
+) -> TrialResult:
+    """Try a grasp briefly, and where that tells nothing as a whole."""
+    from manitwin.physics.mujoco.hand_scene import HandScene
+
+    def scene() -> tuple[HandScene, TrialWatch | None]:
+        new = HandScene(model, gripper, object_to_hand, settings)
+        return new, None if recorder is None else recorder.watch(new)
+
+    new, watch = scene()
+    result = run_brief_phases(new, object_to_hand[:3, :3], settings, watch)
+    if result is None:
+        new, watch = scene()
+        result = run_phases(new, object_to_hand[:3, :3], settings, watch)
+    return result
 
 
 def frozen(settings: TrialSettings) -> TrialSettings:

@@ -2,7 +2,7 @@
 
 Each finger closes along its own straight line of joints and stops where a joint presses; from then on its targets stay:
 the drives' stiffness then resists what pulls at the object. (Fingers that are driven with constant torques have no
-lateral stiffness, see ``trial_phases.SharedTarget``.)
+lateral stiffness, see ``shared_target.SharedTarget``.)
 """
 
 from __future__ import annotations

@@ -13,8 +13,8 @@ from sapien import physx
 
 from manitwin.physics.sapien.body import entity_at
 from manitwin.physics.sapien.shapes import HAND_COLLISION_GROUPS, set_contact
+from manitwin.physics.shared_target import SharedTarget
 from manitwin.physics.trial import TrialSettings
-from manitwin.physics.trial_phases import SharedTarget
 from manitwin.robots.grippers.parallel import ParallelGripper
 
 # PhysX stops a locked axis after every substep but solves contacts with the finger's mass along it too: friction of

@@ -10,8 +10,8 @@ from sapien import physx
 from manitwin.physics.sapien.contacts import Touches
 from manitwin.physics.sapien.robot import SapienRobot
 from manitwin.physics.sapien.world import RobotWorld
+from manitwin.physics.shared_target import SharedTarget
 from manitwin.physics.trial import TrialSettings
-from manitwin.physics.trial_phases import SharedTarget
 
 PRESSING_SHARE = 0.98  # of the closing force, at which the target has come as far as it goes
 
