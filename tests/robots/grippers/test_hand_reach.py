@@ -142,3 +142,40 @@ def test_motion_of_a_hull_is_bounded_from_above_and_not_by_much() -> None:
         )
         assert moved <= bound < moved + 0.03 * np.sqrt(3)
     assert (HandReach(hulls).motions_m(looks[:1]) == 0).all()
+
+
+def test_fingers_close_freely_up_to_the_faces_of_a_box() -> None:
+    hulls = (block([-0.012, -0.02, -0.02], [0.012, 0.02, 0.02]),)
+    pose = inverse(above([0, 0, 0]))
+    travel_m = HandReach(hulls).free_travel_m(PANDA, pose, np.ones(1, bool), 0.0)
+    assert travel_m == pytest.approx(PANDA.opening_m / 2 - 0.012, abs=1e-4)
+    assert HandReach(hulls).free_travel_m(PANDA, pose, np.ones(1, bool), 0.003) == pytest.approx(travel_m - 0.003)
+
+
+def test_fingers_that_close_freely_stay_off_what_they_close_on() -> None:
+    rng = np.random.default_rng(0)
+    free = []
+    for _ in range(30):
+        cloud = rng.normal(size=(40, 3)) * rng.uniform(0.004, 0.02, 3) + rng.uniform(-0.01, 0.01, 3)
+        hull = trimesh.convex.convex_hull(cloud)
+        pose = inverse(above([0, 0, 0], Rotation.random(rng=rng).as_matrix()))
+        travel_m = HandReach((np.array(hull.vertices),)).free_travel_m(PANDA, pose, np.ones(1, bool), 0.001)
+        if travel_m <= 0:
+            continue
+        free.append(travel_m)
+        inside = transform_points(pose, trimesh.sample.sample_surface(hull, 4000, seed=1)[0])
+        for center, half_m in PANDA.boxes(PANDA.opening_m - 2 * travel_m)[len(PANDA.palm_boxes) :]:
+            apart = np.abs(transform_points(inverse(center), inside)) - half_m
+            assert apart.max(1).min() > 0.00099
+    assert len(free) > 10 and max(free) > 0.02
+
+
+@pytest.mark.parametrize("width_m", [0.01, 0.03, 0.06])
+def test_free_closing_that_is_not_simulated_again_changes_no_bit(
+    width_m: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    body, pose = box([width_m, 0.05, 0.04], 0.2), above([0.004, 0.01, 0])
+    short = try_one(SapienTrial(), body, pose)
+    monkeypatch.setattr(HandReach, "free_travel_m", lambda *_: 0.0)
+    assert try_one(SapienTrial(), body, pose) == short
+    assert short.outcome == "held"

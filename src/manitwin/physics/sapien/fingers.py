@@ -137,6 +137,8 @@ class FingerClosing:
 class FingeredHand:
     """A hand that can be closed: its articulation, each finger's way from open to closed, and how far it has come."""
 
+    is_ahead = False
+
     def __init__(
         self, scene: sapien.Scene, gripper: MultiFingerGripper, joints_rad: np.ndarray, settings: TrialSettings
     ):

@@ -7,11 +7,18 @@ articulation's links.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import takewhile
+
 import numpy as np
 import sapien
 from sapien import physx
 
 from manitwin.physics.sapien.body import entity_at
+from manitwin.physics.sapien.scene import weightless_system
 from manitwin.physics.sapien.shapes import HAND_COLLISION_GROUPS, set_contact
 from manitwin.physics.shared_target import SharedTarget
 from manitwin.physics.trial import TrialSettings
@@ -31,14 +38,25 @@ MAX_DRIVE_FORCE = 4.0  # the drive's limit, as a multiple of the closing force: 
 _ALONG_X, _ALONG_MINUS_X = (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 
 
+@dataclass(frozen=True)
+class FreeFrame:
+    """Where a hand is after a frame in which it touched nothing: each finger's place (m) and speed (m/s) along X, the target."""
+
+    along_x: tuple[tuple[float, float], ...]
+    target: SharedTarget
+
+
 class FixedHand:
     """A parallel hand that can be closed.
 
     Finger coordinates are the distances (m) of the two pads from the plane x = 0.
     """
 
-    def __init__(self, scene: sapien.Scene, gripper: ParallelGripper, settings: TrialSettings):
-        """Put the open hand into the scene."""
+    def __init__(
+        self, scene: sapien.Scene, gripper: ParallelGripper, settings: TrialSettings, approach: Sequence[FreeFrame] = ()
+    ):
+        """Put the open hand into the scene; while it closes it is set to the states of ``approach``, and then goes on."""
+        self._approach, self.is_ahead = iter(approach), False
         self._material = physx.PhysxMaterial(settings.finger_friction, settings.finger_friction, 0.0)
         self._contact_offset_m = settings.contact_offset_m
         boxes, first = gripper.boxes(0.0), len(gripper.palm_boxes)
@@ -91,6 +109,11 @@ class FixedHand:
 
     def squeeze(self) -> None:
         """Move the fingers' shared target on by one frame."""
+        state = next(self._approach, None)
+        self.is_ahead = state is not None
+        if state is not None:
+            self._set(state)
+            return
         plus, minus = self.fingers
         mean_m = (plus.entity_pose.p[0] - minus.entity_pose.p[0]) / 2
         self.close_to(self._target.move_on(float(mean_m)))
@@ -109,11 +132,50 @@ class FixedHand:
                 forces[side] += float(push_n[0]) * (-1, 1)[side]
         return tuple(forces)
 
+    def state(self) -> FreeFrame:
+        """Return where its fingers are, how fast they are, and what they close to."""
+        along_x = [(float(finger.entity_pose.p[0]), float(finger.linear_velocity[0])) for finger in self.fingers]
+        return FreeFrame(tuple(along_x), copy(self._target))
+
+    def _set(self, state: FreeFrame) -> None:
+        for finger, (x_m, speed_m_s) in zip(self.fingers, state.along_x, strict=True):
+            finger.entity.pose = sapien.Pose([x_m, 0, 0])
+            finger.linear_velocity = [speed_m_s, 0, 0]
+        self._target = copy(state.target)
+        self.close_to(self._target.value_m)
+
     def close_to(self, target_m: float) -> None:
         """Give both fingers one target; a target inside the object presses on it."""
         target = sapien.Pose([target_m, 0, 0])
         for drive in self._drives:
             drive.set_drive_target(target)
+
+
+def free_frames(gripper: ParallelGripper, settings: TrialSettings, travel_m: float) -> Sequence[FreeFrame]:
+    """Return the first frames of a closing hand, until its fingers have come as far as ``travel_m``, and touched nothing.
+
+    They are the same in every trial, so they are simulated once.
+    """
+
+    def is_clear(frame: FreeFrame) -> bool:
+        return gripper.opening_m / 2 - min(abs(x_m) for x_m, _ in frame.along_x) <= travel_m
+
+    return list(takewhile(is_clear, _empty_closing(gripper, settings)))
+
+
+@lru_cache(maxsize=64)
+def _empty_closing(gripper: ParallelGripper, settings: TrialSettings) -> tuple[FreeFrame, ...]:
+    """Return the frames of a hand that closes on nothing, after a first step in which it stays open."""
+    system = weightless_system(settings.timestep_s)
+    scene = sapien.Scene([system])
+    hand, frames = FixedHand(scene, gripper, settings), []
+    system.step()
+    for _ in range(round(settings.close_time_s / settings.frame_s)):
+        hand.squeeze()
+        for _ in range(settings.steps_per_frame):
+            system.step()
+        frames.append(hand.state())
+    return tuple(frames)
 
 
 def _lock_to_x(finger: physx.PhysxRigidDynamicComponent, tip_depth_m: float) -> None:

@@ -19,7 +19,7 @@ from sapien import physx
 
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.physics.sapien.body import entity_at, graspable_component
-from manitwin.physics.sapien.scene import scene_config
+from manitwin.physics.sapien.scene import weightless_system
 from manitwin.physics.sapien.shapes import HullShapes
 from manitwin.physics.trial import TrialSettings
 from manitwin.physics.trial_phases import HandContacts
@@ -29,7 +29,9 @@ LOAD_RATE_PER_S = 0.01  # drag of the load's drive per mass: 1e-4 of the weight 
 
 
 class SapienHand(Protocol):
-    """A hand in a scene, which stays where it is."""
+    """A hand in a scene, which stays where it is; ``is_ahead`` where it is already as the steps to come would leave it."""
+
+    is_ahead: bool
 
     def joints(self) -> np.ndarray:
         """Return its state ``(J,)``."""
@@ -61,10 +63,8 @@ class HandScene:
     ):
         """Put the body, of these ``shapes``, before the hand."""
         self.settings = settings
-        with scene_config(gravity=[0, 0, 0], bounce_threshold=2.0, enable_enhanced_determinism=False):
-            self.system = physx.PhysxCpuSystem()
+        self.system = weightless_system(settings.timestep_s)
         self.scene = scene = sapien.Scene([self.system])  # kept: bodies go with their scene
-        self.system.timestep = settings.timestep_s
         self.object = graspable_component(
             body,
             shapes,
@@ -82,6 +82,8 @@ class HandScene:
 
     def advance(self, loads_m_s2: np.ndarray) -> None:
         """Take one step for each row of accelerations ``(N, 3)``."""
+        if self.hand.is_ahead:  # nothing touches the object, and nothing else loads it while the hand closes
+            return
         set_target, step = self.load.set_drive_velocity_target, self.system.step
         targets = (loads_m_s2 / LOAD_RATE_PER_S).astype(np.float32)
         is_constant = bool((targets == targets[:1]).all())  # while the hand closes, and where it waits

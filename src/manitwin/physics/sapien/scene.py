@@ -40,3 +40,11 @@ def system_with_gravity(timestep_s: float) -> physx.PhysxCpuSystem:
 def scene_with_gravity(timestep_s: float) -> sapien.Scene:
     """Return a scene of such a system alone."""
     return sapien.Scene([system_with_gravity(timestep_s)])
+
+
+def weightless_system(timestep_s: float) -> physx.PhysxCpuSystem:
+    """Return a system without gravity, for a hand that stands still and what it holds."""
+    with scene_config(gravity=[0, 0, 0], bounce_threshold=2.0, enable_enhanced_determinism=False):
+        system = physx.PhysxCpuSystem()
+    system.timestep = timestep_s
+    return system

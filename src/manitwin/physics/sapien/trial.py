@@ -6,6 +6,7 @@ The engine is imported by the first trial: who only names this simulator, as the
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,6 +27,7 @@ REACH_MARGIN_M = 0.015  # hulls farther than this from the closing hand are left
 # A trial counts only where none of them came this near whenever it was looked: the contact offset of 2 mm, and what the
 # object may do between two looks.
 LOOK_MARGIN_M = 0.005
+CLEAR_M = 0.0005  # beyond the contact offsets of both: until then no finger feels the object
 # What the closing force may change the object's speed by in a step. Of things below 65 g 86 % of verdicts at 1/240 s are those
 # of the reference at 1/960 s and 40 iterations: pads kick them about, or out of the hand. At 1/480 s 94 %, at 1/960 s 96 %.
 MOST_JUMP_M_S = 4.0
@@ -97,7 +99,7 @@ def _try_one(
     recorder: TrialRecorder | None = None,
 ) -> TrialResult:
     """Try a grasp on the hulls that the hand can reach; where the object turned others towards it, on all."""
-    from manitwin.physics.sapien.hand import FixedHand
+    from manitwin.physics.sapien.hand import FixedHand, free_frames
     from manitwin.physics.sapien.hand_scene import HandScene
 
     gaps = reach.gaps_m(gripper, object_to_hand[None])[0]
@@ -108,7 +110,10 @@ def _try_one(
     def simulate(some: np.ndarray, *, briefly: bool = True) -> tuple[TrialResult, np.ndarray]:
         """Return what became of the object with some of its shapes, and the poses at which it was looked at."""
         chosen = [shape for shape, is_in in zip(shapes, some, strict=True) if is_in]
-        scene = HandScene(body, chosen, object_to_hand, settings, lambda scene: FixedHand(scene, gripper, settings))
+        travel_m = reach.free_travel_m(gripper, object_to_hand, some, 2 * settings.contact_offset_m + CLEAR_M)
+        approach = free_frames(gripper, settings, travel_m)
+        make_hand = partial(FixedHand, gripper=gripper, settings=settings, approach=approach)
+        scene = HandScene(body, chosen, object_to_hand, settings, make_hand)
         watch = None if recorder is None else recorder.watch(scene)
         run = run_brief_phases if briefly else run_phases
         result = run(scene, object_to_hand[:3, :3], settings, watch)

@@ -15,6 +15,10 @@ from manitwin.robots.grippers.gripper import Gripper
 from manitwin.robots.grippers.parallel import ParallelGripper
 
 PAIRS_AT_ONCE = 20_000
+_SLOPES = [(0.0, 0.0), *((s * a, s * b) for s in (0.3, 1.0, 3.0, 12.0) for a, b in ((1, 0), (-1, 0), (0, 1), (0, -1)))]
+_SLOPES += [(a, b) for s in (0.5, 2.0) for a in (s, -s) for b in (s, -s)]
+_FACING = np.array([(1.0, *slope) for slope in _SLOPES])
+"""Normals of planes that may stand between a finger and what it closes on ``(25, 3)``, their X parts one."""
 
 
 class HandCollision:
@@ -85,7 +89,8 @@ class HandReach:
     def __init__(self, hulls: tuple[np.ndarray, ...]):
         """Take convex vertices, each ``(V, 3)`` m in the object frame."""
         self._hulls, self._corners = hulls, np.concatenate(hulls)
-        self._starts = np.cumsum([0] + [len(hull) for hull in hulls[:-1]])
+        self._counts = np.array([len(hull) for hull in hulls])
+        self._starts = np.cumsum(self._counts) - self._counts
         low, high = np.minimum.reduceat(self._corners, self._starts), np.maximum.reduceat(self._corners, self._starts)
         self._centers, self._radii_m = (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2
 
@@ -105,6 +110,23 @@ class HandReach:
         swept_low, swept_high = _swept_boxes(gripper)
         return np.maximum(low - swept_high, swept_low - high).max(3).min(2)
 
+    def free_travel_m(
+        self, gripper: ParallelGripper, object_to_gripper: np.ndarray, some: np.ndarray, clear_m: float
+    ) -> float:
+        """Return how far both fingers can close and stay ``clear_m`` off some hulls ``(H,)`` of the object at ``(4, 4)``.
+
+        Never too much: a plane that a hull lies behind bounds how far it reaches towards a finger within what the finger
+        sweeps, and the nearest of several planes is taken.
+        """
+        counts = self._counts[some]
+        corners = self._corners[np.repeat(some, self._counts)] @ object_to_gripper[:3, :3].T + object_to_gripper[:3, 3]
+        starts, travel_m = np.cumsum(counts) - counts, np.inf
+        for mirror, (inner_m, least) in zip(_MIRRORS, _facing_fingers(gripper, clear_m), strict=True):
+            behind = np.maximum.reduceat(corners @ (_FACING * mirror).T, starts)
+            reached_m = (behind[:, None] - least).min(2).max(0)
+            travel_m = min(travel_m, float((inner_m - reached_m).min()))
+        return travel_m
+
     def motions_m(self, object_to_gripper: np.ndarray) -> np.ndarray:
         """Return bounds ``(H,)`` on how far a corner of each hull is in any of the poses ``(P, 4, 4)`` from where it is first.
 
@@ -115,6 +137,25 @@ class HandReach:
         moved = self._centers @ change[:, :3, :3].transpose(0, 2, 1) + change[:, None, :3, 3]
         turned = np.linalg.norm(change[:, :3, :3], axis=(1, 2)) / np.sqrt(2)
         return np.asarray((np.linalg.norm(moved, axis=2) + turned[:, None] * self._radii_m).max(0))
+
+
+_MIRRORS = (np.array([1.0, 1.0, 1.0]), np.array([-1.0, 1.0, 1.0]))  # seen from the +X finger, and from the other one
+
+
+@lru_cache(maxsize=8)
+def _facing_fingers(gripper: ParallelGripper, clear_m: float) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return of each finger of the open hand, seen from it, where its boxes begin ``(B,)`` and the least heights of its planes.
+
+    Those are of ``_FACING`` without their X parts, over what each box sweeps ``(B, 25)``, all ``clear_m`` larger.
+    """
+    boxes, first, count = gripper.boxes(gripper.opening_m), len(gripper.palm_boxes), len(gripper.finger_boxes)
+    fingers = []
+    for side, mirror in enumerate(_MIRRORS):
+        ends = np.array([_bounds(*box) for box in boxes[first + side * count : first + (side + 1) * count]])
+        seen = np.sort(ends * mirror, axis=1) + np.array([[-clear_m], [clear_m]])
+        least = np.minimum(seen[:, :1, 1:] * _FACING[:, 1:], seen[:, 1:, 1:] * _FACING[:, 1:]).sum(2)
+        fingers.append((seen[:, 0, 0], least))
+    return fingers
 
 
 @lru_cache(maxsize=8)
