@@ -291,7 +291,7 @@ class _Phases:
 
     def _advance(self, loads_m_s2: np.ndarray) -> None:
         left = self.settings.max_steps - self.steps
-        self.scene.advance(loads_m_s2[:left])
+        self.scene.advance(loads_m_s2 if left >= len(loads_m_s2) else loads_m_s2[:left])
         self.steps += min(left, len(loads_m_s2))
         if self.watch is not None:
             self.watch(self.phase, self.steps * self.settings.timestep_s, self.hand_m)

@@ -22,6 +22,7 @@ from manitwin.physics.sapien.scene import weightless_system
 from manitwin.physics.sapien.shapes import HAND_COLLISION_GROUPS, set_contact
 from manitwin.physics.shared_target import SharedTarget
 from manitwin.physics.trial import TrialSettings
+from manitwin.robots.grippers.box import PlacedBox
 from manitwin.robots.grippers.parallel import ParallelGripper
 
 # PhysX stops a locked axis after every substep but solves contacts with the finger's mass along it too: friction of
@@ -59,7 +60,7 @@ class FixedHand:
         self._approach, self.is_ahead = iter(approach), False
         self._material = physx.PhysxMaterial(settings.finger_friction, settings.finger_friction, 0.0)
         self._contact_offset_m = settings.contact_offset_m
-        boxes, first = gripper.boxes(0.0), len(gripper.palm_boxes)
+        boxes, first = _closed(gripper), len(gripper.palm_boxes)
         count = len(gripper.finger_boxes)
         palm = physx.PhysxRigidStaticComponent()
         self._attach(palm, boxes[:first])
@@ -176,6 +177,11 @@ def _empty_closing(gripper: ParallelGripper, settings: TrialSettings) -> tuple[F
             system.step()
         frames.append(hand.state())
     return tuple(frames)
+
+
+@lru_cache(maxsize=8)
+def _closed(gripper: ParallelGripper) -> list[PlacedBox]:
+    return gripper.boxes(0.0)
 
 
 def _lock_to_x(finger: physx.PhysxRigidDynamicComponent, tip_depth_m: float) -> None:

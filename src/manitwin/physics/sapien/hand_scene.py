@@ -79,17 +79,27 @@ class HandScene:
         self.hand = make_hand(scene)
         self.in_object_m = body.center_of_mass_m
         self.looks = [object_to_hand]
+        self._pose: np.ndarray | None = None  # of the object, since the last step
+        self._even_loads: np.ndarray | None = (
+            None  # what every step is loaded with: while the hand closes, and where it waits
+        )
 
     def advance(self, loads_m_s2: np.ndarray) -> None:
         """Take one step for each row of accelerations ``(N, 3)``."""
+        self._pose = None
         if self.hand.is_ahead:  # nothing touches the object, and nothing else loads it while the hand closes
             return
         set_target, step = self.load.set_drive_velocity_target, self.system.step
-        targets = (loads_m_s2 / LOAD_RATE_PER_S).astype(np.float32)
-        is_constant = bool((targets == targets[:1]).all())  # while the hand closes, and where it waits
-        for number, target in enumerate(targets):
-            if number == 0 or not is_constant:
-                set_target(target, NO_SPIN)
+        if loads_m_s2 is not self._even_loads:
+            targets = (loads_m_s2 / LOAD_RATE_PER_S).astype(np.float32)
+            self._even_loads = loads_m_s2 if bool((targets == targets[:1]).all()) else None
+            if self._even_loads is None:
+                for target in targets:
+                    set_target(target, NO_SPIN)
+                    step()
+                return
+            set_target(targets[0], NO_SPIN)
+        for _ in range(len(loads_m_s2)):
             step()
 
     def squeeze(self) -> None:
@@ -133,9 +143,10 @@ class HandScene:
 
     def _look(self) -> np.ndarray:
         """Return the object's pose ``(4, 4)`` in the hand's frame, and keep it in ``looks``."""
-        pose = self.object_to_hand()
-        self.looks.append(pose)
-        return pose
+        if self._pose is None:
+            self._pose = self.object_to_hand()
+            self.looks.append(self._pose)
+        return self._pose
 
 
 def _load(target: physx.PhysxRigidDynamicComponent) -> physx.PhysxDriveComponent:

@@ -116,14 +116,16 @@ class HandReach:
         """Return how far both fingers can close and stay ``clear_m`` off some hulls ``(H,)`` of the object at ``(4, 4)``.
 
         Never too much: a plane that a hull lies behind bounds how far it reaches towards a finger within what the finger
-        sweeps, and the nearest of several planes is taken.
+        sweeps, and the nearest of several planes is taken. What lies wholly at a finger's back is left behind.
         """
         counts = self._counts[some]
         corners = self._corners[np.repeat(some, self._counts)] @ object_to_gripper[:3, :3].T + object_to_gripper[:3, 3]
         starts, travel_m = np.cumsum(counts) - counts, np.inf
-        for mirror, (inner_m, least) in zip(_MIRRORS, _facing_fingers(gripper, clear_m), strict=True):
+        for mirror, (inner_m, back_m, least) in zip(_MIRRORS, _facing_fingers(gripper, clear_m), strict=True):
             behind = np.maximum.reduceat(corners @ (_FACING * mirror).T, starts)
-            reached_m = (behind[:, None] - least).min(2).max(0)
+            reached_m = (behind[:, None] - least).min(2)
+            reached_m[np.minimum.reduceat(corners[:, :1] * mirror[0], starts) > back_m] = -np.inf
+            reached_m = reached_m.max(0)
             travel_m = min(travel_m, float((inner_m - reached_m).min()))
         return travel_m
 
@@ -143,8 +145,8 @@ _MIRRORS = (np.array([1.0, 1.0, 1.0]), np.array([-1.0, 1.0, 1.0]))  # seen from 
 
 
 @lru_cache(maxsize=8)
-def _facing_fingers(gripper: ParallelGripper, clear_m: float) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return of each finger of the open hand, seen from it, where its boxes begin ``(B,)`` and the least heights of its planes.
+def _facing_fingers(gripper: ParallelGripper, clear_m: float) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Return of each finger of the open hand, seen from it, where its boxes begin and end ``(B,)``, and planes' least heights.
 
     Those are of ``_FACING`` without their X parts, over what each box sweeps ``(B, 25)``, all ``clear_m`` larger.
     """
@@ -154,7 +156,7 @@ def _facing_fingers(gripper: ParallelGripper, clear_m: float) -> list[tuple[np.n
         ends = np.array([_bounds(*box) for box in boxes[first + side * count : first + (side + 1) * count]])
         seen = np.sort(ends * mirror, axis=1) + np.array([[-clear_m], [clear_m]])
         least = np.minimum(seen[:, :1, 1:] * _FACING[:, 1:], seen[:, 1:, 1:] * _FACING[:, 1:]).sum(2)
-        fingers.append((seen[:, 0, 0], least))
+        fingers.append((seen[:, 0, 0], seen[:, 1, 0], least))
     return fingers
 
 
