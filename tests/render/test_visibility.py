@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
+from manitwin.render.cameras import orbit_cameras
 from manitwin.render.drawable import drawable
+from manitwin.render.renderer import shared_renderer
 from manitwin.render.surfaces import plain_part
-from manitwin.render.visibility import faces_seen_from_outside
+from manitwin.render.visibility import faces_seen_from_outside, is_closed_and_outward
 
 
 def box(side_m: float) -> trimesh.Trimesh:
@@ -72,3 +74,29 @@ def test_drawable_has_backs_of_those_faces_alone_that_are_seen_from_behind() -> 
     assert [len(s.faces) for s in drawable(parts).surfaces] == [20, 24]
     lean = drawable(parts, hidden_left_out=True)
     assert [len(s.faces) for s in lean.surfaces] == [20, 12] and len(lean.shadow.faces) == 32
+
+
+def test_closed_pieces_that_face_outward_show_no_back() -> None:
+    apart = box(0.05).apply_translation([0.2, 0, 0])
+    assert is_closed_and_outward(together(box(0.1), apart))
+    assert not is_closed_and_outward(without_lid(box(0.1)))
+    apart.invert()
+    assert not is_closed_and_outward(together(box(0.1), apart))
+    assert not is_closed_and_outward(together(box(0.1), trimesh.Trimesh(box(0.1).vertices, box(0.1).faces[:4])))
+
+
+def test_seams_of_textures_are_no_open_edges() -> None:
+    mesh = box(0.1)
+    split = trimesh.Trimesh(mesh.triangles.reshape(-1, 3), np.arange(36).reshape(-1, 3), process=False)
+    assert is_closed_and_outward(split)
+
+
+def test_closed_things_look_the_same_without_their_backs() -> None:
+    mesh = trimesh.creation.torus(0.05, 0.02)
+    parts = [plain_part(mesh, (200, 80, 40)), plain_part(box(0.03).apply_translation([0, 0, 0.06]), (20, 80, 40))]
+    cameras = orbit_cameras(np.asarray(mesh.vertices), fov_y_deg=30.0, size_px=128, elevations_deg=(20.0, 50.0))
+    both, fronts = (shared_renderer().render(parts, cameras, with_backs=backs) for backs in (True, False))
+    for one, other in zip(both, fronts, strict=True):
+        differs = (one.rgb != other.rgb).any(2)
+        assert differs.sum() <= 4  # along the outline, where a back has the same depth
+        assert (one.coverage > 0).sum() > 3000

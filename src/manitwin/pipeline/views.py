@@ -15,7 +15,9 @@ from manitwin.engine.stage import Draft
 from manitwin.pipeline.object_state import load_visual
 from manitwin.render.cameras import Camera, orbit_cameras
 from manitwin.render.grounds import ground_for
+from manitwin.render.raycast import merged
 from manitwin.render.renderer import BACKDROP, shared_renderer
+from manitwin.render.visibility import is_closed_and_outward
 
 VIEWS = 8
 """Paper, "Physical Property Estimation"."""
@@ -29,7 +31,7 @@ class ViewsStage:
     """
 
     name: ClassVar[str] = "views"
-    version: ClassVar[str] = "3"
+    version: ClassVar[str] = "4"
     reads: ClassVar[tuple[str, ...]] = ("canonical.glb",)
     writes: ClassVar[tuple[str, ...]] = ("views/", "cameras")
     needs: ClassVar[Resource] = "cpu"
@@ -59,7 +61,7 @@ def draw_views(
     cameras = orbit_cameras(
         points, fov_y_deg=settings.fov_y_deg, size_px=size_px, elevations_deg=settings.elevations_deg
     )
-    frames = shared_renderer().render(parts, cameras)
+    frames = shared_renderer().render(parts, cameras, with_backs=not is_closed_and_outward(merged(list(parts))))
     ground = ground_for(frames)
     return cameras, [frame.over(BACKDROP, ground) for frame in frames]
 

@@ -11,6 +11,7 @@ import trimesh
 
 from manitwin.geometry.boxes import box_corners
 from manitwin.geometry.hulls.reduction import convex_corners, hull_mesh
+from manitwin.geometry.kept import kept
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import farthest_point_sampling
 from manitwin.render.cameras import Camera, framing_camera, project, silhouette_area_px
@@ -20,6 +21,7 @@ from manitwin.render.overlays import ground_shadow, visible_edges
 from manitwin.render.raycast import cast_camera, merged, visible_points
 from manitwin.render.renderer import BACKDROP, shared_renderer
 from manitwin.render.surfaces import plain_part
+from manitwin.render.visibility import is_closed_and_outward
 
 CLAY = (214, 210, 203)
 WIRE = np.array([40, 46, 58], dtype=np.float32)
@@ -81,7 +83,7 @@ def mesh_panel(
     """Draw the convex collision hulls, each in its colour, under the edges of the solid mesh, and the centre of mass."""
     camera = _turned(hero, np.concatenate([np.asarray(solid.vertices), *hulls]), 0.0)
     parts = _colored([hull_mesh(hull) for hull in hulls], HULL_COLORS, roughness=0.9)
-    picture = shared_renderer().render(parts, [camera])[0].rgb.astype(np.float32)
+    picture = shared_renderer().render(parts, [camera], with_backs=False)[0].rgb.astype(np.float32)
     depth, _, _ = cast_camera(RayCaster(solid), camera)
     cover = visible_edges(solid, camera, depth)
     # A fine mesh would be black: its lines together take away at most a quarter of the light.
@@ -185,8 +187,9 @@ def _telling_camera(
 
 
 def _grounded(parts: list[trimesh.Trimesh], mesh: trimesh.Trimesh, camera: Camera) -> np.ndarray:
-    """Draw parts over the shade that ``mesh`` throws on the ground."""
-    frame = shared_renderer().render(parts, [camera])[0]
+    """Draw parts, those of ``mesh`` and closed ones besides, over the shade that it throws on the ground."""
+    closed = kept(mesh, "closed and outward", lambda: is_closed_and_outward(mesh))
+    frame = shared_renderer().render(parts, [camera], with_backs=not closed)[0]
     shade = ground_shadow(mesh, camera)
     behind, picture = ((1 - frame.coverage) * (1 - shade)).astype(float), np.empty_like(frame.rgb)
     for channel, ground in enumerate(BACKDROP):

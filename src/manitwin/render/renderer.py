@@ -22,7 +22,7 @@ import trimesh
 from manitwin.geometry.poses import transform
 from manitwin.render.cameras import Camera, sapien_axes
 from manitwin.render.device import RenderDevice, render_scene, require_renderer
-from manitwin.render.surfaces import RenderSurface, render_surface, triangle_mesh_shape
+from manitwin.render.surfaces import RenderSurface, front_faces, render_surface, triangle_mesh_shape
 
 BACKDROP = (233, 235, 238)  # light enough to be no colour, dark enough that white things stand out
 SUPERSAMPLE = 2  # SAPIEN's edges are not antialiased; twice the size each way removes the steps that are seen
@@ -71,13 +71,16 @@ class Renderer:
         *,
         background: tuple[int, int, int] = BACKDROP,
         supersample: int = SUPERSAMPLE,
+        with_backs: bool = True,
     ) -> list[Frame]:
         """Draw ``parts``, meshes in the object frame, from each camera, over a background colour.
+
+        Without ``with_backs`` faces are not drawn from behind: a sixth of the time less, for what ``is_closed_and_outward``.
 
         ``supersample`` smooths the edges of ``rgb``; with 1, ``depth`` is that of the rays through the pixels' centres
         (measured: 1e-7 m on an object of 0.1 m), with 2 it is a little off at creases and edges.
         """
-        surfaces = [render_surface(part) for part in parts]
+        surfaces = [render_surface(part) if with_backs else front_faces(render_surface(part)) for part in parts]
         points = np.concatenate([s.vertices for s in surfaces])
         low, high = points.min(0), points.max(0)
         center, scale = (low + high) / 2, 2 / float(np.linalg.norm(high - low))  # a sphere of radius 1 holds everything

@@ -1,4 +1,4 @@
-"""Which faces of a thing can be seen from outside it: the others need not be drawn."""
+"""Which faces of a thing can be seen from outside it, and from which side: the others need not be drawn."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import numpy as np
 import trimesh
 
 from manitwin.geometry.ray_caster import RayCaster
+from manitwin.geometry.repair.halfedges import is_closed_and_consistent, label_components
 from manitwin.geometry.repair.thickening import fibonacci_sphere
+from manitwin.geometry.repair.welding import weld_equal
 
 DIRECTIONS = 128
 SPACING_M = 0.008
@@ -14,6 +16,17 @@ _FEWEST, _MOST = 1, 24  # parts of a triangle's longest side between places
 _INWARD = 0.02  # of the way to the triangle's middle: no place is on its border
 _OFF_SURFACE_M = 2e-5  # above it, where rays begin
 _GRAZING = 0.02  # cosine to the normal, below which a ray would run along its own face
+
+
+def is_closed_and_outward(mesh: trimesh.Trimesh) -> bool:
+    """Tell whether a mesh, its seams welded, is closed and all its pieces face outward: from outside no face shows its back."""
+    vertices, faces = weld_equal(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+    if not is_closed_and_consistent(faces, len(vertices)):
+        return False
+    links = np.concatenate([faces[:, :2], faces[:, 1:]])
+    piece = label_components(len(vertices), links[:, 0], links[:, 1])[faces[:, 0]]
+    a, b, c = (vertices[faces[:, corner]] - vertices.mean(0) for corner in range(3))
+    return bool((np.bincount(piece, np.einsum("fi,fi->f", a, np.cross(b, c))) > 0).all())
 
 
 def faces_seen_from_outside(mesh: trimesh.Trimesh, *, from_behind: bool = False) -> np.ndarray:
