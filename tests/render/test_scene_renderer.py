@@ -21,7 +21,7 @@ from manitwin.render.drawable import drawable
 from manitwin.render.procedural_textures import ProceduralTexture, textured_box
 from manitwin.render.raycast import cast_camera
 from manitwin.render.scene_lighting import WHITE_PAPER, DirectionalLight, Lighting
-from manitwin.render.scene_renderer import SceneRenderer, Surroundings
+from manitwin.render.scene_renderer import SceneRenderer, ShadowRegion, Surroundings
 from manitwin.render.surfaces import plain_part, scene_shape
 
 SIZE = 160
@@ -231,6 +231,23 @@ def test_texture_lies_the_right_way_up_on_a_box() -> None:
     upper_left, upper_right, lower_left, lower_right = rgb[20, 20], rgb[20, 44], rgb[44, 20], rgb[44, 44]
     assert upper_left[0] > lower_left[0] > lower_left[2]
     assert upper_right[2] > lower_right[2] > lower_right[0]
+
+
+@pytest.mark.parametrize("side_px", [64, 16])
+def test_roughness_of_a_textured_thing_is_that_of_its_map(side_px: int) -> None:
+    """A mirror's lamp, seen where it is reflected: bright on the smooth half, dim on the rough one; also of a smaller map."""
+    lamp = Lighting(np.full(3, 0.05), (DirectionalLight(np.array([0.0, 0.0, -1.0]), np.full(3, 1.0)),))
+    rough = np.full((side_px, side_px), 230, np.uint8)
+    rough[:, : side_px // 2] = 40
+    texture = ProceduralTexture(np.full((64, 64, 3), 40, np.uint8), rough, 0.0, 0.4)
+    with SceneRenderer(lamp, surroundings=None) as made:
+        made.add("box", [textured_box(np.array([0.2, 0.2, 0.02]), texture, offset_m=(0.2, 0.2))])
+        rgb = made.render([camera([0, 0, 3.0], [0, 0, 0], size=64, fov=0.15)])[0].rgb.astype(int)
+    assert rgb[32, 20].mean() > rgb[32, 44].mean() + 40
+
+
+def test_region_of_shadows_has_texels_for_the_picture() -> None:
+    assert [ShadowRegion().for_pictures_of(px).map_px for px in (64, 256, 1000)] == [160, 640, 1024]
 
 
 def test_name_can_be_given_once(renderer: SceneRenderer) -> None:

@@ -79,6 +79,7 @@ def test_drawable_has_backs_of_those_faces_alone_that_are_seen_from_behind() -> 
 def test_closed_pieces_that_face_outward_show_no_back() -> None:
     apart = box(0.05).apply_translation([0.2, 0, 0])
     assert is_closed_and_outward(together(box(0.1), apart))
+    assert is_closed_and_outward(trimesh.Trimesh([*box(0.1).vertices, [0.3, 0, 0]], box(0.1).faces, process=False))
     assert not is_closed_and_outward(without_lid(box(0.1)))
     apart.invert()
     assert not is_closed_and_outward(together(box(0.1), apart))

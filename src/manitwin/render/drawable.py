@@ -61,10 +61,7 @@ def drawable(
     surfaces = [render_surface(part) if both_sides else front_faces(render_surface(part)) for part in parts]
     whole = merged(list(parts))
     if hidden_left_out:
-        seen = [
-            faces_seen_from_outside(whole, from_behind=behind) for behind in ((False, True) if both_sides else (False,))
-        ]
-        surfaces = _seen_alone(surfaces, *seen)
+        surfaces = _seen_alone(surfaces, *_sides_seen(whole, both_sides))
     if most_texture_px is not None:
         surfaces = [_with_small_textures(each, most_texture_px) for each in surfaces]
     return Drawable(tuple(surfaces), _shadow_caster(whole, both_sides, tolerance_m, hidden_left_out))
@@ -130,6 +127,11 @@ def _with_small_textures(s: RenderSurface, most_px: int) -> RenderSurface:
     return replace(s, color_map=color, roughness_map=roughness, metallic_map=metallic)
 
 
+def _sides_seen(mesh: trimesh.Trimesh, both_sides: bool) -> list[np.ndarray]:
+    """Return which faces are seen from their outward side, and with ``both_sides`` which from behind, ``(F,) bool`` each."""
+    return [faces_seen_from_outside(mesh, from_behind=behind) for behind in ([False, True] if both_sides else [False])]
+
+
 def _seen_alone(
     surfaces: list[RenderSurface], front: np.ndarray, back: np.ndarray | None = None
 ) -> list[RenderSurface]:
@@ -162,8 +164,7 @@ def _shadow_caster(
         faces = simplified(vertices, faces, max(tolerance_m, SHADOW_TOLERANCE_M), keep_open_edges=False)
     sides = [faces[:, ::-1], faces] if both_sides else [faces[:, ::-1]]
     if hidden_left_out:
-        bare = trimesh.Trimesh(vertices, faces, process=False)
-        seen = [faces_seen_from_outside(bare, from_behind=behind) for behind in (False, True)[: len(sides)]]
+        seen = _sides_seen(trimesh.Trimesh(vertices, faces, process=False), both_sides)
         sides = [side[shown] for side, shown in zip(sides, seen, strict=True)]
     return _bare_surface(vertices, np.concatenate(sides))
 

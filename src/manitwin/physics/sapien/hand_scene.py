@@ -80,14 +80,13 @@ class HandScene:
         self.in_object_m = body.center_of_mass_m
         self.looks = [object_to_hand]
         self._pose: np.ndarray | None = None  # of the object, since the last step
-        self._even_loads: np.ndarray | None = (
-            None  # what every step is loaded with: while the hand closes, and where it waits
-        )
+        # Loads of which each step has the same, as they were given last: while the hand closes, and where it waits.
+        self._even_loads: np.ndarray | None = None
 
     def advance(self, loads_m_s2: np.ndarray) -> None:
         """Take one step for each row of accelerations ``(N, 3)``."""
         self._pose = None
-        if self.hand.is_ahead:  # nothing touches the object, and nothing else loads it while the hand closes
+        if self.hand.is_ahead and not loads_m_s2.any():  # nothing touches the object, and nothing else loads it
             return
         set_target, step = self.load.set_drive_velocity_target, self.system.step
         if loads_m_s2 is not self._even_loads:
