@@ -12,6 +12,7 @@ import trimesh
 from PIL import Image
 from trimesh.visual.material import PBRMaterial
 
+from manitwin.formats.meshes.obj_faces import Faces
 from manitwin.formats.meshes.point_hull import hull_part
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import color_by_corner, decode_texture, make_part, material_of, pbr_material
@@ -22,16 +23,7 @@ DEFAULT_COLOR = (0.8, 0.8, 0.8)
 _MAX_PLAIN_BYTES = 64 << 20  # of a text that is held as lines; longer ones are read line by line
 _MAX_LINE = 64 << 20  # a face may have millions of corners
 _MAX_NUMBERS = 4096  # characters of a line of numbers
-_MAX_INDEX = 2**31
 _MAX_LIBRARIES, _NAME_CHARACTERS = 1000, 4096
-
-
-@dataclass
-class _Group:
-    """The faces of one material: per polygon its corner count, per corner its 0-based v, vt and vn index (-1: none)."""
-
-    sizes: list[int] = field(default_factory=list)
-    corners: list[tuple[int, int, int]] = field(default_factory=list)
 
 
 @dataclass
@@ -39,7 +31,7 @@ class _Document:
     positions: list[str] = field(default_factory=list)
     uv: list[str] = field(default_factory=list)
     normals: list[str] = field(default_factory=list)
-    groups: dict[str, _Group] = field(default_factory=dict)
+    groups: dict[str, Faces] = field(default_factory=dict)
     libraries: list[str] = field(default_factory=list)
 
 
@@ -62,9 +54,10 @@ def read_obj(source: MeshSource) -> list[trimesh.Trimesh]:
     materials = _materials(document, source)
     parts = []
     for name, group in document.groups.items():
-        if not group.corners:  # of its faces none has a corner
+        sizes, rows = group.rows()
+        if not len(rows):  # of its faces none has a corner
             continue
-        faces, corners = _unique_corners(group, (len(positions), len(uv), len(normals)), source)
+        faces, corners = _unique_corners(sizes, rows, (len(positions), len(uv), len(normals)), source)
         part = make_part(
             positions[corners[:, 0]],
             faces,
@@ -109,10 +102,8 @@ def _lines(data: bytes, source: MeshSource) -> Iterator[str]:
 def _parse(data: bytes, source: MeshSource) -> _Document:
     document = _Document()
     tables = {"v": document.positions, "vt": document.uv, "vn": document.normals}
-    group: _Group | None = None
+    group: Faces | None = None
     material = ""
-    corner_cache: dict[str, tuple[int, int, int]] = {}
-    known = corner_cache.get
     triangles = 0
     most, most_vertices = source.limits.max_faces, source.limits.max_vertices
     for number, line in enumerate(_lines(data, source), start=1):
@@ -131,21 +122,13 @@ def _parse(data: bytes, source: MeshSource) -> _Document:
                 source.check_vertices(len(table))
         elif keyword == "f":
             if group is None:
-                group = document.groups.setdefault(material, _Group())
+                group = document.groups.setdefault(material, Faces(source))
                 source.check_parts(len(document.groups))
-            # one word more than may be: the rest of the line
-            said = rest.split(None, most + 3)
-            try:
-                corners = [known(word) or _corner(word, document, corner_cache) for word in said[: most + 3]]
-            except ValueError as error:
-                raise source.unreadable(f"line {number} is no face: {line[:60]!r}", "export it again") from error
-            triangles += max(len(said) - 2, 1)
+            size = len(rest.split(None, most + 3))  # one word more than may be: the rest of the line
+            triangles += max(size - 2, 1)
             if triangles > most:
                 source.check_faces(triangles)
-            if len(corners) < 3:
-                continue  # a point or a line written as a face
-            group.sizes.append(len(corners))
-            group.corners.extend(corners)
+            group.add(number, line, rest, size, (len(document.positions), len(document.uv), len(document.normals)))
         elif keyword == "usemtl":
             material = rest[:_NAME_CHARACTERS].strip()
             group = None
@@ -154,29 +137,10 @@ def _parse(data: bytes, source: MeshSource) -> _Document:
     return document
 
 
-def _corner(word: str, document: _Document, cache: dict[str, tuple[int, int, int]]) -> tuple[int, int, int]:
-    """Return the 0-based indices of ``v/vt/vn``; negative numbers count back from the last line so far."""
-    fields = word.split("/")
-    counts = (len(document.positions), len(document.uv), len(document.normals))
-    indices = [-1, -1, -1]
-    relative = False
-    for i, text in enumerate(fields[:3]):
-        if text == "" and i > 0:
-            continue
-        value = int(text)
-        if value == 0 or value < -counts[i] or value > _MAX_INDEX:
-            raise ValueError(word)
-        relative = relative or value < 0
-        indices[i] = value - 1 if value > 0 else counts[i] + value
-    corner = (indices[0], indices[1], indices[2])
-    if not relative:
-        cache[word] = corner
-    return corner
-
-
-def _unique_corners(group: _Group, counts: tuple[int, int, int], source: MeshSource) -> tuple[np.ndarray, np.ndarray]:
-    """Return triangles ``(F, 3)`` into unique ``(v, vt, vn)`` rows ``(V, 3)``."""
-    rows = np.asarray(group.corners, dtype=np.int64)
+def _unique_corners(
+    sizes: np.ndarray, rows: np.ndarray, counts: tuple[int, int, int], source: MeshSource
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return triangles ``(F, 3)`` of polygons with these corner counts and rows, into unique ``(v, vt, vn)`` rows ``(V, 3)``."""
     for column, (count, what) in enumerate(zip(counts, ("vertex", "texture coordinate", "normal"), strict=True)):
         if column and not count and rows[:, column].max() >= 0:
             rows[:, column] = -1  # loaders do not miss what they can do without
@@ -192,7 +156,7 @@ def _unique_corners(group: _Group, counts: tuple[int, int, int], source: MeshSou
         key = np.unique(key, return_inverse=True)[1]
     key = key * (counts[2] + 1) + rows[:, 2] + 1
     _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
-    fans, _ = triangle_fans(np.asarray(group.sizes))
+    fans, _ = triangle_fans(sizes)
     return inverse[fans], rows[first]
 
 
