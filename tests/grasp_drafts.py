@@ -74,7 +74,13 @@ def run_all(draft: Draft, work: Path, *stages: Stage) -> Draft:
 
 
 def proposed_draft(
-    folder: Path, outcomes: list[str], *, unfiltered: int = 0, suffix: str = "", draft: Draft | None = None
+    folder: Path,
+    outcomes: list[str],
+    *,
+    unfiltered: int = 0,
+    suffix: str = "",
+    draft: Draft | None = None,
+    second_outcomes: list[str] | None = None,
 ) -> Draft:
     """A box draft with made-up proposals and verdicts: the last ``unfiltered`` ones are the unfiltered sample.
 
@@ -98,6 +104,7 @@ def proposed_draft(
         outcome=np.array(outcomes, "U16"),
         displacement_m=np.full(count, 0.001),
         rotation_rad=np.full(count, 0.01),
+        second_outcome=np.array(second_outcomes or [""] * count, "U16"),
     )
     for name in ("proposals", "verdicts"):
         draft.paths[f"{name}{suffix}.npz"] = folder / f"{name}{suffix}.npz"

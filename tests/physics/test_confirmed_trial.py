@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -51,7 +51,8 @@ def test_second_engine_is_asked_about_what_moved_and_can_overturn_it() -> None:
     second = Answers("second", {0.001: agreed, 0.002: refused})
     trial = ConfirmedTrial(first, second)
     poses = np.array([above([0, 0, height_m]) for height_m in first.results])
-    assert trial.run(BRICK, PANDA, poses, SETTINGS) == [still, slid, refused, failed]
+    confirmed, overturned = replace(slid, second_outcome="held"), replace(refused, second_outcome="drops")
+    assert trial.run(BRICK, PANDA, poses, SETTINGS) == [still, confirmed, overturned, failed]
     assert second.asked_m == [0.001, 0.002]
     assert (trial.name, trial.confirmed_by) == ("first", "second")
 

@@ -113,6 +113,28 @@ def test_twin_on_which_the_engines_never_agree_is_rejected_where_they_must(tmp_p
     assert run_all(draft, tmp_path, accepted).field("grasps")["verified"] == 2
 
 
+def test_what_the_second_engine_has_said_already_is_not_asked_again(tmp_path: Path) -> None:
+    said = ["", "held", "", "drops", "", "", "", "", ""]
+    draft = proposed_draft(tmp_path, OUTCOMES, unfiltered=2, second_outcomes=said)
+    settings = SecondOpinionConfig(jittered=0, share_of_failed=1.0)
+    first, second = Scripted(lambda *_: "drops", "first"), Scripted(second_engine, "second")
+    run_all(draft, tmp_path, SecondOpinionStage(settings, VerifyConfig(), first, second, PANDA))
+    assert second.asked == CHOSEN - 2
+    with np.load(draft.path("second_opinion.npz")) as arrays:
+        assert arrays["outcome"].tolist() == [
+            "held",
+            "held",
+            "penetrates",
+            "drops",
+            "held",
+            "penetrates",
+            "held",
+            "",
+            "",
+        ]
+        assert arrays["holds"].tolist() == [1, 1, 0, 0, 1, 0, 1, -1, -1]
+
+
 @pytest.mark.parametrize("require_agreement", [False, True])
 def test_failure_tables_add_up_to_the_simulated(tmp_path: Path, require_agreement: bool) -> None:
     rows, summary = record(draft_with_all(tmp_path), tmp_path, require_agreement=require_agreement)

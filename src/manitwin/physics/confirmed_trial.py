@@ -7,6 +7,8 @@ grasps of 60 objects that one engine held, all that the other one dropped were a
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from manitwin.geometry.rigid_body import RigidBody
@@ -34,15 +36,18 @@ class ConfirmedTrial:
         settings: TrialSettings,
         joints_rad: np.ndarray | None = None,
     ) -> list[TrialResult]:
-        """Try the grasps ``gripper_to_object (N, 4, 4)``; a held one that the second engine refuses has its result."""
+        """Try the grasps ``gripper_to_object (N, 4, 4)``; a held one that the second engine refuses has its result.
+
+        What the second engine says of those that it was asked about is their ``second_outcome``.
+        """
         results = list(self.first.run(body, gripper, gripper_to_object, settings, joints_rad))
         moved = [number for number, result in enumerate(results) if result.outcome == "held" and has_moved(result)]
         if moved:
             joints = None if joints_rad is None else joints_rad[moved]
             again = self.second.run(body, gripper, gripper_to_object[moved], settings, joints)
             for number, result in zip(moved, again, strict=True):
-                if result.outcome != "held":
-                    results[number] = result
+                said = results[number] if result.outcome == "held" else result
+                results[number] = replace(said, second_outcome=result.outcome)
         return results
 
 

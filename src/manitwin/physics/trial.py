@@ -67,7 +67,8 @@ class TrialResult:
     ``displacement_m`` is the largest distance that the centre of mass moved in the hand during the phase that decided:
     the slides of a held grasp, else the phase of its failure. ``rotation_rad`` is how far the object turned in the hand
     since it was closed. ``penetration_m`` is the deepest overlap of finger and object, ``finger_forces_n`` the normal
-    forces of the fingers when closed, ``steps`` the simulated steps.
+    forces of the fingers when closed, ``steps`` the simulated steps. ``second_outcome`` is that of a second engine, where one
+    was asked.
     """
 
     outcome: Outcome
@@ -76,6 +77,7 @@ class TrialResult:
     penetration_m: float
     finger_forces_n: tuple[float, ...]
     steps: int
+    second_outcome: Outcome | None = None
 
 
 class GraspTrial(Protocol):

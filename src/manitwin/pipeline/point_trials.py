@@ -23,7 +23,7 @@ from manitwin.pipeline.link_grasps import ChosenLink
 from manitwin.pipeline.object_state import JOINTS, load_body
 from manitwin.pipeline.point_search import PointSearch, Tried
 from manitwin.pipeline.tried import POINT_PROPOSALS, POINT_VERDICTS, read_arrays
-from manitwin.pipeline.verify import VERDICTS, result_arrays, trial_settings
+from manitwin.pipeline.verify import VERDICTS, confirmation, result_arrays, trial_settings
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.point_records import GraspPoint
 
@@ -38,7 +38,7 @@ class PointTrialsStage:
     """
 
     name: ClassVar[str] = "point_trials"
-    version: ClassVar[str] = "11"
+    version: ClassVar[str] = "12"
     reads: ClassVar[tuple[str, ...]] = (
         *READS, "hulls.npz", "points", "spare_grasp_points", "physical", "placements", "geometry?", "canonical.npz?",
         PROPOSALS.format(""), VERDICTS.format(""),
@@ -55,6 +55,7 @@ class PointTrialsStage:
         self.needs: Resource = grasper.needs
         self.model: str | None = (
             f"{grasper.model or grasper.name} for {gripper.name} {gripper.sha256[:12]}, {verify.model_dump_json()}"
+            f"{confirmation(trial)}"
         )
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:

@@ -33,7 +33,7 @@ class SecondOpinionStage:
     with both engines' verdicts.
     """
 
-    version = "8"
+    version = "9"
     needs: Resource = "cpu"
 
     def __init__(
@@ -74,20 +74,23 @@ class SecondOpinionStage:
         )
         body, settings = load_body(draft), trial_settings(self.verify, self.gripper)
         tried = np.concatenate([some_good, some_bad])
+        outcome = np.full(len(poses), "", "U16")
+        outcome[tried] = verdicts["second_outcome"][tried]  # of what the second engine has confirmed or refused already
+        asked = tried[outcome[tried] == ""]
         again = self.second.run(
             body,
             self.gripper,
-            np.concatenate([poses[tried], moved]),
+            np.concatenate([poses[asked], moved]),
             settings,
-            **{name: values[np.concatenate([tried, of])] for name, values in joints.items()},
+            **{name: values[np.concatenate([asked, of])] for name, values in joints.items()},
         )
         first = self.first.run(
             body, self.gripper, moved, settings, **{name: values[of] for name, values in joints.items()}
         )
-        holds, outcome = np.full(len(poses), NOT_TRIED, np.int8), np.full(len(poses), "", "U16")
-        holds[tried] = [result.outcome == "held" for result in again[: len(tried)]]
-        outcome[tried] = [result.outcome for result in again[: len(tried)]]
-        second = np.array([result.outcome == "held" for result in again[len(tried) :]], bool)
+        outcome[asked] = [result.outcome for result in again[: len(asked)]]
+        holds = np.full(len(poses), NOT_TRIED, np.int8)
+        holds[tried] = outcome[tried] == "held"
+        second = np.array([result.outcome == "held" for result in again[len(asked) :]], bool)
         np.savez(
             folder / self.file,
             holds=holds,

@@ -30,14 +30,14 @@ class VerifyStage:
     gripper rejects the object; another gripper does not.
     """
 
-    version = "7"
+    version = "8"
     needs: Resource = "cpu"
 
     def __init__(self, settings: VerifyConfig, trial: GraspTrial, gripper: Gripper, suffix: str = ""):
         """Take the settings, the engine, and the gripper."""
         self.settings, self.trial, self.gripper = settings, trial, gripper
         self.backend = trial.name
-        self.model: str | None = f"{gripper.name} {gripper.sha256[:12]}"
+        self.model: str | None = f"{gripper.name} {gripper.sha256[:12]}{confirmation(trial)}"
         self.name = f"verify{suffix}"
         self.proposals, self.verdicts, self.trial_field = (n.format(suffix) for n in (PROPOSALS, VERDICTS, TRIAL))
         self.reads: tuple[str, ...] = (self.proposals, "solid.npz", "hulls.npz", "physical")
@@ -83,10 +83,19 @@ def describe(trial: GraspTrial, settings: TrialSettings, object_friction: float)
     )
 
 
+def confirmation(trial: GraspTrial) -> str:
+    """Return what a stage's model says of the engine that confirms a trial's verdicts; nothing where none does."""
+    return f", confirmed by {trial.confirmed_by}" if isinstance(trial, ConfirmedTrial) else ""
+
+
 def result_arrays(results: list[TrialResult]) -> dict[str, np.ndarray]:
-    """Return the arrays of ``verdicts.npz``: outcome, displacement (m) and rotation (rad) of each trial."""
+    """Return the arrays of ``verdicts.npz``: outcome, displacement (m) and rotation (rad) of each trial.
+
+    ``second_outcome`` is that of the engine that was asked to confirm it, empty where none was.
+    """
     return {
         "outcome": np.array([result.outcome for result in results], dtype="U16"),
         "displacement_m": np.array([result.displacement_m for result in results], float),
         "rotation_rad": np.array([result.rotation_rad for result in results], float),
+        "second_outcome": np.array([result.second_outcome or "" for result in results], dtype="U16"),
     }
