@@ -1,12 +1,13 @@
 """Measure the classifier that names photos, on pictures whose truth is known: templates rendered over made backgrounds.
 
-    python benchmarks/naming.py [--seeds N] [--limits FILE] [--photos MANIFEST.csv FOLDER]
+    python benchmarks/naming.py [--seeds N] [--limits FILE] [--photos MANIFEST.csv FOLDER] [--meshes] [--twins FOLDER]
 
 Every template is drawn from three elevations and laid over a plain, wooden, cloudy or two-part ground with a soft shadow. The
 categories are split in halves: the temperature and the limits of one half are tried on the other. ``--limits`` writes those
 of all categories, as ``models/classifiers/name_limits.csv`` holds them: the highest probability that any picture of another
 thing gave a name. ``--photos`` prints what photos are named, with the truth of a manifest's column ``category``; nothing is
-set by them.
+set by them. ``--meshes`` names the templates' meshes as a build names what has no name, by six views, with and without their
+size; ``--twins`` does so with finished twins, whose names are their truth.
 """
 
 from __future__ import annotations
@@ -14,16 +15,19 @@ from __future__ import annotations
 import argparse
 import csv
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
 import numpy as np
+from PIL import Image
 
-from manitwin.config import NamingConfig
+from manitwin.config import NamingConfig, ViewsConfig
 from manitwin.errors import Rejected
 from manitwin.formats.image_file import read_image
 from manitwin.models.annotators.likely_names import usual_of
 from manitwin.models.annotators.priors import named
+from manitwin.models.annotators.rules import RulesAnnotator
 from manitwin.models.classifiers.classifier import LIKELIEST, TEMPERATURE, classify, softmax
 from manitwin.models.classifiers.efficientnet_lite import SIDE_PX, logits
 from manitwin.models.classifiers.imagenet import load_names
@@ -32,8 +36,12 @@ from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.made import make, visual_parts
 from manitwin.models.generators.templates.text import read_text
 from manitwin.models.matting import matte_photo
+from manitwin.pipeline.naming import VIEWS_FROM_ABOVE, cut_view
+from manitwin.pipeline.object_state import pictures
+from manitwin.pipeline.views import draw_views
 from manitwin.render.cameras import framing_camera
 from manitwin.render.renderer import BACKDROP, shared_renderer
+from manitwin.twin.loaded_twin import Twin
 
 ELEVATIONS_DEG = (12.0, 35.0, 62.0)
 LIMITS = (0.5, 0.6, 0.7, 0.8, 0.9)
@@ -58,7 +66,15 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--limits", type=Path)
     parser.add_argument("--photos", nargs=2, type=Path)
+    parser.add_argument("--meshes", action="store_true")
+    parser.add_argument("--twins", type=Path)
     arguments = parser.parse_args()
+    if arguments.meshes:
+        print_sized("templates", template_meshes(arguments.seeds))
+        return
+    if arguments.twins:
+        print_sized("twins", finished_twins(arguments.twins))
+        return
     if arguments.photos:
         print_photos(*arguments.photos)
         return
@@ -236,6 +252,44 @@ def print_photos(manifest: Path, folder: Path) -> None:
         category = named(found.name).category if found.name and named(found.name) else None
         likeliest = ", ".join(f"{guess.name} {guess.probability.value:.2f}" for guess in found.likeliest)
         print(f"{path.name:28s} {truth[path.name]:12s} -> {found.name or 'unknown'} [{category}] ({likeliest}){whole}")
+
+
+def template_meshes(seeds: int) -> Iterator[tuple[str, float, list[np.ndarray]]]:
+    """Yield of each made thing its category, its length (m) and the views of it that a name goes by."""
+    templates = load_templates()
+    for category in sorted(templates):
+        for seed in range(seeds):
+            made = make(templates[category], read_text(category, templates), np.random.default_rng(5000 + seed))
+            parts = visual_parts(made)
+            longest_m = float(np.ptp(np.concatenate([part.vertices for part in parts]), axis=0).max())
+            seen = draw_views(parts, ViewsConfig(), RulesAnnotator.picture_px)[1]
+            yield category, longest_m, [cut_view(seen[i]) for i in VIEWS_FROM_ABOVE]
+
+
+def finished_twins(folder: Path) -> Iterator[tuple[str, float, list[np.ndarray]]]:
+    """Yield of each finished twin its name or category, its length (m) and the views of it that a name goes by."""
+    for path in sorted(folder.glob("twins/*/*/twin.json")):
+        twin = Twin(path.parent)
+        seen = [np.asarray(Image.open(picture).convert("RGB")) for picture in pictures(path.parent / "views", "rgb")]
+        said = twin.record.name or twin.record.language.category
+        yield said, max(twin.record.physical.extents_m), [cut_view(seen[i]) for i in VIEWS_FROM_ABOVE]
+
+
+def print_sized(what: str, things: Iterator[tuple[str, float, list[np.ndarray]]]) -> None:
+    """Print how many are named, and how many of these right, without and with their size, by category in halves."""
+    counts: dict[tuple[bool, int], list[int]] = {}
+    categories: dict[str, int] = {}
+    for category, longest_m, views in things:
+        half = categories.setdefault(category, len(categories)) % 2
+        for sized in (False, True):
+            found = classify(views, LIMIT, longest_m if sized else None)
+            row = counts.setdefault((sized, half), [0, 0, 0])
+            right = found.name is not None and found.name in right_names(category)
+            row[0], row[1], row[2] = row[0] + 1, row[1] + (found.name is not None), row[2] + right
+            if found.name is not None and not right:
+                print(f"  {'with' if sized else 'without'} size: {category} of {longest_m:.3f} m is named {found.name}")
+    for (sized, half), (tried, given, right) in sorted(counts.items()):
+        print(f"{what}, half {half}, {'with' if sized else 'without'} size: {tried}, {given} named, {right} right")
 
 
 if __name__ == "__main__":

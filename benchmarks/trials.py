@@ -5,7 +5,8 @@
 ``TWINS`` is a folder of finished twins. All ratios are of CPU seconds measured in this one run:
 - against one scene a grasp with all hulls, all slides and no early exit;
 - against the time inside the physics steps alone;
-- ``--reference N`` jittered and plain grasps a twin are also tried at 1/960 s and 40 iterations, and verdicts compared;
+- ``--reference N`` jittered and plain grasps a twin are tried at 1/960 s and 40 iterations, and verdicts compared, and those of
+  the reference itself with the hand 20 um beside;
 - ``--processes`` runs the same trials in several processes and compares wall seconds with one.
 """
 
@@ -34,6 +35,7 @@ from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.twin.loaded_twin import Twin
 
 REFERENCE = {"timestep_s": 1 / 960, "solver_iterations": 40, "steps_per_frame": 16, "max_steps": 8000}
+BESIDE_M = 2e-5
 NO_LIMITS = {
     "max_overlap_m": np.inf,
     "max_penetration_m": np.inf,
@@ -157,7 +159,7 @@ def _plain_trials() -> Iterator[None]:
 
 def _compare(folders: list[Path], count: int) -> None:
     """Print how often the verdicts are those of the reference: of plain trials at today's step, and as they are run."""
-    verdicts: dict[str, list[bool]] = {"reference": [], "plain": [], "as run": []}
+    verdicts: dict[str, list[bool]] = {"reference": [], "reference, 20 um beside": [], "plain": [], "as run": []}
     is_jittered: list[bool] = []
     for folder in folders:
         twin, rng = Twin(folder), np.random.default_rng(0)
@@ -168,13 +170,17 @@ def _compare(folders: list[Path], count: int) -> None:
         is_jittered += [False] * len(poses) + [True] * len(moved)
         poses, body = np.concatenate([poses, moved]), twin.rigid_body()
         with _plain_trials():
-            reference = SapienTrial().run(body, gripper, poses, replace(_settings(), **REFERENCE))  # type: ignore[arg-type]
+            fine = replace(_settings(), **REFERENCE)  # type: ignore[arg-type]
+            reference = SapienTrial().run(body, gripper, poses, fine)
+            beside = poses.copy()
+            beside[:, :3, 3] += rng.normal(0, BESIDE_M, (len(poses), 3))
+            near = SapienTrial().run(body, gripper, beside, fine)
             plain = SapienTrial().run(body, gripper, poses, _settings())
         as_run = SapienTrial().run(body, gripper, poses, _settings())
-        for name, results in zip(verdicts, (reference, plain, as_run), strict=True):
+        for name, results in zip(verdicts, (reference, near, plain, as_run), strict=True):
             verdicts[name] += [result.outcome == "held" for result in results]
     truth, jitter = np.array(verdicts["reference"]), np.array(is_jittered)
-    for name in ("plain", "as run"):
+    for name in list(verdicts)[1:]:
         for kind, some in (("proposed", ~jitter), ("jittered", jitter)):
             said, true = np.array(verdicts[name])[some], truth[some]
             print(

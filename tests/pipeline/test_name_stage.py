@@ -6,13 +6,14 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from manitwin.config import BuildConfig, NamingConfig
 from manitwin.engine.stage import Draft
 from manitwin.pipeline.guesses import filled_checks, naming_checks
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.naming import NameStage, cut_view
+from manitwin.pipeline.naming import NameStage, cut_view, known_length_m
 from manitwin.pipeline.object_state import object_name
 from manitwin.pipeline.recipe import stages_for
 from manitwin.render.renderer import BACKDROP
@@ -75,6 +76,21 @@ def test_the_finding_names_the_likeliest_and_the_remedy(tmp_path: Path) -> None:
     (marked,) = filled_checks(made)
     assert not marked.passed and marked.message == "vlm:eyes-1 filled in the template mug; width 9, but ..."
     assert unsure.passed is False and "cannot tell what it is (orange 90 %" in unsure.message
+
+
+@pytest.mark.parametrize(
+    ("metric", "units", "known"),
+    [(True, "assumed", True), (True, "user", True), (True, "guessed", False), (False, "assumed", False)],
+)
+def test_a_mesh_is_as_long_as_it_stands_where_its_unit_is_known(
+    tmp_path: Path, metric: bool, units: str, known: bool
+) -> None:
+    made = Draft("t", Item(file=str(SAMPLE)), seed=0, fields={"geometry": {"metric": metric, "units": units}})
+    assert known_length_m(made) is None, "a photo has no size"
+    np.savez(tmp_path / "canonical.npz", vertices=np.array([[0, 0, 0], [0.03, 0, 0], [0, 0, 0.2], [0, 0.01, 0.1]]))
+    made.paths["canonical.npz"] = tmp_path / "canonical.npz"
+    length_m = known_length_m(made)
+    assert (length_m == pytest.approx(0.2)) if known else (length_m is None)
 
 
 def test_a_view_is_cut_out_of_its_backdrop() -> None:

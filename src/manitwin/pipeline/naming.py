@@ -10,6 +10,7 @@ from PIL import Image
 
 from manitwin.config import NamingConfig, Resource
 from manitwin.engine.stage import Draft
+from manitwin.geometry.boxes import upright_extents
 from manitwin.models.classifiers.classifier import Named, classify
 from manitwin.models.classifiers.efficientnet_lite import NAME, WEIGHTS_SHA256
 from manitwin.pipeline.item import Item
@@ -25,8 +26,8 @@ class NameStage:
     """Write the field ``naming``: what a classifier takes an unnamed thing for; None where a person has said it."""
 
     name: ClassVar[str] = "name"
-    version: ClassVar[str] = "1"
-    reads: ClassVar[tuple[str, ...]] = ("photo.png?", "photos/?", "views/?")
+    version: ClassVar[str] = "2"
+    reads: ClassVar[tuple[str, ...]] = ("photo.png?", "photos/?", "views/?", "canonical.npz?", "geometry?")
     writes: ClassVar[tuple[str, ...]] = ("naming",)
     needs: ClassVar[Resource] = "cpu"
     backend: ClassVar[str] = NAME
@@ -46,8 +47,19 @@ class NameStage:
         else:
             views = pictures(draft.path("views/"), "rgb")
             shown = [cut_view(np.asarray(Image.open(views[i]).convert("RGB"))) for i in VIEWS_FROM_ABOVE]
-        named = classify(shown, self.settings.min_probability)
+        named = classify(shown, self.settings.min_probability, known_length_m(draft))
         return {"naming": to_record(named).model_dump(mode="json")}
+
+
+def known_length_m(draft: Draft[Item]) -> float | None:
+    """Return how long a mesh is as it stands; None of a photo, and of a mesh whose unit nobody knows."""
+    if "canonical.npz" not in draft.paths:
+        return None
+    geometry = draft.field("geometry")
+    if not geometry["metric"] or geometry["units"] == "guessed":
+        return None
+    with np.load(draft.path("canonical.npz")) as solid:
+        return float(upright_extents(solid["vertices"]).max())
 
 
 def cut_view(picture: np.ndarray) -> np.ndarray:

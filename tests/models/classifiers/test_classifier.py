@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from manitwin.models.annotators.priors import lookup, named
-from manitwin.models.classifiers.classifier import classify, softmax
+from manitwin.models.classifiers.classifier import TEMPERATURE, classify, softmax
+from manitwin.models.classifiers.efficientnet_lite import SIDE_PX, logits
 from manitwin.models.classifiers.imagenet import CLASSES, load_limits, load_names
 from manitwin.models.classifiers.object_pictures import object_pictures
+from manitwin.models.classifiers.size_evidence import size_likelihoods
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.made import make, visual_parts
 from manitwin.models.generators.templates.text import read_text
@@ -82,3 +84,23 @@ def test_the_pictures_centre_the_object_on_its_own_and_on_plain_ground() -> None
 
 def test_probabilities_are_those_of_the_closed_form() -> None:
     assert softmax(np.log([[1.0, 2.0, 5.0]])) == pytest.approx(np.array([[0.125, 0.25, 0.625]]))
+
+
+def test_a_known_size_counts_by_bayes_rule_and_the_source_says_so() -> None:
+    picture = rendered("a mug")
+    table, weights = load_names(), size_likelihoods(0.11)
+    shares = softmax(logits(object_pictures(picture, SIDE_PX)) / TEMPERATURE).mean(axis=0) * weights
+    found = classify([picture], 0.7, longest_m=0.11)
+    for guess in found.likeliest:
+        members = table.members[table.names.index(guess.name)]
+        assert guess.probability.value == pytest.approx(shares[members].sum() / shares.sum(), rel=1e-9)
+        assert guess.probability.low <= guess.probability.value <= guess.probability.high
+        assert guess.probability.source == "efficientnet-lite0+size"
+
+
+def test_what_is_too_long_for_a_mug_is_less_of_one() -> None:
+    def of_mug(longest_m: float | None) -> float:
+        said = classify([rendered("a mug")], 0.7, longest_m).likeliest
+        return {guess.name: guess.probability.value for guess in said}.get("mug", 0.0)
+
+    assert of_mug(0.11) > of_mug(None) > of_mug(0.6)

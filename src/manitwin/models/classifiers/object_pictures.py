@@ -23,19 +23,24 @@ def object_pictures(rgba: np.ndarray, side_px: int) -> np.ndarray:
         raise ValueError("no object: alpha is empty")
     top, left, bottom, right = rows.min(), columns.min(), rows.max() + 1, columns.max() + 1
     half = (0.5 + MARGIN) * max(bottom - top, right - left)
-    center = ((left + right) / 2, (top + bottom) / 2)
-    alpha = rgba[..., 3:].astype(np.float32) / 255
-    own = rgba[..., :3].astype(np.float32)
+    around = _square(rgba, ((left + right) / 2, (top + bottom) / 2), half)  # a photo is large, and the rest of it not needed
+    alpha = around[..., 3:].astype(np.float32) / 255
+    own = around[..., :3].astype(np.float32)
     plain: list[np.ndarray] = [own * alpha + grey * (1 - alpha) for grey in PLAIN_GREYS]
-    return np.array([_square(picture, center, half, side_px) for picture in [own, *plain]])
+    return np.array([_resized(picture, side_px) for picture in [own, *plain]])
 
 
-def _square(picture: np.ndarray, center: tuple[float, float], half: float, side_px: int) -> np.ndarray:
+def _square(picture: np.ndarray, center: tuple[float, float], half: float) -> np.ndarray:
     """Return the square of ``2 half`` pixels around a centre; what is beyond the border is its nearest pixel."""
-    pad = int(np.ceil(half)) + 1
-    padded = cv2.copyMakeBorder(picture, pad, pad, pad, pad, cv2.BORDER_REPLICATE)
-    x, y, side = round(center[0] - half) + pad, round(center[1] - half) + pad, max(1, round(2 * half))
-    square = padded[y : y + side, x : x + side]
-    way = cv2.INTER_AREA if side > side_px else cv2.INTER_LINEAR
+    side, x, y = max(1, round(2 * half)), round(center[0] - half), round(center[1] - half)
+    rows, columns = (
+        np.clip(np.arange(begin, begin + side), 0, size - 1)
+        for begin, size in ((y, picture.shape[0]), (x, picture.shape[1]))
+    )
+    return picture[rows[:, None], columns]
+
+
+def _resized(square: np.ndarray, side_px: int) -> np.ndarray:
+    way = cv2.INTER_AREA if len(square) > side_px else cv2.INTER_LINEAR
     resized = cv2.resize(square, (side_px, side_px), interpolation=way)
     return np.rint(np.clip(resized, 0, 255)).astype(np.uint8)

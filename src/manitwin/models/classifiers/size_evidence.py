@@ -1,0 +1,48 @@
+"""What a known size says of a thing's name: a mug is not as long as a bucket."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+
+from manitwin.models.annotators.priors import Interval, named, unknown_prior
+from manitwin.models.classifiers.imagenet import load_names
+
+OTHER_SIZE_SHARE = 0.1
+"""So many things have any size: a toy, a sample, a file whose unit is another one."""
+ANY_SIZE_LOG_M = math.log(200)
+"""The width of the logarithms of any size: 5 mm to 1 m."""
+_STANDARD_NORMAL_95 = 1.645
+_LEAST_LOG_SPREAD = 0.05
+
+
+def size_likelihoods(longest_m: float) -> np.ndarray:
+    """Return how likely each of ImageNet's classes ``(1000,)`` makes it that a thing is ``longest_m`` long.
+
+    Densities of the logarithm: those of the usual interval of a class's name, of anything where it has none.
+    """
+    table = load_names()
+    likelihoods = np.full(table.members.shape[1], _density(unknown_prior().longest_axis_m, longest_m))
+    for usual, members in zip(_usual_lengths_m(), table.members, strict=True):
+        likelihoods[members] = _density(usual, longest_m)
+    return likelihoods
+
+
+@cache
+def _usual_lengths_m() -> tuple[Interval, ...]:
+    priors = [named(name) for name in load_names().names]
+    return tuple((unknown_prior() if prior is None else prior).longest_axis_m for prior in priors)
+
+
+def _density(usual: Interval, longest_m: float) -> float:
+    """Return the density of two halves of a log-normal, 90 % of which is in the usual interval, mixed with that of any size."""
+    below, above = (
+        max(abs(math.log(end / usual.typical)) / _STANDARD_NORMAL_95, _LEAST_LOG_SPREAD)
+        for end in (usual.low, usual.high)
+    )
+    off = math.log(longest_m / usual.typical)
+    peak = 1 / (math.sqrt(math.pi / 2) * (below + above))
+    own = peak * math.exp(-0.5 * (off / (below if off < 0 else above)) ** 2)
+    return (1 - OTHER_SIZE_SHARE) * own + OTHER_SIZE_SHARE / ANY_SIZE_LOG_M
