@@ -23,7 +23,9 @@ def object_pictures(rgba: np.ndarray, side_px: int) -> np.ndarray:
         raise ValueError("no object: alpha is empty")
     top, left, bottom, right = rows.min(), columns.min(), rows.max() + 1, columns.max() + 1
     half = (0.5 + MARGIN) * max(bottom - top, right - left)
-    around = _square(rgba, ((left + right) / 2, (top + bottom) / 2), half)  # a photo is large, and the rest of it not needed
+    around = _square(
+        rgba, ((left + right) / 2, (top + bottom) / 2), half
+    )  # a photo is large, and the rest of it not needed
     alpha = around[..., 3:].astype(np.float32) / 255
     own = around[..., :3].astype(np.float32)
     plain: list[np.ndarray] = [own * alpha + grey * (1 - alpha) for grey in PLAIN_GREYS]
