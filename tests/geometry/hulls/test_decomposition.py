@@ -1,4 +1,5 @@
 import io
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -6,9 +7,9 @@ import trimesh
 from scipy.spatial import QhullError
 
 from manitwin.geometry.cavity import find_opening
-from manitwin.geometry.hulls.decomposition import Decomposition, convex_decomposition
+from manitwin.geometry.hulls.decomposition import Decomposition, _merged, convex_decomposition
 from manitwin.geometry.hulls.error import hull_error
-from manitwin.geometry.hulls.reduction import hull_to_obj
+from manitwin.geometry.hulls.reduction import convex_corners, hull_to_obj, hull_volume
 from real_meshes import VESSELS, cup, load_real_mesh, mesh_rows
 
 
@@ -78,6 +79,36 @@ def test_more_components_than_hulls_are_merged() -> None:
     ]
     found = _decompose(trimesh.util.concatenate(crowd))
     assert len(found.hulls) == 32
+
+
+def merged_by_exact_costs(clouds: list[np.ndarray], max_hulls: int, free_m3: float) -> list[np.ndarray]:
+    """Merge the pair whose common hull adds least, whatever it costs to know."""
+    clouds = list(clouds)
+    while len(clouds) > 1:
+        costs = {
+            (i, j): hull_volume(np.vstack([clouds[i], clouds[j]])) - hull_volume(clouds[i]) - hull_volume(clouds[j])
+            for i, j in combinations(range(len(clouds)), 2)
+        }
+        i, j = min(costs, key=lambda pair: (costs[pair], pair))
+        if len(clouds) <= max_hulls and costs[i, j] > free_m3:
+            break
+        clouds[i] = convex_corners(np.vstack([clouds[i], clouds[j]]))[0]
+        del clouds[j]
+    return clouds
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_hulls_merged_by_bounds_of_what_they_add_are_those_merged_by_exact_costs(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    shapes = rng.uniform(0.02, 0.2, (10, 1, 3)) * rng.normal(size=(10, 30, 3))
+    clouds = [convex_corners(shape + rng.uniform(-0.4, 0.4, 3))[0] for shape in shapes]
+    max_hulls, free_m3 = int(rng.integers(2, 8)), float(rng.uniform(0, 0.02))
+    everything_touches_m = 10.0
+    found = _merged(clouds, max_hulls, free_m3, everything_touches_m)
+    expected = merged_by_exact_costs(clouds, max_hulls, free_m3)
+    assert len(found) == len(expected) <= len(clouds) - 2
+    for said, true in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(said, true)
 
 
 def test_flat_mesh_is_refused() -> None:
