@@ -180,12 +180,14 @@ def _compare(folders: list[Path], count: int) -> None:
         for name, results in zip(verdicts, (reference, near, plain, as_run), strict=True):
             verdicts[name] += [result.outcome == "held" for result in results]
     truth, jitter = np.array(verdicts["reference"]), np.array(is_jittered)
+    firm = np.array(verdicts["reference, 20 um beside"]) == truth
     for name in list(verdicts)[1:]:
         for kind, some in (("proposed", ~jitter), ("jittered", jitter)):
             said, true = np.array(verdicts[name])[some], truth[some]
             print(
                 f"{name}, {kind}: {100 * (said == true).mean():.1f} % of {len(true)} verdicts are the reference's (of which"
-                f" {true.sum()} held; {(said & ~true).sum()} held here alone), kappa {cohens_kappa(said, true) or 0.0:.2f}"
+                f" {true.sum()} held; {(said & ~true).sum()} held here alone), kappa {cohens_kappa(said, true) or 0.0:.2f};"
+                f" {100 * (said == true)[firm[some]].mean():.1f} % of the {firm[some].sum()} in which it agrees with itself"
             )
 
 
