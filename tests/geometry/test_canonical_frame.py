@@ -125,6 +125,13 @@ def test_units(longest: float, given: dict, factor: float, metric: bool, source:
     assert (unit.finding is None) == (source in ("user", "declared", "assumed"))
 
 
+def test_a_finding_says_a_size_only_where_it_is_used() -> None:
+    one, several = decide_unit(240.0), decide_unit(12.0)
+    assert one.finding is not None and one.finding.endswith("read as millimetres: 0.24 m")
+    assert several.finding is not None and "read as" not in several.finding
+    assert "millimetres, centimetres, inches would all fit: its scale was not believed; give --units" in several.finding
+
+
 def test_size_that_no_unit_makes_plausible_is_kept_for_the_gate_to_refuse() -> None:
     unit = decide_unit(1e6)
     assert (unit.factor, unit.metric) == (1.0, True)

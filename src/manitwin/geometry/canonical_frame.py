@@ -262,8 +262,10 @@ def _guessed(longest_axis: float, factor: float, declared: bool, expected_m: tup
         return LengthUnit(factor, True, source, f"{said}, and no usual unit makes that plausible; give --units")
     name, unit_m = next(iter(fitting.items()))
     others = [n for n in fitting if n != name]
-    alternatives = f" ({' or '.join(others)} would fit too; give --units to be sure)" if others else ""
-    finding = f"{said}, which is implausible; read as {name}: {longest_axis * unit_m:.3g} m{alternatives}"
+    if others:
+        finding = f"{said}, which is implausible; {', '.join(fitting)} would all fit: its scale was not believed; give --units"
+    else:
+        finding = f"{said}, which is implausible; read as {name}: {longest_axis * unit_m:.3g} m"
     return LengthUnit(unit_m, not others, "guessed", finding)
 
 

@@ -41,7 +41,7 @@ class MeshStage:
     settings: MeshConfig
 
     name: ClassVar[str] = "mesh"
-    version: ClassVar[str] = "3"
+    version: ClassVar[str] = "4"
     reads: ClassVar[tuple[str, ...]] = (f"{_GENERATED}?", "generation?", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry")
     needs: ClassVar[Resource] = "cpu"

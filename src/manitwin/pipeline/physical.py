@@ -43,7 +43,7 @@ class PhysicalStage:
     """Ask for size, mass and friction, scale the object, and compute the mass properties of its real shape."""
 
     name: ClassVar[str] = "physical"
-    version: ClassVar[str] = "12"
+    version: ClassVar[str] = "13"
     reads: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry", "views/", "cameras", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("visual.glb", "solid.npz", "physical", "physical_findings", "size", "called")
 
@@ -84,8 +84,10 @@ class PhysicalStage:
             off_m = float(np.linalg.norm(by_parts.center_of_mass_m - properties.center_of_mass_m))
             uncertainty = 0.0 if _known_mass(subject) is not None else max(uncertainty, OF_OTHER_MATTER * off_m)
             properties = by_parts
-        annotated = self._annotated(subject, solid, mass.value, scale, properties)
+        annotated, refused = self._annotated(subject, solid, mass.value, scale, properties)
         findings = findings_of(estimates)
+        if refused:
+            findings = [*(findings or ()), *refused]
         if annotated is not None and subject.given is not None:
             wall_m = estimates.wall_thickness_m or NOMINAL_WALL_M
             findings = [*(findings or ()), *moments_apart(annotated, solid, mass.value, wall_m, subject.given.source)]
@@ -121,10 +123,10 @@ class PhysicalStage:
 
     def _annotated(
         self, subject: Subject, solid: trimesh.Trimesh, mass_kg: float, scale: float, computed: MassProperties
-    ) -> MassProperties | None:
+    ) -> tuple[MassProperties | None, list[str]]:
         given = subject.given
         if given is None or given.made_of_parts or given.format == FITTED:
-            return None
+            return None, []
         return annotated_mass(given, solid, mass_kg, scale, computed)
 
     def _of_parts(

@@ -124,3 +124,28 @@ def test_an_arch_has_its_apex_and_its_ends_whichever_way_it_lies(turn: np.ndarra
     assert apex[2] > 0.17 and abs(apex[0]) < 0.085
     assert end[2] < 0.05 and abs(end[0]) > 0.07
     assert measured(trimesh.creation.box([0.1, 0.05, 0.2]))[0].arch is None
+
+
+def shoe(heel_forward: bool, filled: bool = False) -> trimesh.Trimesh:
+    """A low front and a high back with the hole for the foot in it, 28 cm long along Y."""
+    sole = trimesh.creation.box([0.09, 0.28, 0.045])
+    sole.apply_translation([0, 0, 0.0225])
+    upper = trimesh.creation.box([0.09, 0.13, 0.07])
+    upper.apply_translation([0, 0.075, 0.08])
+    mesh = trimesh.boolean.union([sole, upper], engine="manifold")
+    if not filled:
+        hole = trimesh.creation.box([0.07, 0.11, 0.09])
+        hole.apply_translation([0, 0.075, 0.09])
+        mesh = trimesh.boolean.difference([mesh, hole], engine="manifold")
+    if heel_forward:
+        mesh.apply_transform(np.diag([1, -1, 1, 1]))
+        mesh.fix_normals()
+    return mesh
+
+
+@pytest.mark.parametrize("heel_forward", [True, False])
+@pytest.mark.parametrize("filled", [True, False])
+def test_a_toe_is_at_the_end_away_from_where_the_foot_goes_in(heel_forward: bool, filled: bool) -> None:
+    toe = best("toe", shoe(heel_forward, filled), stands=True)
+    front = 1 if heel_forward else -1
+    assert front * toe[1] > 0.09 and toe[2] < 0.05

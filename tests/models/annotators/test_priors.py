@@ -187,6 +187,23 @@ def test_what_is_used_or_made_otherwise_is_no_alias(said: str, category: str) ->
     assert found is not None and found.category == category
 
 
+@pytest.mark.parametrize(
+    ("said", "category"),
+    [
+        ("mug_1", "mug"), ("Mug 01", "mug"), ("pitcher blue", "pitcher"), ("ice_guard_pitcher_blue_2", "pitcher"),
+        ("bottle b", "bottle"), ("orange", "orange"), ("orange 2", "orange"),
+    ],
+)  # fmt: skip
+def test_numbers_and_colours_behind_a_thing_say_nothing(said: str, category: str) -> None:
+    found = lookup(said)
+    assert found is not None and found.category == category
+
+
+@pytest.mark.parametrize("said", ["obj_000001", "blue", "v2", "1", "mug rack", "mug rack 2"])
+def test_numbers_and_colours_alone_are_no_thing(said: str) -> None:
+    assert lookup(said) is None
+
+
 def test_form_of_an_alias_is_that_of_its_head_noun() -> None:
     """A plastic spoon is told apart as a spoon, and a thermometer gun held as a pistol."""
     plastic, spoon, gun = lookup("plastic spoon"), lookup("spoon"), lookup("thermometer gun")

@@ -40,6 +40,17 @@ def test_mass_stays_in_the_categorys_interval_where_the_volume_says_more() -> No
     assert lookup("mug").mass_kg.low <= estimate.low <= estimate.value <= estimate.high <= lookup("mug").mass_kg.high
 
 
+def test_a_volume_that_no_such_thing_has_leaves_the_mass_open_and_not_certain() -> None:
+    prior, block = lookup("mug"), trimesh.creation.box([0.12, 0.12, 0.12])
+    assert prior.bulk_density_kg_m3 is not None and prior.bulk_density_kg_m3.low * block.volume > prior.mass_kg.high
+    heavy = mass(block, "mug")
+    assert heavy.value == prior.mass_kg.high and heavy.low == prior.mass_kg.typical and heavy.high > 1.2 * heavy.value
+    sliver = trimesh.creation.box([0.12, 0.02, 0.002])
+    assert prior.bulk_density_kg_m3.high * sliver.volume < prior.mass_kg.low
+    light = mass(sliver, "mug")
+    assert light.low < light.value < light.high
+
+
 def test_interval_goes_on_beyond_the_answer_where_size_and_volume_contradict_each_other() -> None:
     thin = trimesh.creation.box([0.27, 0.1, 0.007])  # as long as a large toy, with the matter of a small one
     prior = lookup("toy")

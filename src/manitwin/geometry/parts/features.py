@@ -16,7 +16,7 @@ from manitwin.geometry.parts.shape import LEAST_HANDLE_REACH, Shape, SurfacePoin
 Feature = Literal[
     "opening", "rim", "inside", "handle", "handle_end", "head", "face", "tip", "edge", "middle", "neck", "spout",
     "top", "base", "side", "center", "front", "back", "end", "ring", "mouth", "bristles", "muzzle", "grip", "housing",
-    "apex", "arch_end", "end_wall",
+    "apex", "arch_end", "end_wall", "toe",
 ]  # fmt: skip
 """A place on an object that geometry can point out."""
 
@@ -247,6 +247,17 @@ def _end(shape: Shape, points: SurfacePoints) -> np.ndarray:
     return _near(0.5 - np.abs(along - 0.5), 0.08) * (0.8 + 0.2 * height) * (0.7 + 0.3 * middle)
 
 
+def _toe(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    """The end of the long axis away from where the foot goes in; without an opening the lower end, as a heel's back stands up."""
+    along = shape.axis.along(points.positions_m)
+    if shape.opening is not None:
+        heel = float(shape.axis.along(shape.opening.center_m[None])[0])
+    else:
+        heel = float(along[_share_of_height(shape, points) > 0.7].mean())
+    front = along if heel < 0.5 else 1 - along
+    return _end(shape, points) * (front > 0.5)
+
+
 def _end_wall(shape: Shape, points: SurfacePoints) -> np.ndarray:
     """What looks sideways near an end of the long axis: where fingers hold that come to the end of a box or can."""
     return _end(shape, points) * (1 - np.abs(points.normals[:, 2]))
@@ -297,7 +308,8 @@ _SCORERS: dict[str, Callable[[Shape, SurfacePoints], np.ndarray | None]] = {
     "opening": _opening, "rim": _rim, "inside": _inside, "handle": _handle, "handle_end": _handle_end, "head": _head,
     "face": _face, "tip": _tip, "edge": _edge, "middle": _middle, "neck": _neck, "spout": _spout, "top": _top,
     "base": _base, "side": _side, "center": _center, "front": partial(_large_face, side=1),
-    "back": partial(_large_face, side=-1), "end": _end, "ring": _ring,
+    "back": partial(_large_face, side=-1), "toe": _toe,
+    "end": _end, "ring": _ring,
     "mouth": _mouth, "bristles": _bristles, "muzzle": _muzzle, "grip": _grip, "housing": _housing,
     "apex": _apex, "arch_end": _arch_end, "end_wall": _end_wall,
 }  # fmt: skip

@@ -270,6 +270,7 @@ _PLACES: dict[str, str] = {
     "apex": "highest place of the arch",
     "arch_end": "end of the arch",
     "end_wall": "side near the end",
+    "toe": "end away from the opening",
 }
 
 

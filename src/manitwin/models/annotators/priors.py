@@ -274,19 +274,28 @@ def lookup(name: str | None) -> Prior | None:
     return None if found is None else found[0]
 
 
+_NO_THING = re.compile(
+    r"[a-z]?\d+[a-z]?|[a-z]|black|white|gr[ae]y|silver|red|green|blue|yellow|orange|brown|pink|purple|beige|small|medium|large"
+)
+
+
 def found_by(name: str | None) -> tuple[Prior, str] | None:
     """Find the prior of what a person calls a thing, and the words, in the singular, by which it is found.
 
     Tried in order: the whole name, or an alias of it; the part before 'of', 'with', 'for', 'in' or 'from'; the whole
     again: each as it is, in the singular, and with words dropped from the front ('red coffee mugs' are coffee mugs,
-    which are mugs). The last word decides what a thing is: a mug rack is no mug. File names are never looked up: they
-    are not evidence.
+    which are mugs). The last word decides what a thing is: a mug rack is no mug. Where none is found, numbers and colours at
+    the end say nothing: 'mug_1' and 'pitcher blue' are a mug and a pitcher. File names are never looked up: they are not
+    evidence.
     """
     if not name or not (phrase := normalised(name)):
         return None
     head = re.split(r" (?:of|with|for|in|without|from) ", phrase, maxsplit=1)[0].split()
     words = phrase.split()
     tries = [words, *(head[i:] for i in range(len(head))), *(words[i:] for i in range(1, len(words)))]
+    while head and _NO_THING.fullmatch(head[-1]):
+        head = head[:-1]
+        tries += [head[i:] for i in range(len(head))]
     index = _index()
     for part in tries:
         for candidate in _singulars(" ".join(part)):

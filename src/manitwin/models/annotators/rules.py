@@ -139,10 +139,15 @@ def _scaled(interval: Interval, factor: float) -> Interval:
 
 
 def _clamped(value: float, open_to: Interval, category: Interval, source: str) -> Estimate:
-    """Keep ``value`` in the category's interval, and of that interval what is left open around it."""
-    value = min(max(value, category.low), category.high)
+    """Keep ``value`` in the category's interval, and of that interval what is left open around it.
+
+    Where it has to be moved, size and volume are not those of such a thing: it may weigh what is usual of it, or what they say.
+    """
+    kept = min(max(value, category.low), category.high)
     low, high = max(category.low, open_to.low), min(category.high, open_to.high)
-    return Estimate(value=value, low=min(low, value), high=max(high, value), source=source)
+    if kept != value:
+        low, high = min(low, value, category.typical), max(high, value, category.typical)
+    return Estimate(value=kept, low=min(low, kept), high=max(high, kept), source=source)
 
 
 def _wall_thickness(subject: Subject, prior: Prior, scale: float) -> float | None:
