@@ -32,6 +32,10 @@ def read(text: str) -> Wanted:
         ("claw hammer", "hammer"),
         ("wooden spoon", "cooking spoon"),
         ("ballpoint pen", "pen"),
+        ("a jam jar", "jar"),
+        ("a travel mug", "thermos"),
+        ("a tooth brush", "toothbrush"),
+        ("a No. 2 pencil", "pencil"),
     ],
 )
 def test_category_is_the_thing_that_is_named(text: str, category: str) -> None:
@@ -85,6 +89,18 @@ def test_parts_are_described_by_their_name() -> None:
         ("a plate 10 inches wide", {"width": 0.254}),
         ("ruler, 0.3 m long", {"length": 0.3}),
         ("a 12cm glass", {"": 0.12}),
+        ("a 1,5 cm dice", {"": 0.015}),
+        ("a mug, 9,5 cm tall", {"height": 0.095}),
+        ("a rolling pin of 1,000 mm", {"": 1.0}),
+        ("a mug 9 centimetres tall", {"height": 0.09}),
+        ("a ruler, 0.3 meters", {"": 0.3}),
+        ('a 4" ruler', {"": 0.1016}),
+        ("a plate 10 in. wide", {"width": 0.254}),
+        ("a 1 foot ruler", {"": 0.3048}),
+        ("a mug 5 1/2 inches tall", {"height": 0.1397}),
+        ("a mug with a height of 9 cm", {"height": 0.09}),
+        ("a mug 9 cm in height", {"height": 0.09}),
+        ("a red mug with a wooden handle, 9 cm tall", {"height": 0.09}),
     ],
 )
 def test_lengths_are_read_with_their_unit_and_direction(text: str, lengths: dict[str, float]) -> None:
@@ -108,6 +124,41 @@ def test_text_that_names_no_template_is_refused_in_one_line(text: str) -> None:
     with pytest.raises(UsageError) as caught:
         read(text)
     assert "\n" not in str(caught.value) and len(str(caught.value)) < 700
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("a magnifying glass", "garlic bulb", "a muffin tin", "a VR headset", "a table tennis ball", "a glass marble"),
+        *("a measuring tape", "a name plate", "a soap dish"),
+    ],
+)
+def test_another_thing_whose_name_ends_as_a_templates_is_refused(text: str) -> None:
+    with pytest.raises(UsageError, match="no template makes"):
+        read(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "cause"),
+    [
+        ("a box 10 cm long, 6 cm wide and 4 cm tall", "several lengths"),
+        ("a box, 20 x 15 x 10 cm", "several lengths"),
+        ("a knife with a 12 cm long handle", "length of a part"),
+        ("a two-litre soda bottle", "a volume"),
+        ("a 2 kg dumbbell", "a mass"),
+        ("a mug without a handle", "what a thing is not"),
+    ],
+)
+def test_what_a_template_cannot_be_told_is_refused_and_not_left_out(text: str, cause: str) -> None:
+    with pytest.raises(UsageError, match=cause):
+        read(text)
+
+
+def test_a_part_is_called_by_its_plural_where_that_is_its_name() -> None:
+    wanted = read("a red toothbrush with white bristles")
+    made = make(TEMPLATES["toothbrush"], wanted, np.random.default_rng(0))
+    white = tuple(int(COLORS["white"][i : i + 2], 16) / 255 for i in (0, 2, 4))
+    assert made.looks["bristles"].rgb == pytest.approx(white)
 
 
 def test_nearest_categories_are_named() -> None:

@@ -156,7 +156,7 @@ def _looks(template: Template, wanted: Wanted, rng: np.random.Generator) -> dict
 def _check_parts(template: Template, wanted: Wanted, mesh: PartedMesh) -> None:
     known = sorted({*template.slots, *mesh.names})
     for part in wanted.wishes:
-        if part and part not in known:
+        if part and part not in known and f"{part}s" not in known:
             raise UsageError(f"a {template.category} has no {part!r} here. Its parts: {', '.join(known)}")
 
 

@@ -9,13 +9,30 @@ from difflib import get_close_matches
 from itertools import pairwise
 
 from manitwin.errors import UsageError
-from manitwin.models.annotators.priors import named
+from manitwin.models.annotators.priors import Prior, load_priors, named
 from manitwin.models.generators.templates.looks import SHADES, Look, color_of, look_of, material_of, shaded
 from manitwin.models.generators.templates.template import Template
 
 MAX_CHARACTERS = 400
-_LENGTH = re.compile(r"(\d{1,4}(?:\.\d{1,3})?) ?(mm|cm|m|inches|inch|in|ft)\b ?(\w{0,12})")
-_METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "inch": 0.0254, "inches": 0.0254, "in": 0.0254, "ft": 0.3048}
+_UNITS_M = {
+    r"millimet(?:re|er)s?": 1e-3, "mm": 1e-3, r"centimet(?:re|er)s?": 1e-2, "cm": 1e-2, r"met(?:re|er)s?": 1.0, "m": 1.0,
+    "inch(?:es)?": 0.0254, "in": 0.0254, "foot|feet|ft": 0.3048,
+}  # fmt: skip
+_LENGTH = re.compile(
+    rf"(\d{{1,4}}(?:\.\d{{1,3}})?) ?({'|'.join(_UNITS_M)})\b\.? ?(?:in (?=height|width|length|diameter|depth))?(\w{{0,12}})"
+)
+_NAMED_LENGTH = re.compile(rf"\b(height|width|length|diameter|depth)(?: of)? ({_LENGTH.pattern.split(' ?(?:in')[0]})")
+_OF_A_PART = re.compile(rf" (?:with|having|and) an? {_LENGTH.pattern}")
+_SEVERAL = re.compile(rf"\d ?(?:x|by|×) ?{_LENGTH.pattern}")
+_NOT_TAKEN = (
+    (re.compile(r"\b(?:no(?!\.? ?\d)|not|without)\b"), "what a thing is not"),
+    (
+        re.compile(r"\b(?:\d[\d.]*|one|two|three|half) ?(?:ml|cl|dl|l|lit(?:re|er)s?|ounces?|oz|pints?|gallons?)\b"),
+        "a volume",
+    ),
+    (re.compile(r"\b\d[\d.]* ?(?:kg|kilograms?|kilos?|g|grams?|lbs?|pounds?)\b"), "a mass"),
+)
+"""What no template can be told, by what it is called: left out in silence, the thing would be another one."""
 DIRECTIONS = {
     "tall": "height", "high": "height", "height": "height", "wide": "width", "width": "width", "broad": "width",
     "diameter": "width", "across": "width", "long": "length", "length": "length", "deep": "depth", "thick": "height",
@@ -72,6 +89,7 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
     if len(text) > MAX_CHARACTERS:
         raise UsageError(f"a text of {len(text)} characters; at most {MAX_CHARACTERS} describe an object")
     plain, lengths = _plain(text), lengths_in(text)
+    _check_taken(text, plain, lengths)
     rest = _LENGTH.sub(lambda m: "" if m[3] in DIRECTIONS else m[3], plain)
     main, *features = re.split(r" with | having | and a | and an ", rest.replace(" ,", " "))
     category, around = _category(main.split(), text, templates)
@@ -82,7 +100,8 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
         if not words:
             continue
         wish, _, left = _wish(words[:-1])
-        wishes[words[-1].removesuffix("s")] = wish
+        part = words[-1] if words[-1] in templates[category].slots else words[-1].removesuffix("s")
+        wishes[part] = wish
         unused += left
     return Wanted(category, wishes, lengths, relative, tuple(unused))
 
@@ -90,11 +109,38 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
 def lengths_in(text: str) -> dict[str, float]:
     """Return the lengths (m) that a text states by their direction, '' for the longest."""
     found = _LENGTH.findall(_plain(text))
-    return {DIRECTIONS.get(direction, ""): float(number) * _METRES[unit] for number, unit, direction in found}
+    return {DIRECTIONS.get(direction, ""): float(number) * _metres(unit) for number, unit, direction in found}
+
+
+def _metres(unit: str) -> float:
+    return next(metres for spelt, metres in _UNITS_M.items() if re.fullmatch(spelt, unit))
 
 
 def _plain(text: str) -> str:
-    return " ".join(text.lower().replace(",", " , ").replace("-", " ").split())
+    """Return the words in lower case: a decimal comma as a point, marks of inches and feet as words, a length before its name."""
+    plain = re.sub(r"(?<=\d),(?=\d{3}\b)", "", text.lower())
+    plain = re.sub(r"(?<=\d),(?=\d)", ".", plain)
+    plain = re.sub(r"(?<=\d) ?(?:\"|″|'')", " inches ", plain)
+    plain = re.sub(r"(?<=\d) ?(?:'|′)", " ft ", plain)
+    plain = re.sub(r"(\d+) (\d)/(\d)\b", lambda m: f"{int(m[1]) + int(m[2]) / max(int(m[3]), 1):g}", plain)
+    plain = " ".join(plain.replace(",", " , ").replace("-", " ").split())
+    return _NAMED_LENGTH.sub(lambda m: f"{m[2]} {m[1]}", plain)
+
+
+def _check_taken(text: str, plain: str, lengths: Mapping[str, float]) -> None:
+    """Raise UsageError for what a template cannot be told."""
+    for pattern, what in _NOT_TAKEN:
+        if (said := pattern.search(plain)) is not None:
+            raise UsageError(f"{text!r}: a template cannot be told {what} ({said[0]!r}); leave it out, or say a length")
+    if len(_LENGTH.findall(plain)) > 1 or len(lengths) > 1 or _SEVERAL.search(plain):
+        raise UsageError(
+            f"{text!r} states several lengths: a template is scaled as a whole; say one, such as '9 cm tall'"
+        )
+    part = _OF_A_PART.search(plain)
+    if part is not None and part[3] not in ("", *(d for d in DIRECTIONS if plain.endswith(d))):
+        raise UsageError(
+            f"{text!r} states the length of a part: a template is scaled as a whole; say that of the whole"
+        )
 
 
 def _category(words: list[str], text: str, templates: Mapping[str, Template]) -> tuple[str, list[str]]:
@@ -102,23 +148,38 @@ def _category(words: list[str], text: str, templates: Mapping[str, Template]) ->
 
     What a thing is, its last noun says: a phrase is no name where words follow that describe nothing (a mug rack is no mug),
     but for those behind a preposition (a cup of tea is a cup). A material that the name says, of those that such a thing is of,
-    is one of the words around it: a wooden spoon is of wood, but a wood chisel is not.
+    is one of the words around it: a wooden spoon is of wood, but a wood chisel is not. Where the longer phrase is another thing
+    that the priors know, a shorter one is that only where both have one form and the size fits: a jam jar is a jar, and a garlic
+    bulb no light bulb.
     """
     words = [word for word in (word.strip('.!?;:"') for word in words) if word]
     names = {
         name: template.category for template in templates.values() for name in (template.category, *template.names)
     }
+    other: Prior | None = None
     for end in range(len(words), 0, -1):
         tail = words[end:]
         if tail and tail[0] not in _PREPOSITIONS and _wish(tail)[2]:
             continue
         for start in range(end):
             phrase = " ".join(words[start:end])
-            prior = named(phrase)
-            category = names.get(phrase) or (prior.category if prior is not None else "")
-            if category in templates and words[start] not in _ARTICLES:
+            prior = named(phrase) or named(phrase.replace(" ", ""))
+            meant = [names.get(phrase), *([] if prior is None else [prior.category, prior.kin_of])]
+            category = next((name for name in meant if name in templates), None)
+            if category is None and words[start] not in _ARTICLES:
+                other = other or prior
+            elif category is not None and words[start] not in _ARTICLES:
+                if other is not None and not _stands_for(other, category):
+                    raise UsageError(_no_category(text, other.category.split(), sorted(names), len(templates)))
                 return category, [*_own_materials(words[start : end - 1], templates[category]), *words[:start], *tail]
     raise UsageError(_no_category(text, words, sorted(names), len(templates)))
+
+
+def _stands_for(meant: Prior, category: str) -> bool:
+    """Tell whether things of a category look like those that are meant, and may be as large."""
+    prior = load_priors()[category]
+    same = meant.shape == prior.shape and [p.label for p in meant.functional] == [p.label for p in prior.functional]
+    return same and prior.longest_axis_m.low <= meant.longest_axis_m.typical <= prior.longest_axis_m.high
 
 
 def _own_materials(words: list[str], template: Template) -> list[str]:
