@@ -10,6 +10,7 @@ from PIL import Image
 
 from manitwin.assets.audit.check import audit_path
 from manitwin.assets.audit.rules import RULES
+from manitwin.assets.joints import Joints
 from manitwin.assets.read import read_asset
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.textures import material_of
@@ -266,10 +267,26 @@ def test_what_a_free_joint_lets_go_is_the_object_and_what_has_no_joint_beside_it
     ball = '<body name="ball"><freejoint/><geom size="0.02"/></body>'
     assert read_asset(mjcf(tmp_path, table + ball)).name == "ball"
     door = '<body name="door"><joint/><geom type="box" size="0.3 0.3 0.01"/></body>'
-    cabinet = read_asset(mjcf(tmp_path, table + door))
+    cabinet = read_asset(mjcf(tmp_path, table.replace("</body>", f"{door}</body>")))
     assert cabinet.name == "table" and cabinet.static
+    assert read_asset(mjcf(tmp_path, table + table.replace("table", "shelf") + door)).name == "door"
     assert not read_asset(mjcf(tmp_path, table)).static  # a program that loads it adds the joint
     assert read_asset(mjcf(tmp_path, table + table.replace("table", "shelf"))).static  # and to scenery none
+
+
+@pytest.mark.parametrize("joints", ["part", "lock", "keep"])
+def test_where_nothing_is_free_what_has_joints_is_the_object_and_not_the_table(tmp_path: Path, joints: Joints) -> None:
+    table = '<body name="table"><geom type="box" size="0.3 0.3 0.1"/></body>'
+    knob = '<body name="knob"><joint/><geom type="box" size="0.05 0.01 0.01" mass="0.1"/></body>'
+    faucet = f'<body name="faucet"><geom type="cylinder" size="0.02 0.1"/>{knob}</body>'
+    asset = read_asset(mjcf(tmp_path, table + faucet + "<body><geom size='0.1'/></body>"), joints=joints)
+    assert asset.name == "faucet" and len(asset.visual) == (1 if joints == "part" else 2)
+    assert "body 'table' is static and was left out: one rigid object is read" in asset.remarks
+    assert "an unnamed body is static and was left out: one rigid object is read" in asset.remarks
+    assert ("body 'knob' has joints and was left out: one rigid object is read" in asset.remarks) == (joints == "part")
+    ball = '<body name="ball"><freejoint/><geom size="0.02"/></body>'
+    free = read_asset(mjcf(tmp_path, table + faucet + ball + ball.replace("ball", "other")), joints=joints)
+    assert free.name == "ball" and any("'other' moves by itself" in remark for remark in free.remarks)
 
 
 def test_shapes_of_one_group_are_seen_alike_and_a_computed_inertia_is_not_judged(tmp_path: Path) -> None:

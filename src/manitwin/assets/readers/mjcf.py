@@ -137,7 +137,8 @@ def _soft_asset(path: Path, file: Path, files: AssetFiles) -> Asset:
 def _rigid_bodies(file: Path, model: Any, files: AssetFiles, joints: Joints) -> list[tuple[int, np.ndarray]]:
     """Return the bodies of a rigid group that has a geom, with their poses in the group's first body.
 
-    It is the first one that a free joint lets go, else the first; where joints are locked or kept, no other divides bodies.
+    It is the first one that a free joint lets go, else the first in whose tree any joint is, else the first; where joints are
+    locked or kept, no other divides bodies.
     """
     groups: dict[int, list[tuple[int, np.ndarray]]] = {}
     head_of: dict[int, int] = {0: 0}
@@ -152,7 +153,8 @@ def _rigid_bodies(file: Path, model: Any, files: AssetFiles, joints: Joints) -> 
         groups.setdefault(head_of[index], []).append((index, poses[index]))
     world = [(_WORLD, np.eye(4))]  # shapes fixed to it: a static object
     shaped = [g for g in groups.values() if any(is_solid(model, index) for index, _ in g)]
-    shaped.sort(key=lambda group: not _is_free(model, group[0][0]))
+    jointed = {int(model.body_rootid[body]) for body in model.jnt_bodyid}  # a base that has no joint holds what moves
+    shaped.sort(key=lambda g: (not _is_free(model, g[0][0]), int(model.body_rootid[g[0][0]]) not in jointed))
     if not shaped:
         if is_solid(model, _WORLD):
             return world
@@ -161,13 +163,23 @@ def _rigid_bodies(file: Path, model: Any, files: AssetFiles, joints: Joints) -> 
         if model.ngeom:
             return next((g for g in groups.values() if any(model.body_geomnum[index] for index, _ in g)), world)
         raise AssetError(f"{file.name}: no body of it has a geom{_but(files.remarks)}")
-    files.remark_left_out([f"body {model.body(g[0][0]).name!r} moves by itself" for g in shaped[1:]], "bodies")
+    files.remark_left_out([_told(model, group) for group in shaped[1:]], "bodies")
     if joints == "lock":
         inside = {index for index, _ in shaped[0][1:]}  # the first one's own joints let all of it go
         files.remark_locked(
             [model.joint(j).name or f"joint_{j:02d}" for j in range(model.njnt) if int(model.jnt_bodyid[j]) in inside]
         )
     return shaped[0]
+
+
+def _told(model: Any, group: list[tuple[int, np.ndarray]]) -> str:
+    """Return what a group of bodies is called, and whether it moves."""
+    head = group[0][0]
+    name = model.body(head).name
+    what = f"body {name!r}" if name else "an unnamed body"
+    if _is_free(model, head):
+        return f"{what} moves by itself"
+    return f"{what} {'has joints' if any(model.body_jntnum[index] for index, _ in group) else 'is static'}"
 
 
 def _but(remarks: list[str]) -> str:
