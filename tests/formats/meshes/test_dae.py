@@ -88,3 +88,28 @@ def test_comments_among_the_shapes_of_a_mesh_leave_it_whole(tmp_path: Path) -> N
     path = _write(tmp_path)
     path.write_text(path.read_text().replace("<polylist", "<!-- <polylist count='0'/> --><polylist", 1))
     assert len(read_mesh(path).parts) == 1
+
+
+def test_normals_that_are_all_the_first_one_are_computed_from_the_faces_and_said(tmp_path: Path) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    ball.export(tmp_path / "a.dae")
+    whole = read_mesh(tmp_path / "a.dae")
+    assert whole.findings == []
+    text = (tmp_path / "a.dae").read_text()
+    broken = re.sub(r"(<p>)([^<]*)", lambda found: found[1] + re.sub(r"(\d+) \d+", r"\1 0", found[2]), text)
+    (tmp_path / "a.dae").write_text(broken)
+    mesh = read_mesh(tmp_path / "a.dae")
+    assert mesh.findings == [
+        "normals in it are one vector for faces that look other ways; they are computed from the faces"
+    ]
+    (part,) = mesh.parts
+    outward = part.vertices / np.linalg.norm(part.vertices, axis=1)[:, None]
+    assert np.einsum("ij,ij->i", part.vertex_normals, outward).min() > 0.99
+
+
+def test_one_normal_of_what_is_flat_is_kept(tmp_path: Path) -> None:
+    # a sheet that is seen from both sides, with one normal that is a little off
+    lines = ["v 0 0 0", "v 1 0 0", "v 0 1 0", "vn 0 0.05 1", "f 1//1 2//1 3//1", "f 1//1 3//1 2//1"]
+    (tmp_path / "sheet.obj").write_text("\n".join(lines))
+    mesh = read_mesh(tmp_path / "sheet.obj")
+    assert mesh.findings == [] and mesh.parts[0].vertex_normals[0][1] > 0.04

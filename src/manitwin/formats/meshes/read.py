@@ -16,8 +16,7 @@ from manitwin.formats.meshes.obj import read_obj
 from manitwin.formats.meshes.ply import read_ply
 from manitwin.formats.meshes.source import MeshLimits, MeshSource
 from manitwin.formats.meshes.stl import read_stl
-from manitwin.formats.meshes.textures import normals_of
-from manitwin.formats.meshes.triangles import with_creased_normals
+from manitwin.formats.meshes.triangles import has_one_false_normal, shaded, without_normals
 from manitwin.formats.sniff import sniff
 
 _SUFFIXES = {
@@ -136,6 +135,8 @@ def _checked(parts: list[trimesh.Trimesh], source: MeshSource) -> list[trimesh.T
 
 
 def _shaded(parts: list[trimesh.Trimesh], source: MeshSource) -> list[trimesh.Trimesh]:
-    if not source.limits.shading:
-        return parts
-    return [part if normals_of(part) is not None else with_creased_normals(part) for part in parts]
+    for index, part in enumerate(parts):
+        if has_one_false_normal(part):
+            source.find("normals in it are one vector for faces that look other ways; they are computed from the faces")
+            parts[index] = without_normals(part)
+    return [shaded(part) for part in parts] if source.limits.shading else parts

@@ -5,11 +5,34 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from manitwin.formats.meshes.textures import make_part, material_of, uv_of
+from manitwin.formats.meshes.textures import make_part, material_of, normals_of, uv_of
 from manitwin.geometry.repair.welding import weld_equal
 
 _CREASE_COSINE = np.cos(np.radians(40.0))  # Blender's long-time default for "auto smooth" is 30, 3ds Max's 45
 _MAX_PAIRS = 20_000_000
+_ALIKE = 1e-6  # of components of unit vectors: the same written number, after a transform
+_ALONG_COSINE = np.cos(np.radians(10.0))  # what is flat up to rounding stays; no curved surface has one normal
+
+
+def shaded(part: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Return the part with the normals that it came with, else with those of ``with_creased_normals``."""
+    return part if normals_of(part) is not None else with_creased_normals(part)
+
+
+def has_one_false_normal(part: trimesh.Trimesh) -> bool:
+    """Tell whether all normals that a part came with are one vector, and some of its faces look another way."""
+    normals = normals_of(part)
+    if normals is None or not len(part.faces) or np.ptp(normals, axis=0).max() > _ALIKE:
+        return False
+    triangles = part.vertices[part.faces]
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    along = np.abs(cross @ normals[0])  # either way: a sheet that is seen from both sides has faces of both
+    return bool((along < _ALONG_COSINE * np.linalg.norm(cross, axis=1)).any())
+
+
+def without_normals(part: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Return the part as one that came without normals."""
+    return make_part(part.vertices, part.faces, material=material_of(part), name=part.metadata["name"], uv=uv_of(part))
 
 
 def with_creased_normals(part: trimesh.Trimesh) -> trimesh.Trimesh:
