@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from manitwin.assets import primitives
 from manitwin.assets.asset import CollisionShape
-from manitwin.assets.asset_files import AssetFiles, joined
+from manitwin.assets.asset_files import MOST_NAMED, AssetFiles, joined
 from manitwin.assets.readers.sdf_terrain import terrain
 from manitwin.assets.readers.upright import Y_UP_FORMATS
 from manitwin.assets.readers.urdf_shapes import candidates, mesh_parts, plain_material
@@ -109,6 +109,7 @@ class SdfShapes:
     def all(self, links: Iterable[etree._Element]) -> tuple[list[trimesh.Trimesh], list[CollisionShape]]:
         """Return the visual parts and the collision shapes of links."""
         placed = list(links)
+        self._remark_scripts(placed)
         visual = [part for link in placed for part in self.visual(link)]
         return visual, [shape for link in placed for shape in self.collision(link)]
 
@@ -131,6 +132,16 @@ class SdfShapes:
                 primitive = element.find("geometry/mesh") is None and not drawn
                 path = self._mesh_path(element)
                 yield CollisionShape(name, *joined(parts), not drawn, path, primitive, as_drawn=drawn)
+
+    def _remark_scripts(self, links: list[etree._Element]) -> None:
+        """Note the material scripts of visuals: they are in the language of OGRE, Gazebo's renderer."""
+        scripts = [script for link in links for script in link.findall("visual/material/script")]
+        told = [text_of(script, "name") or text_of(script, "uri") or text_of(script, ".") for script in scripts]
+        names = [repr(name[:60]) for name in dict.fromkeys(told) if name is not None]
+        if names:
+            more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+            named = ", ".join(names[:MOST_NAMED])
+            self._files.remark(f"colours and textures of Gazebo's material scripts are not read: {named}{more}")
 
     def _elements(self, link: etree._Element, tag: str) -> Iterator[tuple[etree._Element, str]]:
         for element in link.findall(tag):
