@@ -11,6 +11,9 @@ import pytest
 import manitwin
 from manitwin.cli.causes import MEASURE_IT, NAME_IT, REMEDIES, cause_lines, group_causes
 from manitwin.engine.ledger.progress import Unaccepted
+from manitwin.errors import InputError
+from manitwin.formats.meshes.read import read_mesh
+from manitwin.models.fakes.meshes import draco_glb
 from manitwin.pipeline.guesses import OF_ANYTHING, SIZE_UNSAID
 from manitwin.twin.record import REJECTION_REASONS
 
@@ -97,6 +100,15 @@ def test_rejections_are_grouped_by_their_reason_and_apart_from_failures() -> Non
         "why failed: 1 of 1, item 1: no answer in 600 s",
         f"  remedy: {REMEDIES['timeout']}; then manitwin retry DATA",
     ]
+
+
+def test_the_remedy_for_a_compressed_mesh_leads_to_no_compressed_one(tmp_path: Path) -> None:
+    (tmp_path / "a.glb").write_bytes(draco_glb())
+    with pytest.raises(InputError) as caught:
+        read_mesh(tmp_path / "a.glb")
+    (cause,) = group_causes([Unaccepted("1", "rejected", caught.value.reason, str(caught.value))])
+    assert "KHR_draco_mesh_compression" in cause.message
+    assert cause.remedy is not None and "GLB without compression" in cause.remedy
 
 
 def test_nothing_is_said_where_all_were_accepted() -> None:
