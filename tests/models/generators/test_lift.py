@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -15,8 +16,10 @@ from manitwin.errors import Rejected, Unsupported
 from manitwin.formats.glb import read_glb
 from manitwin.formats.image_file import read_image
 from manitwin.models.generators.lift import LiftGenerator
+from manitwin.models.generators.lift.hint import why_not_round
 from manitwin.models.generators.lift.inflation import inflate
 from manitwin.models.generators.lift.lifting import Lifted, ShapeHint, lift
+from manitwin.models.generators.lift.made_photo import from_photo
 from manitwin.models.generators.lift.surface import tip_angle_deg, to_manifold
 from manitwin.models.generators.protocol import GenerationRequest
 from manitwin.models.matting import matte_photo
@@ -225,3 +228,37 @@ def test_every_accepted_photo_becomes_a_solid_that_rests(shared_data: Path) -> N
         "fake_banana": "inflation",
     }
     assert {name: lifted[name].notes["primitive"] for name in expected} == expected
+
+
+def painted(shape: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
+    """A photo of 240 pixels with an outline that is true of offsets from its middle, in shares of its side."""
+    y, x = (np.mgrid[:240, :240] - 119.5) / 240
+    inside = shape(x, y)
+    shade = np.clip(200 - 120 * np.abs(x) - 80 * np.abs(y), 0, 255)[..., None]
+    return np.dstack([np.repeat(shade, 3, axis=2), 255 * inside]).astype(np.uint8)
+
+
+def test_a_ball_with_its_mirror_image_is_no_ball() -> None:
+    one = painted(lambda x, y: np.hypot(x, y) < 0.3)
+    assert from_photo(one, "golf ball").notes["primitive"] != ""
+    beside = painted(lambda x, y: (np.hypot(x, y + 0.2) < 0.2) | (np.hypot(x, y - 0.18) < 0.2))
+    with pytest.raises(Rejected, match="times as long as wide, as no golf ball is"):
+        from_photo(beside, "golf ball")
+
+
+@pytest.mark.parametrize(
+    ("name", "extents", "refused"),
+    [
+        ("golf ball", [0.043, 0.023, 0.022], True),
+        ("golf ball", [0.043, 0.042, 0.043], False),
+        ("rugby ball", [0.28, 0.19, 0.19], False),
+        ("plate", [0.24, 0.011, 0.156], True),
+        ("plate", [0.24, 0.02, 0.23], False),
+        ("banana", [0.2, 0.04, 0.04], False),
+        (None, [0.2, 0.04, 0.04], False),
+    ],
+)
+def test_what_is_round_by_its_name_has_a_round_things_sides(
+    name: str | None, extents: list[float], refused: bool
+) -> None:
+    assert (why_not_round(name, np.array(extents)) is not None) == refused

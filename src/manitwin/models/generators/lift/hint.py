@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from manitwin.models.annotators.priors import Prior, lookup
 
 
@@ -36,6 +38,29 @@ def hint_from_name(name: str | None) -> ShapeHint:
         flat=bool({"flat", "shallow"} & set(words)),
         volume_share=_volume_share(prior),
     )
+
+
+MOST_OUT_OF_ROUND = 1.3
+"""Of a ball's longest side over its shortest, and of a plate's over its second."""
+_NO_BALLS = frozenset({"rugby ball"})
+
+
+def why_not_round(name: str | None, extents: np.ndarray) -> str | None:
+    """Return why sides of lengths ``(3,)`` are those of no such thing, where its name says that it is round; else None.
+
+    A ball is as wide as it is high, and a plate round from above: one that is seen at an angle has an ellipse for its outline,
+    and beside a mirror image a ball has that of a dumbbell.
+    """
+    prior = lookup(name)
+    if prior is None:
+        return None
+    longest, second, shortest = np.sort(np.asarray(extents, float))[::-1]
+    ball = prior.shape == "round" and prior.category.endswith("ball") and prior.category not in _NO_BALLS
+    if ball and longest > MOST_OUT_OF_ROUND * shortest:
+        return f"it would be {longest / shortest:.1f} times as long as wide, as no {prior.category} is"
+    if prior.shape == "flat and round" and longest > MOST_OUT_OF_ROUND * second:
+        return f"it would be {longest / second:.1f} times as long as wide, as no {prior.category} is: it is seen at an angle"
+    return None
 
 
 def _volume_share(prior: Prior) -> float | None:

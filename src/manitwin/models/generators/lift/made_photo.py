@@ -13,7 +13,7 @@ from trimesh.visual import TextureVisuals
 from manitwin.errors import Rejected
 from manitwin.formats.glb import write_glb
 from manitwin.geometry.poses import GLTF_TO_OBJECT
-from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name
+from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name, why_not_round
 from manitwin.models.generators.lift.lifting import DISC_ELLIPSE_IOU, Lifted, lift
 from manitwin.models.generators.lift.seen_corners import box_from_corner
 from manitwin.models.generators.lift.surface import unseen_share
@@ -116,6 +116,13 @@ def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) 
             "generator_failed",
             f"a round thing would have its outline, but a {fitted.category} is not round, and no {fitted.category} that the"
             " template makes has it; check the name and the cut-out, or take the photo from higher up",
+            "generate",
+        )
+    odd = why_not_round(name, np.ptp(lifted.surface.vertices, axis=0))
+    if odd is not None:
+        raise Rejected(
+            "generator_failed",
+            f"{odd}; check the name and the cut-out, or take the photo from another side",
             "generate",
         )
     flat = lifted.notes["primitive"] == "inflation"  # knows nothing of the back
