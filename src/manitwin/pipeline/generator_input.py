@@ -10,6 +10,7 @@ from typing import Any
 
 from manitwin.config import BuildConfig
 from manitwin.errors import Unavailable
+from manitwin.models.annotators.priors import lookup
 from manitwin.models.annotators.protocol import Annotator
 from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generator
 from manitwin.models.registry import backends, create, factory
@@ -38,6 +39,8 @@ def refusal(config: BuildConfig) -> Callable[[Item], str | None]:
         return _asked_with(create("generator", config.generator, config))
 
     def why(item: Item) -> str | None:
+        if (contradiction := _two_things(item)) is not None:
+            return contradiction
         asked, called, other = "text", f"text ({item.text!r})", "a photo"
         if item.file is not None:
             if "image" in asked_with() or not is_image(Path(item.file)):
@@ -52,6 +55,17 @@ def refusal(config: BuildConfig) -> Callable[[Item], str | None]:
         )
 
     return why
+
+
+def _two_things(item: Item) -> str | None:
+    """Return what is wrong where an item's text and its name are those of different things that the priors know."""
+    by_text, by_name = (lookup(said) if said else None for said in (item.text, item.name))
+    if by_text is None or by_name is None or by_text.shape.split()[0] == by_name.shape.split()[0]:
+        return None
+    if by_text.category in (by_name.category, by_name.kin_of) or by_name.category == by_text.kin_of:
+        return None
+    said = f"the text says {by_text.category!r} ({item.text!r}) and the name {by_name.category!r}"
+    return f"{said}; leave out the name, or say the same"
 
 
 def _without_template(config: BuildConfig, text: str) -> str | None:
