@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from scipy.spatial import ConvexHull
 
 from manitwin.geometry.poses import transform
 
-_TURNS, _LAYERS = 24, 9
-_SHARES = (0.0, 0.5, 1.0)  # of the rod's radius, at which its cross-section is looked at
+_TURNS = 24
 
 
 def rod_passes(
@@ -18,17 +17,44 @@ def rod_passes(
 ) -> bool:
     """Tell whether a rod along an axis ``(3,)`` through a point stays outside of all hulls, each ``(V, 3)`` m.
 
-    It is looked at in 9 layers of 49 points.
+    Exact: of each hull, what is at the rod's length is looked at along the axis. One that touches it stays outside.
     """
-    around = _around(axis)
-    layers = np.linspace(-half_length_m, half_length_m, _LAYERS)
-    disc = np.concatenate([share * radius_m * around for share in _SHARES])
-    points = center_m + (layers[:, None, None] * axis + disc[None]).reshape(-1, 3)
+    return not any(_meets(seen, radius_m) for seen in _along(hulls, center_m, axis, half_length_m))
+
+
+def _along(
+    hulls: Sequence[np.ndarray], center_m: np.ndarray, axis: np.ndarray, half_length_m: float
+) -> Iterator[np.ndarray]:
+    """Yield, of each hull within a slab across an axis, the points ``(N, 2)`` whose hull it covers, seen along the axis."""
+    z = axis / np.linalg.norm(axis)
+    x = np.cross(z, np.eye(3)[np.abs(z).argmin()])
+    frame = np.stack([x / np.linalg.norm(x), np.cross(z, x) / np.linalg.norm(x), z], axis=1)
     for hull in hulls:
-        planes = ConvexHull(hull).equations
-        if (points @ planes[:, :3].T + planes[:, 3] < 0).all(1).any():
-            return False
-    return True
+        points = (hull - center_m) @ frame
+        edges = ConvexHull(hull).simplices[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+        seen = [points[np.abs(points[:, 2]) < half_length_m]]
+        for height in (-half_length_m, half_length_m):
+            start, end = points[edges[:, 0]], points[edges[:, 1]]
+            crossing = (start[:, 2] < height) != (end[:, 2] < height)
+            start, end = start[crossing], end[crossing]
+            seen.append(start + ((height - start[:, 2]) / (end[:, 2] - start[:, 2]))[:, None] * (end - start))
+        found = np.concatenate(seen)[:, :2]
+        if len(found):
+            yield found
+
+
+def _meets(points: np.ndarray, radius_m: float) -> bool:
+    """Tell whether the convex hull of points ``(N, 2)`` meets a disc about the origin.
+
+    It does not where some direction has all points beyond the disc: each point allows an arc of directions, none of which is
+    longer than half a turn.
+    """
+    away = np.linalg.norm(points, axis=1)
+    if (away <= radius_m).any():
+        return True
+    angle, half = np.arctan2(points[:, 1], points[:, 0]), np.arccos(radius_m / away)
+    turned = np.mod(angle - angle[0] + np.pi, 2 * np.pi) - np.pi
+    return bool((turned - half).max() > (turned + half).min())
 
 
 def enclosed_share(hulls: Sequence[np.ndarray], point_m: np.ndarray, axis: np.ndarray, reach_m: float) -> float:
