@@ -33,7 +33,7 @@ class CollisionStage:
     settings: CollisionConfig
 
     name: ClassVar[str] = "collision"
-    version: ClassVar[str] = "3"
+    version: ClassVar[str] = "4"
     reads: ClassVar[tuple[str, ...]] = ("solid.npz", "canonical.npz", "geometry")
     writes: ClassVar[tuple[str, ...]] = (HULLS, "collision")
     needs: ClassVar[Resource] = "cpu"

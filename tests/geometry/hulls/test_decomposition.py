@@ -7,9 +7,14 @@ import trimesh
 from scipy.spatial import QhullError
 
 from manitwin.geometry.cavity import find_opening
+from manitwin.geometry.hull_holes import rod_passes
 from manitwin.geometry.hulls.decomposition import Decomposition, _merged, convex_decomposition
 from manitwin.geometry.hulls.error import hull_error
 from manitwin.geometry.hulls.reduction import convex_corners, hull_to_obj, hull_volume
+from manitwin.geometry.repair.cascade import repair
+from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.text import read_text
 from real_meshes import VESSELS, cup, load_real_mesh, mesh_rows
 
 
@@ -54,6 +59,53 @@ def test_cup_stays_open() -> None:
     assert error.cavity_kept is not None and error.cavity_kept > 0.9
     assert error.surface_uncovered_max_m < 1e-3
     _assert_loadable(found.hulls, mesh)
+
+
+TILTED = trimesh.transformations.rotation_matrix(0.7, [1, 0.4, 0.2])
+
+
+def _frame() -> trimesh.Trimesh:
+    outer, inner = trimesh.creation.box((0.2, 0.14, 0.01)), trimesh.creation.box((0.16, 0.1, 1))
+    return trimesh.boolean.difference([outer, inner])
+
+
+def _plate() -> trimesh.Trimesh:
+    hole = trimesh.creation.cylinder(0.012, 0.05).apply_translation((0.03, 0.01, 0))
+    return trimesh.boolean.difference([trimesh.creation.box((0.1, 0.06, 0.01)), hole])
+
+
+@pytest.mark.parametrize("to_object", [np.eye(4), TILTED], ids=["level", "tilted"])
+@pytest.mark.parametrize(
+    ("mesh", "middle_m", "radius_m"),
+    [
+        (trimesh.creation.annulus(0.02, 0.05, 0.025, sections=96), (0, 0, 0), 0.02),
+        (trimesh.creation.annulus(0.02, 0.05, 0.1, sections=32), (0, 0, 0), 0.02),
+        (trimesh.creation.annulus(0.005, 0.012, 0.0015, sections=48), (0, 0, 0), 0.005),
+        (trimesh.creation.torus(0.02, 0.0015, major_sections=96, minor_sections=8), (0, 0, 0), 0.0185),
+        (_frame(), (0, 0, 0), 0.05),
+        (_plate(), (0.03, 0.01, 0), 0.012),
+    ],
+    ids=["tape", "roll", "washer", "ring", "frame", "plate"],
+)
+def test_a_hole_through_a_thing_stays_open(
+    mesh: trimesh.Trimesh, middle_m: tuple[float, float, float], radius_m: float, to_object: np.ndarray
+) -> None:
+    mesh = mesh.copy().apply_transform(to_object)
+    found = _decompose(mesh)
+    _assert_loadable(found.hulls, mesh)
+    middle = to_object[:3, :3] @ np.array(middle_m, float)
+    assert rod_passes(found.hulls, middle, to_object[:3, 2], 0.7 * radius_m, 1.0)
+    assert hull_error(mesh, found.hulls, None, np.random.default_rng(0)).volume_ratio < 1.05
+
+
+@pytest.mark.parametrize("category", ["roll of tape", "curtain ring", "toilet paper"])
+def test_a_hole_through_a_thing_of_a_template_stays_open(category: str) -> None:
+    templates = load_templates()
+    parted = make(templates[category], read_text(category, templates), np.random.default_rng(0)).mesh
+    mesh = repair(trimesh.Trimesh(parted.vertices, parted.faces, process=False)).mesh
+    found = _decompose(mesh)
+    assert rod_passes(found.hulls, mesh.bounds.mean(axis=0), np.array([0.0, 0, 1]), 0.01, 1.0)
+    assert hull_error(mesh, found.hulls, None, np.random.default_rng(0)).volume_ratio < 1.05
 
 
 def test_same_mesh_gives_the_same_hulls() -> None:

@@ -1,9 +1,9 @@
 """Approximate convex decomposition by best-first plane cuts and greedy merging.
 
-The part whose convex hull exceeds it most is cut by the plane that lowers the excess most, until there are more parts
-than hulls; then the pairs whose common hull costs least are merged. Work is counted in parts, never in time, so that
-equal meshes give equal hulls. Source: hull excess volume as the concavity (V-HACD, Mamou and Ghorbel 2009); cutting
-first and merging after (CoACD, Wei, Liu, Ling and Su 2022).
+The part whose convex hull exceeds it most is cut by the plane that lowers the excess most, or crosswise through its
+hole, until there are more parts than hulls; then the pairs whose common hull costs least are merged. Work is counted in
+parts, never in time, so that equal meshes give equal hulls. Source: hull excess volume as the concavity (V-HACD, Mamou
+and Ghorbel 2009); cutting first and merging after (CoACD, Wei, Liu, Ling and Su 2022).
 """
 
 from __future__ import annotations
@@ -24,6 +24,9 @@ _CRUMB_SHARE = 1e-6  # of the mesh's volume: smaller pieces of a cut are dropped
 _CONVEX_SHARE = 1e-3  # of the mesh's volume: a part whose hull exceeds it by less is left whole
 _FREE_MERGE_SHARE = 2.5e-4  # of the mesh's volume: a merge that adds less is made even where there are few enough hulls
 _SECTORS = 8  # first cuts of a vessel, through its axis; without them the search leaves it filled, 12 and 16 were worse
+_CROSS_GAIN = (
+    4.5  # times that of the best plane: what three cuts, crosswise through a hole, must gain to be made instead
+)
 _COARSE_SHARE = 7e-3  # of a part's longest side: detail that does not decide where it is cut
 _POSITIONS = (0.2, 0.5, 0.8)  # of a part's width along a cutting normal
 _MORE_POSITIONS = (0.1, 0.35, 0.65, 0.9)  # along the two normals whose first positions were the best
@@ -161,10 +164,17 @@ def _cut(solid: manifold3d.Manifold, count: int, opening: Opening | None) -> lis
             done.append(worst)
             break
         total, normal, offset = _best_plane(_CoarsePart(worst), opening)
-        if total > worst.hull_volume * (1 - 1e-6):
+        gain = worst.hull_volume - total
+        helps = gain > worst.hull_volume * 1e-6
+        across = None
+        if worst.solid.genus() > 0 and not (helps and opening is not None):  # a vessel's axis has led the first cuts
+            across = _through_hole(worst, max(_CROSS_GAIN * gain, _CONVEX_SHARE * volume))
+        if across is not None:
+            parts += [_Part(piece) for piece in _pieces(across, volume)]
+        elif helps:
+            parts += _split(worst, normal, offset, volume)
+        else:
             done.append(worst)
-            continue
-        parts += _split(worst, normal, offset, volume)
     return [part.hull_vertices for part in parts + done]
 
 
@@ -177,14 +187,49 @@ def _pieces(solids: Sequence[manifold3d.Manifold], volume: float) -> list[manifo
     return [piece for solid in solids for piece in solid.decompose() if piece.volume() > _CRUMB_SHARE * volume]
 
 
+def _through_hole(part: _Part, least_gain: float) -> list[manifold3d.Manifold] | None:
+    """Return a part cut crosswise through its hole where that lowers the summed hull volume by more than ``least_gain``.
+
+    One plane alone lowers nothing there: two halves of a disc are the disc.
+    """
+    solid, best = part.solid, part.hull_volume - least_gain
+    found = None
+    for axis in _normals(part.hull_vertices):
+        middle = _hole_middle(solid, axis)
+        if middle is None:
+            continue
+        quarters = [solid]
+        for angle in (0.0, np.pi / 2):
+            normal = _across(axis, angle)
+            quarters = [
+                half for each in quarters for half in each.split_by_plane(tuple(normal), float(normal @ middle))
+            ]
+        total = sum(piece.hull().volume() for quarter in quarters for piece in quarter.decompose())
+        if total < best:
+            best, found = total, quarters
+    return found
+
+
+def _hole_middle(solid: manifold3d.Manifold, axis: np.ndarray) -> np.ndarray | None:
+    """Return the middle of the largest hole in the section half-way along an axis, None where there is none."""
+    frame = np.stack([_across(axis, np.pi / 2), -_across(axis, 0.0), axis])
+    turned = solid.transform(np.hstack([frame, np.zeros((3, 1))]))
+    low, high = np.reshape(turned.bounding_box(), (2, 3))
+    height = (low[2] + high[2]) / 2
+    rings = [np.asarray(ring) for ring in turned.slice(height).to_polygons()]
+    areas = [float(ring[:, 0] @ (np.roll(ring[:, 1], -1) - np.roll(ring[:, 1], 1))) for ring in rings]
+    if not areas or min(areas) >= 0:  # the outline of a hole runs clockwise
+        return None
+    hole = rings[int(np.argmin(areas))]
+    return frame.T @ np.array([*((hole.min(0) + hole.max(0)) / 2), height])
+
+
 def _best_plane(part: _CoarsePart, opening: Opening | None) -> tuple[float, np.ndarray, float]:
     """Return the summed hull volumes after the best cut, and its plane as normal and offset.
 
     Tried are planes across the object's and the part's axes, and planes through the vessel's axis.
     """
-    centered = part.vertices - part.vertices.mean(0)
-    principal = np.linalg.eigh(np.einsum("ni,nj->ij", centered, centered))[1].T
-    normals = [*np.eye(3), *(axis for axis in principal if np.abs(axis).max() < 0.995)]
+    normals = _normals(part.vertices)
     first = [part.cuts_across(normal, _POSITIONS) for normal in normals]
     leading = sorted(range(len(normals)), key=lambda index: (min(first[index])[0], index))[:2]
     axis = np.array([0.0, 0, 1]) if opening is None else opening.axis
@@ -196,6 +241,13 @@ def _best_plane(part: _CoarsePart, opening: Opening | None) -> tuple[float, np.n
         cuts.append((part.hull_volume_after(normal, offset), offset, normal))
     total, offset, normal = min(cuts, key=lambda cut: cut[0])
     return total, normal, offset
+
+
+def _normals(vertices: np.ndarray) -> list[np.ndarray]:
+    """Return the object's axes and those principal axes of vertices ``(V, 3)`` that are no such axis."""
+    centered = vertices - vertices.mean(0)
+    principal = np.linalg.eigh(np.einsum("ni,nj->ij", centered, centered))[1].T
+    return [*np.eye(3), *(axis for axis in principal if np.abs(axis).max() < 0.995)]
 
 
 def _sector_normals(offsets: np.ndarray, axis: np.ndarray) -> list[np.ndarray]:
