@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drawn_scenes import write_scenes
-from manitwin.errors import InputError, TwinError
+from manitwin.errors import TwinError
 from manitwin.scenes.twin_looks import seen_shape, simplified_twin_looks, twin_looks
 from manitwin.twin.store import RECORD
 
@@ -38,8 +38,16 @@ def test_twin_that_was_built_again_is_read_again(folder: Path) -> None:
     assert np.array_equal(again.vertices_m, shape.vertices_m)
 
 
+def test_a_surface_that_was_cut_short_is_to_be_built_again(folder: Path) -> None:
+    visual = folder / "visual.glb"
+    visual.write_bytes(visual.read_bytes()[:-40])
+    for look in (lambda: twin_looks(folder, 131), lambda: simplified_twin_looks(folder, 0.0013)):
+        with pytest.raises(TwinError, match=r"cannot be read .*build the twin again"):
+            look()
+
+
 def test_missing_twin_is_said(tmp_path: Path) -> None:
-    with pytest.raises(InputError):
+    with pytest.raises(TwinError):
         twin_looks(tmp_path / "none", 128)
     with pytest.raises(TwinError):
         seen_shape(tmp_path / "none")

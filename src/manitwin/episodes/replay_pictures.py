@@ -58,7 +58,7 @@ def tolerance_of(picture_px: int) -> float:
 
 
 def twin_drawable(folder: Path, picture_px: int = FINE_PX) -> Drawable:
-    """Return a twin's looks, simplified for pictures of ``picture_px`` at most; kept for the next call. Raises InputError."""
+    """Return a twin's looks, simplified for pictures of ``picture_px`` at most; kept for the next call. Raises TwinError."""
     return simplified_twin_looks(folder, min(tolerance_of(picture_px), MOST_OF_OBJECTS_M))
 
 

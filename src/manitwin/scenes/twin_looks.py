@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import lru_cache
 from pathlib import Path
 
-from manitwin.formats.glb import read_glb
 from manitwin.render.drawable import Drawable, drawable
 from manitwin.scenes.perception.object_views import SeenShape
+from manitwin.twin.loaded_twin import read_visual
 from manitwin.twin.store import RECORD
 
 TWINS_KEPT, SIMPLIFIED_KEPT = 32, 64
@@ -15,7 +15,7 @@ TWINS_KEPT, SIMPLIFIED_KEPT = 32, 64
 
 
 def twin_looks(folder: Path, picture_px: int) -> Drawable:
-    """Return a twin's visual surface, as it is, for pictures of ``picture_px``; raises InputError.
+    """Return a twin's visual surface, as it is, for pictures of ``picture_px``; raises TwinError.
 
     Its textures get at most twice the pixels each way that a whole picture has, which is what is drawn before it is reduced.
     """
@@ -23,7 +23,7 @@ def twin_looks(folder: Path, picture_px: int) -> Drawable:
 
 
 def simplified_twin_looks(folder: Path, tolerance_m: float) -> Drawable:
-    """Return a twin's visual surface for small pictures, simplified by about a tolerance; raises InputError."""
+    """Return a twin's visual surface for small pictures, simplified by about a tolerance; raises TwinError."""
     return _simplified_looks(folder, _version(folder), tolerance_m)
 
 
@@ -34,12 +34,12 @@ def seen_shape(folder: Path) -> SeenShape:
 
 @lru_cache(maxsize=TWINS_KEPT)
 def _looks(folder: Path, version: tuple[int, int], most_texture_px: int) -> Drawable:
-    return drawable(read_glb(folder / "visual.glb"), most_texture_px=most_texture_px)
+    return drawable(read_visual(folder / "visual.glb"), most_texture_px=most_texture_px)
 
 
 @lru_cache(maxsize=SIMPLIFIED_KEPT)
 def _simplified_looks(folder: Path, version: tuple[int, int], tolerance_m: float) -> Drawable:
-    return drawable(read_glb(folder / "visual.glb"), tolerance_m=tolerance_m)
+    return drawable(read_visual(folder / "visual.glb"), tolerance_m=tolerance_m)
 
 
 @lru_cache(maxsize=TWINS_KEPT)

@@ -211,11 +211,8 @@ def parse_record(content: bytes, path: str | Path = RECORD, *, sealed: bool = Fa
 
     A record of an earlier schema version is brought to this one; its ``revision`` stays that of the file.
     """
-    data = parse_json_object(content, str(path), TwinError, remedy=REMEDY)
-    said, data = data, migrated(data)
-    if data.get("schema_version") != SCHEMA_VERSION:
-        version = printable_line(str(data.get("schema_version")), max_characters=_SHOWN_CHARACTERS)
-        raise TwinError(f"{path}: schema version {version}, this package reads 1 to {SCHEMA_VERSION}; {REMEDY}")
+    said = parse_json_object(content, str(path), TwinError, remedy=REMEDY)
+    data = in_present_version(said, path)
     if (found := _with_controls(data)) is not None:
         raise TwinError(f"{path}: {printable_line(found)!r} holds control characters; {REMEDY}")
     if sealed and revision_of(said) != said.get("revision"):
@@ -226,6 +223,15 @@ def parse_record(content: bytes, path: str | Path = RECORD, *, sealed: bool = Fa
         first = error.errors()[0]
         where = printable_line(".".join(map(str, first["loc"])), max_characters=_SHOWN_CHARACTERS)
         raise TwinError(f"{path}: {where}: {first['msg']}; {REMEDY}") from error
+
+
+def in_present_version(said: dict[str, Any], path: str | Path) -> dict[str, Any]:
+    """Return the content of a twin.json in the present schema version; raises TwinError naming ``path`` for one not known."""
+    data = migrated(said)
+    if data.get("schema_version") != SCHEMA_VERSION:
+        version = printable_line(str(data.get("schema_version")), max_characters=_SHOWN_CHARACTERS)
+        raise TwinError(f"{path}: schema version {version}, this package reads 1 to {SCHEMA_VERSION}; {REMEDY}")
+    return data
 
 
 def verify_record(folder: Path, record: TwinRecord) -> None:

@@ -96,3 +96,21 @@ def test_a_record_that_somebody_has_changed_is_one_line(tmp_path: Path, change: 
     path.write_text("[" * 100_000)
     with pytest.raises(TwinError, match="nested too deep"):
         read_pool(tmp_path)
+
+
+@pytest.mark.parametrize("version", [99, None, "4"])
+def test_a_record_of_another_schema_version_is_refused(tmp_path: Path, version: Any) -> None:
+    identity = write_thing(tmp_path, 0, THINGS[1])
+    path = tmp_path / "twins" / identity[:2] / identity / "twin.json"
+    path.write_text(json.dumps(json.loads(path.read_bytes()) | {"schema_version": version}))
+    with pytest.raises(TwinError, match=f"{identity}/twin.json: schema version {version}.*build the twin again"):
+        read_pool(tmp_path)
+
+
+def test_a_twin_whose_record_was_altered_is_not_drawn(tmp_path: Path) -> None:
+    identity = write_thing(tmp_path, 0, THINGS[1])
+    assert read_pool(tmp_path).body(identity).body.mass_kg > 0
+    path = tmp_path / "twins" / identity[:2] / identity / "twin.json"
+    path.write_text(json.dumps(json.loads(path.read_bytes()) | {"revision": "0" * 64}))
+    with pytest.raises(TwinError, match=r"altered since it was written .*build the twin again"):
+        read_pool(tmp_path).body(identity)

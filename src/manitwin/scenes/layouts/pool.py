@@ -20,7 +20,7 @@ from manitwin.geometry.rigid_body import RigidBody
 from manitwin.scenes.layouts.twin_frames import LabelledPoint, TwinFrame, twin_frames
 from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.record import Placement
-from manitwin.twin.store import RECORD, REMEDY
+from manitwin.twin.store import RECORD, REMEDY, in_present_version, parse_record
 
 KEPT_BODIES = 256
 
@@ -143,14 +143,23 @@ def read_pool(dataset: str | Path, cache: Path | None = None) -> Pool:
     """Read the records of a data set's, or a flat folder's, accepted twins that have a placement that stayed.
 
     ``cache`` is a local folder for the twins of a data set at a URL. Raises UsageError for a place without any, TwinError for a
-    record that is none.
+    record that is none or of another schema version. A body whose record was altered is refused once it is drawn (TwinError).
     """
     source = TwinSource(dataset, cache)
     read = (_pool_twin(source.record_bytes(twin_id), f"{dataset}: {twin_id}/{RECORD}") for twin_id in source.twin_ids())
     twins = [twin for twin in read if twin is not None]
     if not twins:
         raise UsageError(f"{dataset}: no accepted twin that stays where it is set down; give the folder of a build")
-    return Pool(twins, lambda twin_id: source.twin(twin_id).rigid_body())
+
+    def body(twin_id: str) -> RigidBody:
+        twin = source.twin(twin_id)
+        path = (
+            twin.folder / RECORD
+        )  # of those drawn alone: to hash the records of a hundred thousand would take minutes
+        parse_record(twin.read_bytes(RECORD), path, sealed=True)
+        return twin.rigid_body()
+
+    return Pool(twins, body)
 
 
 @lru_cache(maxsize=4)
@@ -187,7 +196,7 @@ class _Standing(BaseModel):
 
 
 def _pool_twin(content: bytes, name: str) -> PoolTwin | None:
-    data = parse_json_object(content, name, TwinError, remedy=REMEDY)
+    data = in_present_version(parse_json_object(content, name, TwinError, remedy=REMEDY), name)
     if data.get("status") == "rejected":
         return None
     try:

@@ -47,7 +47,7 @@ def scene_pictures(
     """Draw a scene from each of its cameras; returns the frames by camera and the ids by name.
 
     Ids are those of the objects from 1 in the record's order, then those of the furniture's boxes. ``twin_folder`` finds a
-    twin's folder by its id. Raises UsageError for a scene without cameras, RendererMissing, InputError.
+    twin's folder by its id. Raises UsageError for a scene without cameras, RendererMissing, TwinError.
     """
     if not record.cameras:
         raise UsageError(f"scene {record.scene_id}: no cameras in its record; sample it again")
