@@ -10,6 +10,7 @@ from manitwin.errors import Rejected
 from manitwin.pipeline.collision import CollisionStage
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import load_hulls
+from manitwin.pipeline.quality import _collision_checks
 from manitwin.twin.record import Hulls
 from manitwin.twin.store import canonical_json
 from real_meshes import cup
@@ -39,6 +40,23 @@ def test_thing_without_an_opening_is_not_judged_on_it(tmp_path: Path) -> None:
     assert field["keeps_opening"] is None and field["cavity_kept"] is None
     assert field["surface_error_p95_m"] == pytest.approx(0, abs=1e-6)
     assert field["volume_ratio"] == pytest.approx(1.0)
+
+
+def test_a_hole_that_the_hulls_close_is_a_failed_check(tmp_path: Path) -> None:
+    ring = trimesh.creation.annulus(0.02, 0.05, 0.025, sections=96)
+    for most, passed in ((32, True), (1, False)):
+        draft = _draft(tmp_path, ring)
+        draft.fields |= CollisionStage(CollisionConfig(max_hulls=most)).run(draft, tmp_path)
+        check = next(check for check in _collision_checks(draft) if check.name == "holes_stay_open")
+        assert check.passed is passed
+        assert check.value == draft.field("collision")["holes_kept"] == pytest.approx(1.0 if passed else 0.0, abs=0.05)
+
+
+def test_a_thing_without_a_hole_has_no_check_of_one(tmp_path: Path) -> None:
+    draft = _draft(tmp_path, cup())
+    draft.fields |= CollisionStage(CollisionConfig()).run(draft, tmp_path)
+    assert draft.field("collision")["holes_kept"] is None
+    assert "holes_stay_open" not in {check.name for check in _collision_checks(draft)}
 
 
 def test_one_hull_over_a_cup_is_said_to_close_it(tmp_path: Path) -> None:

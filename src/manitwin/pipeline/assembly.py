@@ -195,7 +195,9 @@ def _accepted_sections(draft: Draft[Item]) -> dict[str, Any]:
     cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     mesh["volume_m3"] = float(np.einsum("ij,ij->", triangles[:, 0], cross) / 6)
     mesh["area_m2"] = float(np.linalg.norm(cross, axis=1).sum() / 2)
-    mesh["hulls"] = {key: value for key, value in collision.items() if key not in ("method", "notes", "links")}
+    mesh["hulls"] = {
+        key: value for key, value in collision.items() if key not in ("holes_kept", "method", "notes", "links")
+    }
     return {
         "mesh": mesh,
         "physical": draft.field("physical"),

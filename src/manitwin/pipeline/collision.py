@@ -16,6 +16,7 @@ from manitwin.errors import Rejected
 from manitwin.geometry.cavity import Opening, find_opening
 from manitwin.geometry.hulls.decomposition import Decomposition, convex_decomposition
 from manitwin.geometry.hulls.error import hull_error
+from manitwin.geometry.hulls.through_holes import holes_kept
 from manitwin.pipeline.links import face_links, link_solids, read_articulation, shape_of_link
 from manitwin.pipeline.object_state import load_solid
 
@@ -28,6 +29,7 @@ class CollisionStage:
 
     Field ``collision``: twin.Hulls and ``method``, ``notes``. ``keeps_opening`` is None where the solid has no
     opening, else whether the hulls keep ``least_cavity_kept`` of it and a ball dropped in stays inside.
+    ``holes_kept`` is the kept share of the hole through it that the hulls close most, None where there is none.
     """
 
     settings: CollisionConfig
@@ -77,6 +79,7 @@ class CollisionStage:
                 "surface_uncovered_max_m": error.surface_uncovered_max_m,
                 "keeps_opening": keeps_opening,
                 "cavity_kept": error.cavity_kept,
+                "holes_kept": holes_kept(solid, found.hulls),
                 "method": found.method,
                 "notes": notes,
                 **links,

@@ -17,6 +17,9 @@ UNCOVERED_LIMIT_M = 0.002
 CAVITY_LIMIT = 0.8
 """Of the open cavity that the hulls keep: less, and a container holds visibly less than it shows."""
 
+HOLE_LIMIT = 0.5
+"""Of each hole straight through, seen along it, that the hulls keep: less, and nothing goes through that would."""
+
 AGREEMENT_LIMIT = 0.9
 """Of the verified grasps that a second engine holds: below it, the two disagree about the object and not about single grasps."""
 
@@ -175,6 +178,17 @@ def _collision_checks(draft: Draft) -> list[Check]:
                 value=kept,
                 limit=CAVITY_LIMIT,
                 message="share of the open cavity that the collision hulls keep",
+            )
+        )
+    hole = collision["holes_kept"]
+    if hole is not None:
+        checks.append(
+            Check(
+                name="holes_stay_open",
+                passed=hole >= HOLE_LIMIT,
+                value=hole,
+                limit=HOLE_LIMIT,
+                message="share of the hole through it, the one they close most, that the collision hulls keep",
             )
         )
     return checks

@@ -1,0 +1,45 @@
+"""How much of the holes through a solid its convex hulls keep, seen along its axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import manifold3d
+import numpy as np
+import trimesh
+
+_LEAST_SHARE = 0.01  # of the outline's area: smaller holes are of scans, or of no use
+_PRINCIPAL = 0.995  # cosine from which a principal axis is one of the object's
+
+
+def holes_kept(mesh: trimesh.Trimesh, hulls: Sequence[np.ndarray]) -> float | None:
+    """Return the share that hulls, each ``(V, 3)`` m, keep of a watertight mesh's hole that they close most; None without holes.
+
+    Seen are holes straight through, along the object's or its principal axes, of at least 1 % of the outline's area.
+    """
+    if mesh.euler_number >= 2 * mesh.body_count:  # no surface goes around a hole
+        return None
+    vertices = np.array(mesh.vertices, dtype=np.float64, order="C")  # a copy: manifold3d refuses read-only arrays
+    solid = manifold3d.Manifold(manifold3d.Mesh64(vertices, np.array(mesh.faces, dtype=np.uint64, order="C")))
+    if solid.status() != manifold3d.Error.NoError:
+        return None
+    principal = np.linalg.eigh(np.cov(vertices.T))[1].T
+    axes = [*np.eye(3), *(axis for axis in principal if np.abs(axis).max() < _PRINCIPAL)]
+    kept = [share for axis in axes for share in _kept_along(solid, hulls, axis)]
+    return min(kept, default=None)
+
+
+def _kept_along(solid: manifold3d.Manifold, hulls: Sequence[np.ndarray], axis: np.ndarray) -> list[float]:
+    across = np.linalg.svd(axis[None])[2]
+    frame = np.stack([across[1], np.cross(axis, across[1]), axis])
+    seen = solid.transform(np.hstack([frame, np.zeros((3, 1))])).project()
+    least = _LEAST_SHARE * seen.hull().area()
+    flat = [manifold3d.CrossSection.hull_points(np.ascontiguousarray((hull @ frame.T)[:, :2])) for hull in hulls]
+    filled = manifold3d.CrossSection.batch_boolean(flat, manifold3d.OpType.Add)
+    outlines = [np.asarray(ring) for ring in seen.to_polygons()]
+    holes = [manifold3d.CrossSection([ring[::-1]]) for ring in outlines if _area(ring) < 0]  # a hole's runs clockwise
+    return [1 - (hole ^ filled).area() / hole.area() for hole in holes if hole.area() >= least]
+
+
+def _area(ring: np.ndarray) -> float:
+    return float(ring[:, 0] @ (np.roll(ring[:, 1], -1) - np.roll(ring[:, 1], 1))) / 2
