@@ -6,8 +6,10 @@ from dataclasses import asdict
 
 import numpy as np
 
-from manitwin.models.matting.belief import doubts_of
-from manitwin.models.matting.confidence import MatteScores
+from manitwin.models.matting.belief import FEATURES, LEAST_DIFFERENCE, OPINIONS, doubts_of
+from manitwin.models.matting.candidates import Candidate
+from manitwin.models.matting.confidence import MOST_ZOOM, MatteScores, border_of, frame_cause
+from manitwin.models.matting.study import largest_piece
 
 CAUSES = {
     "sharply_bounded": "it is as grey as a shadow, and part of its outline as soft as one: a shadow may hang on it",
@@ -21,24 +23,79 @@ CAUSES = {
     "plain": "the background is too cluttered",
     "unshaded": "part of its outline has the background's colour, dimmed: a shadow may hang on it",
     "solid": "the ground may be seen through it, or it has parts of the ground's colour inside",
-    "thick": "it is thin for so small a photo, so its outline is a large part of it",
+    "thick": "it is thin for so small a picture of it, so its outline is a large part of it",
     "kept": "a part of it with a sharp outline may be lost, or a hole in it filled",
     "outermost": "what looks like its shadow has edges as sharp as its outline, so a clear or grey part of it may be lost",
+    "bulk": "it is thin for so small a picture of it, so its outline is a large part of it",
+    "beside": "something apart from it reaches the image border",
+    "network_beyond": "one way of looking takes more for it, beyond its outline or in its holes",
+    "network_within": "one way of looking takes less for it: a shadow may hang on it, or a hole in it be filled",
+    "network_sharp": "one way of looking is not sure where it ends",
+    "colours": "colours alone do not tell a part of it from the background",
 }
-"""By score; of equally low scores the first is told."""
+"""By score or feature; of equally low scores the first is told."""
 REMEDY = "photograph it whole on a plain surface of another colour, or give an image with an alpha channel"
+CROP = "crop that away if it is another thing, or give an image with an alpha channel"
 LOW_SCORE = 0.5
+AGAINST = ("network_beyond", "network_within")
+ALIKE = 0.9
+"""Likeness of two masks from which on the opinions agree on what the thing is, and differ about a part of it at most."""
+FILLING = 0.8
+"""Of the picture's longer side: a thing of that length cannot be taken much closer."""
+
+
+def told(candidate: Candidate, features: np.ndarray) -> str:
+    """Return why a mask with these ``features`` (F,) is not believed, and what to do about it.
+
+    A frame that things run across is a cause of its own only where it is too cluttered or cuts the thing itself.
+    """
+    cause = frame_cause(candidate.found.background, candidate.found.gradient)
+    if cause is None or (cause == "uncut" and candidate.scores.uncut >= LOW_SCORE):
+        cause = cause_of(features, candidate.scores)
+    if cause in ("uncut", "whole") and _is_beside(candidate.found.mask):
+        cause = "beside"
+    return f"{CAUSES[cause]}; {_remedy(cause, candidate)}"
 
 
 def cause_of(features: np.ndarray, scores: MatteScores) -> str:
     """Return which of ``CAUSES`` costs a mask with these ``features`` (F,) the most of its confidence.
 
-    Where it is that the opinions differ, it is the lowest score, since that tells why they may; ``stable`` where none is low.
+    Where it is that the opinions differ, it is the lowest score, since that tells why they may. Where none is low, it is
+    ``stable`` if they differ about what the thing is, else what one of them says against the mask.
     """
     doubts = doubts_of(features)
     worst = max(doubts, key=lambda name: doubts[name])
-    if worst in CAUSES:
+    if worst not in (*OPINIONS, "stable"):
         return worst
-    found = asdict(scores)
-    lowest = min((name for name in CAUSES if name in found), key=lambda name: round(found[name], 2))
-    return lowest if found[lowest] < LOW_SCORE else "stable"
+    opposed, found = _likeness(features) < ALIKE, asdict(scores)
+    telling = [name for name in CAUSES if name in found and (opposed or name != "stable")]
+    lowest = min(telling, key=lambda name: round(found[name], 2))
+    if found[lowest] < LOW_SCORE:
+        return lowest
+    if opposed:
+        return "stable"
+    return worst if worst in CAUSES and worst != "stable" else max(AGAINST, key=lambda name: doubts[name])
+
+
+def _likeness(features: np.ndarray) -> float:
+    """Return how like a mask with these ``features`` what the network or, if that is less, another mask shows is, in [0, 1]."""
+    most = -min(features[FEATURES.index(name)] for name in ("network_alike", "rival"))
+    return float(1 - LEAST_DIFFERENCE * np.expm1(most))
+
+
+def _is_beside(mask: np.ndarray) -> bool:
+    """Tell whether the border of the picture cuts pieces of a mask (H, W), and not the largest, which is the thing."""
+    border, thing = border_of(mask.shape), largest_piece(mask)
+    return bool((mask & border).any() and not (thing & border).any())
+
+
+def _remedy(cause: str, candidate: Candidate) -> str:
+    if cause == "beside":
+        return CROP
+    if cause not in ("bulk", "thick"):
+        return REMEDY
+    rows, columns = np.nonzero(candidate.found.mask)
+    length = max(np.ptp(rows), np.ptp(columns)) + 1
+    ways = ["give a larger photo"] if candidate.zoom < MOST_ZOOM else []
+    ways += ["take it from closer"] if length < FILLING * max(candidate.found.mask.shape) else []
+    return ", or ".join([*ways, "give an image with an alpha channel"])

@@ -56,9 +56,7 @@ def score(segmentation: Segmentation, *, zoom: float = 1.0, share: np.ndarray | 
     """Score a mask that is not empty; ``zoom`` is the photo's size over the mask's, ``share`` as for ``ground_inside``."""
     mask, background = segmentation.mask, segmentation.background
     outline = mask & ~eroded(mask, 1)
-    border = np.zeros(mask.shape, bool)
-    border[:2] = border[-2:] = True
-    border[:, :2] = border[:, -2:] = True
+    border = border_of(mask.shape)
     sharpest = cv2.dilate(segmentation.gradient, disk(3))
     free = outline & ~border
     typical = max(float(np.percentile(sharpest[mask], 75)), 1e-6)
@@ -94,6 +92,13 @@ def score(segmentation: Segmentation, *, zoom: float = 1.0, share: np.ndarray | 
         ),
         thick=_ramp(-outline.sum() / mask.sum() / min(zoom, MOST_ZOOM), -0.25, -0.12),
     )
+
+
+def border_of(shape: tuple[int, ...]) -> np.ndarray:
+    """Return which pixels (H, W) of a picture are its outermost two."""
+    border = np.ones(shape, bool)
+    border[2:-2, 2:-2] = False
+    return border
 
 
 def frame_cause(background: Background, gradient: np.ndarray) -> str | None:

@@ -11,8 +11,7 @@ from scipy import ndimage
 
 from manitwin.config import MattingConfig
 from manitwin.errors import Rejected
-from manitwin.models.matting.causes import CAUSES, REMEDY, cause_of
-from manitwin.models.matting.confidence import frame_cause
+from manitwin.models.matting.causes import CAUSES, REMEDY, told
 from manitwin.models.matting.explained import Explains, explained_first
 from manitwin.models.matting.learned import Network
 from manitwin.models.matting.outline import dilated, without_small_holes
@@ -125,11 +124,10 @@ def _reject_doubtful(name: str, judged: Judged, min_confidence: float, second_ob
     if judged.of_pieces >= min(min_confidence, LIKELY):
         _reject_several(name, found.mask, second_object_share)
     if judged.confidence < min_confidence:
-        cause = frame_cause(found.background, found.gradient) or cause_of(judged.features, judged.candidate.scores)
         raise Rejected(
             "low_confidence_matte",
             f"{name}: the object cannot be told from the background (confidence {judged.confidence:.2f} <"
-            f" {min_confidence:g}): {CAUSES[cause]}; {REMEDY}",
+            f" {min_confidence:g}): {told(judged.candidate, judged.features)}",
             "generate",
         )
 
