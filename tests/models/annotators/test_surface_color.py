@@ -52,6 +52,17 @@ def test_css_colors_get_their_everyday_names(rgb: tuple[int, int, int], name: st
     assert color_name(lab_from_srgb(np.array(rgb) / 255)) == name
 
 
+@pytest.mark.parametrize(
+    ("rgb", "name"),
+    [
+        ((174, 165, 155), "light grey"), ((191, 180, 165), "beige"), ((199, 173, 163), "beige"), ((200, 185, 170), "beige"),
+        ((217, 166, 169), "pink"), ((236, 190, 180), "pink"), ((196, 131, 121), "pink"),
+    ],
+)  # fmt: skip
+def test_steel_and_beige_cloth_are_not_pink(rgb: tuple[int, int, int], name: str) -> None:
+    assert color_name(lab_from_srgb(np.array(rgb) / 255)) == name
+
+
 def test_dark_gold_in_a_photo_of_metal_is_gold_and_paint_keeps_its_name() -> None:
     for seen, name in (((118, 98, 44), "olive"), ((112, 84, 40), "brown"), ((190, 154, 84), "dark yellow")):
         lab = lab_from_srgb(np.array(seen) / 255)
