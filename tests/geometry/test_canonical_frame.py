@@ -81,6 +81,13 @@ def test_user_decides_even_against_balance() -> None:
     choice = choose_up(upside_down, user="z")
     np.testing.assert_allclose(choice.rotation, np.eye(3), atol=1e-12)
     assert choice.probability == 0.0
+    assert "as the user says" in choice.reason
+
+
+@pytest.mark.parametrize("turned_deg", [0, 30])
+def test_the_reason_names_who_said_which_axis_is_up(turned_deg: int) -> None:
+    block = _turned(trimesh.creation.box(extents=(0.1, 0.06, 0.04)), (turned_deg, 0, 0))
+    assert "z is up as the generator says" in choose_up(block, user="z", said_by="the generator").reason
 
 
 def test_pose_is_snapped_onto_its_facet_and_keeps_its_yaw() -> None:

@@ -36,6 +36,22 @@ def _check(geometry: dict[str, Any], solid: trimesh.Trimesh, parts: list[trimesh
     assert (geometry["vertices"], geometry["faces"]) == (len(solid.vertices), len(solid.faces))
 
 
+@pytest.mark.parametrize(("given", "who"), [(None, "the user"), ("import.json", "the import")])
+def test_the_reason_names_who_said_which_axis_is_up(tmp_path: Path, given: str | None, who: str) -> None:
+    box = trimesh.creation.box((0.1, 0.06, 0.04))
+    box.export(tmp_path / "box.glb")
+    geometry, _, _ = _run(tmp_path / "box.glb", tmp_path / "out", up="y", units="m", given=given)
+    assert geometry["up_reason"] == f"y is up as {who} says"
+
+
+def test_of_a_generated_mesh_the_generator_says_which_axis_is_up(tmp_path: Path) -> None:
+    trimesh.creation.box((0.1, 0.06, 0.04)).export(tmp_path / "generated.glb")
+    fields = {"generation": {"rests": True, "metric": True}}
+    draft = Draft("id", Item(None, text="a box"), 0, fields, {"generated.glb": tmp_path / "generated.glb"})
+    geometry = MeshStage(MeshConfig()).run(draft, tmp_path)["geometry"]
+    assert geometry["up_reason"] == "y is up as the generator says"
+
+
 @pytest.mark.shared_data
 def test_mug_of_the_shared_data_stands_with_its_volume_of_134_ml(shared_data: Path, tmp_path: Path) -> None:
     geometry, solid, parts = _run(shared_data / "meshes/mug_ycb/white_mug.obj", tmp_path, name="mug")

@@ -65,18 +65,19 @@ def choose_up(
     user: Literal["y", "z", "auto"] = "auto",
     file_up: str | None = None,
     stands: bool | None = None,
+    said_by: str = "the user",
 ) -> UpChoice:
     """Choose the canonical pose of a watertight solid; its yaw is kept.
 
     ``file_up`` is the up axis that the format declares (None: no rule; Z is tried before Y). ``stands``: whether such a
-    thing is put down upright (None: unknown). In order: the user's axis; for things that lie, their likeliest side, the
-    file's if nearly as likely; an opening upward; for round, long things that stand, their long axis; the file's axis; the
-    likeliest side. All but an unstable user's axis
+    thing is put down upright (None: unknown). ``said_by`` names who said the axis ``user``, for the reason. In order: that
+    axis; for things that lie, their likeliest side, the file's if nearly as likely; an opening upward; for round, long things
+    that stand, their long axis; the file's axis; the likeliest side. All but an unstable axis that was said
     are snapped onto the support facet.
     """
     poses = stable_poses(solid.vertices, _center_of_mass(solid))
     if user != "auto":
-        return _as_told(poses, user)
+        return _as_told(poses, user, said_by)
     axis = file_up or "z"
     if stands is False:
         pose = _likeliest_side(poses, _axis(axis))
@@ -113,12 +114,12 @@ def _center_of_mass(solid: trimesh.Trimesh) -> np.ndarray:
     return np.asarray(solid.convex_hull.center_mass)
 
 
-def _as_told(poses: list[StablePose], axis: str) -> UpChoice:
+def _as_told(poses: list[StablePose], axis: str, said_by: str) -> UpChoice:
     near = _nearest(poses, _axis(axis), _NEAR_DEG, least=0.0)
     if near is not None:
-        return _turned(near, axis, f"{axis} is up as the user says")
+        return _turned(near, axis, f"{axis} is up as {said_by} says")
     return UpChoice(
-        _FORMAT_TO_Z_UP[axis], axis, 0.0, 0.0, f"{axis} is up as the user says, although it does not rest so"
+        _FORMAT_TO_Z_UP[axis], axis, 0.0, 0.0, f"{axis} is up as {said_by} says, although it does not rest so"
     )
 
 

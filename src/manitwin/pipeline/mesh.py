@@ -41,7 +41,7 @@ class MeshStage:
     settings: MeshConfig
 
     name: ClassVar[str] = "mesh"
-    version: ClassVar[str] = "4"
+    version: ClassVar[str] = "5"
     reads: ClassVar[tuple[str, ...]] = (f"{_GENERATED}?", "generation?", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry")
     needs: ClassVar[Resource] = "cpu"
@@ -65,7 +65,8 @@ class MeshStage:
             with np.errstate(
                 all="ignore"
             ):  # numbers at the edge of what a double holds: what comes of them is looked at
-                result, chosen, to_object = self._solid(soup, file, _said_up(draft, generated), prior)
+                said = _said_up(draft, generated), _said_by(draft, generated)
+                result, chosen, to_object = self._solid(soup, file, said, prior)
         except (QhullError, np.linalg.LinAlgError) as error:
             cause = f"its surface has no depth or precision to make a solid of ({type(error).__name__})"
             raise _degenerate(path, cause) from error
@@ -85,12 +86,15 @@ class MeshStage:
         return {"geometry": geometry}
 
     def _solid(
-        self, soup: trimesh.Trimesh, file: MeshFile, said_up: Literal["y", "z", "auto"], prior: Prior | None
+        self, soup: trimesh.Trimesh, file: MeshFile, said: tuple[Literal["y", "z", "auto"], str], prior: Prior | None
     ) -> tuple[RepairResult, UpChoice, np.ndarray]:
-        """Return the repaired solid, how it was turned, and its transform to the object frame ``(4, 4)``."""
+        """Return the repaired solid, how it was turned, and its transform to the object frame ``(4, 4)``.
+
+        ``said`` is the up axis that was said, and who said it.
+        """
         result = repair(soup, **self.settings.repair.model_dump())
         stands = None if prior is None else prior.stands
-        chosen = choose_up(result.mesh, user=said_up, file_up=file.up, stands=stands)
+        chosen = choose_up(result.mesh, user=said[0], file_up=file.up, stands=stands, said_by=said[1])
         return result, chosen, object_frame(np.asarray(result.mesh.vertices), chosen.rotation)
 
     def _limits(self) -> MeshLimits:
@@ -129,6 +133,13 @@ def _said_up(draft: Draft[Item], generated: bool) -> Literal["y", "z", "auto"]:
     if not generated:
         return draft.payload.up
     return "y" if draft.field("generation").get("rests", False) else "auto"
+
+
+def _said_by(draft: Draft[Item], generated: bool) -> str:
+    """Return who said the up axis: a generator and an import write it, and nobody is asked then."""
+    if generated:
+        return "the generator"
+    return "the user" if draft.payload.given is None else "the import"
 
 
 def _unit(file: MeshFile, draft: Draft[Item], generated: bool, prior: Prior | None) -> LengthUnit:
