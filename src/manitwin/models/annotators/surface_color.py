@@ -15,8 +15,8 @@ from manitwin.geometry.sampling import sample_surface
 # (name, sRGB hex). Several shades share a name. Names and regions follow the ISCC-NBS centroid colours (Kelly and Judd
 # 1955, level 2) and the basic colour terms of Berlin and Kay 1969; the shades are chosen by eye within those regions. Black and
 # dark grey are the centroids 267 and 266: between them lies L* 25, the Munsell value 2.5 at which ISCC-NBS parts the two. The
-# last five pinks are the yellowish pinks (25, 26, 28 to 30), which people call pink, salmon, coral or peach; the greyish one (32)
-# is left out, since beside it cloth, steel and stone of next to no chroma were pink. The last two beiges are 33 and 93.
+# last six pinks are the yellowish pinks (25, 26, 28 to 30, 32), which people call pink, salmon, coral or peach; the greyish one
+# (32) has a little more chroma here and brownish pink and yellowish grey (33, 93) are beige, since cloth and stone were pink.
 _SHADES: tuple[tuple[str, str], ...] = (
     ("blue", "0a18f0"), ("blue", "1e3cbe"), ("dark blue", "0a0a8c"), ("dark red", "8c0808"),
     ("black", "0a0a0a"), ("black", "222222"), ("dark grey", "555555"),
@@ -27,7 +27,7 @@ _SHADES: tuple[tuple[str, str], ...] = (
     ("dark brown", "3e2a1c"), ("dark brown", "4a3426"), ("red", "d01c1f"), ("red", "b3202a"),
     ("red", "e23b30"), ("dark red", "7d1416"), ("dark red", "5c1a1b"), ("pink", "f2a7b8"),
     ("pink", "e87ba0"), ("pink", "f6cfd6"), ("pink", "ffb7a5"), ("pink", "f99379"), ("pink", "f4c2c2"),
-    ("pink", "d9a6a9"), ("pink", "c48379"), ("beige", "c2ac99"), ("beige", "bfb8a5"),
+    ("pink", "d9a6a9"), ("pink", "c48379"), ("pink", "ccaaa3"), ("beige", "c2ac99"), ("beige", "bfb8a5"),
     ("orange", "f07c1c"), ("orange", "d9661f"),
     ("orange", "f79b3e"), ("dark orange", "b0521c"), ("gold", "c79a2b"), ("gold", "b58a3c"),
     ("yellow", "f5d328"), ("yellow", "e3c01c"), ("yellow", "fae36b"), ("light yellow", "fbf0a5"),
