@@ -6,12 +6,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_CELLS = 40  # along the longer side of the outline
+_CELLS = 40  # along the outline's longer side
+_NEAR_PLANE, _FITS = (
+    0.8,
+    10,
+)  # of the surface: so much is taken for near the plane of barrel and grip; how often that is fitted
+_LIKE_BOX = 0.97  # cosine between the plane's normal and an axis of the box: so near, the box is taken
+_STEPS = 72  # directions in a turn, in which the grip is looked for
+_ALONG_BOX = 1.1  # how much better the box's own directions are thought
 _BARREL_ROW = 0.7  # of the longest row: a row that long crosses the barrel
 _GRIP_ROW = 0.55  # of the longest row: rows beyond the barrel are that short in the median, else it is no pistol
 _LEAST_GRIP = 0.25  # of the outline across the barrel
-_ONE_RUN = 0.8  # of the grip's upper rows: so many are one bar
+_ONE_RUN = (
+    0.4  # of the grip's upper rows: so many are one bar; a caulking gun's lever is a second one beside its handle
+)
 _GAP = 3  # cells that may be missing in a bar
+_BACK = 2  # cells that a straight back may be uneven by
+_LEAST_STRAIGHT = 0.55  # of a barrel: how straight it is at least
+_OVERHANG = 0.1  # of the barrel, beyond the grip at its back
+_PLACED, _BLUNT = 0.2, 0.3  # how much a grip at the very end counts against it, and one that tapers to nothing
 _END = 0.2  # of the barrel: what is compared to tell how its ends taper
 _PLACE_WEIGHT, _TAPER_WEIGHT = 2.0, 1.0
 
@@ -39,52 +52,86 @@ class Pistol:
         return offset @ self.along / self.length_m, offset @ self.down / self.barrel_m
 
 
-def find_pistol(surface_m: np.ndarray, obb_extents_m: np.ndarray, obb_to_object: np.ndarray) -> Pistol | None:
+@dataclass(frozen=True)
+class _Outline:
+    """Rows of an outline's cells, from the barrel's back down: how well they ``fit`` a pistol, where its barrel and grip are."""
+
+    fit: float
+    barrel_rows: int
+    first: int
+    last: int
+    grip_share: float
+    front_is_last: bool
+
+
+def find_pistol(surface_m: np.ndarray, obb_to_object: np.ndarray) -> Pistol | None:
     """Return the barrel and grip of surface samples ``(N, 3)``, None for what is not a thick bar with a thinner one across.
 
-    The outline is looked at across the box's shortest axis. The barrel lies along that side of it whose rows are long while the
-    rows beyond are the shortest. Its working end is the one away from the grip, and the one that tapers.
+    The outline is that in the plane near which most of the surface is. Of all directions there the barrel lies along the one in
+    which it is straightest: its back is even from end to end and it fills its box, while a grip with a battery at its end is
+    hollow on both sides, and leans. The working end is the one away from the grip, and the one that tapers.
     """
-    order = np.argsort(-obb_extents_m, kind="stable")
-    axes, extents = obb_to_object[:3, :3].T[order], obb_extents_m[order]
-    flat = (surface_m - obb_to_object[:3, 3]) @ axes[:2].T + extents[:2] / 2
-    cell_m = float(extents[0]) / _CELLS
-    shape = np.maximum(np.ceil(extents[:2] / cell_m).astype(int), 1)
-    taken = np.zeros(shape, dtype=bool)
-    index = np.clip((flat / cell_m).astype(int), 0, shape - 1)
-    taken[index[:, 0], index[:, 1]] = True
-    found: list[tuple[float, Pistol]] = []
-    for length_axis in (0, 1):
-        for near_low in (True, False):
-            outline = taken.T if length_axis == 0 else taken
-            rows = outline if near_low else outline[::-1]
-            measured = _measured(rows)
-            if measured is None:
-                continue
-            ratio, barrel_rows, first, last, grip_share, front_is_last = measured
-            along = -axes[length_axis] if front_is_last else axes[length_axis]
-            down = axes[1 - length_axis] * (1 if near_low else -1)
-            middle = obb_to_object[:3, 3] - down * extents[1 - length_axis] / 2
-            front = (last * cell_m if front_is_last else first * cell_m) - extents[length_axis] / 2
-            pistol = Pistol(
-                origin_m=middle + axes[length_axis] * front,
-                along=along,
-                down=down,
-                length_m=(last - first) * cell_m,
-                barrel_m=barrel_rows * cell_m,
-                height_m=float(extents[1 - length_axis]),
-                grip_share=1 - grip_share if front_is_last else grip_share,
-            )
-            found.append((ratio, pistol))
-    return min(found, key=lambda each: each[0])[1] if found else None
+    center = surface_m.mean(0)
+    axes, of_box = _plane(surface_m, obb_to_object[:3, :3].T)
+    flat = (surface_m - center) @ axes.T
+    cell_m = float(np.ptp(flat, axis=0).max()) / _CELLS
+    best: tuple[float, _Outline, np.ndarray, np.ndarray] | None = None
+    for step in range(_STEPS):
+        angle = 2 * np.pi * step / _STEPS
+        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        turned = flat @ turn.T
+        measured = _measured(_rows(turned, cell_m))
+        if measured is not None:
+            fit = measured.fit * (_ALONG_BOX if of_box and step % (_STEPS // 4) == 0 else 1.0)
+            best = max(best or (0.0, measured, turn, turned), (fit, measured, turn, turned), key=lambda each: each[0])
+    if best is None:
+        return None
+    _, found, turn, turned = best
+    along, down = turn @ axes
+    low = turned.min(0)
+    front = low[0] + (found.last if found.front_is_last else found.first) * cell_m
+    return Pistol(
+        origin_m=center + along * front + down * low[1],
+        along=-along if found.front_is_last else along,
+        down=down,
+        length_m=(found.last - found.first) * cell_m,
+        barrel_m=found.barrel_rows * cell_m,
+        height_m=float(np.ptp(turned[:, 1])),
+        grip_share=1 - found.grip_share if found.front_is_last else found.grip_share,
+    )
 
 
-def _measured(rows: np.ndarray) -> tuple[float, int, int, int, float, bool] | None:
-    """Measure an outline ``(R, C)`` whose barrel may lie along its first rows.
+def _plane(surface_m: np.ndarray, box_axes: np.ndarray) -> tuple[np.ndarray, bool]:
+    """Return two axes ``(2, 3)`` of the plane near which most points ``(N, 3)`` are, and whether they are the box's.
 
-    Returns the median row of the grip by the longest row, how many rows the barrel has, its first and last column, where along
-    it the grip is, and whether its working end is at the last column.
+    A drill's side handle sticks out of it, so the shortest side of its box, or its least spread, need not be its thickness. From
+    each principal axis the farthest points are left out and the plane fitted anew; the thinnest counts. A box that lies nearly
+    so is exact where the fit is not.
     """
+    found: list[tuple[float, np.ndarray]] = []
+    for normal in np.linalg.eigh(np.cov(surface_m.T))[1].T:
+        axes = normal[:, None]
+        for _ in range(_FITS):
+            away = surface_m @ axes[:, 0]
+            away = np.abs(away - np.median(away))
+            spread, axes = np.linalg.eigh(np.cov(surface_m[away <= np.quantile(away, _NEAR_PLANE)].T))
+        found.append((float(spread[0]), axes.T))
+    axes = min(found, key=lambda each: each[0])[1]
+    across = np.abs(box_axes @ axes[0])
+    nearest = int(across.argmax())
+    return (np.delete(box_axes, nearest, 0), True) if across[nearest] > _LIKE_BOX else (axes[1:], False)
+
+
+def _rows(flat_m: np.ndarray, cell_m: float) -> np.ndarray:
+    """Return which cells points ``(N, 2)`` take, a row for each step of the second coordinate."""
+    index = ((flat_m - flat_m.min(0)) / (cell_m * (1 + 1e-9))).astype(int)  # the farthest point is in the last cell
+    taken = np.zeros(index.max(0)[::-1] + 1, dtype=bool)
+    taken[index[:, 1], index[:, 0]] = True
+    return taken
+
+
+def _measured(rows: np.ndarray) -> _Outline | None:
+    """Measure an outline ``(R, C)`` whose barrel may lie along its first rows."""
     lengths = rows.sum(1)
     longest = int(lengths.argmax())
     if longest > len(rows) / 2:
@@ -93,26 +140,45 @@ def _measured(rows: np.ndarray) -> tuple[float, int, int, int, float, bool] | No
     while barrel_rows < len(rows) and lengths[barrel_rows] >= _BARREL_ROW * lengths[longest]:
         barrel_rows += 1
     grip = rows[barrel_rows:]
-    if len(grip) < _LEAST_GRIP * len(rows):
+    if len(grip) < _LEAST_GRIP * len(rows) or np.median(grip.sum(1)) > _GRIP_ROW * lengths[longest]:
         return None
-    ratio = float(np.median(grip.sum(1))) / float(lengths[longest])
-    if ratio > _GRIP_ROW:
-        return None
-    barrel = rows[:barrel_rows]
-    columns = np.flatnonzero(barrel.any(0))
+    halfway = (lengths[longest] + float(np.median(grip.sum(1)))) / 2
+    while lengths[barrel_rows] >= halfway:  # the lower side of a round barrel
+        barrel_rows += 1
+    grip = rows[barrel_rows:]
+    columns = np.flatnonzero(rows[:barrel_rows].any(0))
     first, last = int(columns[0]), int(columns[-1]) + 1
+    barrel = rows[:barrel_rows, first:last]
+    straight = float(barrel[: _BACK + 1].any(0).mean() * barrel.mean())
     upper = grip[: max(len(grip) // 2, 1)]  # below it a drill's battery reaches forward
-    if np.mean([_is_one_run(row) for row in upper]) < _ONE_RUN:
-        return None  # between two bars: seen along the grip, a drill has its barrel on one side and its battery on the other
-    grip_at = float(np.nonzero(upper)[1].mean()) + 0.5 if upper.any() else (first + last) / 2
+    if straight < _LEAST_STRAIGHT or np.mean([_is_one_run(row) for row in upper]) < _ONE_RUN:
+        return None
+    grip_at = float(np.nonzero(upper)[1].mean()) + 0.5
     share = (grip_at - first) / (last - first)
-    heights = barrel[:, first:last].sum(0)
+    heights = barrel.sum(0)
     count = max(round(_END * len(heights)), 1)
     low, high = float(heights[:count].mean()), float(heights[-count:].mean())
     forward = _PLACE_WEIGHT * (0.5 - share) + _TAPER_WEIGHT * (low - high) / max(low, high, 1.0)
-    return ratio, barrel_rows, first, last, share, forward > 0
+    fit = straight * _like_a_grip(grip, upper, first, last)
+    return _Outline(fit, barrel_rows, first, last, share, forward > 0)
+
+
+def _like_a_grip(grip: np.ndarray, upper: np.ndarray, first: int, last: int) -> float:
+    """Return how like a grip the rows beyond a barrel are, up to 1: it tapers less than a chuck, and is not at the very end."""
+    taken = [np.flatnonzero(row) for row in upper if row.any()]
+    before = float(np.median([row[0] for row in taken])) - first
+    behind = last - 1 - float(np.median([row[-1] for row in taken]))
+    overhang = min(before, behind) / (last - first)
+    end = np.mean([_widest_run(row) for row in grip[-max(len(grip) // 4, 1) :]])
+    blunt = float(end / np.median([_widest_run(row) for row in upper]))
+    return (1 - _PLACED * (1 - np.clip(overhang / _OVERHANG, 0, 1))) * (1 - _BLUNT * (1 - np.clip(blunt, 0, 1)))
 
 
 def _is_one_run(row: np.ndarray) -> bool:
     taken = np.flatnonzero(row)
     return len(taken) > 0 and int(np.diff(taken).max(initial=0)) <= _GAP
+
+
+def _widest_run(row: np.ndarray) -> int:
+    ends = np.flatnonzero(np.diff(row.astype(int), prepend=0, append=0))
+    return int((ends[1::2] - ends[::2]).max(initial=0))

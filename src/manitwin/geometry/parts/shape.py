@@ -190,7 +190,7 @@ class Shape:
     @cached_property
     def pistol(self) -> Pistol | None:
         """The barrel and grip, where it has the outline of a pistol."""
-        return find_pistol(self.surface_m, self.obb_extents_m, self.obb_to_object)
+        return find_pistol(self.surface_m, self.obb_to_object)
 
     @cached_property
     def arch(self) -> Arch | None:
