@@ -97,6 +97,35 @@ def test_a_hammer_strikes_with_the_blunt_end_of_its_head() -> None:
     assert best("face", trimesh.boolean.union([shaft, blunt, claw]), stands=False)[1] > 0.03
 
 
+def claw_hammer(shaft_m: float, face_m: float, claw_m: float, bend_m: float) -> trimesh.Trimesh:
+    """A hammer along X whose face looks at -Y, and whose claw tapers to +Y and bends back to the handle."""
+    parts = [
+        trimesh.creation.box([shaft_m, 0.026, 0.024]).apply_translation([shaft_m / 2, 0, 0]),
+        trimesh.creation.box([0.03, face_m, 0.024]).apply_translation([0, -face_m / 2, 0]),
+    ]
+    for share in np.linspace(0, 1, 9):
+        piece = trimesh.creation.box([0.03 * (1 - share) + 0.006, claw_m / 5, 0.024])
+        parts.append(piece.apply_translation([bend_m * share**2, claw_m * share, 0]))
+    return trimesh.boolean.union(parts)
+
+
+@pytest.mark.parametrize(
+    ("shaft_m", "face_m", "claw_m", "bend_m"),
+    [(0.2, 0.08, 0.11, 0.04), (0.2, 0.06, 0.11, 0.04), (0.26, 0.06, 0.08, 0.04), (0.26, 0.09, 0.08, 0.0)],
+)
+def test_a_long_claw_is_no_striking_face(shaft_m: float, face_m: float, claw_m: float, bend_m: float) -> None:
+    assert best("face", claw_hammer(shaft_m, face_m, claw_m, bend_m), stands=False)[1] < -0.8 * face_m
+
+
+def test_an_axe_meets_the_work_with_its_edge() -> None:
+    shaft = trimesh.creation.box([0.35, 0.02, 0.02])
+    poll = trimesh.creation.box([0.03, 0.025, 0.024]).apply_translation([-0.16, -0.0125, 0])
+    edge = [[x, 0.09, 0] for x in (-0.185, -0.1)]
+    root = [[x, 0.0, z] for x in (-0.175, -0.145) for z in (-0.012, 0.012)]
+    blade = trimesh.convex.convex_hull(np.array(edge + root))
+    assert best("face", trimesh.boolean.union([shaft, poll, blade]), stands=False)[1] > 0.06
+
+
 def test_a_mouth_is_the_rim_or_where_a_lid_closes_it() -> None:
     assert best("mouth", cup())[2] == pytest.approx(0.1, abs=0.003)
     assert best("mouth", cylinder(0.04, 0.05))[2] == pytest.approx(0.05, abs=0.003)

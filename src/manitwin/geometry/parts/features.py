@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from manitwin.geometry.parts.shape import LEAST_HANDLE_REACH, Shape, SurfacePoints
+from manitwin.geometry.parts.striking_face import handle_line, striking_face
 
 Feature = Literal[
     "opening", "rim", "inside", "handle", "handle_end", "head", "face", "tip", "edge", "middle", "neck", "spout",
@@ -116,36 +117,7 @@ def _head(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
     return _near(along - 0.55 * share, 0.35 * share) * (0.5 + 0.5 * broad) * centered
 
 
-def _face(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    """The outermost point of the head, across the handle: where a hammer strikes.
-
-    Where the head reaches about as far to both sides, it strikes with the blunt end, which has more surface across the head.
-    """
-    along = shape.axis.along(points.positions_m)
-    off = shape.axis.off_axis_m(points.positions_m)
-    of_head = shape.axis.along(shape.surface_m) < shape.axis.head_share + 0.1
-    furthest = float(shape.axis.off_axis_m(shape.surface_m[of_head]).max())
-    scores = (off / max(furthest, 1e-9)) ** 2 * (along < shape.axis.head_share + 0.12)
-    sideways = (shape.surface_m[of_head] - _handle_line(shape)) @ shape.axis.across[0]
-    reach = np.array([-sideways.min(), sideways.max()])
-    if reach.min() < _BALANCED_HEAD * reach.max():
-        return scores
-    bluntness = [np.ptp((shape.surface_m[of_head] @ shape.axis.across[1])[side * sideways > _HEAD_END * reach[i]])
-                 for i, side in enumerate((-1, 1))]  # fmt: skip
-    blunt_side = 1 if bluntness[1] > bluntness[0] else -1
-    mine = blunt_side * ((points.positions_m - _handle_line(shape)) @ shape.axis.across[0]) > 0
-    return np.where(mine, scores, 0.5 * scores)
-
-
-_BALANCED_HEAD = 0.6  # shorter by longer reach of a head from which both sides may be the striking one
-_HEAD_END = 0.8  # of a head's reach: beyond is its end
 _LOPSIDED = 1.25  # how much farther a brush's head reaches from the handle's line where its bristles stand out sideways
-
-
-def _handle_line(shape: Shape) -> np.ndarray:
-    """Return the middle of the handle half of a long thing, ``(3,)``."""
-    handle = shape.surface_m[shape.axis.along(shape.surface_m) > 0.5]
-    return (handle.min(0) + handle.max(0)) / 2 if len(handle) else shape.obb_to_object[:3, 3]
 
 
 def _bristles(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
@@ -155,7 +127,7 @@ def _bristles(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
     head = shape.surface_m[shape.axis.along(shape.surface_m) < share]
     if not len(head):
         return _head(shape, points)
-    line = _handle_line(shape)
+    line = handle_line(shape)
     directions = np.concatenate([shape.axis.across, -shape.axis.across])
     reach = ((head - line) @ directions.T).max(0)
     lopsided = reach / np.maximum(np.roll(reach, 2), 1e-9)
@@ -306,7 +278,7 @@ def _arch_end(shape: Shape, points: SurfacePoints) -> np.ndarray:
 
 _SCORERS: dict[str, Callable[[Shape, SurfacePoints], np.ndarray | None]] = {
     "opening": _opening, "rim": _rim, "inside": _inside, "handle": _handle, "handle_end": _handle_end, "head": _head,
-    "face": _face, "tip": _tip, "edge": _edge, "middle": _middle, "neck": _neck, "spout": _spout, "top": _top,
+    "face": striking_face, "tip": _tip, "edge": _edge, "middle": _middle, "neck": _neck, "spout": _spout, "top": _top,
     "base": _base, "side": _side, "center": _center, "front": partial(_large_face, side=1),
     "back": partial(_large_face, side=-1), "toe": _toe,
     "end": _end, "ring": _ring,

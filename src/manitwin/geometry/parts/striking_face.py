@@ -1,0 +1,63 @@
+"""Find where a hammer strikes: the blunt end of its head, on either side of its handle's line."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manitwin.geometry.parts.shape import Shape, SurfacePoints
+
+_BALANCED_HEAD = 0.6  # shorter by longer reach of a head from which both sides may be the striking one
+_HEAD_END = 0.8  # of a head's reach: beyond is its end
+_TALLER = 1.3  # a shorter end, along the handle, by the longer one: that is a claw
+_BEYOND_HANDLE = 1.5  # of the handle's half width: what reaches farther is of the head
+
+
+def striking_face(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    """The outermost point of the head, across the handle: where a hammer strikes.
+
+    Where the head reaches about as far to both sides, it strikes with the blunt end, which has the larger section; else with
+    the end that reaches farther, as an axe does, unless that tapers to a claw. The handle's own line counts: a long claw turns
+    the box, and then the blunt end seems to reach less far, or not to be of the head.
+    """
+    along = shape.axis.along(shape.surface_m)
+    line, direction = handle_line(shape), _handle_direction(shape)
+    across = shape.axis.across[0] - (shape.axis.across[0] @ direction) * direction
+    across /= np.linalg.norm(across)
+    frame = np.stack([across, direction, np.cross(across, direction)])
+    surface, here = (shape.surface_m - line) @ frame.T, (points.positions_m - line) @ frame.T
+    half_m = float(np.quantile(np.abs(surface[along > 0.5, 0]), 0.95))
+    sides = [surface[(along < 0.5) & (side * surface[:, 0] > _BEYOND_HANDLE * half_m)] for side in (-1, 1)]
+    reach = np.array([np.abs(side[:, 0]).max(initial=0.0) for side in sides])
+    facing = 0.7 + 0.3 * np.maximum(points.normals @ across * np.sign(here[:, 0]), 0)
+    facing *= shape.axis.along(points.positions_m) < 0.5
+    blunt = _blunt_side(sides, reach)
+    if blunt is None:
+        return (here[:, 0] / max(float(reach.max()), half_m)) ** 2 * facing
+    mine = (here[:, 0] > 0) == (blunt == 1)
+    scores = np.minimum(np.abs(here[:, 0]) / reach[np.where(here[:, 0] > 0, 1, 0)], 1) ** 2 * facing
+    return np.where(mine, scores, 0.5 * scores)
+
+
+def _blunt_side(sides: list[np.ndarray], reach: np.ndarray) -> int | None:
+    """Return which of two sides ``(N, 3)`` of a head is blunt, None where one is not there or the longer one may strike."""
+    if not reach.min():
+        return None
+    ends = [side[np.abs(side[:, 0]) > _HEAD_END * far] for side, far in zip(sides, reach, strict=True)]
+    extents = np.array([np.ptp(end[:, 1:], axis=0) for end in ends])
+    if reach.min() >= _BALANCED_HEAD * reach.max():
+        return int(extents.prod(1).argmax())
+    shorter = int(reach.argmin())
+    return shorter if extents[shorter, 0] > _TALLER * extents[1 - shorter, 0] else None
+
+
+def handle_line(shape: Shape) -> np.ndarray:
+    """Return the middle of the handle half of a long thing, ``(3,)``."""
+    handle = shape.surface_m[shape.axis.along(shape.surface_m) > 0.5]
+    return (handle.min(0) + handle.max(0)) / 2 if len(handle) else shape.obb_to_object[:3, 3]
+
+
+def _handle_direction(shape: Shape) -> np.ndarray:
+    """Return the direction ``(3,)`` in which the handle half of a long thing is longest, away from the head."""
+    handle = shape.surface_m[shape.axis.along(shape.surface_m) > 0.5]
+    longest = np.linalg.eigh(np.cov(handle.T))[1][:, 2] if len(handle) > 2 else shape.axis.direction
+    return np.asarray(longest * np.sign(longest @ shape.axis.direction))
