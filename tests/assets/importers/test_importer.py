@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 from PIL import Image
 from typer.testing import CliRunner
 
@@ -18,7 +17,6 @@ from manitwin.cli.main import app
 from manitwin.errors import AssetError, UsageError
 from manitwin.formats.glb import read_glb
 from manitwin.formats.meshes.textures import material_of
-from manitwin.geometry.repair.welding import weld_equal
 from manitwin.twin.import_record import ImportRecord, read_import_record
 from twin_folders import write_accepted
 
@@ -55,38 +53,6 @@ def test_same_asset_gives_the_same_bytes(tmp_path: Path) -> None:
     _, second = imported(path, tmp_path / "b")
     for name in ("asset.glb", "import.json"):
         assert (first / name).read_bytes() == (second / name).read_bytes()
-
-
-BY_FORMAT = {
-    "urdf": '<robot name="r"><link name="l"><visual><origin xyz="0 0 1"/><geometry><box size="0.1 0.2 0.3"/></geometry></visual>'
-    '<visual><geometry><cylinder radius="0.1" length="0.3"/></geometry></visual></link></robot>',
-    "sdf": '<sdf version="1.9"><model name="r"><link name="l"><visual name="a"><pose>0 0 1 0 0 0</pose><geometry><box>'
-    '<size>0.1 0.2 0.3</size></box></geometry></visual><visual name="b"><geometry><cylinder><radius>0.1</radius>'
-    "<length>0.3</length></cylinder></geometry></visual></link></model></sdf>",
-    "mjcf": '<mujoco><worldbody><body><geom type="box" size="0.05 0.1 0.15" pos="0 0 1"/>'
-    '<geom type="cylinder" size="0.1 0.15"/><geom type="capsule" size="0.1 0.15" pos="1 0 0"/></body></worldbody></mujoco>',
-    "usd": '#usda 1.0\n(defaultPrim = "r"\nupAxis = "Z"\nmetersPerUnit = 1)\ndef Xform "r"\n{\ndef Cube "a"\n{\n'
-    'double size = 0.1\n}\ndef Cylinder "b"\n{\ndouble radius = 0.1\ndouble height = 0.3\n}\n'
-    'def Cone "c"\n{\ndouble radius = 0.1\ndouble height = 0.3\n}\n}\n',
-}
-
-
-@pytest.mark.parametrize("format", BY_FORMAT)
-def test_flat_faces_of_primitives_shade_flat_and_their_solids_stay_closed(tmp_path: Path, format: str) -> None:
-    path = tmp_path / f"thing.{'xml' if format == 'mjcf' else 'usda' if format == 'usd' else format}"
-    path.write_text(BY_FORMAT[format])
-    read = read_asset(path, format)  # type: ignore[arg-type]
-    _, folder = imported(path, tmp_path / "out", format)
-    parts = read_glb(folder / "asset.glb")
-    assert len(parts) == len(read.visual)
-    for part, solid in zip(parts, read.visual, strict=True):
-        alike = np.einsum("fkc,fc->fk", part.vertex_normals[part.faces], part.face_normals)
-        assert (
-            np.degrees(np.arccos(np.clip(alike, -1, 1))).max() < 8
-        )  # a cylinder's side has 48 faces, 7.5 degrees each
-        assert len(part.faces) == len(solid.faces) and np.isclose(part.volume, solid.volume, rtol=1e-5)
-        welded = trimesh.Trimesh(*weld_equal(np.asarray(part.vertices), part.faces), process=False)
-        assert welded.is_watertight and solid.is_watertight
 
 
 @pytest.mark.parametrize("mass_kg", [0.0, -1.0])
