@@ -6,6 +6,7 @@ state, and links in contact always (there 95 % of random states).
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from itertools import combinations
 from pathlib import Path
@@ -83,6 +84,17 @@ def _of_srdf(path: Path, tree: UrdfTree) -> set[tuple[str, str]]:
     return found
 
 
+def _check_pairs(shapes: Counter[int], name: str) -> None:
+    """Raise ConfigError where shapes, so many for each joint, make too many pairs; those of one joint never meet."""
+    count = shapes.total()
+    pairs = (count**2 - sum(each**2 for each in shapes.values())) // 2
+    if pairs > MOST_PAIRS:
+        raise ConfigError(
+            f"{name}: {count:,} collision shapes make {pairs:,} pairs, of which at most {MOST_PAIRS:,} are tried; give an"
+            " SRDF, or fewer shapes"
+        )
+
+
 def _in_contact(tree: UrdfTree, definition: RobotDefinition) -> set[tuple[str, str]]:
     """Return pairs in contact at home, or in most of many random states, of the links' convex hulls."""
     try:
@@ -100,19 +112,18 @@ def _in_contact(tree: UrdfTree, definition: RobotDefinition) -> set[tuple[str, s
             f"{definition.name}: Pinocchio cannot read its URDF ({said}); mend its numbers and joints"
         ) from error
     owners: list[str] = []
-    for link in links_of_urdf(urdf):
-        frame = model.frames[model.getBodyId(link.name)]
+    links_with_shapes = [(model.frames[model.getBodyId(link.name)], link) for link in links_of_urdf(urdf)]
+    shapes = Counter[int]()
+    for frame, link in links_with_shapes:
+        shapes[frame.parentJoint] += len(link.shapes)
+    _check_pairs(shapes, definition.name)
+    for frame, link in links_with_shapes:
         for shape in link.shapes:
             placement = frame.placement * pin.SE3(np.ascontiguousarray(shape.shape_to_link))
             convex = _convex(coal, shape)
             geometry.addGeometryObject(pin.GeometryObject(f"{len(owners)}", frame.parentJoint, placement, convex))
             owners.append(link.name)
     geometry.addAllCollisionPairs()
-    if len(geometry.collisionPairs) > MOST_PAIRS:
-        raise ConfigError(
-            f"{definition.name}: {len(owners):,} collision shapes make {len(geometry.collisionPairs):,} pairs, of which at most"
-            f" {MOST_PAIRS:,} are tried; give an SRDF, or fewer shapes"
-        )
     data, geometry_data = model.createData(), geometry.createData()
     links = [_pair(owners[pair.first], owners[pair.second]) for pair in geometry.collisionPairs]
     home = pin.neutral(model)
