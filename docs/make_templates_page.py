@@ -36,8 +36,10 @@ the right part; their source is `template:CATEGORY`. What is not here is refused
   rack is no mug. The twin is called as the text calls it (a skillet is a skillet, made by the frying pan's template).
 - **How it looks**: colours and materials before or after the name are those of the whole; behind *with*, of a part:
   `a small blue mug with a wooden handle`. What the text does not say is drawn from the seed.
-- **How large it is**: `9 cm` is the longest extent; `9 cm tall`, `wide`, `long` is that direction. Inches and feet are read
-  too. A size that no such thing has is refused. `small` and `large` choose within the usual sizes.
+- **How large it is**: `9 cm` is the longest extent; `9 cm tall`, `wide`, `long` is that direction. Units may be spelt out, and
+  inches and feet are read too. A size that no such thing has is refused. `small` and `large` choose within the usual sizes.
+- **What it cannot be told** is refused and not left out: several lengths or that of a part (a template is scaled as a whole), a
+  volume, a mass, what a thing is not. So is the longer name of another thing (a magnifying glass is no glass).
 - **What it is made of** decides the mass: the volume of each part times its density; of a closed container, with its contents;
   hollow behind a sheet where a handle or a stand of sheet metal would be. It is no estimate, has no interval, and is not refused
   for being unlike that of most such things (a plastic fork); a finding says so.

@@ -19,37 +19,29 @@ FACTOR = 3.0
 
 def annotated_mass(
     given: ImportRecord, solid: trimesh.Trimesh, mass_kg: float, scale: float, computed: MassProperties
-) -> tuple[MassProperties | None, list[str]]:
+) -> MassProperties | None:
     """Return ``computed`` mass properties with the centre and the inertia that an asset gives; None where it gives neither.
-
-    An inertia that is that of no body of this size is not kept: a finding says so.
 
     ``scale`` is what the object was scaled by since: the centre goes with it, the inertia with its square and with the mass.
     An inertia without a mass of its own is of none that could be compared, and is not kept. Raises Rejected
     (``implausible_mass``) for a centre outside of the convex hull, and for an inertia that no body has.
     """
     center = None if given.center_of_mass_m is None else scale * np.array(given.center_of_mass_m)
-    inertia, findings = None, list[str]()
+    inertia = None
     if given.inertia_kg_m2 is not None and given.mass_kg is not None:
         inertia = scale**2 * mass_kg / given.mass_kg * np.array(given.inertia_kg_m2)
+    if center is None and inertia is None:
+        return None
     if center is not None:
         _check_center(center, solid, given.source)
     if inertia is not None:
         _check_inertia(inertia, given.source)
         inertia = (inertia + inertia.T) / 2
-        refused = beyond_reach(
-            inertia, computed.center_of_mass_m if center is None else center, solid, mass_kg, given.source
-        )
-        if refused is not None:
-            findings, inertia = [refused], None
-    if center is None and inertia is None:
-        return None, findings
-    kept = MassProperties(
+    return MassProperties(
         computed.center_of_mass_m if center is None else center,
         computed.inertia_kg_m2 if inertia is None else inertia,
         computed.volume_m3,
     )
-    return kept, findings
 
 
 def moments_apart(
@@ -88,20 +80,4 @@ def _check_inertia(inertia: np.ndarray, source: str) -> None:
         "implausible_mass",
         f"the inertia of {source} is that of no body (principal moments {listed} kg m2): each is positive, and at most the sum of"
         " the two others; mend it, or leave it out of import.json",
-    )
-
-
-def beyond_reach(
-    inertia: np.ndarray, center_m: np.ndarray, solid: trimesh.Trimesh, mass_kg: float, source: str
-) -> str | None:
-    """Say that a moment is more than that of all the mass as far from the axis as the object reaches; None where none is."""
-    offsets = np.asarray(solid.vertices) - center_m
-    moments, axes = np.linalg.eigh(inertia)
-    most = mass_kg * ((offsets**2).sum(1)[:, None] - (offsets @ axes) ** 2).max(0)
-    worst = int(np.argmax(moments / most))
-    if moments[worst] <= most[worst] * (1 + ROUNDING):
-        return None
-    return (
-        f"the inertia of {source} is that of no body of this size and mass: {moments[worst]:.2g} kg m2 about an axis, at most"
-        f" {most[worst]:.2g} were all of it as far out as the object reaches; computed from the shape instead"
     )

@@ -60,7 +60,9 @@ def refusal(config: BuildConfig) -> Callable[[Item], str | None]:
 def _two_things(item: Item) -> str | None:
     """Return what is wrong where an item's text and its name are those of different things that the priors know."""
     by_text, by_name = (lookup(said) if said else None for said in (item.text, item.name))
-    if by_text is None or by_name is None or by_text.shape.split()[0] == by_name.shape.split()[0]:
+    if by_text is None or by_name is None:
+        return None
+    if by_text.shape.split()[0] == by_name.shape.split()[0]:  # a mug may be called a cup
         return None
     if by_text.category in (by_name.category, by_name.kin_of) or by_name.category == by_text.kin_of:
         return None

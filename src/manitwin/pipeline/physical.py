@@ -84,10 +84,8 @@ class PhysicalStage:
             off_m = float(np.linalg.norm(by_parts.center_of_mass_m - properties.center_of_mass_m))
             uncertainty = 0.0 if _known_mass(subject) is not None else max(uncertainty, OF_OTHER_MATTER * off_m)
             properties = by_parts
-        annotated, refused = self._annotated(subject, solid, mass.value, scale, properties)
+        annotated = self._annotated(subject, solid, mass.value, scale, properties)
         findings = findings_of(estimates)
-        if refused:
-            findings = [*(findings or ()), *refused]
         if annotated is not None and subject.given is not None:
             wall_m = estimates.wall_thickness_m or NOMINAL_WALL_M
             findings = [*(findings or ()), *moments_apart(annotated, solid, mass.value, wall_m, subject.given.source)]
@@ -123,10 +121,10 @@ class PhysicalStage:
 
     def _annotated(
         self, subject: Subject, solid: trimesh.Trimesh, mass_kg: float, scale: float, computed: MassProperties
-    ) -> tuple[MassProperties | None, list[str]]:
+    ) -> MassProperties | None:
         given = subject.given
         if given is None or given.made_of_parts or given.format == FITTED:
-            return None, []
+            return None
         return annotated_mass(given, solid, mass_kg, scale, computed)
 
     def _of_parts(

@@ -24,9 +24,8 @@ _CRUMB_SHARE = 1e-6  # of the mesh's volume: smaller pieces of a cut are dropped
 _CONVEX_SHARE = 1e-3  # of the mesh's volume: a part whose hull exceeds it by less is left whole
 _FREE_MERGE_SHARE = 2.5e-4  # of the mesh's volume: a merge that adds less is made even where there are few enough hulls
 _SECTORS = 8  # first cuts of a vessel, through its axis; without them the search leaves it filled, 12 and 16 were worse
-_CROSS_GAIN = (
-    4.5  # times that of the best plane: what three cuts, crosswise through a hole, must gain to be made instead
-)
+# Times that of the best plane: what three cuts, crosswise through a hole, must gain to be made instead.
+_CROSS_GAIN = 4.5
 _COARSE_SHARE = 7e-3  # of a part's longest side: detail that does not decide where it is cut
 _POSITIONS = (0.2, 0.5, 0.8)  # of a part's width along a cutting normal
 _MORE_POSITIONS = (0.1, 0.35, 0.65, 0.9)  # along the two normals whose first positions were the best
@@ -194,7 +193,7 @@ def _through_hole(part: _Part, least_gain: float) -> list[manifold3d.Manifold] |
     """
     solid, best = part.solid, part.hull_volume - least_gain
     found = None
-    for axis in _normals(part.hull_vertices):
+    for axis in own_and_principal_axes(part.hull_vertices):
         middle = _hole_middle(solid, axis)
         if middle is None:
             continue
@@ -229,28 +228,28 @@ def _best_plane(part: _CoarsePart, opening: Opening | None) -> tuple[float, np.n
 
     Tried are planes across the object's and the part's axes, and planes through the vessel's axis.
     """
-    normals = _normals(part.vertices)
+    normals = own_and_principal_axes(part.vertices)
     first = [part.cuts_across(normal, _POSITIONS) for normal in normals]
     leading = sorted(range(len(normals)), key=lambda index: (min(first[index])[0], index))[:2]
     axis = np.array([0.0, 0, 1]) if opening is None else opening.axis
     center = part.vertices.mean(0) if opening is None else opening.center_m
     cuts = [(*cut, normal) for normal, tried in zip(normals, first, strict=True) for cut in tried]
     cuts += [(*cut, normals[index]) for index in leading for cut in part.cuts_across(normals[index], _MORE_POSITIONS)]
-    for normal in _sector_normals(part.vertices - center, axis):
+    for normal in _sectorown_and_principal_axes(part.vertices - center, axis):
         offset = float(normal @ center)
         cuts.append((part.hull_volume_after(normal, offset), offset, normal))
     total, offset, normal = min(cuts, key=lambda cut: cut[0])
     return total, normal, offset
 
 
-def _normals(vertices: np.ndarray) -> list[np.ndarray]:
-    """Return the object's axes and those principal axes of vertices ``(V, 3)`` that are no such axis."""
+def own_and_principal_axes(vertices: np.ndarray) -> list[np.ndarray]:
+    """Return the object's axes and those principal axes of vertices ``(V, 3)`` that are no such axis, each ``(3,)``."""
     centered = vertices - vertices.mean(0)
     principal = np.linalg.eigh(np.einsum("ni,nj->ij", centered, centered))[1].T
     return [*np.eye(3), *(axis for axis in principal if np.abs(axis).max() < 0.995)]
 
 
-def _sector_normals(offsets: np.ndarray, axis: np.ndarray) -> list[np.ndarray]:
+def _sectorown_and_principal_axes(offsets: np.ndarray, axis: np.ndarray) -> list[np.ndarray]:
     """Return normals of planes through the axis that divide the angle a part spans around it, in quarters."""
     first, second = _across(axis, np.pi / 2), -_across(axis, 0.0)
     angles = np.sort(np.arctan2(offsets @ second, offsets @ first))

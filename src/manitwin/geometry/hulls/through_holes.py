@@ -8,8 +8,9 @@ import manifold3d
 import numpy as np
 import trimesh
 
+from manitwin.geometry.hulls.decomposition import own_and_principal_axes
+
 _LEAST_SHARE = 0.01  # of the outline's area: smaller holes are of scans, or of no use
-_PRINCIPAL = 0.995  # cosine from which a principal axis is one of the object's
 
 
 def holes_kept(mesh: trimesh.Trimesh, hulls: Sequence[np.ndarray]) -> float | None:
@@ -23,9 +24,7 @@ def holes_kept(mesh: trimesh.Trimesh, hulls: Sequence[np.ndarray]) -> float | No
     solid = manifold3d.Manifold(manifold3d.Mesh64(vertices, np.array(mesh.faces, dtype=np.uint64, order="C")))
     if solid.status() != manifold3d.Error.NoError:
         return None
-    principal = np.linalg.eigh(np.cov(vertices.T))[1].T
-    axes = [*np.eye(3), *(axis for axis in principal if np.abs(axis).max() < _PRINCIPAL)]
-    kept = [share for axis in axes for share in _kept_along(solid, hulls, axis)]
+    kept = [share for axis in own_and_principal_axes(vertices) for share in _kept_along(solid, hulls, axis)]
     return min(kept, default=None)
 
 

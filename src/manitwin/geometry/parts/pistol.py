@@ -7,19 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 _CELLS = 40  # along the outline's longer side
-_NEAR_PLANE, _FITS = (
-    0.8,
-    10,
-)  # of the surface: so much is taken for near the plane of barrel and grip; how often that is fitted
+_NEAR_PLANE = 0.8  # of the surface: so much is taken for near the plane of barrel and grip
+_FITS = 10  # of that plane
 _LIKE_BOX = 0.97  # cosine between the plane's normal and an axis of the box: so near, the box is taken
 _STEPS = 72  # directions in a turn, in which the grip is looked for
 _ALONG_BOX = 1.1  # how much better the box's own directions are thought
 _BARREL_ROW = 0.7  # of the longest row: a row that long crosses the barrel
 _GRIP_ROW = 0.55  # of the longest row: rows beyond the barrel are that short in the median, else it is no pistol
 _LEAST_GRIP = 0.25  # of the outline across the barrel
-_ONE_RUN = (
-    0.4  # of the grip's upper rows: so many are one bar; a caulking gun's lever is a second one beside its handle
-)
+# Of the grip's upper rows: so many are one bar; a caulking gun's lever is a second one beside its handle.
+_ONE_RUN = 0.4
 _GAP = 3  # cells that may be missing in a bar
 _BACK = 2  # cells that a straight back may be uneven by
 _LEAST_STRAIGHT = 0.55  # of a barrel: how straight it is at least

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, field
 from typing import Literal
 
@@ -119,6 +120,11 @@ def _given_matte(image: np.ndarray, name: str, min_area_share: float, second_obj
     return Matte(np.dstack([colours, alpha]), "alpha", 1.0, findings, {})
 
 
+def _rounded_down(confidence: float) -> float:
+    """Return a confidence in hundredths that is shown beside a limit that it does not reach."""
+    return math.floor(100 * confidence) / 100
+
+
 def _reject_doubtful(name: str, judged: Judged, min_confidence: float, second_object_share: float) -> None:
     found = judged.candidate.found
     if judged.of_pieces >= min(min_confidence, LIKELY):
@@ -126,7 +132,7 @@ def _reject_doubtful(name: str, judged: Judged, min_confidence: float, second_ob
     if judged.confidence < min_confidence:
         raise Rejected(
             "low_confidence_matte",
-            f"{name}: the object cannot be told from the background (confidence {judged.confidence:.2f} <"
+            f"{name}: the object cannot be told from the background (confidence {_rounded_down(judged.confidence):.2f} <"
             f" {min_confidence:g}): {told(judged.candidate, judged.features)}",
             "generate",
         )

@@ -153,10 +153,8 @@ def read_pool(dataset: str | Path, cache: Path | None = None) -> Pool:
 
     def body(twin_id: str) -> RigidBody:
         twin = source.twin(twin_id)
-        path = (
-            twin.folder / RECORD
-        )  # of those drawn alone: to hash the records of a hundred thousand would take minutes
-        parse_record(twin.read_bytes(RECORD), path, sealed=True)
+        # of those drawn alone: to hash the records of a hundred thousand would take minutes
+        parse_record(twin.read_bytes(RECORD), twin.folder / RECORD, sealed=True)
         return twin.rigid_body()
 
     return Pool(twins, body)

@@ -101,6 +101,8 @@ def test_parts_are_described_by_their_name() -> None:
         ("a mug with a height of 9 cm", {"height": 0.09}),
         ("a mug 9 cm in height", {"height": 0.09}),
         ("a red mug with a wooden handle, 9 cm tall", {"height": 0.09}),
+        ("a mug of the 70's", {}),
+        ("an umbrella 3' long", {"length": 0.9144}),
     ],
 )
 def test_lengths_are_read_with_their_unit_and_direction(text: str, lengths: dict[str, float]) -> None:

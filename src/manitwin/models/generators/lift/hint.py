@@ -8,6 +8,10 @@ import numpy as np
 
 from manitwin.models.annotators.priors import Prior, lookup
 
+MOST_OUT_OF_ROUND = 1.3
+"""Of a ball's longest side over its shortest, and of a plate's over its second."""
+_NO_BALLS = frozenset({"rugby ball"})
+
 
 @dataclass(frozen=True)
 class ShapeHint:
@@ -38,11 +42,6 @@ def hint_from_name(name: str | None) -> ShapeHint:
         flat=bool({"flat", "shallow"} & set(words)),
         volume_share=_volume_share(prior),
     )
-
-
-MOST_OUT_OF_ROUND = 1.3
-"""Of a ball's longest side over its shortest, and of a plate's over its second."""
-_NO_BALLS = frozenset({"rugby ball"})
 
 
 def why_not_round(name: str | None, extents: np.ndarray) -> str | None:

@@ -18,10 +18,10 @@ _UNITS_M = {
     r"millimet(?:re|er)s?": 1e-3, "mm": 1e-3, r"centimet(?:re|er)s?": 1e-2, "cm": 1e-2, r"met(?:re|er)s?": 1.0, "m": 1.0,
     "inch(?:es)?": 0.0254, "in": 0.0254, "foot|feet|ft": 0.3048,
 }  # fmt: skip
-_LENGTH = re.compile(
-    rf"(\d{{1,4}}(?:\.\d{{1,3}})?) ?({'|'.join(_UNITS_M)})\b\.? ?(?:in (?=height|width|length|diameter|depth))?(\w{{0,12}})"
-)
-_NAMED_LENGTH = re.compile(rf"\b(height|width|length|diameter|depth)(?: of)? ({_LENGTH.pattern.split(' ?(?:in')[0]})")
+_AMOUNT = rf"(\d{{1,4}}(?:\.\d{{1,3}})?) ?({'|'.join(_UNITS_M)})\b\.?"
+_MEASURES = "height|width|length|diameter|depth"
+_LENGTH = re.compile(rf"{_AMOUNT} ?(?:in (?={_MEASURES}))?(\w{{0,12}})")
+_NAMED_LENGTH = re.compile(rf"\b({_MEASURES})(?: of)? ({_AMOUNT})")
 _OF_A_PART = re.compile(rf" (?:with|having|and) an? {_LENGTH.pattern}")
 _SEVERAL = re.compile(rf"\d ?(?:x|by|×) ?{_LENGTH.pattern}")
 _NOT_TAKEN = (
@@ -121,7 +121,7 @@ def _plain(text: str) -> str:
     plain = re.sub(r"(?<=\d),(?=\d{3}\b)", "", text.lower())
     plain = re.sub(r"(?<=\d),(?=\d)", ".", plain)
     plain = re.sub(r"(?<=\d) ?(?:\"|″|'')", " inches ", plain)
-    plain = re.sub(r"(?<=\d) ?(?:'|′)", " ft ", plain)
+    plain = re.sub(r"(?<=\d) ?(?:'|′)(?!\w)", " ft ", plain)  # the 70's are no feet
     plain = re.sub(r"(\d+) (\d)/(\d)\b", lambda m: f"{int(m[1]) + int(m[2]) / max(int(m[3]), 1):g}", plain)
     plain = " ".join(plain.replace(",", " , ").replace("-", " ").split())
     return _NAMED_LENGTH.sub(lambda m: f"{m[2]} {m[1]}", plain)
