@@ -23,8 +23,9 @@ A message names the file or the thing, the cause and the remedy, and lists what 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
+from typing import Any
 
 _SHOWN_CHARACTERS = 100
 _MOST_CHARACTERS = 3000
@@ -70,23 +71,24 @@ class Rejected(ManiTwinError):
     """The decision not to make a twin of this input.
 
     ``reason`` is one of ``manitwin.twin.record.REJECTION_REASONS[stage]``; ``detail`` is one line for a person.
-    ``stage`` is needed only where two stages share the reason.
+    ``stage`` is needed only where two stages share the reason. ``files`` are kept with the rejection, by their names: what a
+    person can judge it by.
     """
 
-    def __init__(self, reason: str, detail: str, stage: str | None = None):
+    def __init__(self, reason: str, detail: str, stage: str | None = None, files: Mapping[str, bytes] | None = None):
         detail = encodable(detail)
         super().__init__(f"{reason}: {detail}")
-        self.reason, self.detail, self.stage = reason, detail, stage
+        self.reason, self.detail, self.stage, self.files = reason, detail, stage, dict(files or {})
 
-    def __reduce__(self) -> tuple[type, tuple[str, str, str | None]]:
-        return type(self), (self.reason, self.detail, self.stage)
+    def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
+        return type(self), (self.reason, self.detail, self.stage, self.files)
 
 
 class InputError(Rejected):
     """An input that cannot be read, or is not what it claims to be."""
 
-    def __init__(self, reason: str, detail: str, stage: str | None = "input"):
-        super().__init__(reason, detail, stage)
+    def __init__(self, reason: str, detail: str, stage: str | None = "input", files: Mapping[str, bytes] | None = None):
+        super().__init__(reason, detail, stage, files)
 
 
 class InputChanged(ManiTwinError):

@@ -216,6 +216,8 @@ WRONG_VALUES = [
     "view . --trials 3",
     "review apply nothing_here",
     "review tune nothing_here",
+    "review cutouts nothing_here",
+    "review cutouts . --sheet a.txt",
 ]
 
 

@@ -12,6 +12,10 @@ FOREIGN = "a program of others that is not here; a fake stands for it"
 NO_NETWORK = "fetches from the network"
 
 
+NOTHING_DOUBTED = {r"manitwin review cutouts": 2}
+"""The pages' data set has no ledger, and no photo that is rejected for its cut-out; tests/pipeline/test_cutout.py has both."""
+
+
 @dataclass(frozen=True)
 class Arrangement:
     """How a page is run. Patterns are regular expressions, searched in what the page says.
@@ -123,7 +127,8 @@ PAGES: dict[str, Arrangement] = {
     "docs/photos.md": Arrangement(
         # without weights, which only a person adds, each is refused
         rewritten={r"^manitwin models add isnet": "manitwin models add isnet --from nothing.tgz"},
-        exits={r"^manitwin models add": 2, r"--matting (isnet|my-u2net)": 2},
+        slow=(r"manitwin review cutouts",),
+        exits={r"^manitwin models add": 2, r"--matting (isnet|my-u2net)": 2} | NOTHING_DOUBTED,
     ),
     "docs/platforms.md": Arrangement(not_run=WHEEL | {r"uv pip compile": NO_NETWORK}, slow=(DOCTOR,)),
     "docs/priors.md": Arrangement(blocks={"melon": "prior kitchen"}),
@@ -149,7 +154,9 @@ PAGES: dict[str, Arrangement] = {
         blocks={"^DATASET/": "tree DATASET"},
     ),
     "docs/real_scene.md": Arrangement(slow=(r".",)),
-    "docs/review.md": Arrangement(slow=(r"manitwin review (apply|tune|import|report|DATASET)", r"--form")),
+    "docs/review.md": Arrangement(
+        slow=(r"manitwin review (apply|cutouts|tune|import|report|DATASET)", r"--form"), exits=NOTHING_DOUBTED
+    ),
     "docs/search.md": Arrangement(
         slow=(r"manitwin search DATASET --image",),
     ),

@@ -171,7 +171,9 @@ def _photos(twin: Twin, config: BuildConfig, folder: Path) -> tuple[Path, ...]:
     """Return the photo that a twin was made of, cut out again; none where it was made of several, or of something else."""
     if twin.record.source.kind != "image":
         return ()
-    rgba, _ = PhotoStage(config.matting).cut_out(twin.folder / twin.record.source.file, twin.record.name)
+    photo = twin.folder / twin.record.source.file
+    # what is doubted of a twin that was accepted, somebody has confirmed
+    rgba, _ = PhotoStage(config.matting).cut_out(photo, twin.record.name, lambda doubted: doubted.matte)
     Image.fromarray(rgba).save(folder / "photo.png", compress_level=1)
     return (folder / "photo.png",)
 

@@ -24,7 +24,8 @@ REMEDIES = {
     "not_finite": "export it again: some of its numbers are none",
     "no_object": "photograph the object whole and larger, on a plain surface of another colour",
     "several_objects": "one object an input: crop the photo, or give each object in a file of its own",
-    "low_confidence_matte": "photograph it whole on a plain surface of another colour, or give an image with an alpha channel",
+    "low_confidence_matte": "photograph it whole on a plain surface of another colour, or give an image with an alpha channel;"
+    " where its cutout.webp is right, `manitwin review cutouts DATASET --accept ID` builds it",
     "generator_failed": "another photo, another generator (--generator, see docs/generators.md), or a mesh",
     "not_watertight": "close the holes of the mesh in a modeller",
     "degenerate": "give a mesh that encloses a volume, with walls and no holes",

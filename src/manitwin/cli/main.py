@@ -41,6 +41,7 @@ from manitwin.cli.commands.publish import publish
 from manitwin.cli.commands.query import query
 from manitwin.cli.commands.render import render
 from manitwin.cli.commands.review import review, review_apply, review_import, review_report, review_sample, review_tune
+from manitwin.cli.commands.review_cutouts import review_cutouts
 from manitwin.cli.commands.search import search
 from manitwin.cli.commands.segmentation import segmentation
 from manitwin.cli.commands.stats import stats
@@ -113,6 +114,7 @@ for name, reviewing in (
     ("import", review_import),
     ("report", review_report),
     ("apply", review_apply),
+    ("cutouts", review_cutouts),
     ("tune", review_tune),
 ):
     register(app, reviewing, f"review {name}")

@@ -64,8 +64,8 @@ def assemble(
 ) -> TwinRecord:
     """Write the twin's folder into the empty folder ``fresh``, to be renamed into place; returns its record.
 
-    ``stages`` are those that ran, the rejecting one included. Where ``rejected`` is given, only the source and the reason
-    are kept. Without ``keep_source`` names, sizes and digests stand for the input, and ``run.json`` says where it lay.
+    ``stages`` are those that ran, the rejecting one included. Where ``rejected`` is given, only the source, the reason and its
+    files are kept. Without ``keep_source`` names, sizes and digests stand for the input, and ``run.json`` says where it lay.
     """
     source = _write_source(draft, kind, fresh, keep_source)
     record: dict[str, Any] = {
@@ -84,7 +84,10 @@ def assemble(
         },
         "quality": {"checks": _checks_so_far(draft)},
     }
-    if rejected is None:
+    if rejected is not None:
+        for name, content in rejected.files.items():
+            (fresh / name).write_bytes(content)
+    else:
         _write_accepted(draft, fresh)
         record |= _accepted_sections(draft) | _write_links(draft, fresh)
     host: dict[str, Any] = {

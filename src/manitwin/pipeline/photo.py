@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -13,10 +14,11 @@ from manitwin.engine.stage import Draft
 from manitwin.errors import InputError, Rejected
 from manitwin.formats.image_file import read_image
 from manitwin.models.generators.templates.fitting.outline_check import template_outline_check
-from manitwin.models.matting import matte_photo
 from manitwin.models.matting.learned import Network
+from manitwin.models.matting.matte import DoubtedCutOut, Matte, matte_photo
 from manitwin.models.matting.object_network import built_in_model
 from manitwin.models.matting.outline_network import outline_model
+from manitwin.pipeline.cutout import confirmed_or_rejected
 from manitwin.pipeline.item import Item
 
 
@@ -24,7 +26,7 @@ class PhotoStage:
     """Write ``photo.png`` (RGBA, upright, alpha is the matte) and the field ``matte``."""
 
     name: ClassVar[str] = "photo"
-    version: ClassVar[str] = "14"
+    version: ClassVar[str] = "15"
     reads: ClassVar[tuple[str, ...]] = ()
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "matte")
     needs: ClassVar[Resource] = "cpu"
@@ -40,24 +42,36 @@ class PhotoStage:
         """Read and matte; raises InputError, or Rejected where no single object can be told from the background."""
         if draft.payload.file is None:
             raise InputError("empty", "no image file; give one")
-        rgba, field = self.cut_out(Path(draft.payload.file), draft.payload.name)
+        amendment = draft.amendments.get(self.name, {})
+        path = Path(draft.payload.file)
+        rgba, field = self.cut_out(
+            path, draft.payload.name, lambda doubted: confirmed_or_rejected(doubted, path.name, amendment)
+        )
         _save(rgba, folder / "photo.png")
         return {"matte": field | self._network_field()}
 
-    def cut_out(self, path: Path, name: str | None) -> tuple[np.ndarray, dict[str, Any]]:
-        """Return a photo ``(H, W, 4) uint8`` of what a person called ``name`` with its matte, and what is known of that."""
+    def cut_out(
+        self, path: Path, name: str | None, confirmed: Callable[[DoubtedCutOut], Matte]
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Return a photo ``(H, W, 4) uint8`` of what a person called ``name`` with its matte, and what is known of that.
+
+        ``confirmed`` returns the matte of a doubted cut-out that is right all the same, or raises. Raises InputError, Rejected.
+        """
         settings = self.settings
         photo = read_image(path, frame=settings.frame, max_side_px=settings.photo_side_px)
-        matte = matte_photo(
-            photo.pixels,
-            path.name,
-            working_side_px=settings.working_side_px,
-            min_confidence=settings.min_confidence,
-            min_area_share=settings.min_area_share,
-            second_object_share=settings.second_object_share,
-            network=self.network,
-            explains=template_outline_check(name, photo.focal_mm),
-        )
+        try:
+            matte = matte_photo(
+                photo.pixels,
+                path.name,
+                working_side_px=settings.working_side_px,
+                min_confidence=settings.min_confidence,
+                min_area_share=settings.min_area_share,
+                second_object_share=settings.second_object_share,
+                network=self.network,
+                explains=template_outline_check(name, photo.focal_mm),
+            )
+        except DoubtedCutOut as doubted:
+            matte = confirmed(doubted)
         return np.ascontiguousarray(matte.rgba), {
             "method": matte.method,
             "confidence": matte.confidence,
@@ -91,7 +105,7 @@ class PhotosStage(PhotoStage):
         for number, file in enumerate(draft.payload.files):
             path = Path(file)
             try:
-                rgba, field = self.cut_out(path, draft.payload.name)
+                rgba, field = self.cut_out(path, draft.payload.name, _refused)
             except InputError:  # no photo: what was given is not what was meant
                 raise
             except Rejected as answer:
@@ -111,6 +125,10 @@ class PhotosStage(PhotoStage):
         matte = worst | {"findings": [*left_out, *findings], "photos": [field["confidence"] for _, field in kept]}
         matte["focals_mm"] = [field["focal_mm"] for _, field in kept]
         return {"matte": matte | self._network_field()}
+
+
+def _refused(doubted: DoubtedCutOut) -> Matte:
+    raise doubted
 
 
 def _save(rgba: np.ndarray, path: Path) -> None:

@@ -6,22 +6,19 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, Unpack
 
-from manitwin.dataset.index.parts import IndexTables
 from manitwin.dataset.index.query import Index
 from manitwin.dataset.review.corrections import Conflict, Correction, settled
+from manitwin.dataset.review.making_again import made_again
 from manitwin.dataset.review.store import ReviewStore, reviews_path
 from manitwin.dataset.review.twins_seen import read_twin, revisions
 from manitwin.engine.amendments import Amendments, read_amendments, write_amendments
-from manitwin.engine.drive import RunOptions, RunReport, drive
-from manitwin.engine.ledger.ledger import Ledger
+from manitwin.engine.drive import RunOptions, RunReport
 from manitwin.engine.ledger.location import local_ledger
 from manitwin.engine.ledger.reading import read_ledger
 from manitwin.errors import UsageError
 from manitwin.formats.json_file import parse_json_object
 from manitwin.pipeline.human_corrections import CATEGORY, MASS, MOVES, SIZE, STAGES
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.recipe import TwinRecipe
-from manitwin.pipeline.settings import stored_config
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.record import TwinRecord
 
@@ -57,13 +54,7 @@ def apply_reviews(
     for twin_id in items:
         own = [each for each in corrections if each.twin_id == twin_id]
         write_amendments(root, twin_id, amended(read_amendments(root, twin_id), own, read_twin(root, twin_id)))
-    _reopen(root, (number for number, _ in items.values()))
-    settings = stored_config(root)
-    run_settings = settings.run if jobs is None else settings.run.model_copy(update={"cpu": jobs})
-    run = drive(
-        TwinRecipe(settings, IndexTables()), [item for _, item in items.values()], root, run_settings,
-        configuration=settings.model_dump(mode="json"), max_cost_usd=settings.services.max_cost_usd, **options,
-    )  # fmt: skip
+    run = made_again(root, items.values(), jobs, **options)
     return Applied([each for each in corrections if each.twin_id not in left], conflicts, left, run)
 
 
@@ -106,11 +97,3 @@ def _items(root: DatasetRoot, twin_ids: Iterable[str]) -> dict[str, tuple[int, I
                 said = parse_json_object(row[1], f"{path}: item {row[0]}", UsageError, file_names=True)
                 found[twin_id] = int(row[0]), Item.from_json(said)
     return found
-
-
-def _reopen(root: DatasetRoot, numbers: Iterable[int]) -> None:
-    ledger = Ledger(local_ledger(root))
-    try:
-        ledger.reopen(numbers)
-    finally:
-        ledger.close()

@@ -39,6 +39,17 @@ class Matte:
     agreement: dict[str, float] = field(default_factory=dict)
 
 
+class DoubtedCutOut(Rejected):
+    """The decision not to believe a cut-out; ``matte`` is what it would have been."""
+
+    def __init__(self, reason: str, detail: str, matte: Matte):
+        super().__init__(reason, detail, "generate")
+        self.matte = matte
+
+    def __reduce__(self) -> tuple[type, tuple[str, str, Matte]]:
+        return type(self), (self.reason, self.detail, self.matte)
+
+
 def matte_photo(
     image: np.ndarray,
     name: str,
@@ -58,7 +69,8 @@ def matte_photo(
     rules' where smooth surfaces explain the border, ``grabcut`` the rules' where they do not, ``network`` a network's. Where none
     is believed and ``explains`` is given, one that it explains may be (``explained_first``).
 
-    Raises Rejected: ``no_object``, ``several_objects``, ``low_confidence_matte``, naming cause and remedy.
+    Raises Rejected: ``no_object``, ``several_objects``, ``low_confidence_matte``, naming cause and remedy; DoubtedCutOut where
+    something was cut out.
     """
     if image.shape[2] == 4 and (image[..., 3] < 250).mean() > TRANSPARENT_SHARE:
         return _given_matte(image, name, min_area_share, second_object_share)
@@ -66,13 +78,24 @@ def matte_photo(
     study = study_photo(rgb, working_side_px=working_side_px, network=network)
     if explains is not None and study.confidence < min_confidence:
         study = explained_first(rgb, study, explains, min_confidence=min_confidence, working_side_px=working_side_px)
-    chosen = decided(
-        study,
-        name,
-        min_confidence=min_confidence,
-        min_area_share=min_area_share,
-        second_object_share=second_object_share,
-    )
+    try:
+        decided(
+            study,
+            name,
+            min_confidence=min_confidence,
+            min_area_share=min_area_share,
+            second_object_share=second_object_share,
+        )
+    except Rejected as answer:
+        if answer.reason == "no_object" or not study.judged:
+            raise
+        raise DoubtedCutOut(answer.reason, answer.detail, _matte_of(rgb, study)) from None
+    return _matte_of(rgb, study)
+
+
+def _matte_of(rgb: np.ndarray, study: Study) -> Matte:
+    """Return the likeliest matte of a study that found something."""
+    chosen = study.judged[0]
     return Matte(
         rgba=np.dstack([rgb, study.alpha]),
         method="network" if chosen.candidate.by_network else "flat_border" if study.plain else "grabcut",

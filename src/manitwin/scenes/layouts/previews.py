@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import io
 import json
-import math
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 
 import cv2
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image
 
 from manitwin.errors import InputError, UsageError
 from manitwin.formats.image_file import read_image
 from manitwin.formats.label_picture import label_picture
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
+from manitwin.render.contact_sheet import TILE_PX, contact_sheet
 from manitwin.render.false_colors import depth_picture, id_color, ids_picture
 from manitwin.render.scene_renderer import SceneFrame, SceneRenderer, ShadowRegion
 from manitwin.scenes.furniture_pictures import add_furniture, lighting_of
@@ -37,7 +37,6 @@ DEPTH_UNIT_M = 0.001
 
 SCENES_SHOWN = 48
 CAMERA = "oblique"
-TILE_PX, MOST_COLUMNS, CAPTION_PX, GAP_PX = 256, 8, 18, 4
 SHEET_QUALITY = 85
 
 
@@ -137,20 +136,6 @@ def write_contact_sheet(dataset: str | Path, out: str | Path, *, most: int = SCE
     sheet.save(stream, "WEBP", quality=SHEET_QUALITY, method=4)
     root.write_bytes(CONTACT_SHEET, stream.getvalue())
     return len(shown)
-
-
-def contact_sheet(pictures: Sequence[tuple[str, np.ndarray]]) -> Image.Image:
-    """Return pictures ``(TILE_PX, TILE_PX, 3) uint8`` RGB row by row, each with its caption below it."""
-    columns = min(MOST_COLUMNS, math.ceil(math.sqrt(1.5 * len(pictures))))
-    rows = -(-len(pictures) // columns)
-    width, height = TILE_PX + GAP_PX, TILE_PX + CAPTION_PX + GAP_PX
-    page = Image.new("RGB", (columns * width + GAP_PX, rows * height + GAP_PX), "white")
-    draw, font = ImageDraw.Draw(page), ImageFont.load_default(CAPTION_PX - 4)
-    for place, (caption, picture) in enumerate(pictures):
-        x, y = GAP_PX + place % columns * width, GAP_PX + place // columns * height
-        page.paste(Image.fromarray(picture), (x, y))
-        draw.text((x + TILE_PX / 2, y + TILE_PX + CAPTION_PX / 2), caption, "black", font, anchor="mm")
-    return page
 
 
 def _read_picture(root: DatasetRoot, name: str) -> np.ndarray:
