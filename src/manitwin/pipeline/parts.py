@@ -38,7 +38,7 @@ class PartsStage:
     """Give each face of ``visual.glb`` its part, or none where geometry does not tell it."""
 
     name: ClassVar[str] = "parts"
-    version: ClassVar[str] = "6"
+    version: ClassVar[str] = "7"
     reads: ClassVar[tuple[str, ...]] = (
         "solid.npz", "visual.glb", "points", "physical", "language", "geometry", "naming?",
     )  # fmt: skip
@@ -79,11 +79,14 @@ def _given(draft: Draft, solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _To
 
 def _by_form(draft: Draft, solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _Told | None:
     """Return the parts that the rule of its form tells; None where it has no rule, or the surface does not show them."""
-    prior = _prior(draft)
-    if prior is None or prior.parts is None:
+    usual = _prior(draft)
+    if usual is None or usual.parts is None:
         return None
     center_m = np.array(draft.field("physical")["center_of_mass_m"])
-    shape = measure_shape(solid, center_m, prior.head_end, prior.stands, np.random.default_rng(draft.seed))
+    shape = measure_shape(solid, center_m, usual.head_end, usual.stands, np.random.default_rng(draft.seed))
+    prior = usual.of_shape(shape)
+    if prior.parts is None:
+        return None
     found = segmented(solid, shape, prior.parts)
     if found is None:
         return None

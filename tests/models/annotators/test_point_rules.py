@@ -38,6 +38,19 @@ def test_a_mug_is_held_by_its_handle_and_poured_from_its_rim() -> None:
     assert [point.type for point in selected.grasp] == ["parallel_jaw", "pinch", "power"]
 
 
+def test_a_cup_with_a_handle_is_held_by_it_and_one_without_is_not() -> None:
+    handled, plain = select(mug(), "tea cup"), select(cup(), "tea cup")
+    assert [point.label for point in handled.functional] == ["opening", "handle", "base"]
+    assert (
+        "opening of the cup" not in handled.functional[1].description
+        and "the cup by" in handled.functional[1].description
+    )
+    assert labelled(handled, "handle") == pytest.approx(labelled(select(mug(), "mug"), "handle"))
+    assert [point.label for point in plain.functional] == ["opening", "body", "base"]
+    parts = [prior.parts for prior in (lookup("cup"), load_priors()["vase"]) if prior is not None and prior.with_handle]
+    assert parts == ["open", "open"], "what it is without one is as before"
+
+
 def test_a_hammer_strikes_with_its_head_and_is_held_by_its_handle() -> None:
     selected = select(hammer(), "hammer")
     assert labelled(selected, "head")[0] < 0.03

@@ -48,15 +48,12 @@ class PointSelection:
     def __init__(self, request: PointsRequest, prior: Prior | None):
         self.request = request
         self.named = prior is not None
-        self.prior = prior or unknown_prior()
+        usual = prior or unknown_prior()
+        rng = np.random.default_rng(request.subject.seed)
+        solid, center = request.subject.solid, request.center_of_mass_m
+        self.shape: Shape = measure_shape(solid, center, usual.head_end, usual.stands, rng)
+        self.prior = usual.of_shape(self.shape)
         self._thing = f"the {self.prior.category}" if self.named else "the object"
-
-    @cached_property
-    def shape(self) -> Shape:
-        """The measurements that all features share."""
-        rng = np.random.default_rng(self.request.subject.seed)
-        solid, center = self.request.subject.solid, self.request.center_of_mass_m
-        return measure_shape(solid, center, self.prior.head_end, self.prior.stands, rng)
 
     @cached_property
     def points(self) -> SurfacePoints:

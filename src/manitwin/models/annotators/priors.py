@@ -20,7 +20,7 @@ from manitwin.errors import ManiTwinError, choose_from
 from manitwin.formats.toml_file import parse_toml
 from manitwin.geometry.parts.features import Feature
 from manitwin.geometry.parts.membership import PartRole, PartRule
-from manitwin.geometry.parts.shape import HeadEnd
+from manitwin.geometry.parts.shape import HeadEnd, Shape
 from manitwin.twin.point_records import GraspType
 from manitwin.twin.record_values import Estimate, Finite, Record
 
@@ -120,6 +120,14 @@ class Form(Record):
     grasp: tuple[GraspPart, ...] = Field(min_length=2, max_length=3)
 
 
+class Places(Record):
+    """What is where on a thing: the parts of ``Form`` that another form may have of it."""
+
+    parts: PartRule | None
+    functional: tuple[FunctionalPart, ...]
+    grasp: tuple[GraspPart, ...]
+
+
 class Prior(Form):
     """The usual values of one category of things.
 
@@ -148,6 +156,13 @@ class Prior(Form):
     part_materials: dict[PartRole, str] = Field(default_factory=dict)
     sources: tuple[str, ...] = Field(min_length=1)
     measured: tuple[str, ...]
+    with_handle: Places | None = None
+
+    def of_shape(self, shape: Shape) -> Prior:
+        """Return the prior with the places that a thing of this shape has: a tea cup may have a handle, or none."""
+        if self.with_handle is None or shape.side_handle is None:
+            return self
+        return self.model_copy(update=dict(self.with_handle))
 
     @property
     def source(self) -> str:
@@ -193,8 +208,14 @@ def _prior(category: str, row: dict[str, Any], domain: str, defaults: dict[str, 
         "friction_static": contact.friction_static, "friction_dynamic": contact.friction_dynamic,
         "restitution": contact.restitution, **forms[form_name], **row,
     }  # fmt: skip
-    if "functional" in row and "parts" not in row:
-        merged["parts"] = None  # places of its own: the form's rule is of others
+    handled = merged.pop("with_handle", None)
+    if "functional" in row:
+        handled = None
+        merged["parts"] = row.get("parts")  # places of its own: the form's rule is of others
+    if handled is not None:
+        other = forms[handled]
+        told = {key: _worded(other[key], category) for key in ("functional", "grasp")}
+        merged["with_handle"] = {"parts": other["parts"], **told}
     for key in ("functional", "grasp"):
         merged[key] = _worded(merged[key], category)
     return Prior.model_validate({**merged, "category": category, "domain": domain, "surface": surface})
