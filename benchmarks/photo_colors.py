@@ -30,8 +30,8 @@ from manitwin.formats.meshes.textures import linear_to_srgb, srgb_to_linear
 from manitwin.models.annotators.photo_light import light_of_photo
 from manitwin.models.annotators.surface_color import lab_from_srgb, named_colors
 from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.described import Wish
 from manitwin.models.generators.templates.looks import MATERIALS, color_of
-from manitwin.models.generators.templates.text import Wish
 
 MEANS = (0.15, 0.55)
 """Mean linear luminance of a picture: a meter's 18 % grey, to what people correct it to for pale grounds."""

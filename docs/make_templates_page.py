@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.looks import COLORS, MATERIALS, SHADES
+from manitwin.models.generators.templates.described import RELATIVE
+from manitwin.models.generators.templates.looks import COLORS, MATERIALS, SAME_MATERIAL, SHADES
 from manitwin.models.generators.templates.made import make
 from manitwin.models.generators.templates.template import Template
-from manitwin.models.generators.templates.text import DIRECTIONS, RELATIVE, Wanted
+from manitwin.models.generators.templates.text import DIRECTIONS, Wanted
 
 PAGE = Path(__file__).parent / "templates.md"
 INTRODUCTION = """# Things from a sentence: the templates
@@ -31,11 +32,14 @@ the right part; their source is `template:CATEGORY`. What is not here is refused
 [generators](generators.md) that make other things of a text.
 
 - **How many**: `--count 20` makes twenty of each text. What the text says holds for all; what it leaves open is drawn anew for
-  each: measures, colours and materials. The same seed gives the same twenty.
+  each: measures, colours and materials, of a stated material the colours that such things have. The same seed gives the same
+  twenty. A text is one thing: "two forks" and "a set of spoons" are refused and point here; a pair of pliers is one.
 - **What it is**: one of the names below, or another word for it that the [priors](priors.md) know. The last noun counts: a mug
   rack is no mug. The twin is called as the text calls it (a skillet is a skillet, made by the frying pan's template).
-- **How it looks**: colours and materials before or after the name are those of the whole; behind *with*, of a part:
-  `a small blue mug with a wooden handle`. What the text does not say is drawn from the seed.
+- **How it looks**: colours and materials before or after the name are those of the whole; behind *with*, of a part, and of
+  further ones behind *and*: `a small hammer with a red handle and a black head`. What the text does not say is drawn from the
+  seed. Two colours or two materials of one part are refused. What is in a thing, or what it is for, says nothing of it (a glass
+  of red wine, a brush for wood); nor does a word that is not known: the check `text_understood` names such.
 - **How large it is**: `9 cm` is the longest extent; `9 cm tall`, `wide`, `long` is that direction. Units may be spelt out, and
   inches and feet are read too. A size that no such thing has is refused. `small` and `large` choose within the usual sizes.
 - **What it cannot be told** is refused and not left out: several lengths or that of a part (a template is scaled as a whole), a
@@ -137,6 +141,7 @@ def page() -> str:
         "## Words\n\n"
         f"Colours: {', '.join(sorted(COLORS))}; before them {', '.join(sorted(SHADES))}.\n\n"
         f"Materials: {', '.join(sorted(MATERIALS))}.\n\n"
+        f"Other words for them: {', '.join(f'{word} ({name})' for word, name in sorted(SAME_MATERIAL.items()))}.\n\n"
         f"Directions: {', '.join(sorted(DIRECTIONS))}. Sizes: {', '.join(sorted(RELATIVE))}.\n"
     )
     return "\n".join(parts)

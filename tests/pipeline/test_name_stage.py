@@ -78,6 +78,15 @@ def test_the_finding_names_the_likeliest_and_the_remedy(tmp_path: Path) -> None:
     assert unsure.passed is False and "cannot tell what it is (orange 90 %" in unsure.message
 
 
+def test_words_of_a_text_that_say_nothing_to_its_template_are_a_finding() -> None:
+    notes = {"unused_words": ["vintage"]}
+    made = Draft("t", Item(file=None, text="a vintage mug"), seed=0, fields={"generation": {"notes": notes}})
+    (told,) = filled_checks(made)
+    assert told.passed is False and told.message is not None and "'vintage'" in told.message
+    notes["unused_words"] = []
+    assert filled_checks(made) == []
+
+
 @pytest.mark.parametrize(
     ("metric", "units", "known"),
     [(True, "assumed", True), (True, "user", True), (True, "guessed", False), (False, "assumed", False)],

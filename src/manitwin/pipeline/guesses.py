@@ -81,10 +81,14 @@ def filled_in(draft: Draft) -> dict[str, Any] | None:
 
 
 def filled_checks(draft: Draft) -> list[Check]:
-    """Return what a model said of the template that a thing was made of; none where no model was asked."""
+    """Return what a model said of the template that a thing was made of, else words of a text that said nothing to it, if any."""
     filled = filled_in(draft)
     if filled is None:
-        return []
+        unused = (draft.fields.get("generation") or {}).get("notes", {}).get("unused_words", [])
+        message = f"the template knows nothing of {', '.join(map(repr, unused))}: the thing was made without"
+        return (
+            [Check(name="text_understood", passed=False, value=float(len(unused)), message=message)] if unused else []
+        )
     said = [] if filled["category"] is None else [f"{filled['source']} filled in the template {filled['category']}"]
     message = "; ".join([*said, *filled["findings"]])
     return [Check(name="template_filled", passed=not filled["findings"], value=filled["category"], message=message)]

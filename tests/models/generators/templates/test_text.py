@@ -7,9 +7,10 @@ import pytest
 
 from manitwin.errors import UsageError
 from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.described import Wish
 from manitwin.models.generators.templates.looks import COLORS, MATERIALS
 from manitwin.models.generators.templates.made import make
-from manitwin.models.generators.templates.text import MAX_CHARACTERS, Wanted, Wish, read_text
+from manitwin.models.generators.templates.text import MAX_CHARACTERS, Wanted, read_text
 
 TEMPLATES = load_templates()
 
@@ -23,7 +24,7 @@ def read(text: str) -> Wanted:
     [
         ("mug", "mug"),
         ("a mug", "mug"),
-        ("Two MUGS!", "mug"),
+        ("MUGS!", "mug"),
         ("a cup of tea", "cup"),
         ("the red coffee mug", "mug"),
         ("smartphone", "mobile phone"),
@@ -184,3 +185,142 @@ def test_what_no_such_thing_has_is_refused(text: str) -> None:
     wanted = read(text)
     with pytest.raises(UsageError):
         make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
+
+
+def whole(text: str) -> Wish:
+    return read(text).wishes.get("", Wish())
+
+
+@pytest.mark.parametrize(
+    ("text", "material"),
+    [
+        *(
+            ("an enamel mug", "enamel"),
+            ("an enamelled pot", "enamel"),
+            ("an enameled cast iron pot", "enamelled cast iron"),
+        ),
+        *(("a copper mug", "copper"), ("a terracotta plate", "earthenware"), ("an aluminum cup", "aluminium")),
+        *(
+            ("an acrylic cup", "acrylic"),
+            ("an oak spoon", "oak"),
+            ("a wooden oak spoon", "oak"),
+            ("a pine box", "pine"),
+        ),
+        *(
+            ("a marble mortar", "marble"),
+            ("a mug made of recycled plastic", "plastic"),
+            ("a bone china cup", "porcelain"),
+        ),
+    ],
+)
+def test_words_for_matter_are_known(text: str, material: str) -> None:
+    assert whole(text).material == MATERIALS[material]
+
+
+def test_an_enamel_mug_is_of_thin_steel() -> None:
+    made = make(TEMPLATES["mug"], read("an enamel mug, 9 cm tall"), np.random.default_rng(0))
+    assert all(look.surface == "steel" and look.metallic == 0 for look in made.looks.values())
+    assert made.measures["wall_m"] < 0.002 and 0.1 < sum(made.masses_kg.values()) < 0.4
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("a brush for wood", "a glass of red wine", "a bottle of soap", "a box of paper", "a silver plated spoon"),
+        *("a cup of black coffee", "a leather chisel"),
+    ],
+)
+def test_what_a_thing_holds_or_is_for_says_nothing_of_what_it_is_made_of(text: str) -> None:
+    asked = read(text)
+    assert asked.wishes.get("", Wish()).material is None and asked.unused
+    if "silver" not in text:
+        assert asked.wishes == {}
+
+
+def test_a_material_that_only_a_part_has_is_that_part_s() -> None:
+    made = make(TEMPLATES["hammer"], read("a wooden hammer"), np.random.default_rng(1))
+    assert made.looks["handle"].material == "wood" and made.looks["head"].surface == "steel"
+    assert whole("a wooden spatula").material == whole("a hammer made of wood").material == MATERIALS["wood"]
+
+
+def test_a_colour_that_is_a_material_too_is_the_latter_where_no_other_is_said() -> None:
+    assert whole("a copper mug").material == MATERIALS["copper"]
+    mixed = whole("a copper ceramic mug")
+    assert mixed.material == MATERIALS["ceramic"] and mixed.rgb == pytest.approx(MATERIALS["copper"].rgb)
+    colored = whole("a copper coloured mug")
+    assert colored.material is None and colored.rgb == pytest.approx(MATERIALS["copper"].rgb)
+
+
+def test_colours_of_two_words_are_one() -> None:
+    assert whole("a navy blue mug").rgb == whole("a navy mug").rgb
+    assert whole("a rose gold bracelet").rgb not in (whole("a gold bracelet").rgb, whole("a rose bracelet").rgb)
+    assert whole("an off-white mug").rgb != whole("a white mug").rgb
+
+
+def test_metal_colours_and_clear_choose_the_material() -> None:
+    for seed in range(4):
+        spoon = make(TEMPLATES["spoon"], read("a silver spoon"), np.random.default_rng(seed))
+        assert {look.surface for look in spoon.looks.values()} == {"steel"}
+        cup = make(TEMPLATES["cup"], read("a clear cup"), np.random.default_rng(seed))
+        assert {look.surface for look in cup.looks.values()} == {"plastic"}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a hammer with a red handle and a black head",
+        "a hammer with a red handle and black head",
+        "a hammer with red handle, black head",
+        "a black hammer with a red handle",
+        "a red-handled black hammer",
+    ],
+)
+def test_every_part_behind_and_has_its_colour(text: str) -> None:
+    made = make(TEMPLATES["hammer"], read(text), np.random.default_rng(0))
+    red, black = (tuple(int(COLORS[c][i : i + 2], 16) / 255 for i in (0, 2, 4)) for c in ("red", "black"))
+    assert made.looks["handle"].rgb == pytest.approx(red) and made.looks["head"].rgb == pytest.approx(black)
+
+
+def test_a_part_without_words_of_its_own_is_as_the_one_before() -> None:
+    wishes = read("a teapot with a black handle and lid").wishes
+    assert wishes["handle"] == wishes["lid"] != Wish()
+
+
+@pytest.mark.parametrize("text", ["a red and white mug", "a steel and wood knife", "a red mug, blue"])
+def test_two_colours_or_materials_of_one_part_are_refused(text: str) -> None:
+    with pytest.raises(UsageError, match="of one thing"):
+        read(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("two forks", "three red mugs", "a set of spoons", "12 forks", "a pair of mugs", "a pair of chopsticks"),
+        *("two pairs of pliers", "a dozen bowls", "several small bottles", "a stack of plates", "a fork and knife"),
+    ],
+)
+def test_several_things_are_refused(text: str) -> None:
+    with pytest.raises(UsageError, match="asks for several things"):
+        read(text)
+
+
+@pytest.mark.parametrize("text", ["a pair of pliers", "pliers", "a pair of headphones", "a no. 2 pencil"])
+def test_one_thing_that_is_counted_in_another_way_is_one(text: str) -> None:
+    assert read(text).category in ("pliers", "headphones", "pencil")
+
+
+@pytest.mark.parametrize(("text", "category"), [("a box of pencils", "box"), ("a cup for pens", "cup")])
+def test_a_thing_that_holds_others_is_not_one_of_them(text: str, category: str) -> None:
+    assert read(text).category == category
+
+
+def test_of_a_stated_material_the_colour_is_drawn() -> None:
+    for text in ("a ceramic mug", "a plastic bowl", "a silicone spatula", "an enamel mug"):
+        wanted = read(text)
+        drawn = [make(TEMPLATES[wanted.category], wanted, np.random.default_rng(seed)) for seed in range(8)]
+        assert len({next(iter(each.looks.values())).rgb for each in drawn}) > 2
+        assert len({next(iter(each.looks.values())).material for each in drawn}) == 1
+        again = make(TEMPLATES[wanted.category], wanted, np.random.default_rng(3))
+        assert again.looks == drawn[3].looks and again.masses_kg == drawn[3].masses_kg
+    steel = [make(TEMPLATES["mug"], read("a steel mug"), np.random.default_rng(seed)) for seed in range(4)]
+    assert {next(iter(each.looks.values())).rgb for each in steel} == {MATERIALS["steel"].rgb}

@@ -13,10 +13,10 @@ from manitwin.models.annotators.vlm.prompt_files import Prompt
 from manitwin.models.annotators.vlm.question_parts import name_line
 from manitwin.models.annotators.vlm.template_choice import Shown
 from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.described import Wish
 from manitwin.models.generators.templates.filled import Filled, color_said, parts_of
 from manitwin.models.generators.templates.looks import COLORS, MATERIALS
 from manitwin.models.generators.templates.template import Template
-from manitwin.models.generators.templates.text import Wish
 from manitwin.models.vlm.protocol import Question
 from manitwin.models.vlm.strict_schema import strict_schema
 

@@ -14,8 +14,8 @@ from manitwin.formats.image_file import png_of
 from manitwin.models.annotators.vlm.template_likeness import FIRST_LOOK, Likeness
 from manitwin.models.annotators.vlm.template_reader import MODEL_VIEWS, TemplateReader
 from manitwin.models.generators.lift.made_photo import Job
+from manitwin.models.generators.templates.described import Wish
 from manitwin.models.generators.templates.filled import Filled
-from manitwin.models.generators.templates.text import Wish
 from manitwin.models.vlm.protocol import Picture
 from manitwin.render.cameras import framing_camera
 from manitwin.render.grounds import ground_for

@@ -11,11 +11,12 @@ import numpy as np
 from manitwin.errors import UsageError
 from manitwin.geometry.solids.shapes import SolidError
 from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.described import Wish
 from manitwin.models.generators.templates.fitting.fit import Fitted
 from manitwin.models.generators.templates.looks import SHADES, color_of, shaded
 from manitwin.models.generators.templates.made import Made, make
 from manitwin.models.generators.templates.template import Template
-from manitwin.models.generators.templates.text import Wanted, Wish, lengths_in, read_text
+from manitwin.models.generators.templates.text import Wanted, lengths_in, read_text
 
 _HEX = re.compile(r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})")
 
@@ -61,6 +62,9 @@ def color_said(text: str) -> tuple[float, float, float] | None:
     if found is not None:
         red, green, blue = (int(found[channel], 16) / 255 for channel in (1, 2, 3))
         return red, green, blue
+    whole = color_of(" ".join(text.lower().split()))
+    if whole is not None:
+        return whole
     *shade, word = text.lower().split() or [""]
     color = color_of(word)
     if color is None or len(shade) > 1 or (shade and shade[0] not in SHADES):
@@ -100,10 +104,4 @@ def make_filled(filled: Filled, text: str, rng: np.random.Generator) -> Made:
 
 
 def _joined(wishes: Mapping[str, Wish], later: Mapping[str, Wish]) -> dict[str, Wish]:
-    joined = dict(wishes)
-    for part, wish in later.items():
-        before = joined.get(part, Wish())
-        joined[part] = Wish(
-            before.rgb if wish.rgb is None else wish.rgb, before.material if wish.material is None else wish.material
-        )
-    return joined
+    return {**wishes, **{part: wish.over(wishes.get(part, Wish())) for part, wish in later.items()}}

@@ -9,6 +9,7 @@ from manifold3d import Manifold
 from manitwin.geometry.mass_properties import solid_mass_properties
 from manitwin.models.annotators.priors import found_by, word_for
 from manitwin.models.generators.templates.known_frames import known_frame
+from manitwin.models.generators.templates.looks import SAID_OF
 from manitwin.models.generators.templates.made import Made, face_parts
 from manitwin.models.generators.templates.template import IN_THE_OPEN, KnownPoint
 from manitwin.twin.import_record import GivenPoint, ImportRecord
@@ -16,9 +17,6 @@ from manitwin.twin.import_record import GivenPoint, ImportRecord
 MOST_POINTS = 4
 """As many functional points as an object has (paper)."""
 _TELLING_SHARE = 0.25  # of mass and surface together: less of a material is not what a thing is said to be made of
-_SAID = {
-    "electronics": "plastic and electronics"
-}  # a look's matter is the mean of what is inside, which nobody calls so
 
 
 def known_of(made: Made, text: str) -> ImportRecord:
@@ -82,7 +80,7 @@ def material_words(made: Made) -> str:
         shares[made.looks[part].material] = shares.get(made.looks[part].material, 0.0) + share / 2
     ranked = sorted(shares, key=lambda material: -shares[material])[:2]
     told = [material for material in ranked if shares[material] >= _TELLING_SHARE] or ranked[:1]
-    said = [_SAID.get(material, material) for material in told]
+    said = [SAID_OF.get(material, material) for material in told]
     return said[0] if len(said) < 2 or said[1] in said[0] else " and ".join(said)
 
 

@@ -7,6 +7,7 @@ a solid block of the material.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,12 +19,33 @@ COLORS: dict[str, str] = {
     "copper": "b4693f", "bronze": "8c6a3a", "olive": "6f7032", "lime": "a6c93a", "magenta": "b8287f", "maroon": "6e1a20",
     "violet": "7a4fb0", "lavender": "bda9db", "mint": "a9dcc0", "coral": "ee7a66", "ivory": "f4efdf", "tan": "c4a277",
     "khaki": "a89a6c", "charcoal": "3a3c3f", "burgundy": "641c2a", "cyan": "32b4cf", "peach": "f5c0a0",
-    "terracotta": "b9623f", "clear": "dfe9e8",
+    "terracotta": "b9623f", "clear": "dfe9e8", "mustard": "c99a2e", "emerald": "1f7a4d", "rust": "9c4a2a", "ruby": "8f1830",
+    "sapphire": "1c3f94", "off white": "f4efdf", "rose gold": "b9807a", "steel blue": "4a7296", "steel grey": "71777b",
+    "sky blue": "7fb8e0", "royal blue": "2a4fc0", "baby blue": "a9cbe8", "cobalt blue": "1f46a0", "hot pink": "e0408f",
+    "forest green": "24562f", "brick red": "9a3b2c", "wine red": "641c2a", "cherry red": "a81a2c",
 }  # fmt: skip
-"""sRGB by word."""
+"""sRGB by word, or by two."""
+BASIC_COLORS = frozenset(
+    ("white", "black", "grey", "red", "orange", "yellow", "green", "blue", "purple", "pink", "brown", "beige")
+)
+"""The hues that another word makes more exact: olive green is olive."""
+CLEAR = "clear"
+METAL_COLORS = frozenset(("gold", "silver", "bronze", "copper", "rose gold"))
+"""Colours that, of things which may be of metal, mean the metal ones."""
 SAME_COLOR = {"gray": "grey", "silvery": "silver", "golden": "gold", "rose": "pink", "crimson": "red", "scarlet": "red"}
-SAME_COLOR |= {"amber": "orange", "aqua": "cyan", "indigo": "navy", "off-white": "ivory", "lilac": "lavender"}
-SHADES = {"light": 0.45, "pale": 0.6, "pastel": 0.5, "dark": -0.45, "deep": -0.3, "bright": 0.0, "matte": 0.0}
+SAME_COLOR |= {"amber": "orange", "aqua": "cyan", "indigo": "navy", "lilac": "lavender", "transparent": "clear"}
+SAME_COLOR |= {"see through": "clear", "steel gray": "steel grey", "offwhite": "off white", "colorless": "clear"}
+SHADES = {
+    "light": 0.45,
+    "pale": 0.6,
+    "pastel": 0.5,
+    "dark": -0.45,
+    "deep": -0.3,
+    "bright": 0.0,
+    "matte": 0.0,
+    "matt": 0.0,
+}
+SHADES |= {"glossy": 0.0, "shiny": 0.0}
 """How far towards white (positive) or black (negative) a word before a colour moves it."""
 
 
@@ -79,6 +101,10 @@ MATERIALS: dict[str, Look] = {
         _look("glass", "glass", "d4e4e2", 0.05, 2500),
         _look("plastic", "plastic", "d8d8d6", 0.4, 1050),
         _look("melamine", "plastic", "ece7da", 0.3, 1500),
+        _look("acrylic", "plastic", "e4ecec", 0.1, 1180),
+        _look("nylon", "plastic", "2a2b2d", 0.5, 1140),
+        _look("polycarbonate", "plastic", "e0e8e8", 0.15, 1200),
+        _look("resin", "plastic", "d9cfb8", 0.35, 1150),
         _look("silicone", "rubber", "8f9598", 0.7, 1150),
         _look("rubber", "rubber", "232325", 0.85, 1150),
         _look("foam", "foam", "e7c94a", 0.95, 60),
@@ -88,11 +114,27 @@ MATERIALS: dict[str, Look] = {
         _look("iron", "steel", "4a4a4c", 0.6, 7300, 1.0),
         _look("cast iron", "steel", "2c2c2e", 0.75, 7200, 0.6),
         _look("enamel", "steel", "e9ecec", 0.2, 7600),
+        _look("enamelled cast iron", "steel", "e9ecec", 0.2, 7100),
+        _look("titanium", "aluminium", "8f8d88", 0.35, 4500, 1.0),
+        _look("pewter", "steel", "9b9c98", 0.4, 7300, 1.0),
+        _look("bronze", "steel", "8c6a3a", 0.35, 8800, 1.0),
+        _look("sterling silver", "steel", "d3d4d4", 0.2, 10360, 1.0),
         _look("aluminium", "aluminium", "c2c4c6", 0.35, 2700, 1.0),
         _look("brass", "steel", "c09a4a", 0.3, 8500, 1.0),
         _look("copper", "steel", "b4693f", 0.3, 8900, 1.0),
         _look("wood", "wood", "b08455", 0.65, 650),
         _look("bamboo", "wood", "d2b072", 0.6, 700),
+        _look("oak", "wood", "b58d5e", 0.6, 720),
+        _look("walnut", "wood", "5f4029", 0.55, 640),
+        _look("pine", "wood", "d9b67e", 0.65, 510),
+        _look("beech", "wood", "cfa272", 0.6, 720),
+        _look("maple", "wood", "dcb98a", 0.55, 700),
+        _look("birch", "wood", "dfc49a", 0.6, 670),
+        _look("teak", "wood", "9b6a3c", 0.55, 660),
+        _look("olive wood", "wood", "b98a4e", 0.5, 900),
+        _look("acacia", "wood", "8a5a34", 0.55, 700),
+        _look("mahogany", "wood", "6b3421", 0.5, 600),
+        _look("ebony", "wood", "2b211d", 0.45, 1050),
         _look("cork", "foam", "b78c5c", 0.9, 200),
         _look("cardboard", "cardboard", "b08d5f", 0.85, 690),
         _look("paper", "paper", "f3f1ea", 0.9, 800),
@@ -101,6 +143,10 @@ MATERIALS: dict[str, Look] = {
         _look("bristle", "textile", "e6dfc8", 0.9, 300),
         _look("wax", "wax", "f1ead6", 0.5, 900),
         _look("stone", "stone", "85837e", 0.8, 2600),
+        _look("marble", "stone", "e3e1dc", 0.3, 2700),
+        _look("granite", "stone", "6f6d6b", 0.5, 2700),
+        _look("slate", "stone", "46494c", 0.7, 2750),
+        _look("concrete", "stone", "a3a19b", 0.85, 2300),
         _look("soap", "wax", "e7d9c3", 0.45, 1050),
         _look("electronics", "plastic", "26272a", 0.35, 1800),
     )
@@ -110,8 +156,58 @@ SAME_MATERIAL = {
     "wooden": "wood", "metal": "stainless steel", "metallic": "stainless steel", "stainless": "stainless steel",
     "inox": "stainless steel", "plastics": "plastic", "aluminum": "aluminium", "tin": "steel", "clay": "earthenware",
     "pottery": "stoneware", "china": "porcelain", "woolen": "fabric", "cloth": "fabric", "textile": "fabric",
-    "marble": "stone", "granite": "stone", "carton": "cardboard", "rubbery": "rubber", "glassy": "glass",
+    "carton": "cardboard", "rubbery": "rubber", "glassy": "glass", "enamelled": "enamel", "enameled": "enamel",
+    "enamelled steel": "enamel", "enameled steel": "enamel", "enamel steel": "enamel", "enamelled metal": "enamel",
+    "enamelled iron": "enamelled cast iron", "enameled iron": "enamelled cast iron",
+    "enameled cast iron": "enamelled cast iron", "enamel cast iron": "enamelled cast iron",
+    "inox steel": "stainless steel", "chromed": "chrome", "chromium": "chrome", "bone china": "porcelain",
+    "terracotta": "earthenware", "terra cotta": "earthenware", "faience": "earthenware", "borosilicate": "glass",
+    "borosilicate glass": "glass", "pyrex": "glass", "crystal": "glass", "perspex": "acrylic", "plexiglass": "acrylic",
+    "acrylic glass": "acrylic", "polypropylene": "plastic", "polyethylene": "plastic", "pvc": "plastic", "vinyl": "plastic",
+    "bakelite": "plastic", "cotton": "fabric", "linen": "fabric", "felt": "fabric", "canvas": "fabric", "denim": "fabric",
+    "wool": "fabric", "latex": "rubber", "suede": "leather", "oakwood": "oak", "oaken": "oak", "pinewood": "pine",
+    "timber": "wood", "hardwood": "wood", "plywood": "wood", "cherry wood": "wood", "cement": "concrete",
+    "ceramics": "ceramic", "earthen": "earthenware", "aluminium alloy": "aluminium",
 }  # fmt: skip
+SAID_OF = {"electronics": "plastic and electronics", "enamel": "enamelled steel"}
+"""What nobody calls by the word of its look: the mean of what is inside, and what an enamel is on."""
+USUAL_COLORS: dict[str, tuple[str, ...]] = {
+    "ceramic": ("white", "red", "blue", "navy", "green", "yellow", "black"),
+    "porcelain": ("white", "ivory", "light blue", "navy"),
+    "stoneware": ("", "navy", "grey", "cream", "olive"),
+    "earthenware": ("", "dark brown", "cream"),
+    "glass": ("", "", "green", "brown"),
+    "plastic": ("", "white", "black", "red", "blue", "green", "yellow", "grey"),
+    "melamine": ("", "white", "red", "teal", "yellow"),
+    "acrylic": ("", "", "red", "blue"),
+    "nylon": ("", "grey", "red"),
+    "resin": ("", "white", "black", "brown"),
+    "silicone": ("", "red", "black", "teal", "green"),
+    "rubber": ("", "", "grey", "red", "blue"),
+    "foam": ("", "blue", "green", "pink"),
+    "enamel": ("", "white", "black", "red", "navy", "cream", "green"),
+    "enamelled cast iron": ("red", "navy", "cream", "orange", "black", "green"),
+    "aluminium": ("", "", "charcoal", "red", "blue"),
+    "wood": ("", "", "light brown", "dark brown"),
+    "bamboo": ("", "", "dark brown"),
+    "cardboard": ("", "", "white"),
+    "paper": ("", "white", "beige", "red", "blue"),
+    "leather": ("", "black", "tan", "dark brown"),
+    "fabric": ("", "white", "black", "red", "navy", "green", "beige"),
+    "wax": ("", "white", "red", "green"),
+    "soap": ("", "white", "mint", "lavender"),
+    "marble": ("", "", "black", "grey"),
+    "stone": ("", "", "charcoal", "beige"),
+}
+"""Colours that things of a material usually have, by the word for it; '' is its own. What is not here has its own alone."""
+
+
+def usual_looks(look: Look, usual: Iterable[Look]) -> list[Look]:
+    """Return looks of a material in colours that a thing has: those of its ``usual`` ones of it, else those of any of it."""
+    own = [each for each in usual if each.material == look.material]
+    if len(own) > 1:
+        return own
+    return [look_of(f"{color} {look.material}".strip()) for color in USUAL_COLORS.get(look.material, ("",))]
 
 
 def color_of(word: str) -> tuple[float, float, float] | None:

@@ -17,9 +17,10 @@ from manitwin.formats.meshes.triangles import with_creased_normals
 from manitwin.geometry.seams import has_three_places
 from manitwin.geometry.solids.parts import PartedMesh
 from manitwin.models.annotators.priors import lookup
+from manitwin.models.generators.templates.described import Wish
 from manitwin.models.generators.templates.looks import Look, look_of
 from manitwin.models.generators.templates.template import KnownPoint, Model, Template
-from manitwin.models.generators.templates.text import Wanted, Wish
+from manitwin.models.generators.templates.text import Wanted
 from manitwin.twin.import_record import GivenParts
 
 LEAST_WALL_M = 0.0008
@@ -146,10 +147,11 @@ def _looks(template: Template, wanted: Wanted, rng: np.random.Generator) -> dict
     looks: dict[str, Look] = {}
     first = next(iter(template.slots))
     for slot, choices in template.slots.items():
-        drawn = choices[int(rng.integers(len(choices)))]
-        look = look_of(drawn) if drawn else looks[first]
         wish = wanted.wishes.get(slot, Wish())
-        looks[slot] = wish.of(wanted.wishes.get("", Wish()).of(look) if slot == first else look)
+        if slot == first:
+            wish = wish.over(wanted.wishes.get("", Wish()))
+        usual = wish.choices([look_of(words) if words else looks[first] for words in choices])
+        looks[slot] = wish.of(usual[int(rng.integers(len(usual)))])
     return looks
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from difflib import get_close_matches
-from itertools import pairwise
+from dataclasses import dataclass, field, replace
 
 from manitwin.errors import UsageError
-from manitwin.models.annotators.priors import Prior, load_priors, named
-from manitwin.models.generators.templates.looks import SHADES, Look, color_of, look_of, material_of, shaded
+from manitwin.models.annotators.priors import Prior, load_priors
+from manitwin.models.generators.templates.described import ARTICLES, Described, Wish, described, is_described
+from manitwin.models.generators.templates.looks import look_of
+from manitwin.models.generators.templates.named_category import PURPOSE, find_category, plain_words
 from manitwin.models.generators.templates.template import Template
 
 MAX_CHARACTERS = 400
@@ -37,36 +37,9 @@ DIRECTIONS = {
     "tall": "height", "high": "height", "height": "height", "wide": "width", "width": "width", "broad": "width",
     "diameter": "width", "across": "width", "long": "length", "length": "length", "deep": "depth", "thick": "height",
 }  # fmt: skip
-RELATIVE = {
-    "tiny": 0.0,
-    "small": 0.12,
-    "little": 0.12,
-    "mini": 0.0,
-    "large": 0.88,
-    "big": 0.88,
-    "huge": 1.0,
-    "giant": 1.0,
-}
-"""Where in the interval of a category's sizes a word puts a thing: 0 the least, 1 the largest."""
-_ARTICLES = frozenset(
-    {"a", "an", "the", "one", "some", "its", "very", "and", "of", "colored", "coloured", "made", "with"}
-)
-_PREPOSITIONS = frozenset({"of", "in", "for", "from", "made"})
-
-
-@dataclass(frozen=True)
-class Wish:
-    """A colour or a material, or both, that a text names."""
-
-    rgb: tuple[float, float, float] | None = None
-    material: Look | None = None
-
-    def of(self, look: Look) -> Look:
-        """Return a look with what is wished for, the rest as it is."""
-        matter = look if self.material is None else self.material
-        if self.rgb is not None:
-            return matter.colored(self.rgb)
-        return matter if self.material is not None else look
+_CONTENTS = frozenset({"soap", "wax", "paper", "clay", "cloth", "fabric"})
+"""Materials that behind 'of' are what is in a thing: a bottle of soap."""
+_WITH = re.compile(r" (?:with|having|featuring) | and an? (?=.)| (?:that|which) has ")
 
 
 @dataclass(frozen=True)
@@ -85,25 +58,102 @@ class Wanted:
 
 
 def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
-    """Return what a text asks for; raises UsageError where it names no category that there is a template of, or several."""
+    """Return what a text asks for.
+
+    Raises UsageError where it names no category that there is a template of, or several, asks for several things, or says what
+    a template cannot be told.
+    """
     if len(text) > MAX_CHARACTERS:
         raise UsageError(f"a text of {len(text)} characters; at most {MAX_CHARACTERS} describe an object")
     plain, lengths = _plain(text), lengths_in(text)
     _check_taken(text, plain, lengths)
     rest = _LENGTH.sub(lambda m: "" if m[3] in DIRECTIONS else m[3], plain)
-    main, *features = re.split(r" with | having | and a | and an ", rest.replace(" ,", " "))
-    category, around = _category(main.split(), text, templates)
-    wish, relative, unused = _wish(around)
-    wishes = {"": wish} if wish != Wish() else {}
-    for phrase in features:
-        words = [word for word in phrase.split() if word not in _ARTICLES]
+    main, *features = _WITH.split(rest, maxsplit=1)
+    found = find_category(main.split(), text, templates)
+    template, prior = templates[found.category], load_priors()[found.category]
+    try:
+        parts, whole = _part_before(found.before, template)
+        before = described(whole, prior)
+        slot = _slot_meant(before.wish, template, prior)
+        if slot is not None:
+            parts = [*parts, (slot, Described(before.wish))]
+            before = replace(before, wish=Wish())
+        words = _joined(before, described(found.own), _tail(found.tail))
+        wishes = {} if words.wish == Wish() else {"": words.wish}
+        unused = list(words.unused)
+        for part, said in [*parts, *(_features(features[0], template) if features else [])]:
+            wishes[part] = said.wish
+            unused += said.unused
+    except UsageError as error:
+        raise UsageError(f"{text!r}: {error}") from None
+    return Wanted(found.category, wishes, lengths, words.relative, tuple(unused))
+
+
+def _slot_meant(wish: Wish, template: Template, prior: Prior) -> str | None:
+    """Return the part that a material before the name is of, where the thing is of several: of a wooden hammer the handle."""
+    if wish.material is None or not {"and", "with"} & set(prior.material.split()):
+        return None
+    usual = {slot: {look_of(words).surface for words in choices if words} for slot, choices in template.slots.items()}
+    first = next(iter(usual))
+    of_it = [slot for slot, surfaces in usual.items() if wish.material.surface in surfaces]
+    return of_it[0] if of_it and first not in of_it else None
+
+
+def _joined(before: Described, own: Described, tail: Described) -> Described:
+    """Return what is said before a name, in it and behind it: of one thing, so that two colours contradict each other."""
+    wishes = [said.wish for said in (before, tail)]
+    for what in ("rgb", "material"):
+        first, second = (getattr(wish, what) for wish in wishes)
+        if first is not None and second is not None and first != second:
+            raise UsageError(
+                f"two {'colours' if what == 'rgb' else 'materials'} of one thing: say which part has which"
+            )
+    wish = before.wish.over(tail.wish).over(own.wish)
+    relative = next((said.relative for said in (before, tail) if said.relative is not None), None)
+    return Described(wish, relative, before.unused + tail.unused)
+
+
+def _tail(words: list[str]) -> Described:
+    """Return what the words behind a name say of it: the red of 'a mug in red', nothing of 'a glass of red wine'."""
+    cut = next((at for at, word in enumerate(words) if word in PURPOSE), len(words))
+    about, beside = words[:cut], tuple(word for word in words[cut:] if word not in ARTICLES | PURPOSE)
+    telling = [word for word in about if word not in ARTICLES]
+    holds = about[:1] == ["of"] and telling[-1:] and telling[-1] in _CONTENTS
+    if telling and about[0] in ("of", "in") and (holds or not is_described(telling[-1])):
+        return Described(unused=(*telling, *beside))
+    said = described(about)
+    return Described(said.wish, said.relative, (*said.unused, *beside))
+
+
+def _part_before(words: list[str], template: Template) -> tuple[list[tuple[str, Described]], list[str]]:
+    """Return what is said of a part before the name ('a red handled hammer'), and the words that are left."""
+    for at, word in enumerate(words):
+        part = next((s for s in template.slots if word in (s, f"{s}d", f"{s}ed", f"{s}{s[-1]}ed")), None)
+        if part is not None and at:
+            said = described(words[:at])
+            return [(part, Described(said.wish, None, said.unused))], words[at + 1 :]
+    return [], words
+
+
+def _features(text: str, template: Template) -> list[tuple[str, Described]]:
+    """Return what is said of each part behind 'with': 'a red handle, black head and green claw'.
+
+    A part that nothing is said of is as the one before it: of 'a red handle and lid' both are red.
+    """
+    features: list[tuple[str, Described]] = []
+    before: list[str] = []
+    for phrase in re.split(r"( and an? |^an? | and | , | with )", f" {text} ".replace("  ", " ")):
+        words = [word for word in plain_words(phrase.split()) if word not in ARTICLES]
         if not words:
             continue
-        wish, _, left = _wish(words[:-1])
-        part = words[-1] if words[-1] in templates[category].slots else words[-1].removesuffix("s")
-        wishes[part] = wish
-        unused += left
-    return Wanted(category, wishes, lengths, relative, tuple(unused))
+        if is_described(words[-1]) and words[-1] not in template.slots:
+            before += [*words, "and"]  # 'red and white stripes'
+            continue
+        part = words[-1] if words[-1] in template.slots else words[-1].removesuffix("s")
+        said = described([*before, *words[:-1]])
+        features.append((part, said if said != Described() or not features else features[-1][1]))
+        before = []
+    return [*features, *([("", described(before))] if before else [])]
 
 
 def lengths_in(text: str) -> dict[str, float]:
@@ -141,77 +191,3 @@ def _check_taken(text: str, plain: str, lengths: Mapping[str, float]) -> None:
         raise UsageError(
             f"{text!r} states the length of a part: a template is scaled as a whole; say that of the whole"
         )
-
-
-def _category(words: list[str], text: str, templates: Mapping[str, Template]) -> tuple[str, list[str]]:
-    """Return the category and the words around its name, which is the last and then the longest phrase that names one.
-
-    What a thing is, its last noun says: a phrase is no name where words follow that describe nothing (a mug rack is no mug),
-    but for those behind a preposition (a cup of tea is a cup). A material that the name says, of those that such a thing is of,
-    is one of the words around it: a wooden spoon is of wood, but a wood chisel is not. Where the longer phrase is another thing
-    that the priors know, a shorter one is that only where both have one form and the size fits: a jam jar is a jar, and a garlic
-    bulb no light bulb.
-    """
-    words = [word for word in (word.strip('.!?;:"') for word in words) if word]
-    names = {
-        name: template.category for template in templates.values() for name in (template.category, *template.names)
-    }
-    other: Prior | None = None
-    for end in range(len(words), 0, -1):
-        tail = words[end:]
-        if tail and tail[0] not in _PREPOSITIONS and _wish(tail)[2]:
-            continue
-        for start in range(end):
-            phrase = " ".join(words[start:end])
-            prior = named(phrase) or named(phrase.replace(" ", ""))
-            meant = [names.get(phrase), *([] if prior is None else [prior.category, prior.kin_of])]
-            category = next((name for name in meant if name in templates), None)
-            if category is None and words[start] not in _ARTICLES:
-                other = other or prior
-            elif category is not None and words[start] not in _ARTICLES:
-                if other is not None and not _stands_for(other, category):
-                    raise UsageError(_no_category(text, other.category.split(), sorted(names), len(templates)))
-                return category, [*_own_materials(words[start : end - 1], templates[category]), *words[:start], *tail]
-    raise UsageError(_no_category(text, words, sorted(names), len(templates)))
-
-
-def _stands_for(meant: Prior, category: str) -> bool:
-    """Tell whether things of a category look like those that are meant, and may be as large."""
-    prior = load_priors()[category]
-    same = meant.shape == prior.shape and [p.label for p in meant.functional] == [p.label for p in prior.functional]
-    return same and prior.longest_axis_m.low <= meant.longest_axis_m.typical <= prior.longest_axis_m.high
-
-
-def _own_materials(words: list[str], template: Template) -> list[str]:
-    """Return the words of a name that say a material which the first slot of a template has."""
-    known = {look_of(choice).material for choice in next(iter(template.slots.values())) if choice}
-    return [word for word in words if (look := material_of(word)) is not None and look.material in known]
-
-
-def _wish(words: list[str]) -> tuple[Wish, float | None, list[str]]:
-    """Return the colour and material that words name, the relative size, and the words left."""
-    rgb, material, relative, unused = None, None, None, []
-    shade: str | None = None
-    pairs = [" ".join(pair) for pair in pairwise(words)] + [""]
-    skip = False
-    for word, pair in zip(words, pairs, strict=False):
-        if skip:
-            skip = False
-        elif material_of(pair) is not None:
-            material, skip = material_of(pair), True
-        elif (color := color_of(word)) is not None:
-            rgb = color if shade is None else shaded(color, shade)
-        elif material_of(word) is not None:
-            material = material_of(word)
-        elif word in RELATIVE:
-            relative = RELATIVE[word]
-        elif word not in _ARTICLES and word not in SHADES and word not in _PREPOSITIONS:
-            unused.append(word)
-        shade = word if word in SHADES else None
-    return Wish(rgb, material), relative, unused
-
-
-def _no_category(text: str, words: list[str], names: list[str], count: int) -> str:
-    near = dict.fromkeys(match for word in words for match in get_close_matches(word, names, n=2, cutoff=0.6))
-    hint = f"; did you mean {', '.join(list(near)[:4])}?" if near else "."
-    return f"no template makes {text!r}{hint} There are {count} (docs/templates.md)"

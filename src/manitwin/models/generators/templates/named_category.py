@@ -1,0 +1,131 @@
+"""Which template's thing a sentence is about, and the words around its name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from itertools import pairwise
+
+from manitwin.errors import UsageError
+from manitwin.models.annotators.priors import Prior, load_priors, named
+from manitwin.models.generators.templates.described import ARTICLES, is_described
+from manitwin.models.generators.templates.looks import look_of, material_of
+from manitwin.models.generators.templates.template import Template
+
+PURPOSE = frozenset({"for", "on", "inside", "holding", "containing", "filled", "full", "to", "by"})
+"""What is behind these says nothing of the thing itself: a brush for wood is not of it."""
+_BEHIND = frozenset({"of", "in", "from", "made", "that", "which", "painted", "colored", "coloured", ","}) | PURPOSE
+"""Words behind a name that begin what is said of the thing."""
+_PARTED = frozenset({"of", "in", "from"}) | PURPOSE
+"""What a thing is, the words before these say: a box of pencils is a box."""
+_SHOWN_AS = frozenset(
+    {"piece", "kind", "sort", "type", "style", "model", "photo", "picture", "image"}
+    | {"rendering", "render", "twin", "replica"}
+)
+"""What is behind 'of' is meant: a photo of a mug."""
+_GROUPS = frozenset(
+    {"set", "pair", "pack", "packet", "stack", "pile", "bunch", "bundle", "collection", "group", "row", "handful"}
+    | {"couple", "number", "lot", "dozen"}
+)
+_COUNTS = frozenset(
+    {"two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve", "twenty", "dozen"}
+    | {"dozens", "several", "many", "multiple", "few", "both", "various", "couple", "pairs", "sets"}
+)
+
+
+@dataclass(frozen=True)
+class NamedCategory:
+    """A template's category, materials that its name says (``own``), and the words before and behind the name."""
+
+    category: str
+    own: list[str]
+    before: list[str]
+    tail: list[str]
+
+
+def plain_words(words: Sequence[str]) -> list[str]:
+    """Return words without the marks around them; a comma stays as a word of its own."""
+    return [word for word in (word if word == "," else word.strip('.!?;:()"') for word in words) if word]
+
+
+def find_category(words: Sequence[str], text: str, templates: Mapping[str, Template]) -> NamedCategory:
+    """Return the category and the words around its name, which is the last and then the longest phrase that names one.
+
+    What a thing is, its last noun says: a phrase is no name where words follow that describe nothing (a mug rack is no mug),
+    but for those behind a preposition (a cup of tea is a cup, and so is a box of pencils a box). A material that the name says,
+    of those that such a thing is of, is one of the words around it: a wooden spoon is of wood, but a wood chisel is not. Where
+    the longer phrase is another thing that the priors know, a shorter one is that only where both have one form and the size
+    fits: a jam jar is a jar, and a garlic bulb no light bulb.
+
+    Raises UsageError for words that name no category, or several things.
+    """
+    words = plain_words(words)
+    names = {
+        name: template.category for template in templates.values() for name in (template.category, *template.names)
+    }
+    parted = next((at for at, word in enumerate(words) if at and word in _PARTED), len(words))
+    shown = bool({*words[:parted]} & (_SHOWN_AS | _GROUPS | _COUNTS))
+    other: Prior | None = None
+    for end in range(len(words), 0, -1):
+        tail = words[end:]
+        if tail and tail[0] not in _BEHIND and not all(word in ARTICLES or is_described(word) for word in tail):
+            continue
+        for start in range(end):
+            if words[start] in ARTICLES or "," in words[start:end] or (start > parted and not shown):
+                continue
+            phrase = " ".join(words[start:end])
+            prior = named(phrase) or named(phrase.replace(" ", ""))
+            meant = [names.get(phrase), *([] if prior is None else [prior.category, prior.kin_of])]
+            category = next((name for name in meant if name in templates), None)
+            if category is None:
+                other = other or prior
+                continue
+            if other is not None and not _stands_for(other, category):
+                raise UsageError(_no_category(text, other.category.split(), sorted(names), len(templates)))
+            _check_one_thing(text, words[:start], words[start:end], load_priors()[category], set(names))
+            own = _own_materials(words[start : end - 1], templates[category])
+            before = words[: start - 2] if words[max(start - 1, 0)] == "of" and start > 1 else words[:start]
+            return NamedCategory(category, own, before, tail)
+    raise UsageError(_no_category(text, words, sorted(names), len(templates)))
+
+
+def _check_one_thing(text: str, before: list[str], name: list[str], prior: Prior, names: set[str]) -> None:
+    """Raise UsageError where a text asks for several things: a pair of pliers is one, and two forks are not."""
+    words = [*before, *name]
+    plural = name[-1].endswith("s") and named(name[-1].removesuffix("s")) is not None
+    groups = [word for word, of in pairwise(words) if of == "of" and word in _GROUPS]
+    counted = [word for word in before if word in _COUNTS and (plural or word == before[-1] or prior.counter)]
+    numbers = [
+        word for word in before[:1] if re.fullmatch(r"\d+", word) and int(word) > 1 and (plural or len(before) == 1)
+    ]
+    several = [group for group in groups if f"{group} of" != prior.counter] + counted + numbers
+    if several:
+        raise UsageError(
+            f"{text!r} asks for several things ({several[0]}): a text is one; describe it alone, and say how many with --count"
+        )
+    other = next((first for first, word in pairwise(before) if word == "and" and first in names), None)
+    if other is not None:
+        raise UsageError(
+            f"{text!r} asks for several things ({other} and {' '.join(name)}): give each a --text of its own"
+        )
+
+
+def _stands_for(meant: Prior, category: str) -> bool:
+    """Tell whether things of a category look like those that are meant, and may be as large."""
+    prior = load_priors()[category]
+    same = meant.shape == prior.shape and [p.label for p in meant.functional] == [p.label for p in prior.functional]
+    return same and prior.longest_axis_m.low <= meant.longest_axis_m.typical <= prior.longest_axis_m.high
+
+
+def _own_materials(words: list[str], template: Template) -> list[str]:
+    """Return the words of a name that say a material which the first slot of a template has."""
+    known = {look_of(choice).material for choice in next(iter(template.slots.values())) if choice}
+    return [word for word in words if (look := material_of(word)) is not None and look.material in known]
+
+
+def _no_category(text: str, words: list[str], names: list[str], count: int) -> str:
+    near = dict.fromkeys(match for word in words for match in get_close_matches(word, names, n=2, cutoff=0.6))
+    hint = f"; did you mean {', '.join(list(near)[:4])}?" if near else "."
+    return f"no template makes {text!r}{hint} There are {count} (docs/templates.md)"
