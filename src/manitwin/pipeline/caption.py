@@ -21,7 +21,7 @@ class CaptionStage:
     """Ask the annotator for words."""
 
     name: ClassVar[str] = "caption"
-    version: ClassVar[str] = "7"
+    version: ClassVar[str] = "8"
     reads: ClassVar[tuple[str, ...]] = (
         "visual.glb",
         "solid.npz",

@@ -17,6 +17,7 @@ from manitwin.geometry.boxes import oriented_bounding_box, upright_extents
 from manitwin.geometry.mass_properties import MassProperties, shell_mass_properties, solid_mass_properties
 from manitwin.models.annotators.priors import Interval, Prior, lookup
 from manitwin.models.annotators.protocol import Annotator, PhysicalEstimates, Subject
+from manitwin.models.annotators.stated_matter import prior_as_named
 from manitwin.pipeline.annotated_mass import annotated_mass, moments_apart
 from manitwin.pipeline.fill_states import filling_of
 from manitwin.pipeline.human_corrections import corrected_estimates, is_human
@@ -43,7 +44,7 @@ class PhysicalStage:
     """Ask for size, mass and friction, scale the object, and compute the mass properties of its real shape."""
 
     name: ClassVar[str] = "physical"
-    version: ClassVar[str] = "13"
+    version: ClassVar[str] = "14"
     reads: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry", "views/", "cameras", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("visual.glb", "solid.npz", "physical", "physical_findings", "size", "called")
 
@@ -151,8 +152,10 @@ class PhysicalStage:
         """Raise Rejected for the mass of no such thing; ``name`` is None of a template, whose mass is that of its parts."""
         if _is_confirmed(mass):
             return
-        prior = lookup(name)
-        if prior is not None and not _within(mass.value, prior.mass_kg, self.settings.mass_margin):
+        prior, as_named = lookup(name), prior_as_named(name)
+        margin = self.settings.mass_margin
+        usual = [each.mass_kg for each in (prior, as_named) if each is not None]
+        if prior is not None and not any(_within(mass.value, interval, margin) for interval in usual):
             raise Rejected(
                 "implausible_mass",
                 f"{mass.value:.4g} kg, but a {prior.category} weighs {_span(prior.mass_kg)} kg; check the name",

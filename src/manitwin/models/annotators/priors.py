@@ -163,11 +163,12 @@ class Prior(Form):
         if self.with_handle is None or shape.side_handle is None:
             return self
         return self.model_copy(update=dict(self.with_handle))
+    stated: str | None = None
 
     @property
     def source(self) -> str:
-        """The source of its Estimates: whose numbers they are."""
-        return f"prior:{self.like or self.category}"
+        """The source of its Estimates: whose numbers they are, and of which stated material: 'prior:mug of steel'."""
+        return f"prior:{self.like or self.category}{f' of {self.stated}' if self.stated else ''}"
 
 
 def _read(name: str) -> dict[str, Any]:
@@ -263,7 +264,7 @@ def normalised(name: str) -> str:
     return " ".join(words[1:] if words[:1] in (["a"], ["an"], ["the"]) and len(words) > 1 else words)
 
 
-def _singulars(phrase: str) -> Iterator[str]:
+def singulars(phrase: str) -> Iterator[str]:
     """Yield the phrase, and what its last word may be the plural of."""
     yield phrase
     for plural, singular in (("ives", "ife"), ("aves", "af"), ("ies", "y"), ("oes", "o"), ("s", ""), ("es", "")):
@@ -286,7 +287,7 @@ def _index() -> dict[str, Prior]:
 def named(name: str) -> Prior | None:
     """Return the prior whose category or alias a name is, whole or in the plural; None where it is no such name."""
     index = _index()
-    return next((index[phrase] for phrase in _singulars(normalised(name)) if phrase in index), None)
+    return next((index[phrase] for phrase in singulars(normalised(name)) if phrase in index), None)
 
 
 def lookup(name: str | None) -> Prior | None:
@@ -311,7 +312,7 @@ def found_by(name: str | None) -> tuple[Prior, str] | None:
     """
     if not name or not (phrase := normalised(name)):
         return None
-    head = re.split(r" (?:of|with|for|in|without|from) ", phrase, maxsplit=1)[0].split()
+    head = re.split(r" (?:made |full )?(?:of|with|for|in|without|from) ", phrase, maxsplit=1)[0].split()
     words = phrase.split()
     tries = [words, *(head[i:] for i in range(len(head))), *(words[i:] for i in range(1, len(words)))]
     while head and _NO_THING.fullmatch(head[-1]):
@@ -319,7 +320,7 @@ def found_by(name: str | None) -> tuple[Prior, str] | None:
         tries += [head[i:] for i in range(len(head))]
     index = _index()
     for part in tries:
-        for candidate in _singulars(" ".join(part)):
+        for candidate in singulars(" ".join(part)):
             if candidate in index and index[candidate].category != "unknown":
                 return index[candidate], candidate
     return None

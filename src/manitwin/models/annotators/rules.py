@@ -17,8 +17,10 @@ from manitwin.models.annotators.protocol import (
     SelectedPoints,
     Subject,
 )
-from manitwin.models.annotators.walls import density_by_wall, is_outer_skin, median_thickness
+from manitwin.models.annotators.stated_matter import look_of_words, prior_as_named, prior_of
+from manitwin.models.annotators.walls import density_as_stated, density_by_wall, is_outer_skin, median_thickness
 from manitwin.models.annotators.words import describe
+from manitwin.models.generators.templates.looks import MATERIALS
 from manitwin.twin.record import Language
 from manitwin.twin.record_values import Estimate
 
@@ -52,15 +54,23 @@ class RulesAnnotator:
 
     def estimate_physical(self, subject: Subject) -> PhysicalEstimates:
         """Estimate size, mass and friction from the prior, the bulk density and the volume."""
-        return estimate_physical(subject, lookup(subject.name))
+        return estimate_physical(subject, prior_of_subject(subject))
 
     def describe(self, subject: Subject, material: str, extents_m: np.ndarray) -> Language:
         """Describe the object in words: colour and size as measured, the rest from the prior and the shape."""
-        return describe(subject, lookup(subject.name), material, extents_m)
+        return describe(subject, prior_of_subject(subject), material, extents_m)
 
     def select_points(self, request: PointsRequest) -> SelectedPoints:
         """Choose functional and grasp points: the prior's parts, found as geometry."""
         return select_points(request, lookup(request.subject.name))
+
+
+def prior_of_subject(subject: Subject) -> Prior | None:
+    """Return the prior of what a thing is called, of the material that its name says, or that a template has made it of."""
+    given = subject.given
+    look = look_of_words(given.material) if given is not None and given.made_of_parts else None
+    prior = lookup(subject.name)
+    return prior_as_named(subject.name) if prior is None or look is None else prior_of(prior, look)
 
 
 def estimate_physical(subject: Subject, prior: Prior | None) -> PhysicalEstimates:
@@ -72,7 +82,7 @@ def estimate_physical(subject: Subject, prior: Prior | None) -> PhysicalEstimate
         size, density = usual.longest_axis_m, usual.bulk_density_kg_m3
     else:
         size = prior.longest_axis_m.estimate(prior.source)
-        by_wall = density_by_wall(prior, subject.solid, subject.seed) if subject.metric else None
+        by_wall = density_of_wall(prior, subject) if subject.metric else None
         bulk = by_wall or prior.bulk_density_kg_m3
         density = None if bulk is None else bulk.estimate(prior.source)
     extents = upright_extents(subject.solid.vertices)
@@ -91,6 +101,13 @@ def estimate_physical(subject: Subject, prior: Prior | None) -> PhysicalEstimate
         wall_thickness_m=_wall_thickness(subject, prior, scale),
         part_materials={str(role): material for role, material in prior.part_materials.items()} or None,
     )
+
+
+def density_of_wall(prior: Prior, subject: Subject) -> Interval | None:
+    """Return the bulk density that the wall of a mesh in metres says, of the stated material or of those that are usual."""
+    if prior.stated is None:
+        return density_by_wall(prior, subject.solid, subject.seed)
+    return density_as_stated(prior, MATERIALS[prior.stated].density_kg_m3, subject.solid, subject.seed)
 
 
 def _mass(prior: Prior, bulk: Interval | None, longest_m: float, volume_m3: float, size_spread: float) -> Estimate:

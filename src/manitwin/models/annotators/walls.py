@@ -18,6 +18,8 @@ from manitwin.models.annotators.priors import DEVIATIONS_ACROSS, Interval, Prior
 
 METALS = ("steel", "aluminium")
 """What a prior means that says metal."""
+HOLLOW_WHERE_THICK = (*METALS, "plastic")
+"""What thick walls of open ware are made of as two skins, as nobody presses sheet or moulds plastic so thick."""
 MEASURED_SPREAD = 0.25  # natural logs: how far a scan's median thickness and volume are off those of the thing
 LEAST_SHARE = 0.05  # a material that is less likely than this is left out of an interval that is meant to hold 90 %
 _SKIN_FACTOR = 3.0  # a mesh this many times thicker than the wall of such a thing is a closed outer skin
@@ -54,6 +56,30 @@ def density_by_wall(prior: Prior, solid: trimesh.Trimesh, seed: int) -> Interval
     if thickness_m > max(each.wall_m.high for each in options.values()):
         return None
     return _left_open(list(options.values()), thickness_m, prior.bulk_density_kg_m3)
+
+
+def density_as_stated(prior: Prior, density_kg_m3: float, solid: trimesh.Trimesh, seed: int) -> Interval | None:
+    """Return the bulk density (kg/m3) that the wall of a mesh in metres leaves of the material that it is stated to be of.
+
+    A wall as thin as usual is all matter; a thicker one may be swollen by its scan. One that is thicker than any of sheet or
+    moulded plastic is hollow between two skins. None where the mesh is no open ware, and of another wall that is too thick.
+    """
+    walls, matter = load_materials()[prior.surface].wall_m, load_materials()[prior.surface].density_kg_m3
+    if walls is None or not prior.container or prior.mass_distribution != "solid":
+        return None
+    thickness_m = median_thickness(solid, seed)
+    usual = min(walls.typical / thickness_m, 1.0)
+    shares = [usual / float(np.exp(DEVIATIONS_ACROSS / 2 * MEASURED_SPREAD)), usual**0.5, 1.0]
+    if thickness_m > walls.high:
+        if prior.surface not in HOLLOW_WHERE_THICK:
+            return None
+        skins = (2 * wall_m / thickness_m for wall_m in (walls.low, walls.typical, walls.high))
+        shares = [min(share, 1.0) for share in skins]
+    by = density_kg_m3 / matter.typical
+    low, typical, high = (
+        share * by * of for share, of in zip(shares, (matter.low, matter.typical, matter.high), strict=True)
+    )
+    return Interval(low=low, typical=typical, high=high)
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from manitwin.errors import UsageError
-from manitwin.models.annotators.priors import Prior, load_materials
+from manitwin.models.annotators.priors import Prior
 from manitwin.models.generators.templates.looks import (
     BASIC_COLORS,
     CLEAR,
@@ -23,6 +22,7 @@ from manitwin.models.generators.templates.looks import (
     shaded,
     usual_looks,
 )
+from manitwin.models.generators.templates.matter import NO_MATTER_BEFORE, is_composite, is_matter, surfaces_of
 
 RELATIVE = {
     "tiny": 0.0,
@@ -56,22 +56,17 @@ ARTICLES = frozenset(
     | {"that", "which", "is", "it", "out", "entirely", "all", "solid", "finish", "painted", "in", "for", "from", ","}
 )
 """Words that say nothing themselves."""
+PURPOSE = frozenset(
+    {"for", "on", "inside", "holding", "containing", "filled", "full", "to", "by", "with", "having", "without"}
+)
+"""What is behind these says nothing of the thing itself: a brush for wood is not of it."""
+_CONTENTS = frozenset({"soap", "wax", "paper", "clay", "cloth", "fabric"})
+"""Materials that behind 'of' are what is in a thing: a bottle of soap."""
 _COLORED = frozenset({"colored", "coloured", "color", "colour", "painted"})
-_NO_MATTER_BEFORE = frozenset({"coated", "plated", "lined", "covered", "look", "effect", "style", "like", "free"})
-"""Behind the name of a material: the thing is not of it."""
 _PLAIN = frozenset(
     {"ceramic", "plastic", "wood", "steel", "stainless steel", "rubber", "glass", "paper", "stone", "fabric"}
 )
 """Materials that another word makes more exact: a wooden oak spoon is of oak."""
-_NEVER_BEFORE_A_NAME = frozenset({"soap", "wax", "bristle", "electronics"})
-_WORKED_ON = {
-    "tools": frozenset(
-        {"wood", "paper", "glass", "leather", "fabric", "cloth", "stone", "metal", "foam", "cork", "tin"}
-    ),
-    "office": frozenset({"paper"}),
-}
-"""Nouns before the name of a tool that say what it is for, by the priors' domain: a wood saw and a paper punch."""
-_SOFT = frozenset({"textile", "foam", "wax"})
 
 
 @dataclass(frozen=True)
@@ -133,26 +128,81 @@ def described(words: Sequence[str], of: Prior | None = None) -> Described:
     A word that is both a colour and a material (copper) is the latter where no other is said. Raises UsageError for two colours
     or two materials of one thing.
     """
-    said, unused, relative = list[_Said](), list[str](), None
+    said, unused = _read(words, of)
+    relative = [RELATIVE[word] for word in unused if word in RELATIVE]
+    left = tuple(word for word in unused if word not in RELATIVE)
+    color = _color(said, words)
+    wish = Wish(None if color is None else color.rgb, _material(said), "" if color is None else color.kind)
+    return Described(wish, relative[-1] if relative else None, left)
+
+
+def materials_said(before: Sequence[str], called: Sequence[str], tail: Sequence[str], of: Prior) -> list[Look]:
+    """Return the materials that the words around and in what a thing is called say, whatever colours they say.
+
+    What it is called says one of several that such things are of (a paper cup, but no paper towel), or another one where it is
+    no plain name (a plastic jar). Raises UsageError for two of one kind of words.
+    """
+    named = [
+        each
+        for each in _read([*before, *called], of)[0]
+        if each.end <= len(before) or _is_said(each.material, each.end - len(before), called, of)
+    ]
+    said = [_material(named), _material(_read(_about(tail)[0], None)[0])]
+    return [look for look in said if look is not None]
+
+
+def own_materials(called: Sequence[str], of: Prior) -> list[str]:
+    """Return the words of what a thing is called that say what it is of."""
+    found = [each for each in _read(called, of)[0] if _is_said(each.material, each.end, called, of)]
+    return [word for each in found for word in called[each.start : each.end]]
+
+
+def _is_said(look: Look | None, end: int, called: Sequence[str], of: Prior) -> bool:
+    """Tell whether a material in what a thing is called, before word ``end``, says what this one is of."""
+    if look is None or end == len(called) or is_composite(of):
+        return False
+    usual = surfaces_of(of)
+    if look.surface in usual:
+        return len(usual) > 1
+    return " ".join(called) != of.category.lower()
+
+
+def _read(words: Sequence[str], of: Prior | None) -> tuple[list[_Said], list[str]]:
+    """Return the colours and materials that words say, and the words that say neither."""
+    said, left = list[_Said](), list[str]()
     at = 0
     while at < len(words):
         found = _found(words, at, of)
-        word = words[at]
         if found is not None:
             said.append(found)
             at = found.end
             continue
-        if word in RELATIVE:
-            relative = RELATIVE[word]
-        elif word not in ARTICLES and word not in SHADES:
-            unused.append(word)
+        if words[at] not in ARTICLES and words[at] not in SHADES:
+            left.append(words[at])
         at += 1
-    color = _color(said, words)
-    return Described(
-        Wish(None if color is None else color.rgb, _material(said), "" if color is None else color.kind),
-        relative,
-        tuple(unused),
-    )
+    return said, left
+
+
+def described_behind(words: Sequence[str]) -> Described:
+    """Return what the words behind a name say of it: the red of 'a mug in red', nothing of 'a glass of red wine'.
+
+    Raises UsageError as ``described`` does.
+    """
+    about, beside = _about(words)
+    said = described(about)
+    return Described(said.wish, said.relative, (*said.unused, *beside))
+
+
+def _about(words: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return the words behind a name that speak of it, and those that speak of what is in it, or what it is for."""
+    cut = next((at for at, word in enumerate(words) if word in PURPOSE), len(words))
+    about, beside = list(words[:cut]), [word for word in words[cut:] if word not in ARTICLES | PURPOSE]
+    telling = [word for word in about if word not in ARTICLES]
+    if telling and about[0] in ("of", "in"):
+        holds = about[0] == "of" and telling[-1] in _CONTENTS
+        if holds or not is_described(telling[-1]):
+            return [], [*telling, *beside]
+    return about, beside
 
 
 def is_described(word: str) -> bool:
@@ -171,7 +221,7 @@ def _found(words: Sequence[str], at: int, of: Prior | None) -> _Said | None:
         behind = words[end] if end < len(words) else ""
         if behind in _COLORED and (rgb is not None or look is not None):
             return _Said(at, end + 1, rgb or (look.rgb if look is not None else None))
-        if look is not None and behind not in _NO_MATTER_BEFORE and (of is None or is_matter(phrase, look, of)):
+        if look is not None and behind not in NO_MATTER_BEFORE and (of is None or is_matter(phrase, look, of)):
             return _Said(at, end, rgb, look)
         if rgb is not None:
             shade = words[at - 1] if at and words[at - 1] in SHADES else None
@@ -179,28 +229,6 @@ def _found(words: Sequence[str], at: int, of: Prior | None) -> _Said | None:
             rgb = rgb if shade is None else shaded(rgb, shade)
             return _Said(at, end, rgb, None, kind in BASIC_COLORS, kind if kind in (CLEAR, *METAL_COLORS) else "")
     return None
-
-
-def is_matter(word: str, look: Look, of: Prior) -> bool:
-    """Tell whether a word before a thing's name says what it is of: the steel of a steel mug, not the wood of a wood saw.
-
-    What such things are of anyway it always says; soap, wax and soft matter never of others, nor what a tool works on.
-    """
-    usual = surfaces_of(of)
-    if look.surface in usual:
-        return True
-    if word in _NEVER_BEFORE_A_NAME or word in _WORKED_ON.get(of.domain, ()):
-        return False
-    return look.surface not in _SOFT or bool(usual & {"textile", "leather"})
-
-
-def surfaces_of(prior: Prior) -> frozenset[str]:
-    """Return the materials of the priors that the words of a prior's material name, metal as each of its kinds."""
-    words = prior.material.replace(",", " ").replace("-", " ").split()
-    phrases = [*words, *(" ".join(pair) for pair in pairwise(words))]
-    looks = [look for phrase in phrases if (look := material_of(phrase)) is not None]
-    metals = {"steel", "aluminium"} if "metal" in words else set()
-    return frozenset({look.surface for look in looks} | {word for word in words if word in load_materials()} | metals)
 
 
 def _color(said: Sequence[_Said], words: Sequence[str]) -> _Said | None:

@@ -10,12 +10,10 @@ from itertools import pairwise
 
 from manitwin.errors import UsageError
 from manitwin.models.annotators.priors import Prior, load_priors, named
-from manitwin.models.generators.templates.described import ARTICLES, is_described
+from manitwin.models.generators.templates.described import ARTICLES, PURPOSE, is_described, own_materials
 from manitwin.models.generators.templates.looks import look_of, material_of
 from manitwin.models.generators.templates.template import Template
 
-PURPOSE = frozenset({"for", "on", "inside", "holding", "containing", "filled", "full", "to", "by"})
-"""What is behind these says nothing of the thing itself: a brush for wood is not of it."""
 _BEHIND = frozenset({"of", "in", "from", "made", "that", "which", "painted", "colored", "coloured", ","}) | PURPOSE
 """Words behind a name that begin what is said of the thing."""
 _PARTED = frozenset({"of", "in", "from"}) | PURPOSE
@@ -85,7 +83,7 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
             if other is not None and not _stands_for(other, category):
                 raise UsageError(_no_category(text, other.category.split(), sorted(names), len(templates)))
             _check_one_thing(text, words[:start], words[start:end], load_priors()[category], set(names))
-            own = _own_materials(words[start : end - 1], templates[category])
+            own = _own_materials(words[start:end], templates[category], load_priors()[category])
             before = words[: start - 2] if words[max(start - 1, 0)] == "of" and start > 1 else words[:start]
             return NamedCategory(category, own, before, tail)
     raise UsageError(_no_category(text, words, sorted(names), len(templates)))
@@ -119,10 +117,11 @@ def _stands_for(meant: Prior, category: str) -> bool:
     return same and prior.longest_axis_m.low <= meant.longest_axis_m.typical <= prior.longest_axis_m.high
 
 
-def _own_materials(words: list[str], template: Template) -> list[str]:
-    """Return the words of a name that say a material which the first slot of a template has."""
+def _own_materials(called: list[str], template: Template, prior: Prior) -> list[str]:
+    """Return the words of a name that say a material which the first slot of a template has, or another than is usual."""
     known = {look_of(choice).material for choice in next(iter(template.slots.values())) if choice}
-    return [word for word in words if (look := material_of(word)) is not None and look.material in known]
+    own = [word for word in called[:-1] if (look := material_of(word)) is not None and look.material in known]
+    return own or own_materials(called, prior)
 
 
 def _no_category(text: str, words: list[str], names: list[str], count: int) -> str:

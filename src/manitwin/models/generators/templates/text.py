@@ -8,9 +8,17 @@ from dataclasses import dataclass, field, replace
 
 from manitwin.errors import UsageError
 from manitwin.models.annotators.priors import Prior, load_priors
-from manitwin.models.generators.templates.described import ARTICLES, Described, Wish, described, is_described
+from manitwin.models.generators.templates.described import (
+    ARTICLES,
+    Described,
+    Wish,
+    described,
+    described_behind,
+    is_described,
+)
 from manitwin.models.generators.templates.looks import look_of
-from manitwin.models.generators.templates.named_category import PURPOSE, find_category, plain_words
+from manitwin.models.generators.templates.matter import is_composite
+from manitwin.models.generators.templates.named_category import find_category, plain_words
 from manitwin.models.generators.templates.template import Template
 
 MAX_CHARACTERS = 400
@@ -37,8 +45,6 @@ DIRECTIONS = {
     "tall": "height", "high": "height", "height": "height", "wide": "width", "width": "width", "broad": "width",
     "diameter": "width", "across": "width", "long": "length", "length": "length", "deep": "depth", "thick": "height",
 }  # fmt: skip
-_CONTENTS = frozenset({"soap", "wax", "paper", "clay", "cloth", "fabric"})
-"""Materials that behind 'of' are what is in a thing: a bottle of soap."""
 _WITH = re.compile(r" (?:with|having|featuring) | and an? (?=.)| (?:that|which) has ")
 
 
@@ -78,7 +84,7 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
         if slot is not None:
             parts = [*parts, (slot, Described(before.wish))]
             before = replace(before, wish=Wish())
-        words = _joined(before, described(found.own), _tail(found.tail))
+        words = _joined(before, described(found.own), described_behind(found.tail))
         wishes = {} if words.wish == Wish() else {"": words.wish}
         unused = list(words.unused)
         for part, said in [*parts, *(_features(features[0], template) if features else [])]:
@@ -91,7 +97,7 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
 
 def _slot_meant(wish: Wish, template: Template, prior: Prior) -> str | None:
     """Return the part that a material before the name is of, where the thing is of several: of a wooden hammer the handle."""
-    if wish.material is None or not {"and", "with"} & set(prior.material.split()):
+    if wish.material is None or not is_composite(prior):
         return None
     usual = {slot: {look_of(words).surface for words in choices if words} for slot, choices in template.slots.items()}
     first = next(iter(usual))
@@ -111,18 +117,6 @@ def _joined(before: Described, own: Described, tail: Described) -> Described:
     wish = before.wish.over(tail.wish).over(own.wish)
     relative = next((said.relative for said in (before, tail) if said.relative is not None), None)
     return Described(wish, relative, before.unused + tail.unused)
-
-
-def _tail(words: list[str]) -> Described:
-    """Return what the words behind a name say of it: the red of 'a mug in red', nothing of 'a glass of red wine'."""
-    cut = next((at for at, word in enumerate(words) if word in PURPOSE), len(words))
-    about, beside = words[:cut], tuple(word for word in words[cut:] if word not in ARTICLES | PURPOSE)
-    telling = [word for word in about if word not in ARTICLES]
-    holds = about[:1] == ["of"] and telling[-1:] and telling[-1] in _CONTENTS
-    if telling and about[0] in ("of", "in") and (holds or not is_described(telling[-1])):
-        return Described(unused=(*telling, *beside))
-    said = described(about)
-    return Described(said.wish, said.relative, (*said.unused, *beside))
 
 
 def _part_before(words: list[str], template: Template) -> tuple[list[tuple[str, Described]], list[str]]:

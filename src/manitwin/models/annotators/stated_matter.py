@@ -1,0 +1,166 @@
+"""A material that a name says: a steel mug is what the priors say of a mug, but of steel.
+
+The words are those of texts (``generators/templates/looks.py``). What such things weigh goes with the material: mass per volume
+as the densities, but a scan swells thin walls more than thick ones; mass at a size as density times the wall that ware of either
+material usually has (``prior_tables/materials.toml``), or, of what need not be a wall, anything from that to the density alone.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from manitwin.errors import UsageError
+from manitwin.models.annotators.priors import Interval, Prior, found_by, load_materials, singulars
+from manitwin.models.generators.templates.described import materials_said
+from manitwin.models.generators.templates.looks import MATERIALS, SAID_OF, Look
+from manitwin.models.generators.templates.matter import is_composite, is_food, looks_in, surfaces_of
+
+USUAL_WALL_M = 0.003
+"""Of what no walls of open ware are listed for: silicone, cardboard, leather."""
+OF_ONE_MATTER = 0.8
+"""Of the density of its material: what is full and weighs less per volume is mostly hollow."""
+IMITATION = (0.08, 0.4, 1.0)
+"""Mass per volume over the density of its matter: imitations of food are hollow or solid (YCB 010 to 018: 0.05 to 0.45)."""
+_LIGHTEST_KG_M3 = 10.0
+
+
+def prior_as_named(name: str | None) -> Prior | None:
+    """Return the prior of what a person calls a thing, of the material that the name says; None where there is none."""
+    found = found_by(name)
+    if found is None or name is None:
+        return None
+    prior, called = found
+    look = _look_in(name, called, prior)
+    return prior if look is None else prior_of(prior, look)
+
+
+def prior_of(prior: Prior, look: Look) -> Prior:
+    """Return a prior as it is of another material than such things usually are; itself where they are of it anyway.
+
+    Of what has parts of unlike matter the first is of it, and how much of it that is nobody knows.
+    """
+    said = SAID_OF.get(look.material, look.material)
+    if is_composite(prior):
+        return prior if look.surface in surfaces_of(prior) else _with_one_part_of(prior, look, said)
+    if prior.material == said:
+        return prior
+    mass_by, bulk = _weighed(prior, look)
+    contact = load_materials()[look.surface]
+    return prior.model_copy(
+        update={
+            "material": said,
+            "surface": look.surface,
+            "friction_static": contact.friction_static,
+            "friction_dynamic": contact.friction_dynamic,
+            "restitution": contact.restitution,
+            "mass_kg": _times(prior.mass_kg, mass_by),
+            "bulk_density_kg_m3": bulk,
+            "stated": look.material,
+            "part_materials": {},
+        }
+    )
+
+
+def look_of_words(material: str | None) -> Look | None:
+    """Return the look of the words that a twin has for its material; None for several materials or none that is known."""
+    if material is None:
+        return None
+    of_words = {said: name for name, said in SAID_OF.items()}
+    return MATERIALS.get(of_words.get(material, material))
+
+
+def _look_in(name: str, called: str, prior: Prior) -> Look | None:
+    """Return the material that the words around what a thing is called say, or that its name says among several usual ones."""
+    words = re.sub(r"[^a-z0-9,]+", " ", name.lower().replace("\u2019", "").replace("'", "").replace(",", " , ")).split()
+    length = len(called.split())
+    begins = [at for at in range(len(words)) if called in singulars(" ".join(words[at : at + length]))]
+    if not begins:
+        return None
+    begin, end = begins[0], begins[0] + length
+    try:
+        said = materials_said(words[:begin], words[begin:end], words[end:], prior)
+    except UsageError:
+        return None  # steel and wood: nobody knows which is meant
+    return said[0] if len(set(said)) == 1 else None
+
+
+def _weighed(prior: Prior, look: Look) -> tuple[tuple[float, float, float], Interval | None]:
+    """Return what the mass of such things of one size is multiplied with (low, typical, high), and their bulk density."""
+    usual, bulk = looks_in(prior.material), prior.bulk_density_kg_m3
+    if is_food(prior) and bulk is not None:
+        low, typical, high = (share * look.density_kg_m3 for share in IMITATION)
+        return (low / bulk.low, typical / bulk.typical, high / bulk.high), Interval(low=low, typical=typical, high=high)
+    if not usual or prior.mass_distribution == "shell" or prior.domain == "electronics":
+        return (1.0, 1.0, 1.0), bulk
+    density = float(np.exp(np.mean([np.log(each.density_kg_m3) for each in usual])))
+    wall_m = float(np.exp(np.mean([np.log(_wall_m(each)) for each in usual])))
+    heavier, areal = look.density_kg_m3 / density, look.density_kg_m3 * _wall_m(look) / (density * wall_m)
+    if _holds(prior, density):
+        if bulk is None:
+            return (1.0, 1.0, 1.0), None
+        low = max(bulk.low * areal, min(bulk.low, _LIGHTEST_KG_M3))
+        held = Interval(low=low, typical=bulk.typical + low - bulk.low, high=bulk.high + low - bulk.low)
+        return (low / bulk.low, held.typical / bulk.typical, held.high / bulk.high), held
+    swollen = None if bulk is None else _as_swollen(bulk, density, look, wall_m)
+    if prior.container:
+        return (areal, areal, areal), swollen
+    return (min(areal, heavier), float(np.sqrt(areal * heavier)), max(areal, heavier)), swollen
+
+
+def _holds(prior: Prior, density_kg_m3: float) -> bool:
+    """Tell whether such things weigh what is in them rather than what they are of."""
+    bulk = prior.bulk_density_kg_m3
+    light = bulk is not None and bulk.typical < OF_ONE_MATTER * density_kg_m3
+    return prior.vessel or (prior.mass_distribution == "full" and light)
+
+
+def _as_swollen(bulk: Interval, density_kg_m3: float, look: Look, wall_m: float) -> Interval:
+    """Return the bulk density of scans in another material: as far as its walls are thicker, a scan swells them less."""
+    ends = []
+    for value in (bulk.low, bulk.typical, bulk.high):
+        full = min(value / density_kg_m3, 1.0)
+        ends.append(look.density_kg_m3 / (1 + (1 / full - 1) * wall_m / _wall_m(look)))
+    matter = load_materials()[look.surface].density_kg_m3
+    low, typical, high = np.array(ends) * [matter.low / matter.typical, 1.0, matter.high / matter.typical]
+    return Interval(low=float(low), typical=float(typical), high=float(high))
+
+
+def _with_one_part_of(prior: Prior, look: Look, said: str) -> Prior:
+    """Return a prior of things with parts of unlike matter, the first of which is of another one."""
+    first = looks_in(re.split(r" and | with ", prior.material)[0])
+    if not first or first[0].surface != prior.surface:
+        return prior
+    rest = re.split(r"(?= and | with )", prior.material, maxsplit=1)[1]
+    density = float(np.exp(np.mean([np.log(each.density_kg_m3) for each in first])))
+    by = look.density_kg_m3 / density
+    spread = (min(by, 1.0), float(np.sqrt(by)), max(by, 1.0))
+    bulk, contact = prior.bulk_density_kg_m3, load_materials()[look.surface]
+    return prior.model_copy(
+        update={
+            "material": f"{said}{rest}",
+            "surface": look.surface,
+            "friction_static": contact.friction_static,
+            "friction_dynamic": contact.friction_dynamic,
+            "restitution": contact.restitution,
+            "mass_kg": _times(prior.mass_kg, spread),
+            "bulk_density_kg_m3": None if bulk is None else _times(bulk, spread),
+            "stated": look.material,
+            "part_materials": {},
+        }
+    )
+
+
+def _wall_m(look: Look) -> float:
+    walls = load_materials()[look.surface].wall_m
+    return USUAL_WALL_M if walls is None else walls.typical
+
+
+def _times(interval: Interval, by: Sequence[float]) -> Interval:
+    ends = sorted(
+        value * factor for value, factor in zip((interval.low, interval.typical, interval.high), by, strict=True)
+    )
+    low, typical, high = ends
+    return Interval(low=low, typical=typical, high=high)
