@@ -324,3 +324,62 @@ def test_of_a_stated_material_the_colour_is_drawn() -> None:
         assert again.looks == drawn[3].looks and again.masses_kg == drawn[3].masses_kg
     steel = [make(TEMPLATES["mug"], read("a steel mug"), np.random.default_rng(seed)) for seed in range(4)]
     assert {next(iter(each.looks.values())).rgb for each in steel} == {MATERIALS["steel"].rgb}
+
+
+@pytest.mark.parametrize(
+    "text", ["a kettlebell", "a rubber mallet", "a washer", "a toy hammer", "a stone", "a potted plant"]
+)
+def test_kin_of_another_shape_is_not_made(text: str) -> None:
+    with pytest.raises(UsageError, match="no template makes"):
+        read(text)
+
+
+def test_a_roll_is_of_what_is_on_it() -> None:
+    assert read("a roll of duct tape").category == "roll of tape"
+    assert read("a roll of toilet paper").category == "toilet paper"
+
+
+def test_parts_have_other_names() -> None:
+    assert set(read("a jar with a steel lid").wishes) == {"cap"}
+    assert set(read("a hammer with a black grip").wishes) == {"handle"}
+
+
+@pytest.mark.parametrize(
+    ("text", "side", "size_m"),
+    [
+        *(
+            ("a keyboard, 40 cm wide", 0, 0.4),
+            ("a cutting board 20 cm wide", 1, 0.2),
+            ("a cardboard box 30 cm long", 2, 0.3),
+        ),
+        ("a bottle 25 cm long", 2, 0.25),
+    ],
+)
+def test_the_side_that_is_meant_is_one_that_gives_a_usual_size(text: str, side: int, size_m: float) -> None:
+    wanted = read(text)
+    made = make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
+    assert np.ptp(made.mesh.vertices, axis=0)[side] == pytest.approx(size_m, rel=1e-6)
+
+
+def test_all_of_a_wooden_spatula_is_of_wood_that_is_seen() -> None:
+    for seed in range(6):
+        made = make(TEMPLATES["spatula"], read("a wooden spatula"), np.random.default_rng(seed))
+        assert {look.surface for look in made.looks.values()} == {"wood"}
+        brush = make(TEMPLATES["paint brush"], read("a paint brush with a wooden handle"), np.random.default_rng(seed))
+        red, _, blue = brush.looks["handle"].rgb
+        assert red - blue < 0.4, "no red paint"
+
+
+def test_nobody_paints_copper() -> None:
+    for seed in range(6):
+        made = make(TEMPLATES["watering can"], read("a green watering can"), np.random.default_rng(seed))
+        assert {look.material for look in made.looks.values()}.isdisjoint({"copper", "brass"})
+
+
+@pytest.mark.parametrize(
+    ("text", "part", "most_kg"), [("a jar with a steel lid", "cap", 0.08), ("a steel mug", "handle", 0.06)]
+)
+def test_lids_and_handles_of_metal_are_of_sheet(text: str, part: str, most_kg: float) -> None:
+    wanted = read(text)
+    made = make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
+    assert made.masses_kg[part] < most_kg

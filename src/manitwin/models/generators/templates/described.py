@@ -10,6 +10,7 @@ import numpy as np
 from manitwin.errors import UsageError
 from manitwin.models.annotators.priors import Prior
 from manitwin.models.generators.templates.looks import (
+    BARE_METALS,
     BASIC_COLORS,
     CLEAR,
     MATERIALS,
@@ -62,6 +63,7 @@ PURPOSE = frozenset(
 """What is behind these says nothing of the thing itself: a brush for wood is not of it."""
 _CONTENTS = frozenset({"soap", "wax", "paper", "clay", "cloth", "fabric"})
 """Materials that behind 'of' are what is in a thing: a bottle of soap."""
+_GOLDEN = frozenset({"brass", "bronze", "copper"})
 _COLORED = frozenset({"colored", "coloured", "color", "colour", "painted"})
 _PLAIN = frozenset(
     {"ceramic", "plastic", "wood", "steel", "stainless steel", "rubber", "glass", "paper", "stone", "fabric"}
@@ -95,10 +97,13 @@ class Wish:
         if self.material is not None:
             return [self.material] if self.rgb is not None else usual_looks(self.material, usual)
         if self.kind in METAL_COLORS:
-            return [look for look in usual if look.metallic > 0] or list(usual)
+            golden = self.kind != "silver"
+            metals = [look for look in usual if look.metallic > 0]
+            return [look for look in metals if (look.material in _GOLDEN) == golden] or metals or list(usual)
         if self.kind == CLEAR:
             return [look for look in usual if look.surface in ("glass", "plastic")] or [MATERIALS["glass"]]
-        return list(usual)
+        painted = [look for look in usual if look.material not in BARE_METALS] if self.rgb is not None else []
+        return painted or list(usual)
 
 
 @dataclass(frozen=True)

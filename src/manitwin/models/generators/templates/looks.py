@@ -30,6 +30,8 @@ BASIC_COLORS = frozenset(
 )
 """The hues that another word makes more exact: olive green is olive."""
 CLEAR = "clear"
+BARE_METALS = frozenset(("stainless steel", "chrome", "brass", "copper", "bronze"))
+"""What nobody paints: a green watering can is of sheet steel or plastic."""
 METAL_COLORS = frozenset(("gold", "silver", "bronze", "copper", "rose gold"))
 """Colours that, of things which may be of metal, mean the metal ones."""
 SAME_COLOR = {"gray": "grey", "silvery": "silver", "golden": "gold", "rose": "pink", "crimson": "red", "scarlet": "red"}
@@ -188,7 +190,7 @@ USUAL_COLORS: dict[str, tuple[str, ...]] = {
     "enamel": ("", "white", "black", "red", "navy", "cream", "green"),
     "enamelled cast iron": ("red", "navy", "cream", "orange", "black", "green"),
     "aluminium": ("", "", "charcoal", "red", "blue"),
-    "wood": ("", "", "light brown", "dark brown"),
+    "wood": ("", "", "tan", "dark brown"),
     "bamboo": ("", "", "dark brown"),
     "cardboard": ("", "", "white"),
     "paper": ("", "white", "beige", "red", "blue"),
@@ -205,7 +207,8 @@ USUAL_COLORS: dict[str, tuple[str, ...]] = {
 def usual_looks(look: Look, usual: Iterable[Look]) -> list[Look]:
     """Return looks of a material in colours that a thing has: those of its ``usual`` ones of it, else those of any of it."""
     own = [each for each in usual if each.material == look.material]
-    if len(own) > 1:
+    seen = look.surface == "wood" or (look.surface == "steel" and look.metallic > 0)
+    if len(own) > 1 and not seen:  # a red wooden handle is painted: who says wood or steel wants to see it
         return own
     return [look_of(f"{color} {look.material}".strip()) for color in USUAL_COLORS.get(look.material, ("",))]
 

@@ -17,6 +17,7 @@ from manitwin.formats.meshes.triangles import with_creased_normals
 from manitwin.geometry.seams import has_three_places
 from manitwin.geometry.solids.parts import PartedMesh
 from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.walls import METALS
 from manitwin.models.generators.templates.described import Wish
 from manitwin.models.generators.templates.looks import Look, look_of
 from manitwin.models.generators.templates.template import KnownPoint, Model, Template
@@ -26,7 +27,6 @@ from manitwin.twin.import_record import GivenParts
 LEAST_WALL_M = 0.0008
 SHEET_M = 0.0009
 """The wall of hollow handles and stands of sheet metal: 0.8 to 1 mm of stainless steel."""
-_METALLIC = 0.5
 SIZE_MARGIN = 2.0
 """A stated size beyond the category's interval by more than this factor is taken for a mistake."""
 
@@ -79,7 +79,7 @@ def dressed(
     for part, built in model.assembly.solids():
         solid = built.scale((scale, scale, scale))
         density = template.contents_kg_m3.get(part, looks[part].density_kg_m3)
-        if part in template.of_sheet and looks[part].metallic > _METALLIC:
+        if part in template.of_sheet and looks[part].surface in METALS and "cast" not in looks[part].material:
             density *= min(1.0, SHEET_M * float(solid.surface_area()) / float(solid.volume()))
         solids.append((solid, density))
         masses[part] = masses.get(part, 0.0) + density * float(solid.volume())
@@ -151,8 +151,18 @@ def _looks(template: Template, wanted: Wanted, rng: np.random.Generator) -> dict
         if slot == first:
             wish = wish.over(wanted.wishes.get("", Wish()))
         usual = wish.choices([look_of(words) if words else looks[first] for words in choices])
+        if slot != first and wish == Wish() and _is_whole(wanted, looks[first], usual):
+            usual = [looks[first]]
         looks[slot] = wish.of(usual[int(rng.integers(len(usual)))])
     return looks
+
+
+def _is_whole(wanted: Wanted, first: Look, usual: Sequence[Look]) -> bool:
+    """Tell whether a material that is said of the whole is that of a further part too: all of a wooden spatula is of wood."""
+    said = wanted.wishes.get("", Wish()).material
+    return (
+        said is not None and said.surface in ("wood", "plastic") and first.surface in {look.surface for look in usual}
+    )
 
 
 def _check_parts(template: Template, wanted: Wanted, mesh: PartedMesh) -> None:
@@ -163,21 +173,26 @@ def _check_parts(template: Template, wanted: Wanted, mesh: PartedMesh) -> None:
 
 
 def _scale(template: Template, wanted: Wanted, mesh: PartedMesh) -> float:
-    """Return the scale that gives the stated size, or the relative one; 1 where the text says neither."""
+    """Return the scale that gives the stated size, or the relative one; 1 where the text says neither.
+
+    Which side is meant by width is told by the size: of a keyboard of 40 cm the longer one.
+    """
     extents = np.ptp(mesh.vertices, axis=0)
     now = {
-        "": extents.max(),
-        "height": extents[2],
-        "width": extents[:2].min(),
-        "length": extents[:2].max(),
-        "depth": extents[:2].min(),
+        "": [extents.max()],
+        "height": [extents[2]],
+        "width": [extents[:2].min(), extents[:2].max()],
+        "length": [extents.max()],
+        "depth": [extents[:2].min()],
     }
     prior = lookup(template.category)
     assert prior is not None, template.category
     interval = prior.longest_axis_m
     if wanted.lengths_m:
         direction, length = next(iter(wanted.lengths_m.items()))
-        scale = length / float(now[direction])
+        scales = [length / float(side) for side in now[direction]]
+        usual = [scale for scale in scales if interval.low <= float(extents.max()) * scale <= interval.high]
+        scale = [*usual, *scales][0]
         longest = float(extents.max()) * scale
         if not interval.low / SIZE_MARGIN <= longest <= interval.high * SIZE_MARGIN:
             raise UsageError(

@@ -20,9 +20,14 @@ _PARTED = frozenset({"of", "in", "from"}) | PURPOSE
 """What a thing is, the words before these say: a box of pencils is a box."""
 _SHOWN_AS = frozenset(
     {"piece", "kind", "sort", "type", "style", "model", "photo", "picture", "image"}
-    | {"rendering", "render", "twin", "replica"}
+    | {"rendering", "render", "twin", "replica", "roll", "bar", "tube", "stick", "sheet", "block"}
 )
-"""What is behind 'of' is meant: a photo of a mug."""
+"""What is behind 'of' is meant: a photo of a mug, a roll of duct tape."""
+_OF_ANOTHER_SHAPE = frozenset(
+    {"kettlebell", "stone", "washer", "pulley", "bearing", "mallet", "gavel", "toy hammer", "set square", "protractor"}
+    | {"doorbell", "potted plant", "awl", "file", "poker chip", "earring"}
+)
+"""Kin in the priors of what a template makes, of another shape: a kettlebell is no dumbbell."""
 _GROUPS = frozenset(
     {"set", "pair", "pack", "packet", "stack", "pile", "bunch", "bundle", "collection", "group", "row", "handful"}
     | {"couple", "number", "lot", "dozen"}
@@ -75,7 +80,9 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
                 continue
             phrase = " ".join(words[start:end])
             prior = named(phrase) or named(phrase.replace(" ", ""))
-            meant = [names.get(phrase), *([] if prior is None else [prior.category, prior.kin_of])]
+            meant = [names.get(phrase)]
+            if prior is not None:
+                meant += [prior.category, None if prior.category in _OF_ANOTHER_SHAPE else prior.kin_of]
             category = next((name for name in meant if name in templates), None)
             if category is None:
                 other = other or prior
@@ -113,7 +120,11 @@ def _check_one_thing(text: str, before: list[str], name: list[str], prior: Prior
 def _stands_for(meant: Prior, category: str) -> bool:
     """Tell whether things of a category look like those that are meant, and may be as large."""
     prior = load_priors()[category]
-    same = meant.shape == prior.shape and [p.label for p in meant.functional] == [p.label for p in prior.functional]
+    same = (
+        meant.category not in _OF_ANOTHER_SHAPE
+        and meant.shape == prior.shape
+        and [p.label for p in meant.functional] == [p.label for p in prior.functional]
+    )
     return same and prior.longest_axis_m.low <= meant.longest_axis_m.typical <= prior.longest_axis_m.high
 
 

@@ -45,6 +45,11 @@ DIRECTIONS = {
     "tall": "height", "high": "height", "height": "height", "wide": "width", "width": "width", "broad": "width",
     "diameter": "width", "across": "width", "long": "length", "length": "length", "deep": "depth", "thick": "height",
 }  # fmt: skip
+_PART_NAMES = {
+    "lid": ("cap",), "cap": ("lid",), "top": ("cap", "lid"), "stopper": ("cap",), "cork": ("cap",), "grip": ("handle",),
+    "blade": ("head",), "strap": ("band",), "display": ("screen",), "bristle": ("bristles",),
+}  # fmt: skip
+"""Other words for slots of templates, the best first."""
 _WITH = re.compile(r" (?:with|having|featuring) | and an? (?=.)| (?:that|which) has ")
 
 
@@ -129,6 +134,13 @@ def _part_before(words: list[str], template: Template) -> tuple[list[tuple[str, 
     return [], words
 
 
+def _slot_called(word: str, template: Template) -> str:
+    """Return the slot that a word means, in the plural or by another name; else the word itself, in the singular."""
+    names = [word, word.removesuffix("s"), f"{word}s"]
+    names += [other for name in names[:2] for other in _PART_NAMES.get(name, ())]
+    return next((name for name in names if name in template.slots), names[1])
+
+
 def _features(text: str, template: Template) -> list[tuple[str, Described]]:
     """Return what is said of each part behind 'with': 'a red handle, black head and green claw'.
 
@@ -143,7 +155,7 @@ def _features(text: str, template: Template) -> list[tuple[str, Described]]:
         if is_described(words[-1]) and words[-1] not in template.slots:
             before += [*words, "and"]  # 'red and white stripes'
             continue
-        part = words[-1] if words[-1] in template.slots else words[-1].removesuffix("s")
+        part = _slot_called(words[-1], template)
         said = described([*before, *words[:-1]])
         features.append((part, said if said != Described() or not features else features[-1][1]))
         before = []
