@@ -15,6 +15,7 @@ from manitwin.models.generators.templates.looks import (
     CLEAR,
     MATERIALS,
     METAL_COLORS,
+    OF_PRECIOUS_METAL,
     SAME_COLOR,
     SHADES,
     Look,
@@ -55,14 +56,17 @@ ARTICLES = frozenset(
         "colour",
     }
     | {"that", "which", "is", "it", "out", "entirely", "all", "solid", "finish", "painted", "in", "for", "from", ","}
+    | {"please", "i", "want", "need", "make", "create", "generate", "build", "me", "my"}
 )
 """Words that say nothing themselves."""
 PURPOSE = frozenset(
     {"for", "on", "inside", "holding", "containing", "filled", "full", "to", "by", "with", "having", "without"}
 )
 """What is behind these says nothing of the thing itself: a brush for wood is not of it."""
-_CONTENTS = frozenset({"soap", "wax", "paper", "clay", "cloth", "fabric"})
-"""Materials that behind 'of' are what is in a thing: a bottle of soap."""
+_CONTENTS = frozenset(
+    {"soap", "wax", "paper", "clay", "cloth", "fabric", "cream", "mustard", "mint", "lime", "olive", "peach"}
+)
+"""Materials and colours that behind 'of' are what is in a thing: a bottle of soap."""
 _GOLDEN = frozenset({"brass", "bronze", "copper"})
 _COLORED = frozenset({"colored", "coloured", "color", "colour", "painted"})
 _PLAIN = frozenset(
@@ -99,7 +103,9 @@ class Wish:
         if self.kind in METAL_COLORS:
             golden = self.kind != "silver"
             metals = [look for look in usual if look.metallic > 0]
-            return [look for look in metals if (look.material in _GOLDEN) == golden] or metals or list(usual)
+            alike = [look for look in metals if (look.material in _GOLDEN) == golden]
+            yellow = [look for look in alike if look.material == "brass" and self.kind == "gold"]
+            return yellow or alike or metals or list(usual)
         if self.kind == CLEAR:
             return [look for look in usual if look.surface in ("glass", "plastic")] or [MATERIALS["glass"]]
         painted = [look for look in usual if look.material not in BARE_METALS] if self.rgb is not None else []
@@ -222,7 +228,8 @@ def _found(words: Sequence[str], at: int, of: Prior | None) -> _Said | None:
         phrase = " ".join(words[at:end])
         if end > len(words):
             continue
-        look, rgb = material_of(phrase), color_of(phrase)
+        precious = OF_PRECIOUS_METAL.get(phrase) if at and words[at - 1] == "of" else None
+        look, rgb = material_of(precious or phrase), None if precious else color_of(phrase)
         behind = words[end] if end < len(words) else ""
         if behind in _COLORED and (rgb is not None or look is not None):
             return _Said(at, end + 1, rgb or (look.rgb if look is not None else None))

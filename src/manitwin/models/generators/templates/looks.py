@@ -110,6 +110,7 @@ MATERIALS: dict[str, Look] = {
         _look("silicone", "rubber", "8f9598", 0.7, 1150),
         _look("rubber", "rubber", "232325", 0.85, 1150),
         _look("foam", "foam", "e7c94a", 0.95, 60),
+        _look("styrofoam", "foam", "f2f2ee", 0.9, 40),
         _look("stainless steel", "steel", "b9bbbd", 0.25, 7850, 1.0),
         _look("steel", "steel", "a6a8aa", 0.35, 7850, 1.0),
         _look("chrome", "steel", "cfd1d3", 0.08, 7850, 1.0),
@@ -121,6 +122,7 @@ MATERIALS: dict[str, Look] = {
         _look("pewter", "steel", "9b9c98", 0.4, 7300, 1.0),
         _look("bronze", "steel", "8c6a3a", 0.35, 8800, 1.0),
         _look("sterling silver", "steel", "d3d4d4", 0.2, 10360, 1.0),
+        _look("solid gold", "steel", "c39a33", 0.2, 15500, 1.0),
         _look("aluminium", "aluminium", "c2c4c6", 0.35, 2700, 1.0),
         _look("brass", "steel", "c09a4a", 0.3, 8500, 1.0),
         _look("copper", "steel", "b4693f", 0.3, 8900, 1.0),
@@ -169,16 +171,18 @@ SAME_MATERIAL = {
     "bakelite": "plastic", "cotton": "fabric", "linen": "fabric", "felt": "fabric", "canvas": "fabric", "denim": "fabric",
     "wool": "fabric", "latex": "rubber", "suede": "leather", "oakwood": "oak", "oaken": "oak", "pinewood": "pine",
     "timber": "wood", "hardwood": "wood", "plywood": "wood", "cherry wood": "wood", "cement": "concrete",
-    "ceramics": "ceramic", "earthen": "earthenware", "aluminium alloy": "aluminium",
+    "ceramics": "ceramic", "earthen": "earthenware", "aluminium alloy": "aluminium", "solid silver": "sterling silver",
 }  # fmt: skip
-SAID_OF = {"electronics": "plastic and electronics", "enamel": "enamelled steel"}
+OF_PRECIOUS_METAL = {"silver": "sterling silver", "gold": "solid gold"}
+"""What is a colour, but behind 'of': a goblet of silver."""
+SAID_OF = {"solid gold": "gold", "electronics": "plastic and electronics", "enamel": "enamelled steel"}
 """What nobody calls by the word of its look: the mean of what is inside, and what an enamel is on."""
 USUAL_COLORS: dict[str, tuple[str, ...]] = {
     "ceramic": ("white", "red", "blue", "navy", "green", "yellow", "black"),
     "porcelain": ("white", "ivory", "light blue", "navy"),
     "stoneware": ("", "navy", "grey", "cream", "olive"),
     "earthenware": ("", "dark brown", "cream"),
-    "glass": ("", "", "green", "brown"),
+    "glass": ("", "", "", "light green", "light blue"),
     "plastic": ("", "white", "black", "red", "blue", "green", "yellow", "grey"),
     "melamine": ("", "white", "red", "teal", "yellow"),
     "acrylic": ("", "", "red", "blue"),
@@ -191,7 +195,7 @@ USUAL_COLORS: dict[str, tuple[str, ...]] = {
     "enamelled cast iron": ("red", "navy", "cream", "orange", "black", "green"),
     "aluminium": ("", "", "charcoal", "red", "blue"),
     "wood": ("", "", "tan", "dark brown"),
-    "bamboo": ("", "", "dark brown"),
+    "bamboo": ("", "", "brown"),
     "cardboard": ("", "", "white"),
     "paper": ("", "white", "beige", "red", "blue"),
     "leather": ("", "black", "tan", "dark brown"),

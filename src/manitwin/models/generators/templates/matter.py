@@ -33,7 +33,7 @@ _WORKED_ON = {
     "office": frozenset({"paper"}),
 }
 """Nouns before the name of a tool that say what it is for, by the priors' domain: a wood saw and a paper punch."""
-_SOFT = frozenset({"textile", "foam", "wax"})
+_SOFT = frozenset({"textile", "wax"})
 
 
 def is_matter(word: str, look: Look, of: Prior) -> bool:

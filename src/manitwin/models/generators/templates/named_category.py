@@ -68,7 +68,7 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
     names = {
         name: template.category for template in templates.values() for name in (template.category, *template.names)
     }
-    parted = next((at for at, word in enumerate(words) if at and word in _PARTED), len(words))
+    parted = next((at for at in range(1, len(words)) if _parts(words, at)), len(words))
     shown = bool({*words[:parted]} & (_SHOWN_AS | _GROUPS | _COUNTS))
     other: Prior | None = None
     for end in range(len(words), 0, -1):
@@ -91,9 +91,22 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
                 raise UsageError(_no_category(text, other.category.split(), sorted(names), len(templates)))
             _check_one_thing(text, words[:start], words[start:end], load_priors()[category], set(names))
             own = _own_materials(words[start:end], templates[category], load_priors()[category])
-            before = words[: start - 2] if words[max(start - 1, 0)] == "of" and start > 1 else words[:start]
-            return NamedCategory(category, own, before, tail)
+            return NamedCategory(category, own, _without_counter(words[:start]), tail)
     raise UsageError(_no_category(text, words, sorted(names), len(templates)))
+
+
+def _parts(words: Sequence[str], at: int) -> bool:
+    """Tell whether a word parts a thing from what is in it: 'full' in 'a cup full of tea', not in 'a half full glass'."""
+    behind = words[at + 1] if at + 1 < len(words) else ""
+    return words[at] in _PARTED and (words[at] not in ("full", "filled") or behind in ("of", "with"))
+
+
+def _without_counter(before: list[str]) -> list[str]:
+    """Return the words before a name without what it is counted by: red, of 'a pair of red pliers'."""
+    at = next(
+        (at for at, (word, of) in enumerate(pairwise(before)) if of == "of" and word in _GROUPS | _SHOWN_AS), None
+    )
+    return before if at is None else before[:at] + before[at + 2 :]
 
 
 def _check_one_thing(text: str, before: list[str], name: list[str], prior: Prior, names: set[str]) -> None:
@@ -110,6 +123,8 @@ def _check_one_thing(text: str, before: list[str], name: list[str], prior: Prior
         raise UsageError(
             f"{text!r} asks for several things ({several[0]}): a text is one; describe it alone, and say how many with --count"
         )
+    if "and" in name:
+        raise UsageError(f"{text!r} asks for several things ({' '.join(name)}): a text is one; name one of them")
     other = next((first for first, word in pairwise(before) if word == "and" and first in names), None)
     if other is not None:
         raise UsageError(
