@@ -121,10 +121,13 @@ def _check_one_thing(text: str, before: list[str], name: list[str], prior: Prior
     several = [group for group in groups if f"{group} of" != prior.counter] + counted + numbers
     if several:
         raise UsageError(
-            f"{text!r} asks for several things ({several[0]}): a text is one; describe it alone, and say how many with --count"
+            f"{text!r} asks for several things ({several[0]}): one text makes one thing; describe that, and say how many with"
+            " --count"
         )
     if "and" in name:
-        raise UsageError(f"{text!r} asks for several things ({' '.join(name)}): a text is one; name one of them")
+        raise UsageError(
+            f"{text!r} asks for several things ({' '.join(name)}): one text makes one thing; name one of them"
+        )
     other = next((first for first, word in pairwise(before) if word == "and" and first in names), None)
     if other is not None:
         raise UsageError(
