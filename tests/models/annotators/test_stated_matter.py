@@ -126,6 +126,15 @@ def test_what_is_full_weighs_its_contents_whatever_it_is_of() -> None:
     assert full is not None and full.value == pytest.approx(np.pi * 0.033**2 * 0.2 * 1000, rel=0.3)
 
 
+@pytest.mark.parametrize(
+    "name", ["wooden comb", "wooden ruler", "oak cutting board", "wooden dice", "walnut bowl", "wooden tray"]
+)
+def test_what_is_of_wood_is_no_denser_than_wood(name: str) -> None:
+    prior = prior_as_named(name)
+    assert prior is not None and prior.bulk_density_kg_m3 is not None
+    assert 200 < prior.bulk_density_kg_m3.typical <= 720 and prior.bulk_density_kg_m3.high < 1100
+
+
 def test_words_tell_the_material_once() -> None:
     mesh = cup(0.04, 0.09, 0.003)
     seen = subject(mesh, "steel mug", metric=True)

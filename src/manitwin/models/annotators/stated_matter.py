@@ -20,7 +20,7 @@ from manitwin.models.generators.templates.matter import is_composite, is_food, l
 
 USUAL_WALL_M = 0.003
 """Of what no walls of open ware are listed for: silicone, cardboard, leather."""
-OF_ONE_MATTER = 0.8
+OF_ONE_MATTER = 0.5
 """Of the density of its material: what is full and weighs less per volume is mostly hollow."""
 IMITATION = (0.08, 0.4, 1.0)
 """Mass per volume over the density of its matter: imitations of food are hollow or solid (YCB 010 to 018: 0.05 to 0.45)."""
