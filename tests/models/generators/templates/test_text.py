@@ -394,3 +394,20 @@ def test_lids_and_handles_of_metal_are_of_sheet(text: str, part: str, most_kg: f
     wanted = read(text)
     made = make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
     assert made.masses_kg[part] < most_kg
+
+
+def test_what_is_said_behind_a_part_is_that_part_s() -> None:
+    for text in ("a mug with the handle in red", "a mug with a handle painted red", "a red handled mug"):
+        wishes = read(text).wishes
+        assert set(wishes) == {"handle"} and wishes["handle"].rgb == whole("a red mug").rgb
+    assert read("a mug with a handle of wood").wishes["handle"].material == MATERIALS["wood"]
+    assert set(read("a gold rimmed plate").wishes) == {"rim"}
+    assert set(read("a steel-lidded jar").wishes) == {"cap"}
+    assert read("a mug with a big handle").unused == ("big",)
+    with pytest.raises(UsageError, match="no part is named"):
+        read("a green mug with red")
+
+
+def test_dark_and_light_wood_are_so() -> None:
+    wood = sum(MATERIALS["wood"].rgb)
+    assert sum(whole("a dark wood bowl").rgb or ()) < wood < sum(whole("a light wooden bowl").rgb or ())

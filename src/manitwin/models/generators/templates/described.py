@@ -143,8 +143,16 @@ def described(words: Sequence[str], of: Prior | None = None) -> Described:
     relative = [RELATIVE[word] for word in unused if word in RELATIVE]
     left = tuple(word for word in unused if word not in RELATIVE)
     color = _color(said, words)
-    wish = Wish(None if color is None else color.rgb, _material(said), "" if color is None else color.kind)
-    return Described(wish, relative[-1] if relative else None, left)
+    look = _material(said)
+    rgb = _shade_of(said, look, words) if color is None else color.rgb
+    return Described(Wish(rgb, look, "" if color is None else color.kind), relative[-1] if relative else None, left)
+
+
+def _shade_of(said: Sequence[_Said], look: Look | None, words: Sequence[str]) -> tuple[float, float, float] | None:
+    """Return the colour of a material that a shade is said of ('dark wood'), None where none is."""
+    shades = [words[each.start - 1] for each in said if each.start and each.material is not None]
+    shade = next((word for word in shades if SHADES.get(word)), None)
+    return None if look is None or shade is None else shaded(look.rgb, shade)
 
 
 def materials_said(before: Sequence[str], called: Sequence[str], tail: Sequence[str], of: Prior) -> list[Look]:

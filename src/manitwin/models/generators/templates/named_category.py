@@ -30,7 +30,7 @@ _OF_ANOTHER_SHAPE = frozenset(
 """Kin in the priors of what a template makes, of another shape: a kettlebell is no dumbbell."""
 _GROUPS = frozenset(
     {"set", "pair", "pack", "packet", "stack", "pile", "bunch", "bundle", "collection", "group", "row", "handful"}
-    | {"couple", "number", "lot", "dozen"}
+    | {"couple", "number", "lot", "lots", "dozen", "dozens"}
 )
 _COUNTS = frozenset(
     {"two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve", "twenty", "dozen"}

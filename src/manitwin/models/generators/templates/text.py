@@ -10,6 +10,7 @@ from manitwin.errors import UsageError
 from manitwin.models.annotators.priors import Prior, load_priors
 from manitwin.models.generators.templates.described import (
     ARTICLES,
+    RELATIVE,
     Described,
     Wish,
     described,
@@ -50,6 +51,7 @@ _PART_NAMES = {
     "blade": ("head",), "strap": ("band",), "display": ("screen",), "bristle": ("bristles",),
 }  # fmt: skip
 """Other words for slots of templates, the best first."""
+_COMMON_PARTS = ("handle", "lid", "cap", "rim", "blade")
 _WITH = re.compile(r" (?:with|having|featuring) | and an? (?=.)| (?:that|which) has ")
 
 
@@ -127,10 +129,12 @@ def _joined(before: Described, own: Described, tail: Described) -> Described:
 def _part_before(words: list[str], template: Template) -> tuple[list[tuple[str, Described]], list[str]]:
     """Return what is said of a part before the name ('a red handled hammer'), and the words that are left."""
     for at, word in enumerate(words):
-        part = next((s for s in template.slots if word in (s, f"{s}d", f"{s}ed", f"{s}{s[-1]}ed")), None)
+        part = word if word in template.slots else None
+        for name in (*template.slots, *_COMMON_PARTS):
+            if word in (f"{name}d", f"{name}ed", f"{name}{name[-1]}ed"):
+                part = _slot_called(name, template)
         if part is not None and at:
-            said = described(words[:at])
-            return [(part, Described(said.wish, None, said.unused))], words[at + 1 :]
+            return [(part, _of_part(words[:at]))], words[at + 1 :]
     return [], words
 
 
@@ -152,14 +156,25 @@ def _features(text: str, template: Template) -> list[tuple[str, Described]]:
         words = [word for word in plain_words(phrase.split()) if word not in ARTICLES]
         if not words:
             continue
-        if is_described(words[-1]) and words[-1] not in template.slots:
+        names = [at for at, word in enumerate(words) if not is_described(word) or word in template.slots]
+        if not names:
             before += [*words, "and"]  # 'red and white stripes'
             continue
-        part = _slot_called(words[-1], template)
-        said = described([*before, *words[:-1]])
-        features.append((part, said if said != Described() or not features else features[-1][1]))
+        at = names[-1]  # the last but for 'a handle in red'
+        said = _of_part([*before, *words[:at], *words[at + 1 :]])
+        features.append(
+            (_slot_called(words[at], template), said if said != Described() or not features else features[-1][1])
+        )
         before = []
-    return [*features, *([("", described(before))] if before else [])]
+    if before:
+        raise UsageError(f"no part is named that is {' '.join(before[:-1])}")
+    return features
+
+
+def _of_part(words: list[str]) -> Described:
+    """Return what words say of a part, whose size a template cannot be told."""
+    said = described([word for word in words if word not in RELATIVE])
+    return Described(said.wish, None, (*said.unused, *(word for word in words if word in RELATIVE)))
 
 
 def lengths_in(text: str) -> dict[str, float]:
