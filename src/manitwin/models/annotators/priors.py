@@ -157,13 +157,13 @@ class Prior(Form):
     sources: tuple[str, ...] = Field(min_length=1)
     measured: tuple[str, ...]
     with_handle: Places | None = None
+    stated: str | None = None
 
     def of_shape(self, shape: Shape) -> Prior:
         """Return the prior with the places that a thing of this shape has: a tea cup may have a handle, or none."""
         if self.with_handle is None or shape.side_handle is None:
             return self
         return self.model_copy(update=dict(self.with_handle))
-    stated: str | None = None
 
     @property
     def source(self) -> str:
