@@ -136,6 +136,8 @@ class Prior(Form):
     either). ``like`` is the category whose numbers it has for want of its own, ``kin_of`` that whose form it has. ``counter``
     is what such things are counted by ('pair of'). ``part_materials`` are the materials of its parts by role, where they are
     of unlike matter. ``measured`` names the published measurements; ``sources`` says where the rest is from.
+    ``with_handle`` are the places of such a thing from which a handle sticks out, where some have one; ``stated`` is the material
+    that somebody has said it is of.
     """
 
     category: str
