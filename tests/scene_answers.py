@@ -166,6 +166,8 @@ class SecondView:
         return {
             "to the right as seen in the picture": right, "to the left as seen in the picture": -right,
             "straight towards the camera": back, "straight away from the camera": -back,
+            "straight towards the lower edge of the picture": back,
+            "straight towards the upper edge of the picture": -back,
             "to the robot's right": np.array([0, -1]), "to the robot's left": np.array([0, 1]),
             "straight away from the robot": np.array([1, 0]), "straight towards the robot": np.array([-1, 0]),
         }[words]  # fmt: skip
@@ -210,7 +212,7 @@ GRASPS = {
 }
 _WAY = (
     r"(to the (?:right|left) as seen in the picture|straight (?:towards|away from) the (?:camera|robot)"
-    r"|to the robot's (?:right|left))"
+    r"|straight towards the (?:lower|upper) edge of the picture|to the robot's (?:right|left))"
 )
 
 
@@ -280,10 +282,14 @@ def _interaction(q, v, s, asked):
     name = asked[0]
     point = next(p for p in s.records[name]["points"]["functional"] if f"the {p['label']} of" in q["question"])
     pose = s.pose(name)
-    x, y, depth = v.projected((pose[:3, :3] @ point["position_m"] + pose[:3, 3])[None])[0]
+    opens = point["label"] in ("opening", "mouth")
+    place = point["frame"]["position_m"] if opens else point["position_m"]
+    x, y, depth = v.projected((pose[:3, :3] @ place + pose[:3, 3])[None])[0]
     there, seen = v.ids[int(y), int(x)], v.depth[int(y), int(x)]
+    if v.at(q["points"][0]) != (int(y), int(x)):
+        return False
     if q["answer"] == "no":
-        return there == s.ids[name] and abs(seen - depth) < 0.008
+        return there == s.ids[name] and seen > depth - 0.008 and (opens or seen < depth + 0.008)
     return there == s.ids[q["evidence"]["hidden_by"]] != s.ids[name] and seen < depth - 0.01
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from manitwin.scenes.scene_files import scene_files
-from manitwin.scenes.vqa.functional_planning import ALL_ROUND
+from manitwin.scenes.vqa.part_words import ALL_ROUND
 from manitwin.scenes.vqa.question import YES_NO, Question
 from manitwin.scenes.vqa.references import region
 from manitwin.scenes.vqa.templates import FAMILIES

@@ -12,6 +12,8 @@ ALIGNED = 0.94
 """Least cosine between what the robot and the camera call ahead: within 20 degrees their sides are the same or opposite."""
 STEEP = 0.8
 """Cosine between a camera's view and straight down from which on the picture is one from above."""
+FROM_ABOVE = "straight towards the upper edge of the picture", "straight towards the lower edge of the picture"
+"""What is said for away from and towards a camera that looks down."""
 ROBOT_FACES = np.array([1.0, 0.0])
 """The robot stands at the world's origin and faces +X, +Y is to its left."""
 
@@ -29,14 +31,19 @@ class Direction:
 
 
 def picture_directions(camera: Camera) -> list[Direction]:
-    """Return right, left, away and towards as the picture shows them, level."""
+    """Return right, left, away and towards as the picture shows them, level.
+
+    Seen from above, towards the camera is up: what goes that way on the level goes to an edge of the picture.
+    """
     right = _level(camera.camera_to_object[:3, 0])
     ahead = np.array([-right[1], right[0]])
+    from_above = camera.camera_to_object[2, 2] > STEEP
+    away, towards = FROM_ABOVE if from_above else ("straight away from the camera", "straight towards the camera")
     return [
         Direction("picture", "right", "to the right as seen in the picture", _pair(right), ""),
         Direction("picture", "left", "to the left as seen in the picture", _pair(-right), ""),
-        Direction("picture", "away", "straight away from the camera", _pair(ahead), ""),
-        Direction("picture", "towards", "straight towards the camera", _pair(-ahead), ""),
+        Direction("picture", "away", away, _pair(ahead), ""),
+        Direction("picture", "towards", towards, _pair(-ahead), ""),
     ]
 
 

@@ -48,7 +48,7 @@ FAMILIES: Mapping[str, Family] = {
         "Say where {a} is and name the grasp type to use on it.",
     )),
     "touch_point": Family(FUNCTION, (
-        "Where should the robot touch {a} to use its {part}? Give one point.",
+        "The robot has to touch the {part} of {a}. At which point?",
         "Point at the {part} of {a}.",
         "Give a point on the {part} of {a}.",
         "Mark the {part} of {a} with one point.",
