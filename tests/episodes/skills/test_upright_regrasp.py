@@ -92,3 +92,15 @@ def test_episodes_are_only_of_twins_that_a_grasp_brings_there() -> None:
     assert twins_for(upright, pool, begins) == [twins[1].twin_id]
     with pytest.raises(UsageError, match="can be used to upright"):
         twins_for(upright, pool, lambda skill, twin: [])
+
+
+@pytest.mark.parametrize(("sizes_m", "vessel", "suits"), [
+    ([0.2, 0.15, 0.03], False, False),
+    ([0.3, 0.11, 0.03], False, False),
+    ([0.3, 0.3, 0.07], True, True),
+    ([0.11, 0.05, 0.13], False, True),
+])  # fmt: skip
+def test_a_book_that_is_laid_flat_is_not_stood_up(sizes_m: list[float], vessel: bool, suits: bool) -> None:
+    twin = PoolTwin(twin_id(0), "0", "thing", PLACEMENTS, vessel, ())
+    pool = Pool([twin], lambda _: box(sizes_m, 0.2, 0.6))
+    assert SKILLS["upright"].suits(pool, twin, None) is suits

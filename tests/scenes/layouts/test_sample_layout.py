@@ -140,6 +140,17 @@ def test_what_is_stacked_rests_on_what_it_should(dataset: Path) -> None:
             assert touched == {each.name, each.supported_by}
 
 
+@pytest.mark.parametrize("number", range(3))
+def test_what_cannot_carry_is_not_asked_to(number: int) -> None:
+    asked = {"include": ("bowl", "knife"), "stacked": 1, "contained": 1}
+    record = layout(number=number, objects=(4, 6), **asked)
+    stacked = next(each for each in record.objects if each.relation == "on" and each.supported_by)
+    below = next(each for each in record.objects if each.name == stacked.supported_by)
+    assert below.category not in ("mixing bowl", "knife")  # a rim, and 2 cm wide
+    with pytest.raises(UsageError, match=r"nothing of bowl, knife has a level top .* allow 5 objects"):
+        layout(number=number, objects=(4, 4), **asked)
+
+
 def test_what_was_measured_is_within_the_limits() -> None:
     record = layout(objects=(6, 8), stacked=1, contained=1, include=("bowl",))
     assert record.measures.max_moved_m <= 0.01

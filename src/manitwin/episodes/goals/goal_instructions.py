@@ -60,7 +60,7 @@ TEMPLATES: Mapping[str, tuple[str, ...]] = {
     ),
     "hung": (
         "hang {a} on the peg", "hang up {a}", "put {a} on the hook", "pick up {a} and hang {it} on the peg",
-        "take {a} and slip {it} over the peg", "please hang {a} up by its hole",
+        "take {a} and slip {it} over the peg", "please hang {a} up so that the peg goes through {it}",
     ),
     "inserted": (
         "put {a} into the holder", "insert {a} into the holder", "stand {a} in the holder, tip down",

@@ -14,6 +14,9 @@ from manitwin.episodes.skills.skill import FoundPoses, Skill, SkillGoal, Surroun
 from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose
 
 POSES, WAYS = 12, 12
+LEAST_HEIGHT = 0.35
+"""A thing that is no vessel stands where it is so high, in its longest extent: of what lies as it is made, +Z up, a hammer and a
+book have 0.1 and a flashlight 0.3; of what stands, a shoe has 0.4."""
 
 
 class Upright(Skill):
@@ -22,8 +25,11 @@ class Upright(Skill):
     name, predicate, has_partner = "upright", "upright", False
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept a twin that stands, and that also stays in some other placement."""
-        return bool(standing_poses(target)) and bool(lying_poses(target))
+        """Accept a twin that stands, and that also stays in some other placement.
+
+        A book that is laid flat again has not been stood up: what is low with +Z up takes no part.
+        """
+        return bool(standing_poses(target)) and bool(lying_poses(target)) and is_high(pool, target)
 
     def begins_in(self, target: PoolTwin) -> Sequence[StandingPose]:
         """Return the placements on its side."""
@@ -65,6 +71,12 @@ def _free(
 def standing_poses(twin: PoolTwin) -> list[StandingPose]:
     """Return the placements in which a twin's up (+Z of its frame) is the world's."""
     return [pose for pose in twin.poses if pose.object_to_plane[2, 2] >= np.cos(UPRIGHT_RAD)]
+
+
+def is_high(pool: Pool, twin: PoolTwin) -> bool:
+    """Tell whether a person would say of a twin whose +Z is up that it stands: a vessel, and what is high enough."""
+    low, high = pool.body(twin.twin_id).parts.at(np.eye(4)).bounds
+    return twin.vessel or bool((high - low)[2] >= LEAST_HEIGHT * (high - low).max())
 
 
 def lying_poses(twin: PoolTwin) -> list[StandingPose]:

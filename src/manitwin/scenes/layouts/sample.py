@@ -14,7 +14,8 @@ from manitwin.geometry.poses import quaternion_wxyz, transform_points
 from manitwin.scenes.layouts.judging import Judgement, judge
 from manitwin.scenes.layouts.placing import Obstacles, Patch, clutter_of, put_on_surface, workspace_of
 from manitwin.scenes.layouts.pool import Pool, PoolBody, PoolTwin, StandingPose
-from manitwin.scenes.layouts.slots import Put, Slot, draw_slots, draw_twin
+from manitwin.scenes.layouts.slot_drawing import draw_slots
+from manitwin.scenes.layouts.slots import Put, Slot, draw_twin
 from manitwin.scenes.layouts.stacking import level_poses, mouth_of, open_poses, put_into, put_onto
 from manitwin.scenes.layouts.surroundings import make_cameras, make_furniture, make_lights
 from manitwin.scenes.loaded_scene import furniture_boxes

@@ -10,7 +10,6 @@ import numpy as np
 from manitwin.errors import UsageError
 from manitwin.geometry.hull_distance import PlacedParts
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
-from manitwin.scenes.settings import LayoutSettings
 
 Role = Literal["stand", "on", "in"]
 
@@ -61,46 +60,6 @@ class Slot:
         """Tell whether one carries or holds the other, or both are in the same vessel."""
         same = self.role == other.role == "in" and self.parent is other.parent
         return self.parent is other or other.parent is self or same
-
-
-def draw_slots(pool: Pool, settings: LayoutSettings, rng: np.random.Generator) -> list[Slot]:
-    """Return the slots of a layout, those that carry others first, with their twins but for what is stacked or contained.
-
-    Raises UsageError for a category that the pool has not, or where nothing in it is a vessel.
-    """
-    least = settings.least_standing + settings.stacked + settings.contained
-    low, high = settings.objects
-    count = int(rng.integers(max(low, least), high + 1))
-    standing = count - settings.stacked - settings.contained
-    slots = [Slot(i, "stand", category=category) for i, category in enumerate(settings.include)]
-    slots += [Slot(i, "stand") for i in range(len(slots), standing)]
-    carriers = _carriers(pool, slots, settings)
-    for number in range(settings.contained + settings.stacked):
-        role: Role = "in" if number < settings.contained else "on"
-        parent = carriers[role][number % len(carriers[role])]
-        slots.append(Slot(len(slots), role, parent=parent))
-    for slot in slots:
-        if slot.role == "stand":
-            slot.twin = draw_twin(pool, slot, slots, rng)
-    return slots
-
-
-def _carriers(pool: Pool, slots: list[Slot], settings: LayoutSettings) -> dict[Role, list[Slot]]:
-    """Choose which slots hold and which carry others: what was asked for by name first, where it can."""
-    holding: list[Slot] = []
-    if settings.contained:
-        named = [s for s in slots if s.category and any(t.vessel for t in pool.of_category(s.category))]
-        others = [s for s in slots if s.category is None] or slots
-        holding = (named or others[:1])[: settings.contained]
-        for slot in holding:
-            slot.vessel = True
-    carrying: list[Slot] = []
-    if settings.stacked:
-        free = [s for s in slots if not s.vessel] or slots
-        carrying = sorted(free, key=lambda s: s.category is None)[: settings.stacked]
-        for slot in carrying:
-            slot.base = True
-    return {"in": holding, "on": carrying}
 
 
 def draw_twin(

@@ -1,0 +1,67 @@
+"""Draw the places of a layout: how many there are, which of them hold or carry others, and their twins."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manitwin.errors import UsageError
+from manitwin.scenes.layouts.pool import Pool
+from manitwin.scenes.layouts.slots import Role, Slot, draw_twin
+from manitwin.scenes.layouts.stacking import level_poses
+from manitwin.scenes.settings import LayoutSettings
+
+
+def draw_slots(pool: Pool, settings: LayoutSettings, rng: np.random.Generator) -> list[Slot]:
+    """Return the slots of a layout, those that carry others first, with their twins but for what is stacked or contained.
+
+    Raises UsageError for a category that the pool has not, or where nothing in it is a vessel, or nothing that is asked for
+    can carry what is stacked and there is room for nothing else.
+    """
+    least = _least_standing(pool, settings) + settings.stacked + settings.contained
+    low, high = settings.objects
+    if least > high:
+        asked = ", ".join(dict.fromkeys(settings.include))
+        raise UsageError(f"nothing of {asked} has a level top for something to stand on; allow {least} objects or more")
+    count = int(rng.integers(max(low, least), high + 1))
+    standing = count - settings.stacked - settings.contained
+    slots = [Slot(i, "stand", category=category) for i, category in enumerate(settings.include)]
+    slots += [Slot(i, "stand") for i in range(len(slots), standing)]
+    carriers = _carriers(pool, slots, settings)
+    for number in range(settings.contained + settings.stacked):
+        role: Role = "in" if number < settings.contained else "on"
+        parent = carriers[role][number % len(carriers[role])]
+        slots.append(Slot(len(slots), role, parent=parent))
+    for slot in slots:
+        if slot.role == "stand":
+            slot.twin = draw_twin(pool, slot, slots, rng)
+    return slots
+
+
+def _least_standing(pool: Pool, settings: LayoutSettings) -> int:
+    """Return the least number on the furniture: one more than is asked for where none of that can carry what is stacked."""
+    spare = bool(settings.stacked) and not any(_can_carry(pool, category) for category in settings.include)
+    return max(settings.least_standing, len(settings.include) + spare)
+
+
+def _can_carry(pool: Pool, category: str) -> bool:
+    """Tell whether something can stand on a twin of a category, in one of its placements."""
+    return any(level_poses(twin, pool.body(twin.twin_id)) for twin in pool.of_category(category))
+
+
+def _carriers(pool: Pool, slots: list[Slot], settings: LayoutSettings) -> dict[Role, list[Slot]]:
+    """Choose which slots hold and which carry others: what was asked for by name first, where it can."""
+    holding: list[Slot] = []
+    if settings.contained:
+        named = [s for s in slots if s.category and any(t.vessel for t in pool.of_category(s.category))]
+        others = [s for s in slots if s.category is None] or slots
+        holding = (named or others[:1])[: settings.contained]
+        for slot in holding:
+            slot.vessel = True
+    carrying: list[Slot] = []
+    if settings.stacked:
+        free = [s for s in slots if not s.vessel] or slots
+        able = [s for s in free if s.category is None or _can_carry(pool, s.category)]
+        carrying = sorted(able, key=lambda s: s.category is None)[: settings.stacked]
+        for slot in carrying:
+            slot.base = True
+    return {"in": holding, "on": carrying}
