@@ -15,6 +15,7 @@ from manitwin.engine.ledger.reading import read_ledger
 from manitwin.errors import UsageError
 from manitwin.scenes.layouts.layouts_recipe import LayoutNumber, LayoutsRecipe
 from manitwin.scenes.layouts.pool import pool_of
+from manitwin.scenes.layouts.slot_drawing import least_objects
 from manitwin.scenes.run_settings import check_settings, earlier_settings
 from manitwin.scenes.scene import SCENE, SceneRecord
 from manitwin.scenes.scene_files import parse_scene, scene_name
@@ -55,15 +56,14 @@ def make_layouts(
 
     Scenes that were drawn by an earlier run stay so: ``pictures`` is kept. A contact sheet is removed before scenes are made,
     which it would not show.
-    Raises UsageError for a data set without twins, categories that it has not, scenes of other settings at ``out``, or where
-    another run is at work there.
+    Raises UsageError for a data set without twins, categories that it has not, things that can hold or carry nothing, scenes of
+    other settings at ``out``, or where another run is at work there.
     """
     if not 1 <= count <= LARGEST_COUNT:
         raise UsageError(f"{count:.6g} layouts; ask for 1 or more, at most {LARGEST_COUNT}")
     place = DatasetRoot(dataset).absolute()
     pool = pool_of(place)
-    for category in config.layout.include:
-        pool.of_category(category)
+    least_objects(pool.upright if config.layout.upright else pool, config.layout)
     root = DatasetRoot(out)
     config = _with_pictures_there(config, earlier_settings(root), root.url)
     recipe = LayoutsRecipe(config, place)

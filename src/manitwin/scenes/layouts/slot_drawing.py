@@ -17,12 +17,8 @@ def draw_slots(pool: Pool, settings: LayoutSettings, rng: np.random.Generator) -
     Raises UsageError for a category that the pool has not, or where nothing in it is a vessel, or nothing that is asked for
     can carry what is stacked and there is room for nothing else.
     """
-    least = _least_standing(pool, settings) + settings.stacked + settings.contained
-    low, high = settings.objects
-    if least > high:
-        asked = ", ".join(dict.fromkeys(settings.include))
-        raise UsageError(f"nothing of {asked} has a level top for something to stand on; allow {least} objects or more")
-    count = int(rng.integers(max(low, least), high + 1))
+    least, high = least_objects(pool, settings), settings.objects[1]
+    count = int(rng.integers(max(settings.objects[0], least), high + 1))
     standing = count - settings.stacked - settings.contained
     slots = [Slot(i, "stand", category=category) for i, category in enumerate(settings.include)]
     slots += [Slot(i, "stand") for i in range(len(slots), standing)]
@@ -37,10 +33,22 @@ def draw_slots(pool: Pool, settings: LayoutSettings, rng: np.random.Generator) -
     return slots
 
 
-def _least_standing(pool: Pool, settings: LayoutSettings) -> int:
-    """Return the least number on the furniture: one more than is asked for where none of that can carry what is stacked."""
+def least_objects(pool: Pool, settings: LayoutSettings) -> int:
+    """Return the least number of objects: one more than is asked for where none of that can carry what is stacked.
+
+    Raises UsageError as ``draw_slots`` does.
+    """
+    for category in settings.include:
+        pool.of_category(category)
+    if settings.contained and not any(twin.vessel for twin in pool.twins):
+        raise UsageError("nothing in the data set is a vessel that holds something; ask for contained = 0")
     spare = bool(settings.stacked) and not any(_can_carry(pool, category) for category in settings.include)
-    return max(settings.least_standing, len(settings.include) + spare)
+    standing = max(settings.least_standing, len(settings.include) + spare)
+    least = standing + settings.stacked + settings.contained
+    if least > settings.objects[1]:
+        asked = ", ".join(dict.fromkeys(settings.include))
+        raise UsageError(f"nothing of {asked} has a level top for something to stand on; allow {least} objects or more")
+    return least
 
 
 def _can_carry(pool: Pool, category: str) -> bool:
