@@ -11,12 +11,13 @@ import pytest
 import trimesh
 
 from drawn_scenes import add_parts
+from manitwin.dataset.affordances.maps import surface_maps
 from manitwin.dataset.affordances.write import split_of, write_affordances
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.store import RECORD, seal
-from scene_twins import can, slab, write_thing
+from scene_twins import BOWL_HEIGHT_M, BOWL_RADIUS_M, bowl, can, slab, write_thing
 from twin_folders import tried_as_built, twin_id
 
 
@@ -73,6 +74,28 @@ def test_a_functional_map_is_largest_at_its_point(dataset: Path, written: Path) 
         label = arrays["label"][:, arrays["affordance"].tolist().index(f"function:{point.id} {point.label}")]
         nearest_m = np.linalg.norm(points_m - point.position_m, axis=1)
         assert nearest_m[label.argmax()] == nearest_m.min()
+
+
+def test_an_opening_is_used_all_around_its_rim_inside_and_outside(tmp_path: Path) -> None:
+    folder = tmp_path / twin_name(write_thing(tmp_path, 0, bowl()))
+    record = json.loads((folder / RECORD).read_bytes())
+    record["points"]["functional"][0] |= {
+        "label": "opening", "position_m": [0.0, BOWL_RADIUS_M, BOWL_HEIGHT_M - 0.004], "normal": [0.0, 1.0, 0.0],
+        "frame": {
+            "position_m": [0.0, 0.0, BOWL_HEIGHT_M], "quaternion_wxyz": [1.0, 0.0, 0.0, 0.0], "kind": "opening",
+            "size_m": BOWL_RADIUS_M - 0.005, "free": "roll", "source": "geometry",
+        },
+    }  # fmt: skip
+    record["grasps"]["trial"] = tried_as_built()
+    del record["revision"], record["files"]
+    seal(folder, record)
+    maps = surface_maps(Twin(folder), points=1500, trials=1, seed=0)
+    label = maps.maps["function:f0 opening"]
+    radius_m = np.linalg.norm(maps.points_m[:, :2], axis=1)
+    rim = (maps.points_m[:, 2] > BOWL_HEIGHT_M - 0.006) & (radius_m > BOWL_RADIUS_M - 0.012)
+    assert rim.sum() > 50 and label[rim].min() > 0.8
+    assert {bool(side) for side in radius_m[label > 0.9] > BOWL_RADIUS_M - 0.003} == {True, False}
+    assert label[maps.points_m[:, 2] < 0.002].max() < 0.5  # the base is none of it
 
 
 def test_fingers_of_80_mm_hold_a_slab_by_the_sides_that_they_span(dataset: Path, written: Path) -> None:

@@ -74,6 +74,30 @@ def test_given_points_snap_to_the_nearest_candidate() -> None:
     assert len({point.candidate for point in selected.functional}) == len(selected.functional)
 
 
+def test_a_base_is_below_a_thin_floor_and_not_on_it() -> None:
+    positions, normals = candidates(MUG)
+    number = int(np.argmax(normals[:, 2] < -0.9))  # below
+    inside = positions[number] + [0.004, 0, 0.003]
+    asked = request(given_subject(functional_points=[_base_at(positions[number] + [0.02, 0, 0])]))
+    thin = replace(
+        asked, positions_m=np.concatenate([positions, inside[None]]), normals=np.concatenate([normals, [[0, 0, 1.0]]])
+    )
+    first = KeepsGiven(RulesAnnotator()).select_points(thin).functional[0]
+    assert first.label == "base" and first.normal[2] < -0.9
+    above = replace(thin, normals=np.tile([0, 0, 1.0], (len(thin.normals), 1)))
+    selected = KeepsGiven(RulesAnnotator()).select_points(above)
+    assert "base" not in [point.label for point in selected.functional if point.rationale.startswith("imported")]
+    assert selected.findings is not None and "functional point 0" in selected.findings[0]
+
+
+def _base_at(place_m: np.ndarray) -> dict[str, Any]:
+    frame = {
+        "position_m": place_m.tolist(), "quaternion_wxyz": [0.0, 1.0, 0.0, 0.0], "kind": "face", "size_m": 0.03,
+        "free": "roll", "source": "template:mug",
+    }  # fmt: skip
+    return {"position_m": place_m.tolist(), "normal": [0, 0, -1], "label": "base", "frame": frame}
+
+
 def test_points_are_filled_up_with_others_than_those_that_are_given() -> None:
     positions, _ = candidates(MUG)
     own = RulesAnnotator().select_points(request(subject(MUG, "mug"))).functional[0]

@@ -10,6 +10,7 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from manitwin.dataset.affordances.heat_maps import (
+    LEAST_COSINE,
     contact_density,
     contact_points,
     contact_spread_m,
@@ -18,11 +19,14 @@ from manitwin.dataset.affordances.heat_maps import (
     surface_distances,
 )
 from manitwin.dataset.affordances.sampled_grasps import sample_grasps
+from manitwin.geometry.frames.words import means_place
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import farthest_point_sampling, sample_surface
 from manitwin.models.graspers.protocol import GraspProposals
+from manitwin.pipeline.refinement import away_from_feature_m
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.part_records import NO_PART
+from manitwin.twin.point_records import FunctionalPoint
 
 POOL = 4
 """So many samples a point that is kept: the kept ones then lie evenly."""
@@ -109,16 +113,27 @@ def _task_contacts(twin: Twin, caster: RayCaster) -> dict[str, tuple[np.ndarray,
 
 
 def _functions(twin: Twin, points_m: np.ndarray, normals: np.ndarray, extents_m: np.ndarray) -> dict[str, np.ndarray]:
-    """Return a map for each functional point: how near it is along the surface."""
-    functional = twin.record.points.functional if twin.record.points else ()
-    if not functional:
-        return {}
-    seeds = cKDTree(points_m).query(np.array([point.position_m for point in functional]))[1]
-    distances_m = surface_distances(points_m, normals, seeds)
-    return {
-        f"function:{point.id} {point.label}": function_map(distance_m, extents_m)
-        for point, distance_m in zip(functional, distances_m, strict=True)
-    }
+    """Return a map for each functional point: how near it is along the surface, of an opening how near its rim is."""
+    found = {}
+    for point in twin.record.points.functional if twin.record.points else ():
+        seeds = _seeds(point, points_m, normals)
+        distance_m = surface_distances(points_m, normals, seeds).min(0)
+        found[f"function:{point.id} {point.label}"] = function_map(distance_m, extents_m)
+    return found
+
+
+def _seeds(point: FunctionalPoint, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Return the points from which the distance to a functional point counts: the nearest on its side of the matter.
+
+    An opening is used all around: its points are those at the rim's circle, as near as neighbours are to each other.
+    """
+    same_side = normals @ np.array(point.normal) > LEAST_COSINE
+    away_m = np.linalg.norm(points_m - np.array(point.position_m), axis=1)
+    nearest = int(np.where(same_side, away_m, away_m + away_m.max()).argmin())
+    if point.frame is None or point.frame.kind != "opening" or not means_place(point.label, "opening"):
+        return np.array([nearest])
+    spacing_m = float(np.median(cKDTree(points_m).query(points_m, 2)[0][:, 1]))
+    return np.union1d(nearest, np.flatnonzero(away_from_feature_m(point.frame, points_m) <= 2 * spacing_m))
 
 
 def has_parts(maps: SurfaceMaps) -> bool:

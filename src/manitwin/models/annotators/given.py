@@ -9,6 +9,7 @@ from typing import TypeVar, get_args
 import numpy as np
 
 from manitwin.config import Resource
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.models.annotators.protocol import (
     Annotator,
     AnnotatorQuestion,
@@ -21,12 +22,17 @@ from manitwin.models.annotators.protocol import (
     Subject,
 )
 from manitwin.twin.import_record import GivenPoint, ImportRecord
-from manitwin.twin.point_records import FunctionalPoint, GraspPoint, GraspType
+from manitwin.twin.point_records import FunctionalFrame, FunctionalPoint, GraspPoint, GraspType
 from manitwin.twin.record import Language
 from manitwin.twin.record_values import Estimate
 
 NEAR_M, NEAR_SHARE = 0.02, 0.1
 """A candidate stands for a given point within 2 cm, or 10 % of the longest side: 42 candidates lie about so far apart."""
+
+FACING_KINDS = ("face", "button", "surface")
+"""Kinds of frames whose Z is the way out of the surface on which the point lies."""
+OPPOSED = -0.1
+"""Cosine of a candidate's normal and that way: less, and the candidate is on the other side of the wall."""
 
 LEAST, MOST = {"functional": 2, "grasp": 2}, {"functional": 4, "grasp": 3}
 """How many points an object has (paper: 2-4 functional and 2-3 grasp points)."""
@@ -72,11 +78,15 @@ class GivenPoints:
         for number, point in enumerate(points):
             distances_m = self._distances(point)
             distances_m[list(taken)] = np.inf
+            limit_m = self._limit_m
+            if point.frame is not None and point.frame.kind in FACING_KINDS:
+                distances_m[self._request.normals @ _way_out(point.frame) < OPPOSED] = np.inf
+                limit_m = max(limit_m, point.frame.size_m)  # any place of the face is on it
             candidate = int(distances_m.argmin())
-            if distances_m[candidate] > self._limit_m:
+            if distances_m[candidate] > limit_m:
                 nearest = f"{distances_m[candidate] * 1000:.0f} mm" if np.isfinite(distances_m[candidate]) else "none"
                 self.findings.append(
-                    f"{kind} point {number} ({self._given.source}) has no candidate within {self._limit_m * 1000:.0f} mm"
+                    f"{kind} point {number} ({self._given.source}) has no candidate within {limit_m * 1000:.0f} mm"
                     f" (the nearest free one: {nearest})"
                 )
             elif len(snapped) == MOST[kind]:
@@ -123,6 +133,11 @@ class GivenPoints:
 
     def _rationale(self, distance_m: float) -> str:
         return f"{self._given.source}: annotated {distance_m * 1000:.0f} mm from this candidate"
+
+
+def _way_out(frame: FunctionalFrame) -> np.ndarray:
+    """Return a frame's Z axis ``(3,)``."""
+    return np.asarray(rotation_from_quaternion_wxyz(np.array(frame.quaternion_wxyz))[:, 2])
 
 
 def _filled(given: list[Point], others: tuple[Point, ...], least: int, letter: str) -> list[Point]:
