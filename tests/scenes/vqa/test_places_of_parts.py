@@ -97,6 +97,17 @@ def test_a_box_that_lies_has_no_top_and_no_front(tmp_path: Path) -> None:
     assert [is_told(name, lies) for name in ("top", "front", "handle")] == [False, False, True]
 
 
+def test_what_is_on_the_surface_is_counted_where_nothing_stands_on_another_thing(tmp_path: Path) -> None:
+    write_scenes(tmp_path)
+    assert drafts(tmp_path, "count_objects") and drafts(tmp_path, "list_objects")
+    file = scene_files(tmp_path / "scenes")[0]
+    scene = json.loads(file.read_bytes())
+    scene["objects"][1]["supported_by"] = scene["objects"][0]["name"]
+    file.write_text(json.dumps(scene))
+    assert not drafts(tmp_path, "count_objects") and not drafts(tmp_path, "list_objects")
+    assert drafts(tmp_path, "is_there")
+
+
 def test_seen_from_above_nothing_goes_towards_the_camera() -> None:
     words = {}
     for name, eye in (("above", [0.5, -0.2, 1.2]), ("front", [0.5, -1.0, 0.3])):

@@ -15,12 +15,16 @@ ABSENT = 4
 
 
 def detection(asked: Context) -> Iterator[Draft]:
-    """Ask for boxes, and in pictures without a doubtful object for counts and lists."""
+    """Ask for boxes, and in pictures without a doubtful object for what is there.
+
+    What is on the surface is counted and listed where nothing stands on or lies in another thing: of that one may say either.
+    """
     yield from _boxes(asked)
     if asked.view.is_sure and len(asked.view.clear) >= 2:
-        yield from _counts(asked)
         yield from _existence(asked)
-        yield from _lists(asked)
+        if all(each.thing.placed_as.supported_by is None for each in asked.view.clear):
+            yield from _counts(asked)
+            yield from _lists(asked)
 
 
 def _boxes(asked: Context) -> Iterator[Draft]:

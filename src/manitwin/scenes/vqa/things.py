@@ -116,6 +116,12 @@ class Thing:
         """The distance of the two points of it that are farthest apart."""
         return self.shape.longest_m
 
+    @property
+    def length_m(self) -> float:
+        """Its longest side, as a person measures it: that of the smallest box around it, and not from corner to corner."""
+        physical = self.shape.twin.record.physical
+        return self.longest_m if physical is None else float(max(physical.obb.extents_m))
+
 
 @dataclass(frozen=True)
 class Seen:
