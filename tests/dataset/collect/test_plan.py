@@ -9,6 +9,7 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 from typer.testing import CliRunner
 
 from json_documents import check_keys
@@ -16,7 +17,7 @@ from manitwin.cli.main import app
 from manitwin.dataset.collect.facts import GROUPS, band_of, facts_of
 from manitwin.dataset.collect.plan_files import MANIFEST, PROMPTS, write_plan
 from manitwin.dataset.collect.planning import INSIDE, plan_inputs, shares
-from manitwin.dataset.collect.sentences import SENTENCES
+from manitwin.dataset.collect.sentences import SENTENCES, sentence
 from manitwin.dataset.collect.store import Row
 from manitwin.models.annotators.priors import load_priors
 from manitwin.pipeline.manifest import Notes, iterate_items
@@ -80,6 +81,12 @@ def test_prompts_name_their_category_and_differ() -> None:
     assert all(prompt.category in prompt.text for prompt in prompts)
     assert {prompt.category for prompt in prompts} <= set(load_priors()) - {"unknown"}
     assert len(set(SENTENCES)) == 15 and not any(re.search(r"\ba [aeiou]", prompt.text) for prompt in prompts)
+
+
+def test_a_prompt_asks_for_a_pair_of_what_comes_in_pairs() -> None:
+    scissors = load_priors()["scissors"]
+    said = [sentence(scissors, number, np.random.default_rng(number)) for number in range(len(SENTENCES))]
+    assert said[0] == "a pair of scissors" and all("pair of scissors" in each for each in said)
 
 
 def test_a_plan_is_two_manifests_that_a_build_reads(tmp_path: Path) -> None:

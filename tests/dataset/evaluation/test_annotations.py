@@ -14,6 +14,7 @@ from manitwin.dataset.evaluation.annotations import AnnotationReport, evaluate_a
 from manitwin.dataset.evaluation.labels import read_labels
 from manitwin.errors import UsageError
 from manitwin.twin.shares import wilson_interval
+from manitwin.twin.store import RECORD, seal
 from twin_folders import write_set
 
 TRUE = {
@@ -82,6 +83,18 @@ def test_what_differs_from_the_label_is_wrong(
     changes = {column: value} | ({"category_synonyms": ""} if column == "category" else {})
     report = scored(place, tmp_path, **changes)
     assert wrong in {(score.dimension, score.question) for score in report.scores if not score.right}
+
+
+@pytest.mark.parametrize(("high_kg", "right"), [("0.3", True), ("0.095", False)])
+def test_a_mass_without_an_interval_lies_in_the_labels(tmp_path: Path, high_kg: str, right: bool) -> None:
+    write_set(tmp_path, accepted=3, rejected=0)
+    folder = next(tmp_path.glob(f"twins/*/{twin_of(tmp_path)}"))
+    record = json.loads((folder / RECORD).read_bytes())
+    record["physical"]["mass_kg"] |= {"value": 0.1, "low": 0.1, "high": 0.1, "source": "template:mug"}
+    del record["revision"], record["files"]
+    seal(folder, record)
+    report = scored(tmp_path, tmp_path, plausible_mass_low_kg="0.09", plausible_mass_high_kg=high_kg)
+    assert [score.right for score in report.scores if score.question == "mass interval"] == [right]
 
 
 def test_empty_cells_are_not_scored(place: Path, tmp_path: Path) -> None:

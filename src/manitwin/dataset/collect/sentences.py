@@ -35,7 +35,7 @@ def sentence(prior: Prior, number: int, rng: np.random.Generator) -> str:
     color, other_color = rng.choice(COLORS, 2, replace=False)
     size = prior.longest_axis_m
     said = SENTENCES[number].format(
-        thing=prior.category,
+        thing=f"{prior.counter} {prior.category}" if prior.counter else prior.category,
         material=prior.material,
         color=color,
         other_color=other_color,

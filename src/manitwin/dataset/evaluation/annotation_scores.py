@@ -65,9 +65,12 @@ def scores_of(record: TwinRecord, label: Label) -> Iterator[Score]:
 
 
 def _of_mass(twin_id: str, said: Estimate, true: Interval) -> Iterator[Score]:
+    """Yield the questions about a mass; one without an interval, which was given or follows from parts, lies in the true one."""
     text = f"{said.value:.3g} kg ({said.low:.3g} to {said.high:.3g})"
     factor = max(said.value / true.middle, true.middle / said.value)
-    yield _score(twin_id, "physical", "mass interval", said.low <= true.middle <= said.high, text, true)
+    is_exact = said.low == said.high
+    inside = true.low <= said.value <= true.high if is_exact else said.low <= true.middle <= said.high
+    yield _score(twin_id, "physical", "mass interval", inside, text, true)
     yield _score(twin_id, "physical", f"mass within {MASS_FACTOR}", factor <= MASS_FACTOR, text, true)
 
 
