@@ -93,9 +93,9 @@ def test_an_opening_is_used_all_around_its_rim_inside_and_outside(tmp_path: Path
     label = maps.maps["function:f0 opening"]
     radius_m = np.linalg.norm(maps.points_m[:, :2], axis=1)
     rim = (maps.points_m[:, 2] > BOWL_HEIGHT_M - 0.006) & (radius_m > BOWL_RADIUS_M - 0.012)
-    assert rim.sum() > 50 and label[rim].min() > 0.8
+    assert rim.sum() > 50 and label[rim].min() > 0.5
     assert {bool(side) for side in radius_m[label > 0.9] > BOWL_RADIUS_M - 0.003} == {True, False}
-    assert label[maps.points_m[:, 2] < 0.002].max() < 0.5  # the base is none of it
+    assert label[maps.points_m[:, 2] < 0.01].max() < 0.1  # the base and the floor are none of it
 
 
 def test_fingers_of_80_mm_hold_a_slab_by_the_sides_that_they_span(dataset: Path, written: Path) -> None:

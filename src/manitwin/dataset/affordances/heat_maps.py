@@ -15,6 +15,8 @@ MOST_OFF_M = 0.008
 """A contact that a ray finds farther from where the fingers closed is another surface's."""
 FUNCTION_SHARE = 0.15
 """A functional map falls by ``exp(-1/2)`` in this share of the diagonal, along the surface."""
+RIM_SHARE = 0.05
+"""The same of an opening, whose map lies all around it: a third as wide, or most of a plate would be its rim."""
 NEIGHBOURS, LOOKED_AT = 8, 32
 """So many neighbours, of so many that are nearest: of a thin plate half of these are on its other side."""
 POSITIVE = 0.5
@@ -72,9 +74,9 @@ def surface_distances(points_m: np.ndarray, normals: np.ndarray, seeds: np.ndarr
     return np.asarray(dijkstra(graph.tocsr(), directed=False, indices=seeds))
 
 
-def function_map(distance_m: np.ndarray, extents_m: np.ndarray) -> np.ndarray:
+def function_map(distance_m: np.ndarray, extents_m: np.ndarray, share: float = FUNCTION_SHARE) -> np.ndarray:
     """Return a functional map from distances along the surface: 1 at the point, 0 where it cannot be reached."""
-    spread_m = FUNCTION_SHARE * float(np.linalg.norm(extents_m))
+    spread_m = share * float(np.linalg.norm(extents_m))
     return np.where(np.isfinite(distance_m), np.exp(-0.5 * (np.minimum(distance_m, 1e3) / spread_m) ** 2), 0.0)
 
 

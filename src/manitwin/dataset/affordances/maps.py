@@ -10,7 +10,9 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from manitwin.dataset.affordances.heat_maps import (
+    FUNCTION_SHARE,
     LEAST_COSINE,
+    RIM_SHARE,
     contact_density,
     contact_points,
     contact_spread_m,
@@ -118,7 +120,8 @@ def _functions(twin: Twin, points_m: np.ndarray, normals: np.ndarray, extents_m:
     for point in twin.record.points.functional if twin.record.points else ():
         seeds = _seeds(point, points_m, normals)
         distance_m = surface_distances(points_m, normals, seeds).min(0)
-        found[f"function:{point.id} {point.label}"] = function_map(distance_m, extents_m)
+        share = RIM_SHARE if _opens(point) else FUNCTION_SHARE
+        found[f"function:{point.id} {point.label}"] = function_map(distance_m, extents_m, share)
     return found
 
 
@@ -130,10 +133,15 @@ def _seeds(point: FunctionalPoint, points_m: np.ndarray, normals: np.ndarray) ->
     same_side = normals @ np.array(point.normal) > LEAST_COSINE
     away_m = np.linalg.norm(points_m - np.array(point.position_m), axis=1)
     nearest = int(np.where(same_side, away_m, away_m + away_m.max()).argmin())
-    if point.frame is None or point.frame.kind != "opening" or not means_place(point.label, "opening"):
+    if point.frame is None or not _opens(point):
         return np.array([nearest])
     spacing_m = float(np.median(cKDTree(points_m).query(points_m, 2)[0][:, 1]))
     return np.union1d(nearest, np.flatnonzero(away_from_feature_m(point.frame, points_m) <= 2 * spacing_m))
+
+
+def _opens(point: FunctionalPoint) -> bool:
+    """Whether a point means an opening whose rim is known."""
+    return point.frame is not None and point.frame.kind == "opening" and means_place(point.label, "opening")
 
 
 def has_parts(maps: SurfaceMaps) -> bool:
