@@ -119,6 +119,14 @@ def test_scenes_give_episodes_too(bricks: Path, tmp_path: Path) -> None:
         make_episodes(bricks, tmp_path / "episodes", 2, CONFIG, executor="inline")
 
 
+def test_other_objects_are_not_promised_where_scenes_have_their_own(bricks: Path, tmp_path: Path) -> None:
+    layouts = LayoutsConfig(seed=2, layout=LayoutSettings(objects=(2, 2), robot="panda"))
+    assert make_layouts(bricks, tmp_path / "scenes", 1, layouts, executor="inline").exit_code == 0
+    with pytest.raises(UsageError, match="others is 3: scenes have their own objects"):
+        make_episodes(tmp_path / "scenes", tmp_path / "out", 1, TrajectoriesConfig(others=3), executor="inline")
+    assert not (tmp_path / "out").exists()
+
+
 def test_what_is_no_place_of_twins_is_said(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no accepted twin"):
         make_episodes(tmp_path, tmp_path / "out", 1, CONFIG, executor="inline")

@@ -157,6 +157,19 @@ def _check_twins(dataset: str, scenes: Path) -> None:
     source.check(named)
 
 
+def _check_asked(config: TrajectoriesConfig, source: EpisodesSource) -> None:
+    """Raise UsageError for settings that the source has its own answer to: they would be left out without a word."""
+    if source.tasks is not None and config.skill != TrajectoriesConfig.model_fields["skill"].default:
+        raise UsageError(
+            f"skill is {config.skill}: tasks say themselves what is to be done; leave it out, or give their scenes,"
+            f" {source.scenes}"
+        )
+    if source.scenes is not None and config.others:
+        raise UsageError(
+            f"others is {config.others}: scenes have their own objects; leave it out, or give the data set, {source.dataset}"
+        )
+
+
 def _with_robot_of(tasks: Sequence[TaskRecord], config: TrajectoriesConfig) -> TrajectoriesConfig:
     """Return settings with the robot that tasks were made for, where none is named and all are of the same."""
     robots = {task.robot for task in tasks}
@@ -192,13 +205,15 @@ def make_episodes(
 
     ``twins`` names where the twins of scenes are now, None: where they were as the layouts were made.
     ``count`` is how many there are at the end; where there are as many already, none is made.
-    Raises UsageError for a place without twins or scenes, an unknown robot or skill, an ``out`` that has episodes of
-    scenes where twins are given or the other way, or made with other settings, or where another run is at work there.
+    Raises UsageError for a place without twins or scenes, settings that tasks or scenes answer themselves, an unknown robot or
+    skill, an ``out`` that has episodes of scenes where twins are given or the other way, or made with other settings, or where
+    another run is at work there.
     """
     if not 1 <= count <= LARGEST_COUNT:
         raise UsageError(f"{count:.6g} episodes; ask for 1 or more, at most {LARGEST_COUNT}")
     skill = load_skill(config.skill)
     source, root = EpisodesSource.of(place, twins), DatasetRoot(out)
+    _check_asked(config, source)
     tasks = [] if source.tasks is None else read_tasks(source.tasks)
     config = _with_robot_of(tasks, config)
     robot = load_robot(config.robot)

@@ -166,6 +166,12 @@ def test_tasks_are_carried_out_with_their_goals_and_words(
             assert numbers[0] == 0 and numbers[-1] == 1 and (np.diff(numbers.astype(int)) >= 0).all()
 
 
+def test_a_skill_is_not_asked_of_tasks_which_say_themselves_what_is_done(folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="skill is lift: tasks say themselves what is to be done"):
+        make_episodes(folder, tmp_path / "out", 1, TrajectoriesConfig(skill="lift"), executor="inline")
+    assert not (tmp_path / "out").exists()
+
+
 def replayed(env: gymnasium.Env, episode: StoredEpisode, off_rad: float = 0.0) -> dict:
     """Give an episode's commands to an environment; ``off_rad`` turns the arm's base, else the states have to be the same."""
     recording, info = episode.recording, {}
