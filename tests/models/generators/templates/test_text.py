@@ -167,6 +167,8 @@ def test_a_part_is_called_by_its_plural_where_that_is_its_name() -> None:
 def test_nearest_categories_are_named() -> None:
     with pytest.raises(UsageError, match=r"did you mean hammer"):
         read("a hamer")
+    with pytest.raises(UsageError, match=r"'a steel kettle'; of its shape there are: pitcher, teapot, watering can\."):
+        read("a steel kettle")  # spelt like a bottle
 
 
 def test_stated_size_is_the_size() -> None:

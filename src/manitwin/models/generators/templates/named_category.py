@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from itertools import pairwise
 
 from manitwin.errors import UsageError
-from manitwin.models.annotators.priors import Prior, load_priors, named
+from manitwin.models.annotators.priors import Prior, load_priors, lookup, named
 from manitwin.models.generators.templates.described import ARTICLES, PURPOSE, is_described, own_materials
 from manitwin.models.generators.templates.looks import look_of, material_of
 from manitwin.models.generators.templates.template import Template
@@ -32,6 +32,8 @@ _GROUPS = frozenset(
     {"set", "pair", "pack", "packet", "stack", "pile", "bunch", "bundle", "collection", "group", "row", "handful"}
     | {"couple", "number", "lot", "lots", "dozen", "dozens"}
 )
+USED_ALIKE = 0.6
+"""The share of places of use in common, from which a thing of the same shape is worth a hint."""
 _COUNTS = frozenset(
     {"two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve", "twenty", "dozen"}
     | {"dozens", "several", "many", "multiple", "few", "both", "various", "couple", "pairs", "sets"}
@@ -88,11 +90,11 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
                 other = other or prior
                 continue
             if other is not None and not _stands_for(other, category):
-                raise UsageError(_no_category(text, other.category.split(), sorted(names), len(templates)))
+                raise UsageError(_no_category(text, other.category.split(), templates))
             _check_one_thing(text, words[:start], words[start:end], load_priors()[category], set(names))
             own = _own_materials(words[start:end], templates[category], load_priors()[category])
             return NamedCategory(category, own, _without_counter(words[:start]), tail)
-    raise UsageError(_no_category(text, words, sorted(names), len(templates)))
+    raise UsageError(_no_category(text, words, templates))
 
 
 def _parts(words: Sequence[str], at: int) -> bool:
@@ -153,7 +155,21 @@ def _own_materials(called: list[str], template: Template, prior: Prior) -> list[
     return own or own_materials(called, prior)
 
 
-def _no_category(text: str, words: list[str], names: list[str], count: int) -> str:
-    near = dict.fromkeys(match for word in words for match in get_close_matches(word, names, n=2, cutoff=0.6))
-    hint = f"; did you mean {', '.join(list(near)[:4])}?" if near else "."
-    return f"no template makes {text!r}{hint} There are {count} (docs/templates.md)"
+def _no_category(text: str, words: list[str], templates: Mapping[str, Template]) -> str:
+    """Say that no template makes a thing, and which are of its shape; of a word that nobody knows, which are spelt alike."""
+    meant = lookup(" ".join(words))
+    alike = [] if meant is None else [name for name in templates if _is_used_alike(load_priors()[name], meant)]
+    if alike:
+        hint = f"; of its shape there are: {', '.join(alike[:4])}."
+    else:
+        names = sorted({name for template in templates.values() for name in (template.category, *template.names)})
+        said = words if meant is None else meant.category.split()
+        spelt = dict.fromkeys(match for word in said for match in get_close_matches(word, names, n=2, cutoff=0.6))
+        hint = f"; did you mean {', '.join(list(spelt)[:4])}?" if spelt else "."
+    return f"no template makes {text!r}{hint} There are {len(templates)} (docs/templates.md)"
+
+
+def _is_used_alike(one: Prior, other: Prior) -> bool:
+    """Tell whether two kinds of things have one shape and nearly the same places of use."""
+    ours, theirs = ({part.feature for part in prior.functional} for prior in (one, other))
+    return one.shape == other.shape and len(ours & theirs) >= USED_ALIKE * len(ours | theirs)
