@@ -11,6 +11,7 @@ from manitwin.geometry.boxes import (
     oriented_bounding_box,
     separation_m,
     smallest_enclosing_circle,
+    turn_to_sides,
     upright_extents,
 )
 from manitwin.geometry.poses import inverse, transform_points
@@ -54,6 +55,14 @@ def test_length_is_no_diagonal_where_the_smallest_box_leans() -> None:
     leaning = 0.2 + 0.01 / np.sqrt(2)
     assert oriented_bounding_box(sheet.vertices)[0].max() == pytest.approx(0.2 * np.sqrt(2))
     assert upright_extents(sheet.vertices) == pytest.approx([leaning, 0.01, leaning])
+
+
+@pytest.mark.parametrize(("lies_deg", "turn_deg"), [(0, 0), (30, 30), (-40, -40), (60, -30), (170, -10)])
+def test_a_rectangle_is_turned_to_its_nearer_axis(lies_deg: float, turn_deg: float) -> None:
+    angle = np.radians(lies_deg)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    cosine, sine = turn_to_sides(np.array([[3.0, 1], [3, -1], [-3, 1], [-3, -1]]) @ turn.T)
+    assert np.degrees(np.arctan2(sine, cosine)) == pytest.approx(turn_deg, abs=1e-4)
 
 
 def test_circle_of_a_rectangle_has_half_its_diagonal() -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from handmade import candidates, mug, visual
 from manitwin.engine.stage import Draft
@@ -54,6 +55,14 @@ def test_the_caption_stage_returns_language(draft: Draft, tmp_path: Path) -> Non
     fields = CaptionStage(RulesAnnotator()).run(draft, tmp_path)
     language = Language(**json.loads(json.dumps(fields["language"])))
     assert (language.category, language.color, language.material) == ("mug", "red", "ceramic")
+
+
+def test_the_caption_tells_the_sides_of_what_lies_askew(draft: Draft, tmp_path: Path) -> None:
+    askew = trimesh.creation.box((0.3, 0.1, 0.05))
+    askew.apply_transform(trimesh.transformations.rotation_matrix(0.7, [0, 0, 1]))
+    np.savez(tmp_path / "solid.npz", vertices=askew.vertices, faces=askew.faces)
+    language = CaptionStage(RulesAnnotator()).run(draft, tmp_path)["language"]
+    assert language["size"] == "30 x 10 x 5 cm, medium-sized"
 
 
 def test_the_points_stage_returns_candidates_at_their_places(draft: Draft, tmp_path: Path) -> None:

@@ -62,6 +62,14 @@ def upright_extents(points: np.ndarray) -> np.ndarray:
     return np.array([*sides, np.ptp(points[:, 2])])
 
 
+def turn_to_sides(points: np.ndarray) -> tuple[float, float]:
+    """Return cosine and sine of the angle, within 45 degrees of none, at which the smallest rectangle around ``(N, 2)`` lies."""
+    _, along = _smallest_rectangle(np.asarray(points, dtype=float))
+    across = np.array([-along[1], along[0]])
+    cosine, sine = max((along, -along, across, -across), key=lambda side: float(side[0]))
+    return float(cosine), float(sine)
+
+
 def longest_edges(points: np.ndarray) -> np.ndarray:
     """Return the four parallel edges ``(4, 2, 3)`` of the box of ``upright_extents`` along its longest side."""
     points = np.asarray(points, dtype=float)

@@ -6,10 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numpy as np
-
 from manitwin.config import NO_SETTINGS, Resource
 from manitwin.engine.stage import Draft
+from manitwin.geometry.boxes import upright_extents
 from manitwin.models.annotators.photo_light import PhotoLight, light_of_photos
 from manitwin.models.annotators.protocol import Annotator
 from manitwin.pipeline.human_corrections import corrected_language
@@ -50,10 +49,12 @@ class CaptionStage:
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Return ``language``."""
-        physical = draft.field("physical")
+        material = draft.field("physical")["material"]
         subject = read_scaled_subject(draft, known_as=draft.field("called"))
         subject = replace(subject, photographed=is_photographed(draft), light=light_of_texture(draft))
-        language = self._annotator.describe(subject, physical["material"], np.array(physical["extents_m"]))
+        # as a ruler shows them: a mesh may lie at any angle to its axes
+        extents_m = upright_extents(subject.solid.vertices)
+        language = self._annotator.describe(subject, material, extents_m)
         return {"language": corrected_language(language, draft).model_dump()}
 
 

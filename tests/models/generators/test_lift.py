@@ -125,6 +125,14 @@ def test_flat_head_on_a_handle_is_not_revolved_and_lies() -> None:
     assert np.ptp(lifted.surface.vertices[:, 1]) < 0.15
 
 
+@pytest.mark.parametrize("degrees", [-50, -20, 35, 70])
+def test_what_lies_askew_in_the_photo_is_as_long_along_an_axis_as_it_is(degrees: float) -> None:
+    turner = [(280, 60), (320, 60), (320, 330), (380, 360), (380, 540), (220, 540), (220, 360), (280, 330)]
+    lifted = lift(_drawn(_turned(turner, degrees)), NO_HINT)
+    assert lifted.notes["rests"] == "lying"
+    assert sorted(np.ptp(lifted.surface.vertices, axis=0)[[0, 2]]) == pytest.approx((160 / 480, 1.0), abs=0.02)
+
+
 def test_inflated_strip_is_a_round_bar() -> None:
     mask = np.zeros((80, 400), bool)
     mask[20:60, 10:390] = True

@@ -14,7 +14,7 @@ from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name
 from manitwin.models.generators.lift.primitives import profile
 from manitwin.models.generators.lift.residual import Explained
 from manitwin.models.generators.lift.silhouette import CROP_SIDE_PX, Silhouette, analyse_silhouette
-from manitwin.models.generators.lift.surface import LiftedSurface, assert_solid, normalised
+from manitwin.models.generators.lift.surface import LiftedSurface, assert_solid, normalised, squared
 from manitwin.models.generators.lift.texture import crop_object, paint_unseen
 
 __all__ = ["Lifted", "ShapeHint", "choose_primitive", "hint_from_name", "lift"]
@@ -53,7 +53,7 @@ def lift(rgba: np.ndarray, hint: ShapeHint) -> Lifted:
     photo = cv2.resize(crop.colours, (width, height), interpolation=cv2.INTER_AREA)
     view = View(crop, photo, analyse_silhouette(crop.mask))
     primitive, made = _explaining(view, hint)
-    surface = normalised(made.surface)
+    surface = normalised(squared(made.surface) if made.notes["rests"] == "lying" else made.surface)
     assert_solid(surface)
     notes = {
         "primitive": primitive,

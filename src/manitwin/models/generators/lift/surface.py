@@ -9,6 +9,8 @@ import numpy as np
 import trimesh
 from scipy.spatial import ConvexHull, QhullError
 
+from manitwin.geometry.boxes import turn_to_sides
+
 _EDGE_ON = 1e-6
 UPRIGHT_TIP_ANGLE_DEG = 8.0  # what stands in the photo and would not fall at this slope
 TILTED_TIP_ANGLE_DEG = 15.0  # what does not stand in the photo must be steadier to be set upright
@@ -126,6 +128,15 @@ def laid_round(surface: LiftedSurface) -> LiftedSurface:
         return flattened
     low, height = lying.vertices[:, 1].min(), float(np.ptp(lying.vertices[:, 1]))
     return cut_below(lying, 1, low + _LYING_CUTS[-1] * height)
+
+
+def squared(surface: LiftedSurface) -> LiftedSurface:
+    """Turn what lies about the vertical, by 45 degrees at most, so that its sides seen from above lie along x and z.
+
+    A photo shows what lies at any angle; lengths along the axes are so those that a ruler shows.
+    """
+    cosine, sine = turn_to_sides(surface.vertices[:, [0, 2]])
+    return surface.moved(np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]]), np.zeros(3))
 
 
 def normalised(surface: LiftedSurface) -> LiftedSurface:
