@@ -133,6 +133,28 @@ def test_what_lies_askew_in_the_photo_is_as_long_along_an_axis_as_it_is(degrees:
     assert sorted(np.ptp(lifted.surface.vertices, axis=0)[[0, 2]]) == pytest.approx((160 / 480, 1.0), abs=0.02)
 
 
+def _blob() -> np.ndarray:
+    """A round body with two bulges: it has no mirror axis."""
+    around = np.linspace(0, 2 * math.pi, 200)
+    bulges = 0.3 * np.exp(-(((around - 0.5) / 0.35) ** 2)) + 0.25 * np.exp(-(((around - 1.9) / 0.3) ** 2))
+    radius = 180 * (1 + bulges)
+    return _drawn(list(zip(300 + radius * np.cos(around), 300 + radius * np.sin(around), strict=True)))
+
+
+def test_what_is_round_by_its_name_is_inflated_as_deep_as_it_is_wide() -> None:
+    lifted = lift(_blob(), ShapeHint(round=True, stands=False))
+    _check_contract(lifted)
+    assert lifted.notes["primitive"] == "inflation"
+    assert 0.75 < np.ptp(lifted.surface.vertices[:, 1]) / np.ptp(lifted.surface.vertices, axis=0)[[0, 2]].min() < 1.02
+
+
+@pytest.mark.parametrize("share", [0.1, 0.25])
+def test_an_inflated_body_has_the_volume_that_its_name_tells(share: float) -> None:
+    lifted = lift(_blob(), ShapeHint(stands=False, volume_share=share))
+    assert lifted.notes["primitive"] == "inflation" and lifted.notes["depth_source"] == "prior"
+    assert to_manifold(lifted.surface).volume() == pytest.approx(share, rel=0.12)
+
+
 def test_inflated_strip_is_a_round_bar() -> None:
     mask = np.zeros((80, 400), bool)
     mask[20:60, 10:390] = True

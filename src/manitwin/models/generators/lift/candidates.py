@@ -9,7 +9,7 @@ import numpy as np
 
 from manitwin.models.generators.lift.handles import handle_tubes
 from manitwin.models.generators.lift.hint import ShapeHint
-from manitwin.models.generators.lift.inflation import inflate
+from manitwin.models.generators.lift.inflation import full_round, inflate, limit_of_volume
 from manitwin.models.generators.lift.primitives import DEPTH_SHARE, make_box, profile, revolve, trim_caps
 from manitwin.models.generators.lift.residual import Explained, explained, parallel_camera
 from manitwin.models.generators.lift.revolution import WALL_SHARE, chosen_elevation, half_widths, projected, solid_of
@@ -33,6 +33,8 @@ LEAST_BODY_SHARE = 0.55  # of the outline: the body that a round container's han
 LEAST_TURNED_IOU = 0.92
 LEAST_TIP_ANGLE_DEG = 5.0
 STANDING_CUTS = (0.015, 0.03, 0.05, 0.08, 0.12)  # shares of the height tried for a flat base
+_ONE_BULGE = 0.85  # solidity from which on an outline is that of one body: a handle is no thicker for its wide head
+_TOLD_RELIEF_RISE = 2.0  # a relief is as high as the body is deep whose depth is told
 _RELIEF_RISE = 1.5  # a bar of radius r lies as a relief this many r high: between a half bar and a whole one
 _COMPACT = (
     1.5  # round things no longer than this are set on their base, whatever else is usual: it is flat, they do not roll
@@ -156,44 +158,62 @@ def boxed(view: View, hint: ShapeHint) -> Made:
 def inflated(view: View, hint: ShapeHint) -> Made:
     """Return the inflated outline: rounded on both sides, with a flat base where it stands and a facet where it lies."""
     silhouette = view.silhouette
-    limit, source = _depth_limit_px(silhouette, hint)
-    notes: dict[str, Any] = {"depth_limit": _share(limit, silhouette), "depth_source": source}
+    depth = _depth(silhouette, hint)
+    notes: dict[str, Any] = {"depth_limit": _share(depth.limit_px, silhouette), "depth_source": depth.source}
+
+    def body_of(rise: float, *, flat_back: bool = False) -> LiftedSurface:
+        mask, limit_px, fullness = silhouette.mask, depth.limit_px, depth.fullness
+        return inflate(mask, depth_limit_px=limit_px, rise=rise, flat_back=flat_back, fullness=fullness)
+
     sturdy = silhouette.elongation < 2.5 and not (silhouette.holes and silhouette.solidity < 0.6)
     if hint.stands or (hint.stands is None and sturdy):
-        body = inflate(silhouette.mask, depth_limit_px=limit, rise=1.0, flat_back=False)
+        body = body_of(1.0)
         standing = stood(body, LEAST_TIP_ANGLE_DEG if hint.stands else UPRIGHT_TIP_ANGLE_DEG, STANDING_CUTS)
         if standing is None and hint.stands:
             standing = stood(body, 2.0)
         if standing is not None:
             return Made(standing, view.explained(body), {"rests": "standing", **notes})
-    rise = 1.0 if source == "prior" else _RELIEF_RISE / 2
-    body = inflate(silhouette.mask, depth_limit_px=limit, rise=rise, flat_back=False)
+    told = depth.source != "outline"
+    body = body_of(1.0 if told else _RELIEF_RISE / 2)
     found = view.explained(body)
     lying = laid_round(body)
     if tip_angle_deg(lying) < LEAST_TIP_ANGLE_DEG:
-        relief = inflate(silhouette.mask, depth_limit_px=limit, rise=_RELIEF_RISE, flat_back=True)
+        relief = body_of(_TOLD_RELIEF_RISE if told else _RELIEF_RISE, flat_back=True)
         return Made(laid(relief), found, {"rests": "lying", **notes})
     return Made(lying, found, {"rests": "lying", **notes})
 
 
-def _depth_limit_px(silhouette: Silhouette, hint: ShapeHint) -> tuple[float | None, str]:
-    """Return how far a body may rise to each side, and what says so.
+@dataclass(frozen=True)
+class _Depth:
+    """How far a body may rise to each side (None: as far as it is round), how full it is below that, and what says so."""
 
-    The category's volume, spread over the outline, is its mean thickness: what is flat is as thick everywhere. Without a
-    category, nothing in one outline tells a flat head from a round one: slender things get the mean of both.
+    limit_px: float | None
+    fullness: float
+    source: str
+
+
+def _depth(silhouette: Silhouette, hint: ShapeHint) -> _Depth:
+    """Return how deep a thing is that is seen from one side.
+
+    What is round by its name is as deep as wide. Else its category's volume is that of the body: what is flat is as thick
+    everywhere, what is round half as thick again in its middle. Without a category, nothing in one outline tells a flat head
+    from a round one: slender things get the mean of both.
     """
     typical, largest = silhouette.typical_radius_px, silhouette.largest_radius_px
+    fullness = full_round(silhouette.mask) if silhouette.solidity > _ONE_BULGE else 1.0
     if hint.round and not hint.flat:
-        return None, "round"
+        return _Depth(None, fullness, "round")
     if hint.volume_share is not None:
         length = float(max(np.linalg.norm(np.diff(silhouette.corners[:3], axis=0), axis=1)))
-        thickness = hint.volume_share * length**3 / float(silhouette.mask.sum())
-        return float(np.clip(thickness / 2, 0.08 * typical, 1.5 * largest)), "prior"
+        limit = limit_of_volume(
+            silhouette.mask, hint.volume_share * length**3, fullness=fullness, most_px=1.5 * largest
+        )
+        return _Depth(max(limit, 0.08 * typical), fullness, "prior")
     if hint.flat or silhouette.holes:
-        return 1.15 * typical, "outline"
+        return _Depth(1.15 * typical, 1.0, "outline")
     if silhouette.elongation > 2.5:
-        return float(np.sqrt(typical * largest)), "outline"
-    return 0.6 * largest, "outline"
+        return _Depth(float(np.sqrt(typical * largest)), 1.0, "outline")
+    return _Depth(0.6 * largest, 1.0, "outline")
 
 
 def _share(limit_px: float | None, silhouette: Silhouette) -> float | None:

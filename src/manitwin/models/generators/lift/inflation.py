@@ -13,21 +13,25 @@ from scipy.sparse.linalg import spsolve
 
 from manitwin.models.generators.lift.surface import LiftedSurface, from_manifold, to_manifold
 
+_HALVINGS = 24
 _TARGET_CELLS = 2200
 _SOLVER_SIDE_PX = 224
 _SNAP = 0.12  # crossings nearer to a grid node than this share of a cell are moved off it: no sliver triangles
 _AROUND = ((0, 0), (0, 1), (1, 1), (1, 0))  # a cell's corners (row, column), clockwise on the screen
 
 
-def inflate(mask: np.ndarray, *, depth_limit_px: float | None, rise: float, flat_back: bool) -> LiftedSurface:
+def inflate(
+    mask: np.ndarray, *, depth_limit_px: float | None, rise: float, flat_back: bool, fullness: float = 1.0
+) -> LiftedSurface:
     """Inflate ``mask`` (H, W) to a closed surface in its pixels.
 
     ``depth_limit_px`` flattens what would rise higher (thin flat things); ``flat_back`` makes a relief on the plane z = 0
-    instead of a body mirrored about it. ``rise`` multiplies the height. Holes of the mask stay holes.
+    instead of a body mirrored about it. ``fullness`` multiplies the height before it is limited, ``rise`` after. Holes of the
+    mask stay holes.
     """
     cell = float(np.clip(np.sqrt(mask.sum() / _TARGET_CELLS), 1.5, max(mask.shape) / 24))
     points, triangles, rim = triangulate_mask(mask, cell)
-    height = np.sqrt(np.maximum(_sample(_solve(mask), points, mask.shape), 0) / 2)
+    height = fullness * np.sqrt(np.maximum(_sample(_solve(mask), points, mask.shape), 0) / 2)
     if depth_limit_px is not None:
         height = depth_limit_px * np.tanh(height / depth_limit_px)
     height *= rise
@@ -44,6 +48,28 @@ def inflate(mask: np.ndarray, *, depth_limit_px: float | None, rise: float, flat
     # a bridge thinner than the grid may have broken: the largest part is the object
     facing = np.repeat([1.0, -1.0], count)
     return from_manifold(to_manifold(LiftedSurface(vertices, faces, np.concatenate([uv, uv]), facing)))
+
+
+def limit_of_volume(mask: np.ndarray, volume_px: float, *, fullness: float, most_px: float) -> float:
+    """Return the ``depth_limit_px`` at which the body that ``mask`` (H, W) is inflated to has a volume; ``most_px`` at most.
+
+    It is no mean thickness: what is round is half as thick again in its middle as in the mean.
+    """
+    field = _solve(mask)
+    height = fullness * np.sqrt(np.maximum(field, 0) / 2)
+    cell_px2 = mask.size / field.size
+    low, high = 0.0, most_px
+    for _ in range(_HALVINGS):
+        limit = (low + high) / 2
+        volume = 2 * cell_px2 * float((limit * np.tanh(height / limit)).sum())
+        low, high = (limit, high) if volume < volume_px else (low, limit)
+    return high
+
+
+def full_round(mask: np.ndarray) -> float:
+    """Return the ``fullness`` at which ``mask`` (H, W) is inflated as thick as its largest circle is wide: 1.41 for a disc."""
+    peak_px = float(np.sqrt(max(float(_solve(mask).max()), 1e-9) / 2))
+    return float(cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5).max()) / peak_px
 
 
 def _solve(mask: np.ndarray) -> np.ndarray:
