@@ -74,6 +74,11 @@ def test_without_a_color_none_is_claimed() -> None:
     assert "unknown" not in " ".join(language.captions) and "white" not in " ".join(language.captions)
 
 
+def test_a_box_is_not_told_to_be_round_as_most_of_its_name_are() -> None:
+    assert described(cylinder(0.03, 0.1), "speaker").shape == "cylindrical"
+    assert described(trimesh.creation.box((0.2, 0.07, 0.06)), "speaker").shape == "bar-shaped"
+
+
 def test_without_a_name_the_category_is_unknown_and_the_shape_is_measured() -> None:
     mesh = cylinder(0.03, 0.1)
     language = described(mesh, None, material="unknown material")

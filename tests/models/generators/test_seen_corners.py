@@ -104,3 +104,13 @@ def test_an_ellipse_without_a_name_is_a_disc_as_well_as_an_egg(half_axes_px: tup
 def test_a_circle_and_an_ellipse_that_is_said_to_be_round_are_solids_of_revolution() -> None:
     assert lift(_ellipse(200, 200), ShapeHint()).notes["primitive"] == "revolution"
     assert lift(_ellipse(150, 250), ShapeHint(round=True)).notes["primitive"] == "revolution"
+
+
+def test_a_long_speaker_is_a_box_that_lies_and_no_speaker_on_its_end() -> None:
+    view = View(np.radians(40), np.radians(35), np.radians(12), 0.2)
+    made = from_photo(_drawn((0.2, 0.055, 0.07), view), "speaker")
+    assert made.notes["primitive"] == "box" and made.known is None
+    measures = made.notes["measures"]
+    sides = np.array([measures["width"], measures["depth"], 1.0]) * measures["height_m"]
+    assert sides[:2].max() / sides[2] == pytest.approx(0.2 / 0.07, rel=0.1)
+    assert sides[:2].min() / sides[2] == pytest.approx(0.055 / 0.07, rel=0.15)

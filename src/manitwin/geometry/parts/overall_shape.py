@@ -37,9 +37,14 @@ class OverallShape:
         return "flat" if self.flatness >= _FLAT else "compact"
 
     @property
+    def is_box(self) -> bool:
+        """Whether it fills its box as nothing round does."""
+        return self.box_fill > _BOX_FILL
+
+    @property
     def word(self) -> str:
         """A word for a thing that nobody has named."""
-        if self.box_fill > _BOX_FILL:
+        if self.is_box:
             return {"long": "bar-shaped", "flat": "slab-shaped", "compact": "box-shaped"}[self.proportion]
         if self.revolution_residual < _ROUND_RESIDUAL:
             if self.flatness >= _FLAT:

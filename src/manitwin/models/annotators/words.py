@@ -37,6 +37,7 @@ _METALS = frozenset(
         "zinc",
     )
 )
+_ROUND = frozenset({"cylindrical", "round"})
 _MADE_OF = {"wooden": "wood", "woollen": "wool", "golden": "gold", "metallic": "metal", "earthen": "clay"}
 
 
@@ -114,6 +115,8 @@ def _shape(subject: Subject, prior: Prior | None, rng: np.random.Generator) -> s
     if prior is not None:
         proportion = measured.proportion
         said = prior.shape.lower()
+        if measured.is_box and _ROUND & set(re.findall(r"\w+", said)):
+            return measured.word  # most speakers are cylinders, this one is none
         return prior.shape if proportion == "compact" or proportion in said else f"{prior.shape}, {proportion}"
     opening = find_opening(subject.solid)
     return f"{measured.word} and hollow, open at one side" if opening is not None else measured.word

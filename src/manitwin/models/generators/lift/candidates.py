@@ -174,7 +174,7 @@ def inflated(view: View, hint: ShapeHint) -> Made:
         if standing is not None:
             return Made(standing, view.explained(body), {"rests": "standing", **notes})
     told = depth.source != "outline"
-    body = body_of(1.0 if told else _RELIEF_RISE / 2)
+    body = body_of(1.0 if told or silhouette.solidity > _ONE_BULGE else _RELIEF_RISE / 2)
     found = view.explained(body)
     lying = laid_round(body)
     if tip_angle_deg(lying) < LEAST_TIP_ANGLE_DEG:
@@ -209,9 +209,9 @@ def _depth(silhouette: Silhouette, hint: ShapeHint) -> _Depth:
             silhouette.mask, hint.volume_share * length**3, fullness=fullness, most_px=1.5 * largest
         )
         return _Depth(max(limit, 0.08 * typical), fullness, "prior")
-    if hint.flat or silhouette.holes:
+    if hint.flat:
         return _Depth(1.15 * typical, 1.0, "outline")
-    if silhouette.elongation > 2.5:
+    if silhouette.elongation > 2.5 or silhouette.holes:
         return _Depth(float(np.sqrt(typical * largest)), 1.0, "outline")
     return _Depth(0.6 * largest, 1.0, "outline")
 

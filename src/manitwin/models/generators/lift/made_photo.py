@@ -69,8 +69,8 @@ def from_photo(
 ) -> Job:
     """Return the template that the name means where its fit explains the photo, else the photo lifted; raises Rejected.
 
-    What has no template, and no name or that of a box, is a box where its outline is that of one seen from a corner. What has
-    no name has the shape of a template of the ``likely`` names, each with its probability, where one explains the photo.
+    What has no template, and no name or that of a box, is a box where its outline is that of one seen from a corner; so is what
+    lies otherwise than its template does where a box explains it much better (a long speaker). What has no name has the shape of a template of the ``likely`` names, each with its probability, where one explains the photo.
     ``focal_mm`` is the lens as 35 mm equivalent, where it is known.
     """
     template = template_for(name)
@@ -84,6 +84,10 @@ def from_photo(
     fitted = (
         None if template is None else fit(template.category, rgba, or_of=kinds_of(template.category), focal_mm=focal_mm)
     )
+    lies = fitted is not None and not fitted.upright  # otherwise than the template rests
+    box = box_from_corner(rgba, focal_mm) if lies else None
+    if box is not None and fitted is not None and _explains_more(box, fitted.residual.iou):
+        return _shape_alone(box, rgba, primitive="box", source="the outline's six corners")
     return fitted_or_lifted(fitted, rgba, name)
 
 
