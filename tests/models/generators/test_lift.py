@@ -16,10 +16,10 @@ from manitwin.errors import Rejected, Unsupported
 from manitwin.formats.glb import read_glb
 from manitwin.formats.image_file import read_image
 from manitwin.models.generators.lift import LiftGenerator
-from manitwin.models.generators.lift.hint import why_not_round
+from manitwin.models.generators.lift.hint import hint_from_name, why_not_round
 from manitwin.models.generators.lift.inflation import inflate
 from manitwin.models.generators.lift.lifting import Lifted, ShapeHint, lift
-from manitwin.models.generators.lift.made_photo import from_photo
+from manitwin.models.generators.lift.made_photo import fitted_or_lifted, from_photo
 from manitwin.models.generators.lift.surface import tip_angle_deg, to_manifold
 from manitwin.models.generators.protocol import GenerationRequest
 from manitwin.models.matting import matte_photo
@@ -274,6 +274,29 @@ def test_a_ball_with_its_mirror_image_is_no_ball() -> None:
     beside = painted(lambda x, y: (np.hypot(x, y + 0.2) < 0.2) | (np.hypot(x, y - 0.18) < 0.2))
     with pytest.raises(Rejected, match="times as long as wide, as no golf ball is"):
         from_photo(beside, "golf ball")
+
+
+def test_a_can_seen_nearly_from_above_is_no_egg() -> None:
+    around = np.linspace(0, 2 * math.pi, 200)
+    askew = _turned(list(zip(300 + 140 * np.cos(around), 300 + 200 * np.sin(around), strict=True)), 14)
+    with pytest.raises(Rejected, match="its outline is an ellipse, as a can has none from the side"):
+        fitted_or_lifted(None, _drawn(askew), "can")
+    assert fitted_or_lifted(None, _drawn(_turned([(220, 100), (380, 100), (380, 500), (220, 500)], 14)), "can")
+    assert fitted_or_lifted(None, _drawn(askew), "apple")
+
+
+@pytest.mark.parametrize(
+    ("name", "tall"),
+    [("lemon", True), ("tomato", False)],
+)
+def test_a_round_fruit_is_turned_about_the_axis_that_gives_its_usual_volume(name: str, tall: bool) -> None:
+    around = np.linspace(0, 2 * math.pi, 200)
+    lying = list(zip(300 + 200 * np.cos(around), 300 + 155 * np.sin(around), strict=True))
+    lifted = lift(_drawn(lying), hint_from_name(name))
+    _check_contract(lifted)
+    width, height, depth = np.ptp(lifted.surface.vertices, axis=0)
+    assert width == pytest.approx(depth, abs=0.02)
+    assert (height > 1.15 * width) == tall
 
 
 @pytest.mark.parametrize(

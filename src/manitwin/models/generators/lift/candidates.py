@@ -13,7 +13,7 @@ from manitwin.models.generators.lift.inflation import full_round, inflate, limit
 from manitwin.models.generators.lift.primitives import DEPTH_SHARE, make_box, profile, revolve, trim_caps
 from manitwin.models.generators.lift.residual import Explained, explained, parallel_camera
 from manitwin.models.generators.lift.revolution import WALL_SHARE, chosen_elevation, half_widths, projected, solid_of
-from manitwin.models.generators.lift.silhouette import Silhouette, turning
+from manitwin.models.generators.lift.silhouette import Silhouette, about_the_other_axis, turning
 from manitwin.models.generators.lift.surface import (
     TILTED_TIP_ANGLE_DEG,
     UPRIGHT_TIP_ANGLE_DEG,
@@ -30,7 +30,11 @@ _FLAT_BOX_DEPTH_SHARE = 0.12  # of the shorter side: a book, a tray
 UPRIGHT_TILT_DEG = 20.0  # an axis that leans less stands in the photo
 LEANING_DEG = 3.0  # what leans more is set upright about its own axis, as if seen from the side
 LEAST_BODY_SHARE = 0.55  # of the outline: the body that a round container's handles and spouts stick out of
-LEAST_TURNED_IOU = 0.92
+LEAST_TURNED_IOU, LEAST_MIRROR_IOU = 0.92, 0.9
+_LONGER = 1.1
+_RIM_RADIUS, _SHARP_RIM = 0.93, 0.24
+"""As much of a body's height has nearly the largest radius: 0.37 of an ellipsoid's, 0.2 of a lemon's turned the wrong way."""
+_CLEARLY_NEARER = 0.1  # of the logarithm of a volume
 LEAST_TIP_ANGLE_DEG = 5.0
 STANDING_CUTS = (0.015, 0.03, 0.05, 0.08, 0.12)  # shares of the height tried for a flat base
 _ONE_BULGE = 0.85  # solidity from which on an outline is that of one body: a handle is no thicker for its wide head
@@ -63,6 +67,33 @@ class Made:
     surface: LiftedSurface
     explained: Explained
     notes: dict[str, Any]
+
+
+def turned_about(silhouette: Silhouette, hint: ShapeHint) -> Silhouette:
+    """Return the silhouette with the mirror axis that the thing is turned about, where it is symmetric along and across.
+
+    A lemon on its side, turned about the axis across it, would be a lens: with a sharp rim, which hardly anything has, and
+    more than its category's volume.
+    """
+    if hint.stands or hint.container or hint.flat or hint.boxy:
+        return silhouette
+    _, radii = profile(silhouette)
+    height, width = float(len(radii)), 2 * float(radii.max())
+    if width < _LONGER * height:
+        return silhouette
+    other = about_the_other_axis(silhouette)
+    if other.mirror_iou < LEAST_MIRROR_IOU:
+        return silhouette
+    sharp = float((radii > _RIM_RADIUS * radii.max()).mean()) < _SHARP_RIM
+    return other if sharp or _too_much(height / width, hint) else silhouette
+
+
+def _too_much(flatness: float, hint: ShapeHint) -> bool:
+    """Whether a category's volume is that of an ellipsoid turned about its long axis, and not about its short one."""
+    if not hint.round or hint.volume_share is None:
+        return False
+    flat, long = (abs(float(np.log(np.pi / 6 * flatness**power / hint.volume_share))) for power in (1, 2))
+    return long < flat - _CLEARLY_NEARER
 
 
 def standing_turned(view: View, hint: ShapeHint, *, plain: bool) -> Made | None:

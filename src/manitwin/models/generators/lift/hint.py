@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,9 @@ from manitwin.models.annotators.priors import Prior, lookup
 
 MOST_OUT_OF_ROUND = 1.3
 """Of a ball's longest side over its shortest, and of a plate's over its second."""
+LEAST_ELLIPSE_IOU, ELLIPSE_IN_RECTANGLE = 0.92, 0.85
+"""An ellipse fills 0.785 of its rectangle, a rectangle overlaps by 0.84 with the ellipse of its moments."""
+_CYLINDERS = frozenset({"cylindrical", "short cylindrical"})
 _NO_BALLS = frozenset({"rugby ball"})
 
 
@@ -60,6 +64,19 @@ def why_not_round(name: str | None, extents: np.ndarray) -> str | None:
     if prior.shape == "flat and round" and longest > MOST_OUT_OF_ROUND * second:
         return f"it would be {longest / second:.1f} times as long as wide, as no {prior.category} is: it is seen at an angle"
     return None
+
+
+def why_no_cylinder(name: str | None, silhouette: Mapping[str, float]) -> str | None:
+    """Return why an outline of these scores is that of no such thing seen from the side, where its name says cylinder; else None.
+
+    From the side a cylinder is a rectangle; an ellipse is its end, seen at an angle.
+    """
+    prior = lookup(name)
+    if prior is None or prior.shape not in _CYLINDERS:
+        return None
+    if silhouette["rectangle_iou"] > ELLIPSE_IN_RECTANGLE or silhouette["ellipse_iou"] < LEAST_ELLIPSE_IOU:
+        return None
+    return f"its outline is an ellipse, as a {prior.category} has none from the side: it is seen at an angle"
 
 
 def _volume_share(prior: Prior) -> float | None:

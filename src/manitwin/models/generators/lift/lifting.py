@@ -9,7 +9,15 @@ import cv2
 import numpy as np
 
 from manitwin.errors import Rejected
-from manitwin.models.generators.lift.candidates import Made, View, boxed, inflated, revolved, standing_turned
+from manitwin.models.generators.lift.candidates import (
+    Made,
+    View,
+    boxed,
+    inflated,
+    revolved,
+    standing_turned,
+    turned_about,
+)
 from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name
 from manitwin.models.generators.lift.primitives import profile
 from manitwin.models.generators.lift.residual import Explained
@@ -51,7 +59,7 @@ def lift(rgba: np.ndarray, hint: ShapeHint) -> Lifted:
     crop = crop_object(rgba, CROP_SIDE_PX)
     height, width = crop.mask.shape
     photo = cv2.resize(crop.colours, (width, height), interpolation=cv2.INTER_AREA)
-    view = View(crop, photo, analyse_silhouette(crop.mask))
+    view = View(crop, photo, turned_about(analyse_silhouette(crop.mask), hint))
     primitive, made = _explaining(view, hint)
     surface = normalised(squared(made.surface) if made.notes["rests"] == "lying" else made.surface)
     assert_solid(surface)

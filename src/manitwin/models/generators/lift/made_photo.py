@@ -13,7 +13,7 @@ from trimesh.visual import TextureVisuals
 from manitwin.errors import Rejected
 from manitwin.formats.glb import write_glb
 from manitwin.geometry.poses import GLTF_TO_OBJECT
-from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name, why_not_round
+from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name, why_no_cylinder, why_not_round
 from manitwin.models.generators.lift.lifting import DISC_ELLIPSE_IOU, Lifted, lift
 from manitwin.models.generators.lift.seen_corners import box_from_corner
 from manitwin.models.generators.lift.surface import unseen_share
@@ -70,7 +70,8 @@ def from_photo(
     """Return the template that the name means where its fit explains the photo, else the photo lifted; raises Rejected.
 
     What has no template, and no name or that of a box, is a box where its outline is that of one seen from a corner; so is what
-    lies otherwise than its template does where a box explains it much better (a long speaker). What has no name has the shape of a template of the ``likely`` names, each with its probability, where one explains the photo.
+    lies otherwise than its template does where a box explains it much better (a long speaker). What has no name has the shape
+    of a template of the ``likely`` names, each with its probability, where one explains the photo.
     ``focal_mm`` is the lens as 35 mm equivalent, where it is known.
     """
     template = template_for(name)
@@ -122,7 +123,9 @@ def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) 
             " template makes has it; check the name and the cut-out, or take the photo from higher up",
             "generate",
         )
-    odd = why_not_round(name, np.ptp(lifted.surface.vertices, axis=0))
+    odd = why_not_round(name, np.ptp(lifted.surface.vertices, axis=0)) or (
+        why_no_cylinder(name, lifted.notes["silhouette"]) if _from_the_side(lifted) else None
+    )
     if odd is not None:
         raise Rejected(
             "generator_failed",
@@ -136,10 +139,14 @@ def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) 
     return _lifted_job(lifted, notes)
 
 
+def _from_the_side(lifted: Lifted) -> bool:
+    """Whether it is a body of revolution that was taken to be seen at the height of its middle."""
+    return lifted.notes["primitive"] == "revolution" and not lifted.notes.get("elevation_deg")
+
+
 def _merely_as_wide(lifted: Lifted) -> bool:
     """Whether it is a body of revolution of which no rim was seen from above and nothing sticks out: a box may look so too."""
-    notes = lifted.notes
-    return notes["primitive"] == "revolution" and not notes.get("handles") and not notes.get("elevation_deg")
+    return _from_the_side(lifted) and not lifted.notes.get("handles")
 
 
 def _is_round(fitted: Fitted) -> bool:

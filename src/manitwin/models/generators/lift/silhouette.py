@@ -5,7 +5,7 @@ Pixels are (row, column) of a crop around the object; angles are in degrees, pos
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -81,6 +81,17 @@ def analyse_silhouette(mask: np.ndarray) -> Silhouette:
     )
 
 
+def about_the_other_axis(silhouette: Silhouette) -> Silhouette:
+    """Return the measures about the mirror axis across the one that was found."""
+    mask = silhouette.mask
+    long_tilt, _ = _principal_axis(mask)
+    across = abs((silhouette.axis_tilt_deg - long_tilt + 90.0) % 180.0 - 90.0) > 45.0
+    tilt, iou = _refined_axis(mask, _made_small(mask), long_tilt if across else long_tilt + 90.0)
+    turned = turned_upright(mask, tilt)
+    column, _ = _best_column(turned)
+    return replace(silhouette, axis_tilt_deg=tilt, axis_column_px=column, mirror_iou=iou, row_fill=_row_fill(turned))
+
+
 def turned_upright(image: np.ndarray, tilt_deg: float) -> np.ndarray:
     """Turn an image or mask by ``-tilt_deg`` about its centre into a square that holds all of it."""
     height, width = image.shape[:2]
@@ -129,15 +140,22 @@ def _ellipse_iou(mask: np.ndarray) -> float:
 
 def _mirror_axis(mask: np.ndarray, long_tilt: float) -> tuple[float, float]:
     """Search the tilt whose two halves agree best: upright, along and across the longest direction, then refined."""
-    scale = _SEARCH_SIDE_PX / max(mask.shape)
-    small = cv2.resize(mask.astype(np.float32), None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) > 0.5
+    small = _made_small(mask)
 
     def agreement(tilt: float) -> float:
         return _best_column(turned_upright(small, tilt))[1]
 
     # the upright axis is preferred where others are hardly better: most photos show things as they stand
     starts = {0.0: 0.012, long_tilt: 0.0, long_tilt + 90.0: -0.02}
-    best = max(starts, key=lambda tilt: agreement(tilt) + starts[tilt])
+    return _refined_axis(mask, small, max(starts, key=lambda tilt: agreement(tilt) + starts[tilt]))
+
+
+def _refined_axis(mask: np.ndarray, small: np.ndarray, best: float) -> tuple[float, float]:
+    """Return the tilt near ``best`` whose halves agree best, by the mask made small and then the mask, and that agreement."""
+
+    def agreement(tilt: float) -> float:
+        return _best_column(turned_upright(small, tilt))[1]
+
     tilt = best
     for step in (4.0, 2.0, 1.0, 0.5):
         tilt = max((tilt - step, tilt, tilt + step), key=lambda t: (agreement(t), -abs(t - best)))
@@ -146,6 +164,12 @@ def _mirror_axis(mask: np.ndarray, long_tilt: float) -> tuple[float, float]:
     exact = {t: _best_column(turned_upright(mask, t))[1] for t in (tilt - 0.25, tilt, tilt + 0.25)}
     tilt = max(exact, key=lambda t: (exact[t], -abs(t - tilt)))
     return (tilt + 90.0) % 180.0 - 90.0, exact[tilt]
+
+
+def _made_small(mask: np.ndarray) -> np.ndarray:
+    scale = _SEARCH_SIDE_PX / max(mask.shape)
+    small = cv2.resize(mask.astype(np.float32), None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    return np.asarray(small > 0.5)
 
 
 def _best_column(turned: np.ndarray) -> tuple[float, float]:
