@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+import trimesh
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
@@ -46,7 +47,8 @@ def inflate(
     faces = np.concatenate([triangles, triangles[:, ::-1] + count, walls])
     uv = np.column_stack([(x + 0.5) / mask.shape[1], 1 - (0.5 - y) / mask.shape[0]])
     # a bridge thinner than the grid may have broken: the largest part is the object
-    facing = np.repeat([1.0, -1.0], count)
+    front = trimesh.Trimesh(vertices[:count], triangles, process=False)
+    facing = np.concatenate([np.asarray(front.vertex_normals)[:, 2], np.full(count, -1.0)])
     return from_manifold(to_manifold(LiftedSurface(vertices, faces, np.concatenate([uv, uv]), facing)))
 
 

@@ -11,7 +11,8 @@ from scipy.spatial import ConvexHull, QhullError
 
 from manitwin.geometry.boxes import turn_to_sides
 
-_EDGE_ON = 1e-6
+GRAZING_COSINE = 0.3
+"""At 73 degrees a pixel of the photo is three and a half times as long as wide on the surface."""
 UPRIGHT_TIP_ANGLE_DEG = 8.0  # what stands in the photo and would not fall at this slope
 TILTED_TIP_ANGLE_DEG = 15.0  # what does not stand in the photo must be steadier to be set upright
 _CUTS = (0.015, 0.03, 0.05, 0.08)  # shares of the height tried for a flat base
@@ -25,8 +26,8 @@ class LiftedSurface:
     """A closed triangle mesh: ``vertices (V, 3)``, ``faces (F, 3)`` wound outward, ``uv (V, 2)`` (v upward).
 
     x to the right of the photo, y up, z towards the camera, in pixels of the mask until scaled. Every vertex has one
-    texture coordinate, of the photo seen along z: the projection has no seams. ``facing (V,)`` is 1 where the surface looks
-    at the camera, 0 on the outline, -1 where the photo cannot show it.
+    texture coordinate, of the photo seen along z: the projection has no seams. ``facing (V,)`` is the cosine at which the
+    camera looks at the surface: 1 from straight before it, 0 on the outline, -1 where the photo cannot show it.
     """
 
     vertices: np.ndarray
@@ -35,8 +36,8 @@ class LiftedSurface:
     facing: np.ndarray
 
     def seen(self) -> np.ndarray:
-        """Return for each face (F,) whether the photo shows it: no corner looks away from the camera."""
-        return np.asarray(self.facing[self.faces].min(axis=1) > -_EDGE_ON)
+        """Return for each face (F,) whether the photo shows it: at no corner so askew that its pixels would be streaks."""
+        return np.asarray(self.facing[self.faces].min(axis=1) > GRAZING_COSINE)
 
     def moved(self, matrix: np.ndarray, offset: np.ndarray) -> LiftedSurface:
         """Return the surface under ``x -> matrix @ x + offset``; ``matrix`` must not mirror."""
