@@ -285,6 +285,18 @@ def test_a_can_seen_nearly_from_above_is_no_egg() -> None:
     assert fitted_or_lifted(None, _drawn(askew), "apple")
 
 
+def test_a_tin_with_its_shadow_and_letters_for_holes_is_no_cushion() -> None:
+    def tin(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        open_lid = (np.hypot(x + 0.1, y) < 0.25) | (np.hypot(x - 0.05, y + 0.05) < 0.25)
+        shadow = np.hypot(x - 0.12, y - 0.2) < 0.2
+        letters = (np.abs(x + 0.12) < 0.05) & (np.abs(y) < 0.03)
+        return np.asarray((open_lid | shadow) & ~letters)
+
+    with pytest.raises(Rejected, match="a can is a cylinder, and none has this outline from any side"):
+        from_photo(painted(tin), "tin")
+    assert from_photo(painted(tin), "toy").notes["primitive"] == "inflation"
+
+
 @pytest.mark.parametrize(
     ("name", "tall"),
     [("lemon", True), ("tomato", False)],

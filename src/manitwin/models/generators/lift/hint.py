@@ -66,13 +66,19 @@ def why_not_round(name: str | None, extents: np.ndarray) -> str | None:
     return None
 
 
+def is_cylinder(name: str | None) -> bool:
+    """Tell whether a name's category is a cylinder and nothing else."""
+    prior = lookup(name)
+    return prior is not None and prior.shape in _CYLINDERS
+
+
 def why_no_cylinder(name: str | None, silhouette: Mapping[str, float]) -> str | None:
     """Return why an outline of these scores is that of no such thing seen from the side, where its name says cylinder; else None.
 
     From the side a cylinder is a rectangle; an ellipse is its end, seen at an angle.
     """
     prior = lookup(name)
-    if prior is None or prior.shape not in _CYLINDERS:
+    if prior is None or not is_cylinder(name):
         return None
     if silhouette["rectangle_iou"] > ELLIPSE_IN_RECTANGLE or silhouette["ellipse_iou"] < LEAST_ELLIPSE_IOU:
         return None

@@ -13,7 +13,7 @@ from trimesh.visual import TextureVisuals
 from manitwin.errors import Rejected
 from manitwin.formats.glb import write_glb
 from manitwin.geometry.poses import GLTF_TO_OBJECT
-from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name, why_no_cylinder, why_not_round
+from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name, is_cylinder, why_no_cylinder, why_not_round
 from manitwin.models.generators.lift.lifting import DISC_ELLIPSE_IOU, Lifted, lift
 from manitwin.models.generators.lift.seen_corners import box_from_corner
 from manitwin.models.generators.lift.surface import unseen_share
@@ -101,11 +101,9 @@ def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) 
     except Rejected as error:
         if fitted is None:
             raise
-        residual = fitted.residual
         raise Rejected(
             error.reason,
-            f"{error.detail}; and no {fitted.category} that the template makes has this outline: overlap {residual.iou:.2f}"
-            f" (at least {LEAST_IOU}), outlines {residual.outline:.4f} of its length apart (at most {MOST_OUTLINE});"
+            f"{error.detail}; and no {fitted.category} that the template makes has this outline: {_how_far(fitted)};"
             " check the name and the cut-out",
             error.stage,
         ) from error
@@ -135,8 +133,23 @@ def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) 
     flat = lifted.notes["primitive"] == "inflation"  # knows nothing of the back
     if fitted is not None and flat and fitted.confidence >= LEAST_AGAINST_INFLATION:
         return from_fit(fitted, rgba, name)
+    if fitted is not None and flat and _is_round(fitted) and is_cylinder(name):
+        raise Rejected(
+            "generator_failed",
+            f"a {fitted.category} is a cylinder, and none has this outline from any side: {_how_far(fitted)};"
+            " check the name and the cut-out",
+            "generate",
+        )
     notes = lifted.notes if fitted is None else lifted.notes | {"poor_fit": notes_of(fitted)}
     return _lifted_job(lifted, notes)
+
+
+def _how_far(fitted: Fitted) -> str:
+    residual = fitted.residual
+    return (
+        f"overlap {residual.iou:.2f} (at least {LEAST_IOU}), outlines {residual.outline:.4f} of its length apart"
+        f" (at most {MOST_OUTLINE})"
+    )
 
 
 def _from_the_side(lifted: Lifted) -> bool:
