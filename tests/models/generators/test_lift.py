@@ -297,18 +297,16 @@ def test_a_tin_with_its_shadow_and_letters_for_holes_is_no_cushion() -> None:
     assert from_photo(painted(tin), "toy").notes["primitive"] == "inflation"
 
 
-@pytest.mark.parametrize(
-    ("name", "tall"),
-    [("lemon", True), ("tomato", False)],
-)
-def test_a_round_fruit_is_turned_about_the_axis_that_gives_its_usual_volume(name: str, tall: bool) -> None:
+@pytest.mark.parametrize(("name", "rests"), [("lemon", "lying"), ("tomato", "standing")])
+def test_a_round_fruit_is_turned_about_the_axis_that_gives_its_usual_volume(name: str, rests: str) -> None:
     around = np.linspace(0, 2 * math.pi, 200)
-    lying = list(zip(300 + 200 * np.cos(around), 300 + 155 * np.sin(around), strict=True))
-    lifted = lift(_drawn(lying), hint_from_name(name))
+    outline = list(zip(300 + 200 * np.cos(around), 300 + 155 * np.sin(around), strict=True))
+    lifted = lift(_drawn(outline), hint_from_name(name))
     _check_contract(lifted)
+    assert lifted.notes["primitive"] == "revolution" and lifted.notes["rests"] == rests
     width, height, depth = np.ptp(lifted.surface.vertices, axis=0)
-    assert width == pytest.approx(depth, abs=0.02)
-    assert (height > 1.15 * width) == tall
+    assert width == pytest.approx(1.0) and height < 0.8  # as in the photo
+    assert depth == pytest.approx(155 / 200 if rests == "lying" else 1.0, abs=0.03)
 
 
 @pytest.mark.parametrize(

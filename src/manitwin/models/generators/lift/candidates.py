@@ -34,6 +34,7 @@ LEAST_TURNED_IOU, LEAST_MIRROR_IOU = 0.92, 0.9
 _LONGER = 1.1
 _RIM_RADIUS, _SHARP_RIM = 0.93, 0.24
 """As much of a body's height has nearly the largest radius: 0.37 of an ellipsoid's, 0.2 of a lemon's turned the wrong way."""
+_LIKE_ENDS = 0.15  # how far the mean radii of both ends are apart, of the larger one
 _CLEARLY_NEARER = 0.1  # of the logarithm of a volume
 LEAST_TIP_ANGLE_DEG = 5.0
 STANDING_CUTS = (0.015, 0.03, 0.05, 0.08, 0.12)  # shares of the height tried for a flat base
@@ -145,7 +146,10 @@ def revolved(view: View, hint: ShapeHint) -> Made:
     rows, radii = profile(silhouette)
     third = len(radii) // 3
     # a thing that lies in the photo stands on its wider end
-    upside_down = abs(tilt) > 45 and radii[:third].mean() > radii[-third:].mean()
+    first, last = float(radii[:third].mean()), float(radii[-third:].mean())
+    upside_down = abs(tilt) > 45 and first > last
+    # neither end is the one that such a thing would stand on
+    lies = abs(tilt) > 45 and hint.stands is False and abs(first - last) < _LIKE_ENDS * max(first, last)
     rows, radii = trim_caps(rows, radii, base_at_top=upside_down)
     open_top = hint.container and not upside_down and radii[: max(3, len(radii) // 20)].mean() > 0.6 * radii.max()
     surface = revolve(silhouette, rows, radii, wall_px=WALL_SHARE * radii.max() if open_top else None)
@@ -154,7 +158,7 @@ def revolved(view: View, hint: ShapeHint) -> Made:
         surface = surface.moved(np.diag([-1.0, -1.0, 1.0]), np.zeros(3))
     least = UPRIGHT_TIP_ANGLE_DEG if abs(tilt) < UPRIGHT_TILT_DEG else TILTED_TIP_ANGLE_DEG
     stands = hint.stands if hint.stands is not None else tip_angle_deg(surface) >= least
-    if stands or silhouette.elongation < _COMPACT:
+    if stands or (silhouette.elongation < _COMPACT and not lies):
         return Made(surface, found, {"rests": "standing", "hollow": bool(open_top)})
     leaning = np.radians(tilt + (180 if upside_down else 0))
     turn = np.array([[np.cos(leaning), np.sin(leaning), 0], [-np.sin(leaning), np.cos(leaning), 0], [0, 0, 1]])
