@@ -276,6 +276,18 @@ def test_a_ball_with_its_mirror_image_is_no_ball() -> None:
         from_photo(beside, "golf ball")
 
 
+@pytest.mark.parametrize("degrees", [0, 20])
+def test_a_lemon_with_both_its_tips_lies_along_an_axis(degrees: float) -> None:
+    around = np.linspace(0, 2 * math.pi, 400)
+    reach = 170 + 60 * np.exp(-((np.sin(around) / 0.15) ** 2)) + 20 * np.cos(2 * around)  # a tip at each end
+    outline = list(zip(300 + reach * np.cos(around), 300 + reach * np.sin(around), strict=True))
+    lifted = lift(_drawn(_turned(outline, degrees)), hint_from_name("lemon"))
+    _check_contract(lifted)
+    assert (lifted.notes["primitive"], lifted.notes["rests"]) == ("revolution", "lying")
+    width, _, depth = np.ptp(lifted.surface.vertices, axis=0)
+    assert width == pytest.approx(1.0) and depth == pytest.approx(reach[100] / reach[0], abs=0.05)
+
+
 def test_a_can_seen_nearly_from_above_is_no_egg() -> None:
     around = np.linspace(0, 2 * math.pi, 200)
     askew = _turned(list(zip(300 + 140 * np.cos(around), 300 + 200 * np.sin(around), strict=True)), 14)

@@ -150,7 +150,8 @@ def revolved(view: View, hint: ShapeHint) -> Made:
     upside_down = abs(tilt) > 45 and first > last
     # neither end is the one that such a thing would stand on
     lies = abs(tilt) > 45 and hint.stands is False and abs(first - last) < _LIKE_ENDS * max(first, last)
-    rows, radii = trim_caps(rows, radii, base_at_top=upside_down)
+    if not lies:
+        rows, radii = trim_caps(rows, radii, base_at_top=upside_down)
     open_top = hint.container and not upside_down and radii[: max(3, len(radii) // 20)].mean() > 0.6 * radii.max()
     surface = revolve(silhouette, rows, radii, wall_px=WALL_SHARE * radii.max() if open_top else None)
     found = view.explained(_in_picture(surface, silhouette))
@@ -160,7 +161,7 @@ def revolved(view: View, hint: ShapeHint) -> Made:
     stands = hint.stands if hint.stands is not None else tip_angle_deg(surface) >= least
     if stands or (silhouette.elongation < _COMPACT and not lies):
         return Made(surface, found, {"rests": "standing", "hollow": bool(open_top)})
-    leaning = np.radians(tilt + (180 if upside_down else 0))
+    leaning = np.radians(90.0 * round((tilt + (180 if upside_down else 0)) / 90.0))  # along an axis of its frame
     turn = np.array([[np.cos(leaning), np.sin(leaning), 0], [-np.sin(leaning), np.cos(leaning), 0], [0, 0, 1]])
     lying = laid_round(surface.moved(turn, np.zeros(3)))
     return Made(lying, found, {"rests": "lying", "hollow": bool(open_top)})

@@ -61,7 +61,8 @@ def lift(rgba: np.ndarray, hint: ShapeHint) -> Lifted:
     photo = cv2.resize(crop.colours, (width, height), interpolation=cv2.INTER_AREA)
     view = View(crop, photo, turned_about(analyse_silhouette(crop.mask), hint))
     primitive, made = _explaining(view, hint)
-    surface = normalised(squared(made.surface) if made.notes["rests"] == "lying" else made.surface)
+    askew = primitive == "inflation" and made.notes["rests"] == "lying"
+    surface = normalised(squared(made.surface) if askew else made.surface)
     assert_solid(surface)
     notes = {
         "primitive": primitive,

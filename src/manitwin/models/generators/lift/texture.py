@@ -25,6 +25,10 @@ _SAMPLES, _ROUNDS = 4096, 10
 _AROUND_SHARE = 0.06  # of the longer side, a Gaussian's sigma: a letter with the ground around it
 _RING_SHARE = 0.03  # of the length along an axis: a line of text with its ground; a cap is higher
 _SOFT_SHARE = 0.008  # of the longer side: borders between two colours are no sharper
+_SOFT_RIM_SHARE = (
+    0.015  # of the longer side, a Gaussian's sigma: strokes of letters are lost, the shade of the side is not
+)
+_GRAZED_SHARE = 0.025  # of the longer side: so far inward a large round body is seen too much askew to show the photo
 _RIM_SHARE = 0.04  # of the longer side: how far the outline's colours reach inward
 
 
@@ -173,11 +177,13 @@ def _of_rings(photo: np.ndarray, mask: np.ndarray, axis: Silhouette) -> np.ndarr
 
 
 def _rim_difference(photo: np.ndarray, base: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Return what the photo's outline differs from ``base``, fading inward; constant outward."""
-    reach = _RIM_SHARE * max(mask.shape)
-    rim = mask & ~ndimage.binary_erosion(mask)
-    nearest = ndimage.distance_transform_edt(~rim, return_distances=False, return_indices=True)
-    spread = (photo - base)[nearest[0], nearest[1]]
-    difference = np.asarray(cv2.GaussianBlur(spread, (0, 0), 0.5 * reach))
+    """Return what the photo differs from ``base`` near the outline, softly, fading inward; as at the outline outward."""
+    side = max(mask.shape)
+    sigma = _SOFT_RIM_SHARE * side
+    inside = mask.astype(np.float32)
+    near = np.asarray(cv2.GaussianBlur(inside, (0, 0), sigma))
+    soft = cv2.GaussianBlur((photo - base) * inside[..., None], (0, 0), sigma) / np.maximum(near, 1e-3)[..., None]
+    nearest = ndimage.distance_transform_edt(~mask, return_distances=False, return_indices=True)
     depth = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
-    return difference * np.exp(-depth / reach)[..., None]
+    fading = np.exp(-np.maximum(depth - _GRAZED_SHARE * side, 0) / (_RIM_SHARE * side))
+    return np.asarray(soft[nearest[0], nearest[1]] * fading[..., None])
