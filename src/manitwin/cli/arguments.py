@@ -44,6 +44,7 @@ PLACES = frozenset(
         "verdicts",
         "export",
         "form",
+        "sheet",
         "static",
         "catalogue",
         "root",
