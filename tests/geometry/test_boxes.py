@@ -1,5 +1,3 @@
-"""None"""
-
 from __future__ import annotations
 
 import numpy as np
@@ -8,6 +6,7 @@ import trimesh
 
 from manitwin.geometry.boxes import (
     footprint,
+    measured_extents,
     oriented_bounding_box,
     separation_m,
     smallest_enclosing_circle,
@@ -126,3 +125,15 @@ def test_the_bound_is_never_above_the_distance() -> None:
         half = len(dense) // 2
         distance = min(np.linalg.norm(np.array(dense[half:]) - p, axis=1).min() for p in dense[:half])
         assert separation_m(one, other) <= distance + 0.05
+
+
+def test_a_mug_is_as_long_as_with_its_handle_and_a_bar_that_lies_askew_as_along_itself() -> None:
+    angle = np.linspace(0, 2 * np.pi, 200)
+    around = np.column_stack([0.041 * np.cos(angle), 0.041 * np.sin(angle)])
+    handle = np.array([[0.073, -0.008], [0.073, 0.008]])
+    mug = np.vstack([np.column_stack([np.vstack([around, handle]), np.full(202, z)]) for z in (0, 0.095)])
+    assert upright_extents(mug)[0] < 0.11
+    assert measured_extents(mug) == pytest.approx([0.114, 0.082, 0.095], abs=1e-4)
+    bar = np.array([[x, y, z] for x in (-0.15, 0.15) for y in (-0.05, 0.05) for z in (0, 0.05)])
+    turn = np.array([[np.cos(0.2), -np.sin(0.2)], [np.sin(0.2), np.cos(0.2)]])
+    assert measured_extents(np.column_stack([bar[:, :2] @ turn.T, bar[:, 2]])) == pytest.approx([0.3, 0.1, 0.05])

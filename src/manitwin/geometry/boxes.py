@@ -10,6 +10,9 @@ from scipy.spatial import ConvexHull
 
 from manitwin.geometry.poses import transform
 
+ASKEW_SHARE = 0.9
+"""Of the area along the axes: what fits a rectangle that is smaller than that lies at an angle to them."""
+
 
 def box_corners(half_extents_m: np.ndarray, box_to_frame: np.ndarray) -> np.ndarray:
     """Return the eight corners ``(8, 3)`` of a box at a pose ``(4, 4)``."""
@@ -60,6 +63,17 @@ def upright_extents(points: np.ndarray) -> np.ndarray:
     across = np.array([-along[1], along[0]])
     sides = sorted((float(np.ptp(points[:, :2] @ along)), float(np.ptp(points[:, :2] @ across))), reverse=True)
     return np.array([*sides, np.ptp(points[:, 2])])
+
+
+def measured_extents(points: np.ndarray) -> np.ndarray:
+    """Return the extents ``(3,)`` along X, Y and Z, of what lies askew those of ``upright_extents``.
+
+    A round thing with a handle is as long as from the handle to the far side, though a rectangle that is a little smaller stands
+    askew around it.
+    """
+    along_axes, upright = np.ptp(np.asarray(points, dtype=float), axis=0), upright_extents(points)
+    is_askew = upright[0] * upright[1] < ASKEW_SHARE * along_axes[0] * along_axes[1]
+    return upright if is_askew else along_axes
 
 
 def turn_to_sides(points: np.ndarray) -> tuple[float, float]:
