@@ -11,7 +11,7 @@ from PIL import Image
 
 from manitwin.config import BuildConfig, NamingConfig
 from manitwin.engine.stage import Draft
-from manitwin.pipeline.guesses import filled_checks, naming_checks
+from manitwin.pipeline.guesses import naming_checks, template_checks
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.naming import NameStage, cut_view, known_length_m
 from manitwin.pipeline.object_state import object_name
@@ -73,7 +73,7 @@ def test_the_finding_names_the_likeliest_and_the_remedy(tmp_path: Path) -> None:
     made.fields["generation"] = {"known": {"name": "mug"}, "notes": {"filled": filled}}
     (told,) = naming_checks(made)
     assert told.passed and told.message == "vlm:eyes-1 takes it for a mug; --name overrules it"
-    (marked,) = filled_checks(made)
+    (marked,) = template_checks(made)
     assert not marked.passed and marked.message == "vlm:eyes-1 filled in the template mug; width 9, but ..."
     assert unsure.passed is False and "cannot tell what it is (orange 90 %" in unsure.message
 
@@ -81,10 +81,10 @@ def test_the_finding_names_the_likeliest_and_the_remedy(tmp_path: Path) -> None:
 def test_words_of_a_text_that_say_nothing_to_its_template_are_a_finding() -> None:
     notes = {"unused_words": ["vintage"]}
     made = Draft("t", Item(file=None, text="a vintage mug"), seed=0, fields={"generation": {"notes": notes}})
-    (told,) = filled_checks(made)
+    (told,) = template_checks(made)
     assert told.passed is False and told.message is not None and "'vintage'" in told.message
     notes["unused_words"] = []
-    assert filled_checks(made) == []
+    assert template_checks(made) == []
 
 
 @pytest.mark.parametrize(

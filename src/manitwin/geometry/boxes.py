@@ -65,7 +65,7 @@ def upright_extents(points: np.ndarray) -> np.ndarray:
     return np.array([*sides, np.ptp(points[:, 2])])
 
 
-def measured_extents(points: np.ndarray) -> np.ndarray:
+def extents_along_sides(points: np.ndarray) -> np.ndarray:
     """Return the extents ``(3,)`` along X, Y and Z, of what lies askew those of ``upright_extents``.
 
     A round thing with a handle is as long as from the handle to the far side, though a rectangle that is a little smaller stands

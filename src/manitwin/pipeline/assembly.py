@@ -21,10 +21,10 @@ from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.pipeline.grasps import GRASP_POINTS
 from manitwin.pipeline.guesses import (
     OF_NO_NAME,
-    filled_checks,
     likeliest_words,
     naming_checks,
     size_checks,
+    template_checks,
     unsaid_size_words,
 )
 from manitwin.pipeline.item import Item
@@ -113,7 +113,7 @@ def _provenance(stage: Stage, draft: Draft[Item]) -> dict[str, Any]:
 
 def _checks_so_far(draft: Draft[Item]) -> list[dict[str, Any]]:
     """Return the checks of a twin that was rejected; those of an accepted one take their place."""
-    made = [*rehearsal_checks(draft), *naming_checks(draft), *size_checks(draft), *filled_checks(draft)]
+    made = [*rehearsal_checks(draft), *naming_checks(draft), *size_checks(draft), *template_checks(draft)]
     return [*(check.model_dump() for check in made), *draft.fields.get("gate", {}).get("checks", [])]
 
 

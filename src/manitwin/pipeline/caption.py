@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from manitwin.config import NO_SETTINGS, Resource
 from manitwin.engine.stage import Draft
-from manitwin.geometry.boxes import measured_extents
+from manitwin.geometry.boxes import extents_along_sides
 from manitwin.models.annotators.photo_light import PhotoLight, light_of_photos
 from manitwin.models.annotators.protocol import Annotator
 from manitwin.pipeline.human_corrections import corrected_language
@@ -53,7 +53,7 @@ class CaptionStage:
         subject = read_scaled_subject(draft, known_as=draft.field("called"))
         subject = replace(subject, photographed=is_photographed(draft), light=light_of_texture(draft))
         # as a ruler shows them: a mesh may lie at any angle to its axes
-        extents_m = measured_extents(subject.solid.vertices)
+        extents_m = extents_along_sides(subject.solid.vertices)
         language = self._annotator.describe(subject, material, extents_m)
         return {"language": corrected_language(language, draft).model_dump()}
 

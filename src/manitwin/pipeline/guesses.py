@@ -80,15 +80,22 @@ def filled_in(draft: Draft) -> dict[str, Any] | None:
     return cast(dict[str, Any] | None, generation.get("notes", {}).get("filled"))
 
 
-def filled_checks(draft: Draft) -> list[Check]:
-    """Return what a model said of the template that a thing was made of, else words of a text that said nothing to it, if any."""
+def template_checks(draft: Draft) -> list[Check]:
+    """Return what is to be said of how a template was filled in: by a model, else by the words of a text."""
     filled = filled_in(draft)
-    if filled is None:
-        unused = (draft.fields.get("generation") or {}).get("notes", {}).get("unused_words", [])
-        message = f"the template knows nothing of {', '.join(map(repr, unused))}: the thing was made without"
-        return (
-            [Check(name="text_understood", passed=False, value=float(len(unused)), message=message)] if unused else []
-        )
+    return _unused_words_checks(draft) if filled is None else [_filled_check(filled)]
+
+
+def _filled_check(filled: dict[str, Any]) -> Check:
     said = [] if filled["category"] is None else [f"{filled['source']} filled in the template {filled['category']}"]
     message = "; ".join([*said, *filled["findings"]])
-    return [Check(name="template_filled", passed=not filled["findings"], value=filled["category"], message=message)]
+    return Check(name="template_filled", passed=not filled["findings"], value=filled["category"], message=message)
+
+
+def _unused_words_checks(draft: Draft) -> list[Check]:
+    """Return the failed check of a text with words that say nothing to its template; none for all others."""
+    unused = (draft.fields.get("generation") or {}).get("notes", {}).get("unused_words", [])
+    if not unused:
+        return []
+    message = f"the template knows nothing of {', '.join(map(repr, unused))}: the thing was made without"
+    return [Check(name="text_understood", passed=False, value=float(len(unused)), message=message)]

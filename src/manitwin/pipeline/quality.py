@@ -7,7 +7,7 @@ from typing import Any
 
 from manitwin.engine.stage import Draft
 from manitwin.pipeline.grasps import GRASP_POINTS
-from manitwin.pipeline.guesses import OF_NO_NAME, filled_checks, naming_checks, size_checks
+from manitwin.pipeline.guesses import OF_NO_NAME, naming_checks, size_checks, template_checks
 from manitwin.twin.record_values import Check
 from manitwin.twin.shares import wilson_interval
 
@@ -51,7 +51,7 @@ def quality_checks(draft: Draft) -> list[dict[str, Any]]:
         )
     checks += size_checks(draft)
     checks += _unseen(draft)
-    checks += filled_checks(draft)
+    checks += template_checks(draft)
     checks += photos_checks(draft)
     findings = draft.field("geometry")["findings"]
     checks.append(

@@ -55,12 +55,11 @@ def review_cutouts(
         out_console.print(f"{len(photos)} cut-outs are doubted")
         raise typer.Exit(0)
     with WatchedRun("photos", dataset) as watched:
-        done = confirm(root, accept, name, jobs=jobs, **watched.callbacks)
-    assert done.run is not None, "something was accepted"
-    counts = done.run.counts_of_given
+        confirmed, run = confirm(root, accept, name, jobs=jobs, **watched.callbacks)
+    counts = run.counts_of_given
     told = ", ".join(f"{counts[state]} {state}" for state in ("accepted", "rejected", "failed") if counts.get(state))
-    out_console.print(f"{len(done.photos)} cut-outs are confirmed by {name}: {told}")
-    unfinished = bool(done.run.open or counts.get("failed"))
+    out_console.print(f"{len(confirmed)} cut-outs are confirmed by {name}: {told}")
+    unfinished = bool(run.open or counts.get("failed"))
     if unfinished or counts.get("rejected"):
         print_error(f"`manitwin status {dataset}` says why not all are accepted")
     raise typer.Exit(4 if unfinished else 3 if counts.get("rejected") else 0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Unpack
 
@@ -43,14 +43,6 @@ class DoubtedPhoto:
     item: Item
     detail: str
     sha256: str
-
-
-@dataclass(frozen=True)
-class Confirmed:
-    """What came of cut-outs that were confirmed: the items by twin id, and the run."""
-
-    photos: list[DoubtedPhoto] = field(default_factory=list)
-    run: RunReport | None = None
 
 
 def doubted_photos(root: DatasetRoot) -> list[DoubtedPhoto]:
@@ -98,8 +90,8 @@ def confirm(
     *,
     jobs: int | None = None,
     **options: Unpack[RunOptions],
-) -> Confirmed:
-    """Build the photos whose cut-outs an ``annotator`` has looked at and found right.
+) -> tuple[list[DoubtedPhoto], RunReport]:
+    """Build the photos whose cut-outs an ``annotator`` has looked at and found right; return them, and what the run did.
 
     ``twin_ids`` may be shortened to any beginning that only one of them has. Raises UsageError naming those that have no doubted
     cut-out, before anything is written, and where another run is at work there.
@@ -110,9 +102,7 @@ def confirm(
         said = amendments.setdefault(PhotoStage.name, {})
         said[CONFIRMED] = {"sha256": photo.sha256, "source": f"{HUMAN}{annotator}"}
         write_amendments(root, photo.twin_id, amendments)
-    if not chosen:
-        return Confirmed()
-    return Confirmed(chosen, made_again(root, ((each.number, each.item) for each in chosen), jobs, **options))
+    return chosen, made_again(root, ((each.number, each.item) for each in chosen), jobs, **options)
 
 
 def _chosen(root: DatasetRoot, photos: Sequence[DoubtedPhoto], twin_ids: Iterable[str]) -> list[DoubtedPhoto]:

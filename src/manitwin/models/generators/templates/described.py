@@ -37,26 +37,12 @@ RELATIVE = {
     "giant": 1.0,
 }
 """Where in the interval of a category's sizes a word puts a thing: 0 the least, 1 the largest."""
-ARTICLES = frozenset(
-    {
-        "a",
-        "an",
-        "the",
-        "one",
-        "some",
-        "its",
-        "very",
-        "and",
-        "of",
-        "colored",
-        "coloured",
-        "made",
-        "with",
-        "color",
-        "colour",
-    }
-    | {"that", "which", "is", "it", "out", "entirely", "all", "solid", "finish", "painted", "in", "for", "from", ","}
-    | {"please", "i", "want", "need", "make", "create", "generate", "build", "me", "my"}
+FILLER_WORDS = frozenset(
+    (
+        *("a", "an", "the", "one", "some", "its", "very", "and", "of", "colored", "coloured", "made", "with", "color"),
+        *("colour", "that", "which", "is", "it", "out", "entirely", "all", "solid", "finish", "painted", "in", "for"),
+        *("from", ",", "please", "i", "want", "need", "make", "create", "generate", "build", "me", "my"),
+    )
 )
 """Words that say nothing themselves."""
 PURPOSE = frozenset(
@@ -196,7 +182,7 @@ def _read(words: Sequence[str], of: Prior | None) -> tuple[list[_Said], list[str
             said.append(found)
             at = found.end
             continue
-        if words[at] not in ARTICLES and words[at] not in SHADES:
+        if words[at] not in FILLER_WORDS and words[at] not in SHADES:
             left.append(words[at])
         at += 1
     return said, left
@@ -215,8 +201,8 @@ def described_behind(words: Sequence[str]) -> Described:
 def _about(words: Sequence[str]) -> tuple[list[str], list[str]]:
     """Return the words behind a name that speak of it, and those that speak of what is in it, or what it is for."""
     cut = next((at for at, word in enumerate(words) if word in PURPOSE), len(words))
-    about, beside = list(words[:cut]), [word for word in words[cut:] if word not in ARTICLES | PURPOSE]
-    telling = [word for word in about if word not in ARTICLES]
+    about, beside = list(words[:cut]), [word for word in words[cut:] if word not in FILLER_WORDS | PURPOSE]
+    telling = [word for word in about if word not in FILLER_WORDS]
     if telling and about[0] in ("of", "in"):
         holds = about[0] == "of" and telling[-1] in _CONTENTS
         if holds or not is_described(telling[-1]):

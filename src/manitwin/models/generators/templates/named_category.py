@@ -10,7 +10,7 @@ from itertools import pairwise
 
 from manitwin.errors import UsageError
 from manitwin.models.annotators.priors import Prior, load_priors, lookup, named
-from manitwin.models.generators.templates.described import ARTICLES, PURPOSE, is_described, own_materials
+from manitwin.models.generators.templates.described import FILLER_WORDS, PURPOSE, is_described, own_materials
 from manitwin.models.generators.templates.looks import look_of, material_of
 from manitwin.models.generators.templates.template import Template
 
@@ -75,10 +75,10 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
     other: Prior | None = None
     for end in range(len(words), 0, -1):
         tail = words[end:]
-        if tail and tail[0] not in _BEHIND and not all(word in ARTICLES or is_described(word) for word in tail):
+        if tail and tail[0] not in _BEHIND and not all(word in FILLER_WORDS or is_described(word) for word in tail):
             continue
         for start in range(end):
-            if words[start] in ARTICLES or "," in words[start:end] or (start > parted and not shown):
+            if words[start] in FILLER_WORDS or "," in words[start:end] or (start > parted and not shown):
                 continue
             phrase = " ".join(words[start:end])
             prior = named(phrase) or named(phrase.replace(" ", ""))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from manitwin.errors import UsageError
 from manitwin.models.annotators.priors import Prior, load_priors
 from manitwin.models.generators.templates.described import (
-    ARTICLES,
+    FILLER_WORDS,
     RELATIVE,
     Described,
     Wish,
@@ -153,7 +153,7 @@ def _features(text: str, template: Template) -> list[tuple[str, Described]]:
     features: list[tuple[str, Described]] = []
     before: list[str] = []
     for phrase in re.split(r"( and an? |^an? | and | , | with )", f" {text} ".replace("  ", " ")):
-        words = [word for word in plain_words(phrase.split()) if word not in ARTICLES]
+        words = [word for word in plain_words(phrase.split()) if word not in FILLER_WORDS]
         if not words:
             continue
         names = [at for at, word in enumerate(words) if not is_described(word) or word in template.slots]
