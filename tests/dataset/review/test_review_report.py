@@ -101,6 +101,15 @@ def test_verdicts_of_files_are_added_up(place: Path, tmp_path: Path, suffix: str
     assert "3 of 4      75.0% [30.1%, 95.4%]" in done.stderr and "100.0%" in done.stderr
 
 
+def test_a_sample_of_more_than_there_is_says_that_it_is_all(place: Path) -> None:
+    count = len(accepted(place))
+    assert (
+        f"all that were accepted; the sample may have {count + 1}"
+        in run("review", "sample", place, "--sample", count + 1).output
+    )
+    assert "all that were accepted" not in run("review", "sample", place, "--sample", count).output
+
+
 def test_export_has_a_row_an_answer_in_three_formats_and_csv_comes_back_as_it_was(
     made: Path, place: Path, tmp_path: Path
 ) -> None:

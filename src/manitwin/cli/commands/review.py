@@ -129,6 +129,8 @@ def review_sample(
     plan, strata = draw_plan(dataset, sample, seed, overlap)
     twice = sum(plan.wanted(twin_id) > 1 for twin_id in plan.twins)
     out_console.print(f"{len(plan.twins)} twins of {len(strata)} categories, {twice} of them for two annotators")
+    if len(plan.twins) < sample:
+        out_console.print(f"these are all that were accepted; the sample may have {sample}")
     for file, rows in write_forms(dataset, plan, form, annotator or []):
         out_console.print(f"{file}: {rows} rows to fill in; `manitwin review import {dataset} {file}` reads them")
 
