@@ -83,6 +83,17 @@ def test_shared_texture_is_stored_once() -> None:
     assert len(_tree(two)["images"]) == len(_tree(one)["images"]) == 2
 
 
+def test_textures_of_one_size_are_told_apart_by_their_pixels() -> None:
+    first, other = _texture(), Image.fromarray(255 - np.asarray(_texture()))
+    parts = [_parts(each)[0] for each in (first, other, first.copy(), other.copy(), first)]
+    tree = _tree(write_glb(parts))
+    materials = [tree["materials"][mesh["primitives"][0]["material"]] for mesh in tree["meshes"]]
+    textures = [each["pbrMetallicRoughness"]["baseColorTexture"]["index"] for each in materials]
+    sources = [tree["textures"][each]["source"] for each in textures]
+    assert sources == [sources[0], sources[1]] * 2 + [sources[0]] and sources[0] != sources[1]
+    assert len(tree["images"]) == 3
+
+
 @pytest.mark.parametrize("size", [(128, 64), (100, 36)])
 def test_large_textures_are_scaled_down(size: tuple[int, int]) -> None:
     data = write_glb(_parts(_texture(size)), max_texture_size=32)

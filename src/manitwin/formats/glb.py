@@ -89,7 +89,9 @@ class _Document:
         self._chunks: list[bytes] = []
         self._length = 0
         self._known: dict[str, int] = {}
-        self._digests: dict[int, tuple[Image.Image, str]] = {}  # many materials may show one image
+        self._numbers: dict[int, tuple[Image.Image, int]] = {}  # many materials may show one image
+        self._first: dict[str, Image.Image] = {}  # by mode and size
+        self._digests: dict[str, dict[str, int]] = {}  # by mode and size
 
     def add(self, part: trimesh.Trimesh, name: str) -> None:
         """Append a part as a mesh of one primitive under a node of its own."""
@@ -184,15 +186,28 @@ class _Document:
         return self._known[key]
 
     def _texture(self, image: Image.Image, kind: Literal["color", "data"], with_alpha: bool) -> int:
-        if id(image) not in self._digests:
-            self._digests[id(image)] = image, hashlib.sha256(image.tobytes()).hexdigest()
-        digest = self._digests[id(image)][1]
-        key = f"texture:{kind}:{with_alpha}:{image.mode}:{image.size}:{digest}"
+        number = self._number(image)
+        key = f"texture:{kind}:{with_alpha}:{number}"
         if key not in self._known:
             data, mime = _encoded(_fitted(image, self._max_texture_size), kind, with_alpha)
             source = self._append("images", {"bufferView": self._view(data), "mimeType": mime})
             self._known[key] = self._append("textures", {"source": source})
         return self._known[key]
+
+    def _number(self, image: Image.Image) -> int:
+        """Return the number that images of the same pixels share, which are compared only where a second has mode and size."""
+        if id(image) not in self._numbers:
+            number, group = len(self._numbers), f"{image.mode}:{image.size}"
+            first = self._first.setdefault(group, image)
+            if first is not image:  # hashing the pixels of a scan takes longer than writing all else of it
+                known = self._digests.setdefault(group, {_digest(first): self._numbers[id(first)][1]})
+                number = known.setdefault(_digest(image), number)
+            self._numbers[id(image)] = image, number
+        return self._numbers[id(image)][1]
+
+
+def _digest(image: Image.Image) -> str:
+    return hashlib.sha256(image.tobytes()).hexdigest()
 
 
 def _fitted(image: Image.Image, longest: int) -> Image.Image:
