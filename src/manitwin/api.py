@@ -64,7 +64,7 @@ def build(
     under another one, the inputs that are given are (where none is given, all that are there), from the first stage that
     it changes.
 
-    ``name``, ``units`` m|cm|mm|auto, ``up`` y|z|auto, ``license`` and ``attribution`` hold for all inputs whose manifest row
+    ``name``, ``units`` m|cm|mm|none|auto, ``up`` y|z|auto, ``license`` and ``attribution`` hold for all inputs whose manifest row
     does not say otherwise; of each text ``count`` variations are made, which differ in what it leaves open. With ``views`` the
     inputs are photos of one thing, which becomes one twin; ``turns_deg`` is the camera's turn about the vertical in each,
     counter-clockwise seen from above. With ``strict`` a manifest's column that nobody knows is an error. ``config`` None: what

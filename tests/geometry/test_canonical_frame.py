@@ -5,7 +5,7 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from manitwin.geometry.canonical_frame import UpChoice, choose_up, decide_unit, object_frame
+from manitwin.geometry.canonical_frame import UpChoice, choose_up, object_frame
 from manitwin.geometry.poses import transform_points
 
 
@@ -105,49 +105,6 @@ def test_y_up_maps_to_z_up_without_spinning() -> None:
     block = trimesh.creation.box(extents=(0.05, 0.12, 0.08))
     choice = choose_up(block, file_up="y")
     np.testing.assert_allclose(choice.rotation, [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("longest", "given", "factor", "metric", "source"),
-    [
-        (0.24, {}, 1.0, True, "assumed"),
-        (240.0, {}, 0.001, True, "guessed"),
-        (0.24, {"file_unit_m": 1.0}, 1.0, True, "declared"),
-        (24.0, {"file_unit_m": 0.01}, 0.01, True, "declared"),
-        (240.0, {"user": "mm"}, 0.001, True, "user"),
-        (5.0, {"user": "m"}, 1.0, True, "user"),
-        (12.0, {}, 0.001, False, "guessed"),  # 12 mm, 12 cm or 12 inches
-        (12.0, {"expected_m": (0.1, 0.14)}, 0.01, True, "guessed"),
-        (1.0, {"expected_m": (0.08, 0.13)}, 1.0, False, "unknown"),  # a mug scaled to the unit cube
-        (1.0, {}, 1.0, False, "unknown"),
-        (1.0, {"expected_m": (0.9, 1.5)}, 1.0, True, "assumed"),  # a walking stick
-        (2.0, {"file_unit_m": 1.0}, 1.0, False, "unknown"),  # -1..1, as generators write it
-        (0.7, {"file_unit_m": 1.0, "expected_m": (0.08, 0.13)}, 1.0, True, "declared"),
-        (0.7, {"expected_m": (0.08, 0.13)}, 1.0, False, "unknown"),
-    ],
-)
-def test_units(longest: float, given: dict, factor: float, metric: bool, source: str) -> None:
-    unit = decide_unit(longest, **given)
-    assert (unit.factor, unit.metric, unit.source) == (factor, metric, source)
-    assert (unit.finding is None) == (source in ("user", "declared", "assumed"))
-
-
-def test_a_finding_says_a_size_only_where_it_is_used() -> None:
-    one, several = decide_unit(240.0), decide_unit(12.0)
-    assert one.finding is not None and one.finding.endswith("read as millimetres: 0.24 m")
-    assert several.finding is not None and "read as" not in several.finding
-    assert "millimetres, centimetres, inches would all fit: its scale was not believed; give --units" in several.finding
-
-
-def test_size_that_no_unit_makes_plausible_is_kept_for_the_gate_to_refuse() -> None:
-    unit = decide_unit(1e6)
-    assert (unit.factor, unit.metric) == (1.0, True)
-    assert unit.finding is not None and "no usual unit" in unit.finding
-
-
-def test_finding_names_the_unit_that_was_taken() -> None:
-    finding = decide_unit(240.121).finding
-    assert finding is not None and "millimetres" in finding and "0.24 m" in finding
 
 
 @pytest.mark.parametrize("turn_deg", [(90, 0, 0), (0, 90, 0), (0, -90, 0)])

@@ -32,7 +32,8 @@ REMEDIES = {
     "absurd_size": "say the unit: --units m, cm or mm, or a column units",
     "poor_quality": "another photo, or another generator (--generator, see docs/generators.md)",
     "implausible_mass": "check --units and --name, or the columns units and name",
-    "implausible_size": "check --units and --name, or the columns units and name",
+    "implausible_size": "check --units and --name, or the columns units and name; --units none where no unit is right, as of"
+    " game assets: it is then made as large as is usual of what it is called",
     "too_wide": "a gripper that opens wider (--gripper, see docs/grippers.md)",
     "too_thin": "a gripper for thin things, such as a suction cup (--gripper, see docs/grippers.md)",
     "no_proposal": "another gripper (--gripper, see docs/grippers.md); hands may not reach such a thing at all",

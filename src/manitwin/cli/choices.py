@@ -89,7 +89,7 @@ def _shipped(*folders: str) -> Callable[[], Iterable[str]]:
     return find
 
 
-UNITS = Choices("units", _of("m", "cm", "mm", "auto"))
+UNITS = Choices("units", _of("m", "cm", "mm", "none", "auto"))
 EVALUATIONS = Choices("evaluation", _of("annotations", "generation", "grasps"))
 UP = Choices("up", _of("y", "z", "auto"))
 SECOND_OPINIONS = Choices("second opinion", _of("all", "sample"))

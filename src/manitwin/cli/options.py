@@ -22,7 +22,7 @@ LARGEST_SEED = 2**63 - 1
 Text = Annotated[
     list[str] | None, typer.Option("--text", help="A thing to make from words alone; may be repeated.", metavar="WORDS")
 ]
-Units = Annotated[str, choices.UNITS.option(help="Units of meshes: m, cm, mm or auto.")]
+Units = Annotated[str, choices.UNITS.option(help="Units of meshes: m, cm, mm, none (no lengths) or auto.")]
 Up = Annotated[str, choices.UP.option(help="Up axis of meshes: y, z or auto.")]
 License = Annotated[str | None, typer.Option(help="Licence of the inputs (SPDX).")]
 Attribution = Annotated[str | None, typer.Option(help="Whom to credit for the inputs.")]

@@ -17,6 +17,8 @@ from manitwin.formats.bounded_file import open_regular
 from manitwin.formats.packed_source import MAX_KEPT_BYTES
 from manitwin.formats.printable import printable_line
 from manitwin.formats.source_files import side_files
+from manitwin.geometry.length_unit import StatedUnit
+from manitwin.twin.import_record import IMPORTED_MESH
 from manitwin.twin.store import sha256_of_json
 
 ID_DIGITS = 16
@@ -40,7 +42,7 @@ class Item(Payload):
     file: str | None
     text: str | None = None
     name: str | None = None
-    units: Literal["m", "cm", "mm", "auto"] = "auto"
+    units: StatedUnit = "auto"
     up: Literal["y", "z", "auto"] = "auto"
     license: str | None = None
     attribution: str | None = None
@@ -56,10 +58,16 @@ class Item(Payload):
 
     @property
     def title(self) -> str:
-        """The name of the file and the number of further photos, or the begin of the text, with the number of a variation."""
+        """The name of the file and the number of further photos, or the begin of the text, with the number of a variation.
+
+        The mesh of every imported asset has the same name: it is told by its folder.
+        """
         if self.file:
+            path = Path(self.file)
+            if self.given is not None and path.name == IMPORTED_MESH:
+                return path.parent.name or path.name
             more = f" and {len(self.views)} more" if self.views else ""
-            return f"{Path(self.file).name}{more}"
+            return f"{path.name}{more}"
         number = f" ({self.variation + 1})" if self.variation else ""
         return f"'{(self.text or '')[:40]}'{number}"
 

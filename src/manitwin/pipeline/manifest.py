@@ -19,6 +19,7 @@ from manitwin.formats.json_file import parse_json
 from manitwin.formats.output_folder import require_writable_folder
 from manitwin.formats.printable import printable_line
 from manitwin.formats.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES
+from manitwin.geometry.length_unit import StatedUnit
 from manitwin.pipeline.folder_listing import FolderListing, list_folder
 from manitwin.pipeline.inspection import imported
 from manitwin.pipeline.item import Item
@@ -36,7 +37,6 @@ _LINES = re.compile(r"[\r\n\t\u2028\u2029]")
 COLUMNS = ("file", "text", "name", "units", "up", "license", "attribution", "group", "turn_deg")
 _KNOWN = frozenset(COLUMNS)
 
-Units = Literal["m", "cm", "mm", "auto"]
 Up = Literal["y", "z", "auto"]
 Refusal = Callable[[Item], str | None]
 
@@ -235,14 +235,14 @@ def _item(
             what = "no file" if os.path.exists(path) else "not there"
             raise UsageError(f"{where}: {shortened(path)} is {what}; paths are absolute or relative to the manifest")
         file = _resolved(path)
-    for key, kind in (("units", Units), ("up", Up)):
+    for key, kind in (("units", StatedUnit), ("up", Up)):
         if values[key] not in get_args(kind):
             raise UsageError(f"{where}: {choose_from(key, str(values[key]), get_args(kind))}")
     return Item(
         file=file,
         text=text,
         name=values["name"] or None,
-        units=cast(Units, values["units"]),
+        units=cast(StatedUnit, values["units"]),
         up=cast(Up, values["up"]),
         license=values["license"],
         attribution=values["attribution"],

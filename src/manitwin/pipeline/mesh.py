@@ -19,7 +19,8 @@ from manitwin.formats.meshes.repaired import repaired_parts
 from manitwin.formats.meshes.source import MeshLimits
 from manitwin.formats.meshes.textures import bake_transform
 from manitwin.formats.printable import printable_line
-from manitwin.geometry.canonical_frame import LengthUnit, UpChoice, choose_up, decide_unit, object_frame
+from manitwin.geometry.canonical_frame import UpChoice, choose_up, object_frame
+from manitwin.geometry.length_unit import LengthUnit, decide_unit
 from manitwin.geometry.poses import OBJECT_TO_GLTF
 from manitwin.geometry.repair.cascade import RepairResult, repair
 from manitwin.geometry.repair.components import connected_parts
@@ -41,7 +42,7 @@ class MeshStage:
     settings: MeshConfig
 
     name: ClassVar[str] = "mesh"
-    version: ClassVar[str] = "5"
+    version: ClassVar[str] = "6"
     reads: ClassVar[tuple[str, ...]] = (f"{_GENERATED}?", "generation?", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry")
     needs: ClassVar[Resource] = "cpu"
@@ -150,7 +151,9 @@ def _unit(file: MeshFile, draft: Draft[Item], generated: bool, prior: Prior | No
         metric = bool(draft.field("generation").get("metric", False))
         return LengthUnit(file.unit_m or 1.0, metric, "declared" if metric else "unknown", None)
     usual = None if prior is None else (prior.longest_axis_m.low, prior.longest_axis_m.high)
-    return decide_unit(longest, user=draft.payload.units, file_unit_m=file.unit_m, expected_m=usual)
+    return decide_unit(
+        longest, user=draft.payload.units, file_unit_m=file.unit_m, expected_m=usual, file_format=file.format
+    )
 
 
 def _soup(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
