@@ -24,7 +24,7 @@ def one_line(text: str) -> str:
     [
         (("build", "nothing_here.png", "-o", "OUT"), "nothing_here.png: not there"),
         (("build", "FILE"), "give a folder or URL with -o"),
-        (("build", "FILE", "-o", "OUT", "--units", "inch"), "Valid: auto, cm, m, mm"),
+        (("build", "FILE", "-o", "OUT", "--units", "inch"), "Valid: auto, cm, m, mm, none"),
         (("build", "FILE", "-o", "OUT", "--jobs", "0"), "jobs is 0"),
         (("build", "FILE", "-o", "FILE"), "give a folder"),
         (("build", "FILE", "-o", "OUT", "--config", "none.toml"), "none.toml: not there"),

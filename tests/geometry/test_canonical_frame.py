@@ -123,3 +123,37 @@ def test_what_lies_and_is_not_round_stays_as_its_format_says() -> None:
     handle = trimesh.creation.box([0.2, 0.03, 0.02], transform=trimesh.transformations.translation_matrix([0.21, 0, 0]))
     pan = trimesh.boolean.union([body, handle], engine="manifold")
     assert choose_up(pan, file_up="z", stands=True).turned_deg < 10
+
+
+def _hollow_brick() -> trimesh.Trimesh:
+    """A toy brick of 64 x 32 x 19 mm, open below."""
+    outside = trimesh.creation.box(extents=(0.064, 0.032, 0.019))
+    inside = trimesh.creation.box(extents=(0.061, 0.029, 0.019))
+    return trimesh.boolean.difference([outside, inside.apply_translation((0, 0, -0.0015))], engine="manifold")
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"),
+    [
+        ({"opens_up": False, "stands": True}, True),
+        ({"file_up": "z"}, True),  # nobody has named it, but its format says which side is up
+        ({}, False),
+        ({"file_up": "z", "opens_up": True}, False),  # a cup stands on its rim in no file that means it
+    ],
+)
+def test_a_thing_that_is_hollow_from_below_is_not_turned_over(given: dict, kept: bool) -> None:
+    choice = choose_up(_hollow_brick(), **given)
+    assert choice.turned_deg == pytest.approx(0.0 if kept else 180.0, abs=0.1), choice.reason
+
+
+def test_a_brick_of_a_y_up_file_without_a_rule_keeps_its_opening_below() -> None:
+    brick = _turned(_hollow_brick(), (-90, 0, 0))
+    stood = _stood(brick, choose_up(brick, stands=True, opens_up=False))
+    assert stood.center_mass[2] > stood.extents[2] / 2, "its top plate is the heavy end"
+
+
+def test_a_thing_that_stands_and_is_upside_down_in_its_file_is_turned_over() -> None:
+    cone = _turned(trimesh.creation.cone(radius=0.02, height=0.12, sections=32), (180, 0, 0))
+    standing, unknown = choose_up(cone, stands=True), choose_up(cone)
+    assert standing.turned_deg == pytest.approx(180.0, abs=0.1) and "upside down" in standing.reason
+    assert unknown.turned_deg < 150

@@ -27,7 +27,13 @@ from manitwin.geometry.length_unit import decide_unit
         (60.0, {"file_format": "stl"}, 0.001, True, "guessed"),  # 60 cm would fit, but STL is in millimetres
         (60.0, {"file_format": "obj"}, 0.001, False, "guessed"),
         (9.5, {"file_format": "stl"}, 0.001, False, "guessed"),
-        (48.0, {"expected_m": (0.02, 0.38), "file_format": "stl"}, 0.001, True, "guessed"),  # a chess piece, no garden one
+        (
+            48.0,
+            {"expected_m": (0.02, 0.38), "file_format": "stl"},
+            0.001,
+            True,
+            "guessed",
+        ),  # a chess piece, no garden one
         (3.7, {"expected_m": (0.08, 0.13)}, 0.0254, True, "guessed"),  # a mug in inches
         (1.8, {"expected_m": (0.05, 0.5)}, 0.0254, False, "guessed"),  # a thing of any size, and as likely 1.8 m long
         (0.89, {"file_unit_m": 1.0, "user": "none"}, 1.0, False, "user"),

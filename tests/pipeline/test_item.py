@@ -41,3 +41,9 @@ def test_a_file_that_is_another_thing_by_now_is_unreadable(tmp_path: Path, what:
     with pytest.raises(InputError, match=r"a\.stl: .*; (check the path|give a file)") as caught:
         twin_id(Item(file=str(path)))
     assert caught.value.reason == "unreadable"
+
+
+def test_an_imported_asset_is_told_by_its_folder_since_all_have_one_file_name(tmp_path: Path) -> None:
+    mesh, record = tmp_path / "padlock" / "asset.glb", tmp_path / "padlock" / "import.json"
+    assert Item(file=str(mesh), given=str(record)).title == "padlock"
+    assert Item(file=str(mesh)).title == "asset.glb"

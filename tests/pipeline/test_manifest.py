@@ -85,7 +85,7 @@ def test_columns_that_nobody_knows_are_an_error_where_it_is_asked_for(folder: Pa
     ("content", "message"),
     [
         ("fil,name\ncup.glb,cup\n", "did you mean 'file'"),
-        ("file,units\ncup.glb,inch\n", "Valid: auto, cm, m, mm"),
+        ("file,units\ncup.glb,inch\n", "Valid: auto, cm, m, mm, none"),
         ("file\nnot_there.glb\n", "not_there.glb is not there"),
         ("file,text\ncup.glb,a cup\n", "either 'file' or 'text'"),
         ("name\ncup\n", "either 'file' or 'text'"),

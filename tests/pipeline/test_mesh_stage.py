@@ -52,6 +52,38 @@ def test_of_a_generated_mesh_the_generator_says_which_axis_is_up(tmp_path: Path)
     assert geometry["up_reason"] == "y is up as the generator says"
 
 
+def test_a_game_asset_whose_numbers_are_no_lengths_has_no_scale(tmp_path: Path) -> None:
+    trimesh.creation.cylinder(radius=0.18, height=0.89).export(tmp_path / "bottle.glb")
+    declared, _, _ = _run(tmp_path / "bottle.glb", tmp_path / "declared", name="bottle")
+    none, _, _ = _run(tmp_path / "bottle.glb", tmp_path / "none", name="bottle", units="none")
+    assert (declared["metric"], declared["units"]) == (True, "declared")
+    assert (none["metric"], none["units"], none["unit_factor"]) == (False, "user", 1.0)
+    assert not any("units" in finding for finding in none["findings"])
+
+
+def test_an_stl_without_a_word_is_in_millimetres(tmp_path: Path) -> None:
+    trimesh.creation.box((60.0, 32.0, 32.0)).export(tmp_path / "queen.stl")
+    geometry, solid, _ = _run(tmp_path / "queen.stl", tmp_path / "out")
+    assert (geometry["metric"], geometry["units"], geometry["unit_factor"]) == (True, "guessed", 0.001)
+    assert solid.extents.max() == pytest.approx(0.06)
+    assert geometry["findings"] == ["60 units are 60 m as metres, which is implausible; read as millimetres: 0.06 m"]
+
+
+def test_a_hat_of_a_file_lies_on_its_rim(tmp_path: Path) -> None:
+    bowl = trimesh.boolean.difference(
+        [trimesh.creation.icosphere(3, 0.1), trimesh.creation.icosphere(3, 0.095), _half_space()], engine="manifold"
+    )
+    bowl.export(tmp_path / "hat.stl")
+    for name, opens in (("hat", -1.0), ("bowl", 1.0)):
+        _, solid, _ = _run(tmp_path / "hat.stl", tmp_path / name, name=name)
+        opening = find_opening(solid)
+        assert opening is not None and opening.axis[2] == pytest.approx(opens, abs=1e-3)
+
+
+def _half_space() -> trimesh.Trimesh:
+    return trimesh.creation.box((1, 1, 1)).apply_translation((0, 0, -0.5))
+
+
 @pytest.mark.shared_data
 def test_mug_of_the_shared_data_stands_with_its_volume_of_134_ml(shared_data: Path, tmp_path: Path) -> None:
     geometry, solid, parts = _run(shared_data / "meshes/mug_ycb/white_mug.obj", tmp_path, name="mug")

@@ -56,15 +56,17 @@ def choose_up(
     user: Literal["y", "z", "auto"] = "auto",
     file_up: str | None = None,
     stands: bool | None = None,
+    opens_up: bool | None = None,
     said_by: str = "the user",
 ) -> UpChoice:
     """Choose the canonical pose of a watertight solid; its yaw is kept.
 
     ``file_up`` is the up axis that the format declares (None: no rule; Z is tried before Y). ``stands``: whether such a
-    thing is put down upright (None: unknown). ``said_by`` names who said the axis ``user``, for the reason. In order: that
-    axis; for things that lie, their likeliest side, the file's if nearly as likely; an opening upward; for round, long things
-    that stand, their long axis; the file's axis; the likeliest side. All but an unstable axis that was said
-    are snapped onto the support facet.
+    thing is put down upright (None: unknown), ``opens_up`` whether an opening is the top of such a thing (False: it may be
+    hollow from below, as hats and toy bricks are). ``said_by`` names who said the axis ``user``, for the reason. In order: that
+    axis; for things that lie, their likeliest side, the file's if nearly as likely; an opening upward, but of one that the file
+    has underneath; for round, long things that stand, their long axis; the file's axis; for things that stand, the file's axis
+    downward; the likeliest side. All but an unstable axis that was said are snapped onto the support facet.
     """
     poses = stable_poses(solid.vertices, _center_of_mass(solid))
     if user != "auto":
@@ -74,11 +76,16 @@ def choose_up(
         pose = _likeliest_side(poses, _axis(axis))
         return _turned(pose, axis, "such a thing lies; this is the side it most likely lies on")
     opening = find_opening(solid)
+    axes = [axis] if file_up else _undeclared_axes(solid, stands)
+    unnamed = opens_up is None and stands is None
+    if opening is not None and (opens_up is False or (unnamed and file_up is not None)):
+        kept = _open_below(poses, axes, opening.axis)
+        if kept is not None:
+            return _turned(kept[1], kept[0], f"it rests with {kept[0]} up, and such a thing may be hollow from below")
     if opening is not None:
         pose_up = _nearest(poses, opening.axis, _TILTED_DEG)
         if pose_up is not None:
             return _turned(pose_up, axis, "its opening points up")
-    axes = [axis] if file_up else _undeclared_axes(solid, stands)
     if stands:
         pose_up = _stood_up(solid, poses, _axis(axes[0]))
         if pose_up is not None:
@@ -94,6 +101,10 @@ def choose_up(
     tilted = _likeliest_within(poses, _axis(axis), _TILTED_DEG)
     if tilted is not None:
         return _turned(tilted, axis, f"tilted to the nearest side that it rests on, from {axis} up")
+    if stands:
+        over = _nearest(poses, -_axis(axis), _NEAR_DEG)
+        if over is not None:
+            return _turned(over, axis, f"it stands upside down in its file: it rests with {axis} down, and not up")
     return _turned(
         _likeliest_side(poses, _axis(axis)), axis, f"it does not rest with {axis} up; this is its likeliest side"
     )
@@ -112,6 +123,15 @@ def _as_told(poses: list[StablePose], axis: str, said_by: str) -> UpChoice:
     return UpChoice(
         _FORMAT_TO_Z_UP[axis], axis, 0.0, 0.0, f"{axis} is up as {said_by} says, although it does not rest so"
     )
+
+
+def _open_below(poses: list[StablePose], axes: list[str], opening: np.ndarray) -> tuple[str, StablePose] | None:
+    """Return the first of a file's axes on which a thing rests with its opening underneath, and that pose."""
+    for axis in axes:
+        near = _nearest(poses, _axis(axis), _NEAR_DEG)
+        if near is not None and float(opening @ near.rotation[2]) < -np.cos(np.radians(_TILTED_DEG)):
+            return axis, near
+    return None
 
 
 def _stood_up(solid: trimesh.Trimesh, poses: list[StablePose], up: np.ndarray) -> StablePose | None:

@@ -95,7 +95,10 @@ class MeshStage:
         """
         result = repair(soup, **self.settings.repair.model_dump())
         stands = None if prior is None else prior.stands
-        chosen = choose_up(result.mesh, user=said[0], file_up=file.up, stands=stands, said_by=said[1])
+        opens_up = None if prior is None else prior.container or prior.vessel
+        chosen = choose_up(
+            result.mesh, user=said[0], file_up=file.up, stands=stands, opens_up=opens_up, said_by=said[1]
+        )
         return result, chosen, object_frame(np.asarray(result.mesh.vertices), chosen.rotation)
 
     def _limits(self) -> MeshLimits:

@@ -118,6 +118,8 @@ def test_standard_sizes_are_in_the_intervals(name: str) -> None:
         ("box of crackers", "cracker box"),
         ("Phillips screwdriver", "screwdriver"), ("chef’s knife", "chef's knife"), ("Rubik's cube", "rubik's cube"),
         ("scissors", "scissors"), ("eye glasses", "glasses"), ("can opener", "can opener"), ("headset", "headphones"),
+        ("lego duplo brick", "building block"), ("concrete hollow block", "brick"), ("bread knife on a rack", "chef's knife"),
+        ("trash bin", "trash can"), ("blue recycling bins", "trash can"), ("dish on a rack", "plate"),
     ],
 )  # fmt: skip
 def test_lookup_understands_what_people_say(said: str, category: str) -> None:

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from manitwin.assets.asset import AnnotatedFrame, AnnotatedGrasps, Asset
 from manitwin.assets.importers.dropped import CENTER, INERTIA, impossible_mass_properties, left_out
 from manitwin.assets.importers.links import given_articulation
+from manitwin.assets.importers.telling_name import telling_name
 from manitwin.errors import AssetError
 from manitwin.geometry.canonical_frame import object_frame
 from manitwin.geometry.poses import GLTF_TO_OBJECT, inverse, transform_points
@@ -82,7 +83,7 @@ def import_record(asset: Asset, to_object: np.ndarray) -> ImportRecord:
         {
             "format": asset.format,
             "file": asset.path.name or asset.path.resolve().name,
-            "name": _words(asset.name) or "object",
+            "name": _words(telling_name(asset.name, asset.path)) or "object",
             "category": asset.category or None,
             "license": asset.license,
             "attribution": asset.attribution,

@@ -12,6 +12,7 @@ import re
 from collections.abc import Iterator
 from functools import cache
 from importlib import resources
+from itertools import combinations
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -298,6 +299,7 @@ def lookup(name: str | None) -> Prior | None:
     return None if found is None else found[0]
 
 
+_MOST_WORDS_BEFORE = 6
 _NO_THING = re.compile(
     r"[a-z]?\d+[a-z]?|[a-z]|black|white|gr[ae]y|silver|red|green|blue|yellow|orange|brown|pink|purple|beige|small|medium|large"
 )
@@ -306,17 +308,19 @@ _NO_THING = re.compile(
 def found_by(name: str | None) -> tuple[Prior, str] | None:
     """Find the prior of what a person calls a thing, and the words, in the singular, by which it is found.
 
-    Tried in order: the whole name, or an alias of it; the part before 'of', 'with', 'for', 'in' or 'from'; the whole
+    Tried in order: the whole name, or an alias of it; the part before 'of', 'with', 'for', 'in', 'on' or 'from'; the whole
     again: each as it is, in the singular, and with words dropped from the front ('red coffee mugs' are coffee mugs,
-    which are mugs). The last word decides what a thing is: a mug rack is no mug. Where none is found, numbers and colours at
+    which are mugs), and before its last word stands alone with words dropped between ('lego duplo brick' is a lego brick). The
+    last word decides what a thing is: a mug rack is no mug. Where none is found, numbers and colours at
     the end say nothing: 'mug_1' and 'pitcher blue' are a mug and a pitcher. File names are never looked up: they are not
     evidence.
     """
     if not name or not (phrase := normalised(name)):
         return None
-    head = re.split(r" (?:made |full )?(?:of|with|for|in|without|from) ", phrase, maxsplit=1)[0].split()
+    head = re.split(r" (?:made |full )?(?:of|with|for|in|on|without|from) ", phrase, maxsplit=1)[0].split()
     words = phrase.split()
-    tries = [words, *(head[i:] for i in range(len(head))), *(words[i:] for i in range(1, len(words)))]
+    tries = [words, *(head[i:] for i in range(len(head) - 1)), *_words_dropped(head), head[-1:]]
+    tries += [words[i:] for i in range(1, len(words))]
     while head and _NO_THING.fullmatch(head[-1]):
         head = head[:-1]
         tries += [head[i:] for i in range(len(head))]
@@ -326,6 +330,16 @@ def found_by(name: str | None) -> tuple[Prior, str] | None:
             if candidate in index and index[candidate].category != "unknown":
                 return index[candidate], candidate
     return None
+
+
+def _words_dropped(head: list[str]) -> Iterator[list[str]]:
+    """Yield a name with words dropped between two that stay, the last of which is its noun; the most and the nearest first."""
+    *before, noun = head
+    if len(before) > _MOST_WORDS_BEFORE:
+        return
+    for kept in range(len(before) - 1, 0, -1):
+        for places in reversed(list(combinations(range(len(before)), kept))):
+            yield [*(before[place] for place in places), noun]
 
 
 def word_for(prior: Prior, said: str) -> str:

@@ -1,0 +1,32 @@
+"""What an imported asset is called: its own name, or that of its file or folder where its own says nothing."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+_SAYS_NOTHING = frozenset({
+    "asset", "base", "body", "collision", "default", "env", "export", "exported", "geometry", "link", "main", "mesh",
+    "meshes", "mjcf", "model", "mujoco", "obj", "object", "robot", "root", "scene", "sdf", "sim", "simulation",
+    "stage", "textured", "unnamed", "untitled", "urdf", "usd", "visual", "world", "xform", "xml",
+})  # fmt: skip
+"""Words that tools write where nobody named anything: USD's World, obj2mjcf's textured, MuJoCo's default model name."""
+_FOLDERS_UP = 1
+
+
+def telling_name(name: str, path: Path) -> str:
+    """Return an asset's own name; that of its file, else of its folder, where its own says nothing of what it is.
+
+    Of several names none of which says anything, its own.
+    """
+    place = path.resolve()
+    others = [
+        place.stem if place.suffix else place.name,
+        *(parent.name for parent in list(place.parents)[:_FOLDERS_UP]),
+    ]
+    return next((each for each in (name, *others) if _says_something(each)), name)
+
+
+def _says_something(name: str) -> bool:
+    words = [re.sub(r"\d+", "", word) for word in re.findall(r"[^\W_]+", name.lower())]
+    return any(word and word not in _SAYS_NOTHING for word in words)
