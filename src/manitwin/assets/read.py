@@ -52,7 +52,6 @@ VALID_ASSETS = (
 _NAME_FILES = ("urdf", "mjcf", "sdf", "gso", "embodiedgen", "usd")
 """Descriptions that name meshes of other folders."""
 WITH_JOINTS = ("urdf", "mjcf", "sdf")
-KEEPS_JOINTS = ("urdf", "mjcf")
 FORMATS: tuple[Format, ...] = ("twin", "urdf", "mjcf", "sdf", "usd", "robotwin", "manitwin100k", "embodiedgen", "gso")
 
 
@@ -215,7 +214,7 @@ def read_asset(
 
     ``root``: the folder above which no file is read for a description that names some (``root_of`` the path by default).
     ``joints``: "part" reads the first rigid part of what moves, "lock" all of it as one rigid body as the file stands (of
-    ``WITH_JOINTS`` alone), "keep" the same with its links and joints, of ``KEEPS_JOINTS``; the first rigid part of others.
+    ``WITH_JOINTS`` alone), "keep" the same with its links and joints; the first rigid part of formats without joints.
     ``shape_only``: textures are not decoded and normals not made where that costs time, which is enough to measure it. A
     format's reader, and the engine that it may need, are loaded only when they are used.
     """
@@ -232,7 +231,7 @@ def read_asset(
     from manitwin.assets.asset_files import MESH_LIMITS, SHAPE_LIMITS
 
     limits = SHAPE_LIMITS if shape_only else MESH_LIMITS
-    read = joints != "part" and chosen in (WITH_JOINTS if joints == "lock" else KEEPS_JOINTS)
+    read = joints != "part" and chosen in WITH_JOINTS
     asset: Asset = reader.read(path, root, limits, joints=joints) if read else reader.read(path, root, limits)
     return asset
 

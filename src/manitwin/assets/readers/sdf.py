@@ -1,4 +1,4 @@
-"""SDF: the first object of a model that is rigid, links that fixed joints join taken as one."""
+"""SDF: the first object of a model, links that fixed joints join taken as one, with the joints of what moves."""
 
 from __future__ import annotations
 
@@ -10,14 +10,16 @@ from pathlib import Path
 import numpy as np
 from lxml import etree  # type: ignore[import-untyped]
 
+from manitwin.assets.articulation import Articulation, AssetLink, Tree
 from manitwin.assets.asset import Asset, Contact, Inertial, combined_inertial
 from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles
 from manitwin.assets.joints import Joints
 from manitwin.assets.licence_text import stated_licence, stated_or_none
 from manitwin.assets.read import is_file_below, only_file
 from manitwin.assets.readers.joint_elements import sdf_joints
+from manitwin.assets.readers.sdf_links import chosen_links
 from manitwin.assets.readers.sdf_shapes import ModelFrames, SdfShapes, pose_of
-from manitwin.assets.readers.upright import upright_shapes
+from manitwin.assets.readers.upright import Shapes, upright_shapes
 from manitwin.assets.readers.urdf_shapes import candidates
 from manitwin.assets.root import root_of
 from manitwin.errors import AssetError
@@ -31,7 +33,10 @@ _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 @dataclass(frozen=True)
 class SdfModel:
-    """An SDF model with the links of the object that is read; ``config`` is the model.config beside it."""
+    """An SDF model with the links of the object that is read; ``config`` is the model.config beside it.
+
+    ``moving`` is what joints of these links a twin can have, None where none is kept.
+    """
 
     file: Path
     root: etree._Element
@@ -40,15 +45,16 @@ class SdfModel:
     links: tuple[etree._Element, ...]
     frames: ModelFrames
     files: AssetFiles
+    moving: Tree | None = None
 
 
 def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS, *, joints: Joints = "part") -> Asset:
     """Read an SDF file, or a model's folder; the asset's axes are those of the model.
 
     Meshes are looked up from the file's folder and from those above it up to ``root`` (``root_of`` the path by default), those
-    of ``model://`` in the folder of the model's name before any other. Links behind joints that move, nested and included models
-    are left out with a remark; with ``joints="lock"`` the links are held as the file stands. Raises AssetError naming what is
-    broken. Source: the SDFormat specification, version 1.9.
+    of ``model://`` in the folder of the model's name before any other. Links behind joints that move are left out with a remark,
+    or held as the file stands (``joints``); so are nested and included models left out. Raises AssetError naming what is broken.
+    Source: the SDFormat specification, version 1.9.
     """
     opened = open_sdf(path, root, limits, joints=joints)
     return asset_of(opened, path)
@@ -75,9 +81,10 @@ def open_sdf(
         files.used.add(config.resolve())
     model = _only_model(file, root, files)
     frames = ModelFrames(file, model)
-    return SdfModel(
-        file, root, beside, model, _rigid_links(file, model, frames, files, joints == "lock"), frames, files
-    )
+    links, moving = tuple(model.findall("link")), None
+    if not _stands_fast(model):
+        links, moving = chosen_links(model, frames, files, joints, root.get("version"))
+    return SdfModel(file, root, beside, model, links, frames, files, moving)
 
 
 def _included(file: Path, root: etree._Element, files: AssetFiles) -> tuple[Path, etree._Element]:
@@ -115,9 +122,15 @@ def _main_files(uri: str, file: Path, files: AssetFiles) -> Iterator[Path]:
 
 def asset_of(opened: SdfModel, path: Path) -> Asset:
     """Return the asset that an SDF's elements describe; raises AssetError."""
-    visual, collision = upright_shapes(
-        lambda turn: SdfShapes(opened.file, opened.frames, opened.files, turn_gltf=turn).all(opened.links), opened.files
-    )
+    owners: list[int] = []
+
+    def shapes(turn: bool) -> Shapes:
+        read = SdfShapes(opened.file, opened.frames, opened.files, turn_gltf=turn)
+        visual, collision = read.all(opened.links)
+        owners[:] = read.owners
+        return visual, collision
+
+    visual, collision = upright_shapes(shapes, opened.files)
     if not visual and not collision and not opened.files.missing:
         terrain = any(link.find(".//heightmap") is not None for link in opened.links)
         raise AssetError(
@@ -135,7 +148,7 @@ def asset_of(opened: SdfModel, path: Path) -> Asset:
         collision=tuple(collision),
         up="z",
         unit_m=1.0,
-        inertial=_declared_inertial(opened),
+        inertial=_declared_inertial(opened, opened.links),
         contact=_declared_contact(opened),
         static=_stands_fast(opened.model),
         license=licence,
@@ -146,7 +159,17 @@ def asset_of(opened: SdfModel, path: Path) -> Asset:
         lenient=tuple(opened.files.lenient),
         joints=sdf_joints(opened.model),
         partial=opened.files.partial,
+        articulation=None if opened.moving is None else _articulation(opened, opened.moving, owners),
     )
+
+
+def _articulation(opened: SdfModel, moving: Tree, owners: list[int]) -> Articulation:
+    """Return links and joints; ``owners`` are the places of the links, as they are read, of the visual parts."""
+    links = []
+    for place, head in enumerate(moving.heads):
+        mine = tuple(link for link, of in zip(opened.links, moving.link_of, strict=True) if of == place)
+        links.append(AssetLink(str(opened.links[head].get("name")), _declared_inertial(opened, mine)))
+    return Articulation(tuple(links), moving.joints, tuple(moving.link_of[owner] for owner in owners))
 
 
 def _only_model(file: Path, root: etree._Element, files: AssetFiles) -> etree._Element:
@@ -175,46 +198,8 @@ def _stands_fast(model: etree._Element) -> bool:
     return (text_of(model, "static") or "").lower() in ("true", "1")
 
 
-def _rigid_links(
-    file: Path, model: etree._Element, frames: ModelFrames, files: AssetFiles, lock_joints: bool
-) -> tuple[etree._Element, ...]:
-    """Return the links of the first rigid group that has a shape, in the order of the file; all of what stands fast."""
-    links = {link.get("name"): link for link in model.findall("link")}
-    if _stands_fast(model):
-        return tuple(links.values())
-    group = {name: {name} for name in links}
-    moves: dict[str, str] = {}
-    for joint in model.findall("joint"):
-        ends = [frames.link_of((joint.findtext(tag) or "").strip()) for tag in ("parent", "child")]
-        kind = joint.get("type") or ""
-        if ends[1] in links and kind != "fixed":
-            moves[ends[1]] = f"{joint.get('name')} ({kind})"
-        if (
-            (kind == "fixed" or lock_joints)
-            and all(end in links for end in ends)
-            and group[ends[0]] is not group[ends[1]]
-        ):
-            small, large = sorted((group[end] for end in ends), key=len)
-            large |= small
-            group.update(dict.fromkeys(small, large))
-    chosen: set[str] | None = None
-    left_out = []
-    for name, link in links.items():
-        shaped = link.find("visual") is not None or link.find("collision") is not None
-        if chosen is None and shaped:
-            chosen = group[name]
-        elif chosen is not None and shaped and name not in chosen:
-            how = f"moves by joint {moves[name]}" if name in moves else "is joined to nothing fixed"
-            left_out.append(f"link {name!r} {how}")
-    files.remark_left_out(left_out, "links")
-    chosen = chosen or group[next(iter(links))]
-    if lock_joints:
-        files.remark_locked([joint for name, joint in moves.items() if name in chosen])
-    return tuple(link for name, link in links.items() if name in chosen)
-
-
-def _declared_inertial(opened: SdfModel) -> Inertial:
-    found = [_of_link(opened, link) for link in opened.links if link.find("inertial") is not None]
+def _declared_inertial(opened: SdfModel, links: tuple[etree._Element, ...]) -> Inertial:
+    found = [_of_link(opened, link) for link in links if link.find("inertial") is not None]
     with_mass = [entry for entry in found if entry.mass_kg is not None]
     return combined_inertial(with_mass) if with_mass else found[0] if found else Inertial()
 

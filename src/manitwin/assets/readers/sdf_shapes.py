@@ -105,12 +105,14 @@ class SdfShapes:
 
     def __init__(self, file: Path, frames: ModelFrames, files: AssetFiles, *, turn_gltf: bool = False):
         self._file, self._frames, self._files, self._turn_gltf = file, frames, files, turn_gltf
+        self.owners: list[int] = []
 
     def all(self, links: Iterable[etree._Element]) -> tuple[list[trimesh.Trimesh], list[CollisionShape]]:
-        """Return the visual parts and the collision shapes of links."""
+        """Return the visual parts and the collision shapes of links; ``owners`` then has the place of each visual part's link."""
         placed = list(links)
         self._remark_scripts(placed)
-        visual = [part for link in placed for part in self.visual(link)]
+        owned = [(place, part) for place, link in enumerate(placed) for part in self.visual(link)]
+        self.owners, visual = [place for place, _ in owned], [part for _, part in owned]
         return visual, [shape for link in placed for shape in self.collision(link)]
 
     def visual(self, link: etree._Element) -> Iterator[trimesh.Trimesh]:

@@ -1,0 +1,203 @@
+"""Which links of an SDF model are read, and which joints of them a twin can have."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from lxml import etree  # type: ignore[import-untyped]
+
+from manitwin.assets.articulation import Node, Tree, rigid_links
+from manitwin.assets.asset_files import AssetFiles
+from manitwin.assets.joints import Joints
+from manitwin.assets.readers.sdf_shapes import ModelFrames, pose_of
+from manitwin.formats.xml_file import text_of
+from manitwin.geometry.articulation import ArticulatedJoint, JointKind
+
+_KINDS: dict[str, JointKind] = {"revolute": "revolute", "continuous": "continuous", "prismatic": "prismatic"}
+_COUPLES = "gearbox"  # it holds nothing: it couples two joints
+_UNLIMITED = 1e15  # SDFormat's default is 1e16
+_AXES_OF_THE_MODEL = (1, 4)  # up to this version an axis was written in the model's frame
+
+Links = dict[str, etree._Element]
+Ends = tuple[str, str]
+"""The links of a joint, its parent's first."""
+
+
+def chosen_links(
+    model: etree._Element, frames: ModelFrames, files: AssetFiles, joints: Joints, version: str | None
+) -> tuple[tuple[etree._Element, ...], Tree | None]:
+    """Return the links of the first object that has a shape, the first of a tree first; and with ``joints="keep"`` what moves.
+
+    "part": links on fixed joints are one object, what moves is another. "lock" and "keep": what joints hold is one, as the file
+    stands, which is with all joints at 0. ``version`` is that of the document.
+    """
+    links: Links = {link.get("name"): link for link in model.findall("link")}
+    held = [(joint, ends) for joint in model.findall("joint") if (ends := _ends(joint, frames)) is not None]
+    group = {name: {name} for name in links}
+    for joint, ends in held:
+        if _holds(joint, joints) and all(end in links for end in ends) and group[ends[0]] is not group[ends[1]]:
+            small, large = sorted((group[end] for end in ends), key=len)
+            large |= small
+            group.update(dict.fromkeys(small, large))
+    moves = {ends[1]: joint for joint, ends in held if ends[1] in links and joint.get("type") != "fixed"}
+    chosen: set[str] | None = None
+    left_out = []
+    for name, link in links.items():
+        shaped = link.find("visual") is not None or link.find("collision") is not None
+        if chosen is None and shaped:
+            chosen = group[name]
+        elif chosen is not None and shaped and name not in chosen:
+            how = f"moves by joint {_told(moves[name])}" if name in moves else "is joined to nothing fixed"
+            left_out.append(f"link {name!r} {how}")
+    files.remark_left_out(left_out, "links")
+    chosen = chosen or group[next(iter(links))]
+    if joints == "lock":
+        files.remark_locked([_told(joint) for name, joint in moves.items() if name in chosen])
+    kept = tuple(link for name, link in links.items() if name in chosen)
+    within = [(joint, ends) for joint, ends in held if all(end in chosen for end in ends) and _holds(joint, joints)]
+    if joints != "keep" or all(joint.get("type") == "fixed" for joint, _ in within):
+        return kept, None
+    order, nodes = _tree([str(link.get("name")) for link in kept], links, within, files, frames, version)
+    found = rigid_links(nodes)
+    for remark in found.remarks:
+        files.remark(remark)
+    return tuple(links[name] for name in order), found if found.joints else None
+
+
+def _tree(
+    names: list[str],
+    links: Links,
+    held: list[tuple[etree._Element, Ends]],
+    files: AssetFiles,
+    frames: ModelFrames,
+    version: str | None,
+) -> tuple[list[str], list[Node]]:
+    """Return the links in an order in which those that hold come first, and what each is held by.
+
+    A joint that would hold a link a second time closes a loop, and is left out with a remark. A joint from the child's side
+    turns about the opposite axis.
+    """
+    children = {ends[1] for _, ends in held}
+    root = next((name for name in names if name not in children), names[0])
+    order, left = [root], list(held)
+    nodes = [Node(root, None, links[root].find("visual") is not None)]
+    for name in order:  # grows by the links that joints hold to it
+        for joint, ends in [each for each in left if name in each[1]]:
+            left.remove((joint, ends))
+            other = ends[1] if name == ends[0] else ends[0]
+            if other in order:
+                files.remark(f"joint {_told(joint)} closes a loop and was left out")
+                continue
+            kept, cause = _kept(joint, ends, frames, version, backward=name == ends[1])
+            nodes.append(Node(other, order.index(name), links[other].find("visual") is not None, kept, cause))
+            order.append(other)
+    return order, nodes
+
+
+def _kept(
+    joint: etree._Element, ends: Ends, frames: ModelFrames, version: str | None, *, backward: bool
+) -> tuple[ArticulatedJoint | None, str]:
+    """Return a joint in the model's axes; None for a fixed one, and with the cause for one that cannot be kept."""
+    written, name = joint.get("type") or "", str(joint.get("name"))
+    if written == "fixed":
+        return None, ""
+    kind = _KINDS.get(written)
+    if kind is None:
+        return None, f"{name[:60]!r} is {written}, which twins do not have"
+    if joint.find("axis/mimic") is not None:
+        return None, f"{name[:60]!r} copies another one (mimic), which twins do not have"
+    placed = _pose(joint, ends, frames)
+    axis, limits = _axis(joint, placed, frames, version), _limits(joint)
+    if axis is None or limits is None:
+        what = "axis has no direction" if axis is None else "limits leave it no way"
+        return None, f"{name[:60]!r} cannot move: its {what}"
+    lower, upper = limits if kind != "continuous" else (None, None)
+    if lower is not None and upper is not None and not lower <= 0 <= upper:
+        return None, f"{name[:60]!r} stands outside of its limits"
+    kind = "continuous" if kind == "revolute" and lower is None else kind
+    return (
+        ArticulatedJoint(
+            name=name,
+            kind=kind,
+            parent=0,
+            child=0,
+            origin_m=placed[:3, 3],
+            axis=-axis if backward else axis,
+            lower=lower,
+            upper=upper,
+            damping=max(0.0, _number(joint, "axis/dynamics/damping") or 0.0),
+            friction=max(0.0, _number(joint, "axis/dynamics/friction") or 0.0),
+            effort=_positive(joint, "axis/limit/effort"),
+            velocity=_positive(joint, "axis/limit/velocity"),
+        ),
+        "",
+    )
+
+
+def _pose(joint: etree._Element, ends: Ends, frames: ModelFrames) -> np.ndarray:
+    """Return a joint's pose in the model's frame ``(4, 4)``: relative to its child, where it does not say to what."""
+    pose = joint.find("pose")
+    base = (None if pose is None else pose.get("relative_to")) or (joint.findtext("child") or "").strip() or ends[1]
+    return frames.to_model(base) @ pose_of(joint, f"joint {joint.get('name')!r}")
+
+
+def _axis(joint: etree._Element, placed: np.ndarray, frames: ModelFrames, version: str | None) -> np.ndarray | None:
+    """Return a joint's axis of length one in the model's frame; None where it has no direction.
+
+    It is written in the joint's frame, unless it says otherwise, and up to SDFormat 1.4 in that of the model.
+    """
+    element = joint.find("axis/xyz")
+    try:
+        axis = np.array([float(word) for word in (text_of(joint, "axis/xyz") or "0 0 1").replace(",", " ").split()])
+    except ValueError:
+        return None
+    length = float(np.linalg.norm(axis)) if axis.shape == (3,) else 0.0
+    if not math.isfinite(length) or length < 1e-9:
+        return None
+    frame = None if element is None else element.get("expressed_in")
+    of_model = (text_of(joint, "axis/use_parent_model_frame") or "").lower() in ("true", "1") or _is_old(version)
+    turn = np.eye(3) if frame is None and of_model else (placed if frame is None else frames.to_model(frame))[:3, :3]
+    return np.asarray(turn @ (axis / length))
+
+
+def _is_old(version: str | None) -> bool:
+    try:
+        return tuple(int(number) for number in (version or "").split(".")) <= _AXES_OF_THE_MODEL
+    except ValueError:
+        return False
+
+
+def _limits(joint: etree._Element) -> tuple[float | None, float | None] | None:
+    """Return the limits, (None, None) where there are none; None where no position lies between them."""
+    lower, upper = (_number(joint, f"axis/limit/{key}") for key in ("lower", "upper"))
+    if lower is None or upper is None or max(-lower, upper) >= _UNLIMITED:
+        return None, None
+    return (lower, upper) if lower < upper else None
+
+
+def _number(joint: etree._Element, path: str) -> float | None:
+    try:
+        value = float(text_of(joint, path) or "nan")
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _positive(joint: etree._Element, path: str) -> float | None:
+    value = _number(joint, path)
+    return value if value is not None and 0 < value < _UNLIMITED else None
+
+
+def _ends(joint: etree._Element, frames: ModelFrames) -> Ends | None:
+    parent, child = (frames.link_of((joint.findtext(tag) or "").strip()) for tag in ("parent", "child"))
+    return None if not child else (parent, child)
+
+
+def _holds(joint: etree._Element, joints: Joints) -> bool:
+    kind = joint.get("type") or ""
+    return kind == "fixed" or (joints != "part" and kind != _COUPLES)
+
+
+def _told(joint: etree._Element) -> str:
+    return f"{joint.get('name')} ({joint.get('type') or ''})"
