@@ -158,7 +158,7 @@ class PhysicalStage:
         if prior is not None and not any(_within(mass.value, interval, margin) for interval in usual):
             raise Rejected(
                 "implausible_mass",
-                f"{mass.value:.4g} kg, but a {prior.category} weighs {_span(prior.mass_kg)} kg; check the name",
+                f"{mass.value:.4g} kg, but a {prior.category} weighs {_span(prior.mass_kg)} kg; check the name{_declared(mass)}",
             )
         density = mass.value / volume_m3
         if not self.settings.min_density_kg_m3 <= density <= self.settings.max_density_kg_m3:
@@ -167,6 +167,13 @@ class PhysicalStage:
                 f"{mass.value:.4g} kg in {volume_m3 * 1e6:.4g} ml is {density:.4g} kg/m3, as no object has; "
                 "check units and name",
             )
+
+
+def _declared(mass: Estimate) -> str:
+    """Say how a mass that an imported asset declares can be left to the annotators."""
+    if not mass.source.startswith("imported:"):
+        return ""
+    return ", or set mass_kg in its import.json to null: it is then estimated"
 
 
 def _prior_of(draft: Draft[Item], estimates: PhysicalEstimates) -> Prior | None:

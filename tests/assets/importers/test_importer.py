@@ -260,3 +260,11 @@ def test_report_has_what_was_kept_and_dropped_of_each_and_why_one_failed(tmp_pat
     assert bad["folder"] is None and "no <link>" in bad["error"]
     refused = CliRunner().invoke(app, [*words[:-1], str(tmp_path / "no" / "report.json")])
     assert "cannot be written" in str(refused.exception)
+
+
+def test_a_mass_of_less_than_the_air_within_is_a_placeholder(tmp_path: Path) -> None:
+    record, _ = imported(mug_urdf(tmp_path / "in", mass_kg=1e-9), tmp_path / "out")
+    assert (record.mass_kg, record.center_of_mass_m, record.inertia_kg_m2) == (None, None, None)
+    assert any(why.startswith("mass, centre of mass and inertia: 1e-09 kg in a hull of") for why in record.dropped)
+    light, _ = imported(mug_urdf(tmp_path / "light", mass_kg=0.016), tmp_path / "out")
+    assert light.mass_kg == 0.016, "wrong, and still what somebody says"

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from manitwin.assets.asset import Asset
+from dataclasses import replace
+
+from manitwin.assets.asset import Asset, Inertial
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.assets.audit.rules import center_of_mass, inertia
 
 CENTER, INERTIA = "centre of mass", "inertia"
 
+_LEAST_DENSITY_KG_M3 = 0.1  # of the hull: a tenth of the air in it
 _CENTER_RULES = (center_of_mass.outside, center_of_mass.left_at_origin)
 _INERTIA_RULES = (inertia.not_positive_definite, inertia.triangle, inertia.placeholder, inertia.magnitude)
 
@@ -27,6 +30,21 @@ def impossible_mass_properties(asset: Asset) -> dict[str, str]:
         if declared is not None and said:
             found[what] = said[0]
     return found
+
+
+def without_placeholder_mass(asset: Asset) -> tuple[Asset, list[str]]:
+    """Return the asset without a mass that says only that there is one, and why; as it is where its mass may be meant.
+
+    Simulators refuse a mass of 0, so that bodies without one get 1e-9 kg: with it go centre, inertia and the masses of links.
+    """
+    mass_kg, volume_m3 = asset.inertial.mass_kg, float(MeasuredAsset(asset).hull.volumes_m3.sum())
+    if mass_kg is None or not 0 < mass_kg < _LEAST_DENSITY_KG_M3 * volume_m3:
+        return asset, []
+    moving = asset.articulation
+    if moving is not None:
+        moving = replace(moving, links=tuple(replace(link, inertial=Inertial()) for link in moving.links))
+    why = f"mass, centre of mass and inertia: {mass_kg:.3g} kg in a hull of {1000 * volume_m3:.3g} l is a placeholder"
+    return replace(asset, inertial=Inertial(), articulation=moving), [why]
 
 
 def left_out(asset: Asset) -> list[str]:

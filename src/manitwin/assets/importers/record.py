@@ -10,7 +10,13 @@ import trimesh
 from pydantic import ValidationError
 
 from manitwin.assets.asset import AnnotatedFrame, AnnotatedGrasps, Asset
-from manitwin.assets.importers.dropped import CENTER, INERTIA, impossible_mass_properties, left_out
+from manitwin.assets.importers.dropped import (
+    CENTER,
+    INERTIA,
+    impossible_mass_properties,
+    left_out,
+    without_placeholder_mass,
+)
 from manitwin.assets.importers.links import given_articulation
 from manitwin.assets.importers.telling_name import telling_name
 from manitwin.errors import AssetError
@@ -44,7 +50,9 @@ def asset_to_object(asset: Asset) -> np.ndarray:
 def import_record(asset: Asset, to_object: np.ndarray) -> ImportRecord:
     """Return the import record of an asset; what cannot be true is not kept, and named among what is missing."""
     remarks = list(asset.remarks)
+    asset, placeholder = without_placeholder_mass(asset)
     numbers, missing, dropped = _numbers(asset)
+    dropped = placeholder + dropped
     impossible = impossible_mass_properties(asset)
     dropped += [f"{what}: {why}" for what, why in impossible.items()]
     functional = [_point(frame, to_object) for frame in asset.frames if frame.kind in ("functional", "target")]

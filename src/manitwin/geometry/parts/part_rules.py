@@ -28,11 +28,12 @@ _SURE_REACH = 3.0  # times the least reach of a handle: sticks out beyond doubt
 
 
 def _handles(shape: Shape) -> list[Protrusion]:
-    least_m = LEAST_HANDLE_REACH * float(shape.body.radius_m.max())
     first = shape.side_handle
-    return (
-        [] if first is None else [first, *(p for p in shape.body.protrusions if p is not first and p.reach_m > least_m)]
-    )
+    if first is None:
+        return []
+    least_m = LEAST_HANDLE_REACH * float(shape.body.radius_m.max())
+    beside = [p for p in shape.body.protrusions if p.reach_m > least_m and p.low_m < shape.body.top_m]
+    return [first, *(p for p in beside if p is not first)]
 
 
 def _handled(shape: Shape, points_m: np.ndarray) -> Membership | None:

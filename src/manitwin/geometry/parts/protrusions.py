@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,7 +19,7 @@ class Protrusion:
     """A part that sticks out of the body in one direction.
 
     ``azimuth_rad`` is where, about the vertical through ``axis_xy_m``; ``reach_m`` how far out it goes beyond the body;
-    ``share`` its share of the surface samples; ``height_m`` how tall its outer half is.
+    ``share`` its share of the surface samples; ``height_m`` how tall its outer half is; ``low_m`` is its lowest height.
     """
 
     azimuth_rad: float
@@ -27,18 +27,21 @@ class Protrusion:
     reach_m: float
     share: float
     height_m: float
+    low_m: float
 
 
 @dataclass(frozen=True)
 class RoundBody:
     """A body about a vertical axis and what sticks out of it, the largest first.
 
-    ``heights_m (24,)`` and ``radius_m (24,)`` are the body's outline.
+    ``heights_m (24,)`` and ``radius_m (24,)`` are the body's outline, ``top_m`` is the last of the most heights in a row at
+    which it goes round: what stands in a vase is above.
     """
 
     axis_xy_m: np.ndarray
     heights_m: np.ndarray
     radius_m: np.ndarray
+    top_m: float
     protrusions: tuple[Protrusion, ...]
 
     def radius_at(self, points_m: np.ndarray) -> np.ndarray:
@@ -80,11 +83,17 @@ def round_body(surface_m: np.ndarray, axis_xy_m: np.ndarray | None = None) -> Ro
     occupied = (outermost > 0).sum(1) >= _BODY_DIRECTIONS * _DIRECTIONS
     heights = low + (np.arange(_HEIGHTS) + 0.5) * (high - low) / _HEIGHTS
     if not occupied.any():
-        return RoundBody(axis_xy_m, heights, np.full(_HEIGHTS, float(np.median(radius))), ())
+        return RoundBody(axis_xy_m, heights, np.full(_HEIGHTS, float(np.median(radius))), float(high), ())
     outline = np.array([np.median(row[row > 0]) if row.any() else np.nan for row in outermost])
     outline = np.interp(heights, heights[occupied], outline[occupied])
-    body = RoundBody(axis_xy_m, heights, outline, ())
-    return RoundBody(axis_xy_m, heights, outline, _protrusions(body, surface_m))
+    body = RoundBody(axis_xy_m, heights, outline, float(heights[_longest_run(occupied)[-1]]), ())
+    return replace(body, protrusions=_protrusions(body, surface_m))
+
+
+def _longest_run(flags: np.ndarray) -> np.ndarray:
+    """Return the indices of the longest run of true flags, the first of several; there is one."""
+    places = np.flatnonzero(flags)
+    return max(np.split(places, np.flatnonzero(np.diff(places) > 1) + 1), key=len)
 
 
 def _fitted_axis(points_xy_m: np.ndarray) -> np.ndarray:
@@ -123,6 +132,7 @@ def _protrusions(body: RoundBody, surface_m: np.ndarray) -> tuple[Protrusion, ..
                 reach_m=reach,
                 share=float(counts[run % _DIRECTIONS].sum() / len(surface_m)),
                 height_m=float(np.ptp(outer)),
+                low_m=float(surface_m[out][members, 2].min()),
             )
         )
     return tuple(sorted(found, key=lambda p: -p.reach_m * p.share))

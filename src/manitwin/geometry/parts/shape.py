@@ -170,11 +170,13 @@ class Shape:
     def side_handle(self) -> Protrusion | None:
         """What sticks out of an upright body and is large enough to be held: the largest, or one that is taller and steeper.
 
+        It is beside the body: flowers and brushes that stand in it are above.
+
         A spout may reach farther than the handle opposite, but ends in a tip; a handle comes back to the body lower down.
         """
         least_m = LEAST_HANDLE_REACH * self.body.radius_m.max()
-        large = [p for p in self.body.protrusions if p.reach_m > least_m] if self.upright else []
-        if not large:
+        large = [p for p in self.body.protrusions if p.reach_m > least_m and p.low_m < self.body.top_m]
+        if not large or not self.upright:
             return None
         first, tallest = large[0], max(large, key=lambda p: p.height_m)
         steeper = tallest.height_m / tallest.reach_m > _STEEPER * first.height_m / first.reach_m
