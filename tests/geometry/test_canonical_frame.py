@@ -157,3 +157,10 @@ def test_a_thing_that_stands_and_is_upside_down_in_its_file_is_turned_over() -> 
     standing, unknown = choose_up(cone, stands=True), choose_up(cone)
     assert standing.turned_deg == pytest.approx(180.0, abs=0.1) and "upside down" in standing.reason
     assert unknown.turned_deg < 150
+
+
+def test_a_bottle_that_lies_in_the_world_of_its_file_is_stood_up_and_one_that_a_person_laid_down_is_not() -> None:
+    lying = _turned(_bottle(), (90, 0, 0))
+    for by_convention, vessel, height in ((True, True, 0.2), (False, True, 0.06), (True, False, 0.06)):
+        choice = choose_up(lying, user="z", stands=True, opens_up=vessel, by_convention=by_convention)
+        assert _stood(lying, choice).extents[2] == pytest.approx(height, abs=1e-3), choice.reason

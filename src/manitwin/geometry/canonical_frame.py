@@ -31,6 +31,7 @@ _NEARLY_AS_LIKELY = 0.6
 _ELONGATED = 1.5
 _LONGER = 1.2
 _LEANING_DEG = 45.0
+_LAY = "it lies with {} up, but such a thing stands, and it is round and long"
 _ROUND = 0.1  # relative difference of the two moments across the axis
 
 
@@ -58,18 +59,24 @@ def choose_up(
     stands: bool | None = None,
     opens_up: bool | None = None,
     said_by: str = "the user",
+    by_convention: bool = False,
 ) -> UpChoice:
     """Choose the canonical pose of a watertight solid; its yaw is kept.
 
     ``file_up`` is the up axis that the format declares (None: no rule; Z is tried before Y). ``stands``: whether such a
     thing is put down upright (None: unknown), ``opens_up`` whether an opening is the top of such a thing (False: it may be
-    hollow from below, as hats and toy bricks are). ``said_by`` names who said the axis ``user``, for the reason. In order: that
-    axis; for things that lie, their likeliest side, the file's if nearly as likely; an opening upward, but of one that the file
-    has underneath; for round, long things that stand, their long axis; the file's axis; for things that stand, the file's axis
-    downward; the likeliest side. All but an unstable axis that was said are snapped onto the support facet.
+    hollow from below, as hats and toy bricks are). ``said_by`` names who said the axis ``user``, for the reason;
+    ``by_convention``: nobody meant this thing by it, it is the up axis of its world. In order: that axis, but by convention
+    after the long axis of a round, long vessel; for things that lie, their likeliest side, the file's if nearly
+    as likely; an opening upward, but of one that the file has underneath; for round, long things that stand, their long
+    axis; the file's axis; for things that stand, the file's axis downward; the likeliest side. All but an unstable axis that
+    was said are snapped onto the support facet.
     """
     poses = stable_poses(solid.vertices, _center_of_mass(solid))
     if user != "auto":
+        stood = _stood_up(solid, poses, _axis(user)) if by_convention and opens_up else None
+        if stood is not None:
+            return _turned(stood, user, _LAY.format(user))
         return _as_told(poses, user, said_by)
     axis = file_up or "z"
     if stands is False:
@@ -89,9 +96,7 @@ def choose_up(
     if stands:
         pose_up = _stood_up(solid, poses, _axis(axes[0]))
         if pose_up is not None:
-            return _turned(
-                pose_up, axes[0], f"it lies with {axes[0]} up, but such a thing stands, and it is round and long"
-            )
+            return _turned(pose_up, axes[0], _LAY.format(axes[0]))
     for candidate in axes:
         near = _nearest(poses, _axis(candidate), _NEAR_DEG)
         if near is not None:

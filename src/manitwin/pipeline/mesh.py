@@ -27,7 +27,7 @@ from manitwin.geometry.repair.components import connected_parts
 from manitwin.models.annotators.priors import Prior, lookup
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import object_name
-from manitwin.twin.import_record import ImportRecord
+from manitwin.twin.import_record import ImportRecord, read_import_record
 
 _GENERATED = "generated.glb"
 _LEAST_LENGTH_M = 1e-9
@@ -67,7 +67,8 @@ class MeshStage:
                 all="ignore"
             ):  # numbers at the edge of what a double holds: what comes of them is looked at
                 said = _said_up(draft, generated), _said_by(draft, generated)
-                result, chosen, to_object = self._solid(soup, file, said, prior)
+                by_convention = prior is not None and not generated and _up_is_convention(draft)
+                result, chosen, to_object = self._solid(soup, file, said, prior, by_convention)
         except (QhullError, np.linalg.LinAlgError) as error:
             cause = f"its surface has no depth or precision to make a solid of ({type(error).__name__})"
             raise _degenerate(path, cause) from error
@@ -87,17 +88,28 @@ class MeshStage:
         return {"geometry": geometry}
 
     def _solid(
-        self, soup: trimesh.Trimesh, file: MeshFile, said: tuple[Literal["y", "z", "auto"], str], prior: Prior | None
+        self,
+        soup: trimesh.Trimesh,
+        file: MeshFile,
+        said: tuple[Literal["y", "z", "auto"], str],
+        prior: Prior | None,
+        by_convention: bool,
     ) -> tuple[RepairResult, UpChoice, np.ndarray]:
         """Return the repaired solid, how it was turned, and its transform to the object frame ``(4, 4)``.
 
-        ``said`` is the up axis that was said, and who said it.
+        ``said`` is the up axis that was said, and who said it; ``by_convention`` as ``choose_up`` has it.
         """
         result = repair(soup, **self.settings.repair.model_dump())
         stands = None if prior is None else prior.stands
         opens_up = None if prior is None else prior.container or prior.vessel
         chosen = choose_up(
-            result.mesh, user=said[0], file_up=file.up, stands=stands, opens_up=opens_up, said_by=said[1]
+            result.mesh,
+            user=said[0],
+            file_up=file.up,
+            stands=stands,
+            opens_up=opens_up,
+            said_by=said[1],
+            by_convention=by_convention,
         )
         return result, chosen, object_frame(np.asarray(result.mesh.vertices), chosen.rotation)
 
@@ -144,6 +156,11 @@ def _said_by(draft: Draft[Item], generated: bool) -> str:
     if generated:
         return "the generator"
     return "the user" if draft.payload.given is None else "the import"
+
+
+def _up_is_convention(draft: Draft[Item]) -> bool:
+    """Tell whether the up axis is that of the world an imported asset was made for, in which nobody said how it stands."""
+    return draft.payload.given is not None and not read_import_record(Path(draft.payload.given)).has_places
 
 
 def _unit(file: MeshFile, draft: Draft[Item], generated: bool, prior: Prior | None) -> LengthUnit:

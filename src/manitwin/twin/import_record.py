@@ -108,6 +108,11 @@ class ImportRecord(Record):
         return self.format in (TEMPLATE, FILLED)
 
     @property
+    def has_places(self) -> bool:
+        """Whether somebody put points, grasps or resting poses on the object: how it stands is then meant."""
+        return bool(self.functional_points or self.grasp_points or self.grasps or self.rests) or self.format == "twin"
+
+    @property
     def called(self) -> str:
         """The object's name: the key to the priors."""
         return self.category or self.name

@@ -4,6 +4,7 @@ import dataclasses
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer import Typer
 from typer.testing import CliRunner
@@ -12,10 +13,14 @@ from foreign_assets import mug_urdf
 from input_items import collect_items
 from manitwin.assets.importers.importer import import_assets
 from manitwin.cli.commands.import_ import import_
+from manitwin.config import MeshConfig
 from manitwin.engine.ledger.ledger import Ledger
+from manitwin.engine.stage import Draft
 from manitwin.errors import UsageError
 from manitwin.formats.packed_source import pack_source
+from manitwin.geometry.poses import OBJECT_TO_GLTF
 from manitwin.pipeline.item import Item, twin_id
+from manitwin.pipeline.mesh import MeshStage
 
 EARLIER = ("file", "text", "name", "units", "up", "license", "attribution")
 """What an item was before it could be imported, varied or shown by several photos."""
@@ -114,3 +119,25 @@ def test_command_prints_one_line_an_asset(tmp_path: Path) -> None:
     assert "0 imported, 1 imported before, 0 not" in " ".join(again.output.split())
     broken = CliRunner().invoke(app, [str(path), "-o", str(tmp_path / "out"), "--from", "urd"])
     assert isinstance(broken.exception, UsageError) and "did you mean 'urdf'" in str(broken.exception)
+
+
+@pytest.mark.parametrize(("name", "height_m"), [("bottle", 0.2), ("foam brick", 0.06)])
+def test_a_vessel_that_lies_in_its_world_is_stood_up_with_what_is_given_of_it(
+    tmp_path: Path, name: str, height_m: float
+) -> None:
+    shape = '<origin xyz="0 0 0.03" rpy="1.5707963267948966 0 0"/><geometry><cylinder radius="0.03" length="0.2"/></geometry>'
+    inertia = '<inertia ixx="1e-3" iyy="2e-4" izz="1e-3" ixy="0" ixz="0" iyz="0"/>'
+    inertial = f'<inertial><origin xyz="0 0.05 0.03"/><mass value="0.4"/>{inertia}</inertial>'
+    (tmp_path / "thing.urdf").write_text(
+        f'<robot name="{name}"><link name="a">{inertial}<visual>{shape}</visual></link></robot>'
+    )
+    (one,) = import_assets([tmp_path / "thing.urdf"], tmp_path / "imported")
+    assert one.folder is not None and one.record is not None and one.record.center_of_mass_m is not None, one.error
+    given = one.folder / "import.json"
+    item = Item(str(one.folder / "asset.glb"), name=name, units="m", up="y", given=str(given))
+    geometry = MeshStage(MeshConfig()).run(Draft("id", item, 0), tmp_path)["geometry"]
+    with np.load(tmp_path / "canonical.npz") as solid:
+        assert np.ptp(solid["vertices"][:, 2]) == pytest.approx(height_m, abs=1e-3)
+    moved = one.record.moved(np.array(geometry["input_to_object"]) @ OBJECT_TO_GLTF)
+    assert moved.center_of_mass_m is not None
+    assert abs(moved.center_of_mass_m[2] - height_m / 2) == pytest.approx(0.05 if name == "bottle" else 0.0, abs=1e-3)
