@@ -62,7 +62,7 @@ def left_at_origin(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def _millimetres(point: np.ndarray) -> str:
-    return "(" + ", ".join(f"{1000 * value:.3g}" for value in point) + ")"
+    return "(" + ", ".join(f"{round(1000 * float(value), 3) + 0.0:.3g}" for value in point) + ")"  # to the micrometre
 
 
 RULES = (
