@@ -88,17 +88,20 @@ def shape_of_link(solid: trimesh.Trimesh, hulls: list[int]) -> dict[str, Any]:
 def link_masses(draft: Draft[Item], articulation: Articulation) -> list[LinkMass]:
     """Return the mass properties of the links, which weigh together what the twin does.
 
-    Where the asset gives those of all of them these are kept, else each is filled evenly, all with one density.
+    Where the asset gives those of all of them these are kept, an inertia that it lacks as of an even filling; else each is filled
+    evenly, all with one density.
     """
     shapes, mass_kg = draft.field("collision")["links"], draft.field("physical")["mass_kg"]["value"]
     given = read_given(draft)
     total_kg = sum(link.mass_kg or 0.0 for link in articulation.links)
     ratio = mass_kg / total_kg if total_kg and abs(mass_kg / total_kg - 1) > _ROUNDING else 1.0
     kept = []
-    for link in articulation.links:
-        if link.mass_kg is None or link.center_of_mass_m is None or link.inertia_kg_m2 is None or given is None:
+    for link, shape in zip(articulation.links, shapes, strict=True):
+        if link.mass_kg is None or link.center_of_mass_m is None or given is None:
             break
-        inertia = with_triangle_slack(ratio * np.array(link.inertia_kg_m2))
+        even = link.mass_kg * np.array(shape["inertia_m2"])
+        said = even if link.inertia_kg_m2 is None else np.array(link.inertia_kg_m2)
+        inertia = with_triangle_slack(ratio * said)
         kept.append(LinkMass(ratio * link.mass_kg, np.array(link.center_of_mass_m), inertia, given.source))
     if len(kept) == len(articulation.links):
         return kept

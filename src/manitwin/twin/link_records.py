@@ -113,7 +113,7 @@ class Link(Record):
 
 
 class GivenLink(Record):
-    """A link of an imported asset; mass, centre of mass and inertia where the asset gives all three, else null."""
+    """A link of an imported asset; mass and centre of mass where it gives both and an inertia, null where that cannot be true."""
 
     name: str = Field(min_length=1)
     mass_kg: Annotated[Finite, Field(gt=0, le=LARGEST_KG)] | None
@@ -150,12 +150,13 @@ class Articulation(Record):
 
 
 def _moved(link: GivenLink, transform: np.ndarray) -> GivenLink:
-    if link.center_of_mass_m is None or link.inertia_kg_m2 is None:
+    if link.center_of_mass_m is None:
         return link
     rotation = transform[:3, :3]
     center = rotation @ link.center_of_mass_m + transform[:3, 3]
-    inertia = rotation @ np.array(link.inertia_kg_m2) @ rotation.T
-    return link.model_copy(update={"center_of_mass_m": center.tolist(), "inertia_kg_m2": inertia.tolist()})
+    said = link.inertia_kg_m2
+    inertia = None if said is None else (rotation @ np.array(said) @ rotation.T).tolist()
+    return link.model_copy(update={"center_of_mass_m": center.tolist(), "inertia_kg_m2": inertia})
 
 
 def require_tree(links: Sequence[str], joints: Sequence[Joint]) -> None:
@@ -172,10 +173,12 @@ def require_tree(links: Sequence[str], joints: Sequence[Joint]) -> None:
 
 
 def _link_scaled(link: GivenLink, factor: float) -> GivenLink:
-    if link.center_of_mass_m is None or link.inertia_kg_m2 is None:
+    if link.center_of_mass_m is None:
         return link
-    center, inertia = factor * np.array(link.center_of_mass_m), factor**2 * np.array(link.inertia_kg_m2)
-    return link.model_copy(update={"center_of_mass_m": center.tolist(), "inertia_kg_m2": inertia.tolist()})
+    said = link.inertia_kg_m2
+    inertia = None if said is None else (factor**2 * np.array(said)).tolist()
+    center = (factor * np.array(link.center_of_mass_m)).tolist()
+    return link.model_copy(update={"center_of_mass_m": center, "inertia_kg_m2": inertia})
 
 
 def _joint_scaled(joint: Joint, factor: float) -> Joint:

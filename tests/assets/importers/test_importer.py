@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
+from articulated_assets import LIDDED_BOX
 from foreign_assets import embodiedgen, gso, manitwin100k, mug_urdf
 from handmade import mug
 from manitwin.assets.importers.importer import import_assets
@@ -268,3 +269,17 @@ def test_a_mass_of_less_than_the_air_within_is_a_placeholder(tmp_path: Path) -> 
     assert any(why.startswith("mass, centre of mass and inertia: 1e-09 kg in a hull of") for why in record.dropped)
     light, _ = imported(mug_urdf(tmp_path / "light", mass_kg=0.016), tmp_path / "out")
     assert light.mass_kg == 0.016, "wrong, and still what somebody says"
+
+
+def test_a_links_inertia_beyond_its_size_is_not_kept_and_its_mass_is(tmp_path: Path) -> None:
+    lid = LIDDED_BOX[LIDDED_BOX.index('<link name="lid"') :]
+    text = LIDDED_BOX.replace(lid, re.sub(r'i(xx|yy|zz)="[^"]*"', r'i\1="0.16"', lid, count=3))
+    (tmp_path / "box.urdf").write_text(text)
+    record, _ = imported(tmp_path / "box.urdf", tmp_path / "out")
+    assert record.articulation is not None
+    body, lid_ = record.articulation.links
+    assert body.inertia_kg_m2 is not None
+    assert lid_.inertia_kg_m2 is None and lid_.mass_kg is not None and lid_.center_of_mass_m is not None
+    assert any(why.startswith("inertia of link 'lid': 0.16 kg m2 about an axis, but") for why in record.dropped)
+    turned = record.articulation.moved(np.diag([-1.0, -1.0, 1.0, 1.0])).links[1]
+    assert turned.center_of_mass_m == pytest.approx(np.array([-1, -1, 1]) * lid_.center_of_mass_m)

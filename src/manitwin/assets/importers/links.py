@@ -10,20 +10,23 @@ from pydantic import ValidationError
 from manitwin.assets.articulation import AssetLink
 from manitwin.assets.asset import Asset
 from manitwin.errors import AssetError
+from manitwin.geometry.poses import transform_points
 from manitwin.twin.link_records import Articulation, GivenLink, Joint
 
 _ROUNDING = 1e-4  # of the largest moment, as of a whole asset: files often hold six digits
+_UNSEEN = 4.0  # times the most that its mass has within what is seen: twice as far out, of what is not seen
 
 
-def given_articulation(asset: Asset, to_object: np.ndarray) -> Articulation | None:
-    """Return links and joints in the object frame; None for an asset in which nothing moves.
+def given_articulation(asset: Asset, to_object: np.ndarray) -> tuple[Articulation | None, list[str]]:
+    """Return links and joints in the object frame, None for an asset in which nothing moves; and what was dropped, with why.
 
-    A link keeps mass, centre of mass and inertia where all three are those of a body. Raises AssetError for a link that shows
+    A link keeps mass, centre of mass and inertia where all three are those of a body, but no inertia that is far beyond what its
+    mass has within what is seen of it. Raises AssetError for a link that shows
     nothing: a mesh of it is missing.
     """
     found = asset.articulation
     if found is None:
-        return None
+        return None, []
     shown = [link for link, part in zip(found.link_of_visual, asset.visual, strict=True) if len(part.faces)]
     names = _distinct([link.name for link in found.links])
     bare = [name for place, name in enumerate(names) if place not in shown]
@@ -35,15 +38,35 @@ def given_articulation(asset: Asset, to_object: np.ndarray) -> Articulation | No
         )
     joint_names = _distinct([joint.name for joint in found.joints])
     joints = [replace(joint.moved(to_object), name=name) for joint, name in zip(found.joints, joint_names, strict=True)]
+    parts = [part for part in asset.visual if len(part.faces)]
+    links = [_link(name, link, to_object) for name, link in zip(names, found.links, strict=True)]
+    dropped = []
+    for place, link in enumerate(links):
+        points = np.concatenate([part.vertices for part, of in zip(parts, shown, strict=True) if of == place])
+        why = _too_large(link, transform_points(to_object, points))
+        if why is not None:
+            links[place] = link.model_copy(update={"inertia_kg_m2": None})
+            dropped.append(why)
     try:
-        return Articulation(
-            links=[_link(name, link, to_object) for name, link in zip(names, found.links, strict=True)],
-            joints=[Joint.of(joint, names) for joint in joints],
-            link_of_mesh=shown,
-        )
+        moving = Articulation(links=links, joints=[Joint.of(joint, names) for joint in joints], link_of_mesh=shown)
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         raise AssetError(f"{asset.path.name}: its joints: {first['msg']}; mend it where it was made") from error
+    return moving, dropped
+
+
+def _too_large(link: GivenLink, points_m: np.ndarray) -> str | None:
+    """Say that an inertia is more than a link's mass has anywhere within its visual points ``(N, 3)``; None where it may be."""
+    if link.mass_kg is None or link.center_of_mass_m is None or link.inertia_kg_m2 is None:
+        return None
+    reach_m = float(np.linalg.norm(points_m - link.center_of_mass_m, axis=1).max())
+    largest, most = float(np.linalg.eigvalsh(link.inertia_kg_m2)[-1]), link.mass_kg * reach_m**2
+    if largest <= _UNSEEN * most:
+        return None
+    return (
+        f"inertia of link {link.name[:60]!r}: {largest:.2g} kg m2 about an axis, but {link.mass_kg:.3g} kg within"
+        f" {1000 * reach_m:.3g} mm of its centre have {most:.2g} at most"
+    )
 
 
 def _link(name: str, link: AssetLink, to_object: np.ndarray) -> GivenLink:

@@ -62,6 +62,8 @@ def import_record(asset: Asset, to_object: np.ndarray) -> ImportRecord:
             dropped.append(
                 f"{len(points) - _MAX_POINTS} {what} points: the first {_MAX_POINTS} are enough to choose from"
             )
+    articulation, wrong_links = given_articulation(asset, to_object)
+    dropped += wrong_links
     rests, repairs = settled_rests(asset, to_object)
     remarks += repairs
     center = None if CENTER in impossible else asset.inertial.center_of_mass_m
@@ -107,7 +109,7 @@ def import_record(asset: Asset, to_object: np.ndarray) -> ImportRecord:
             "missing": missing,
             "dropped": [*dropped, *left_out(asset)],
             "remarks": list(dict.fromkeys(remarks)),
-            "articulation": given_articulation(asset, to_object),
+            "articulation": articulation,
             **numbers,
         },
     )
