@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from handmade import cylinder, mug, subject, visual
-from manitwin.models.annotators.priors import load_priors
+from manitwin.models.annotators.priors import found_by, load_priors, word_for
 from manitwin.models.annotators.rules import RulesAnnotator
 from manitwin.models.annotators.words import article, is_metal, joined, size_words, write_captions
 from manitwin.twin.record import Language
@@ -144,3 +144,17 @@ def test_captions_tell_different_facts() -> None:
     told = [frozenset(fact for fact, words in facts.items() if words in caption) for caption in captions]
     assert len(captions) == len(set(told)) == 8, told
     assert set().union(*told) == set(facts)
+
+
+@pytest.mark.parametrize(
+    ("said", "told"),
+    [
+        ("ketchup", "ketchup bottle"),
+        ("orange juice", "orange juice carton"),
+        ("alphabet soup", "soup can"),
+        ("pan", "pan"),
+    ],
+)
+def test_what_is_in_a_package_is_told_with_it(said: str, told: str) -> None:
+    found = found_by(said)
+    assert found is not None and word_for(*found) == told

@@ -343,8 +343,15 @@ def _words_dropped(head: list[str]) -> Iterator[list[str]]:
 
 
 def word_for(prior: Prior, said: str) -> str:
-    """Return what a person calls a thing that was found by these words: a 'coffee mug' is a mug, a 'pan' no frying pan."""
+    """Return what a person calls a thing that was found by these words: a 'coffee mug' is a mug, a 'pan' no frying pan.
+
+    What it is sold in is called so where the words say only what is in it: 'ketchup' is a ketchup bottle.
+    """
     words, category = said.split(), normalised(prior.category).split()
     if words[-len(category) :] == category:
         return prior.category
+    whole = [name for name in (prior.category, *prior.aliases) if " of " not in name]
+    packed = next((name for name in whole if normalised(name).startswith(f"{said} ")), None)
+    if packed is not None:
+        return packed
     return next((alias for alias in prior.aliases if normalised(alias) == said), said)  # a cook's knife as it is spelt
