@@ -92,6 +92,23 @@ def test_transferred_grasp_has_to_fit_between_the_pads(tmp_path: Path) -> None:
     assert not usable_grasps(twin, WSG)[0].transferred
 
 
+def test_grasps_of_jaws_of_ones_own_are_transferred_and_those_of_cups_and_hands_are_not(tmp_path: Path) -> None:
+    others = {"own_jaws": None, "own_cup": None, "own_hand": None}
+    rows = [
+        row(0, verified=False, outcome="slips"), row(1, gripper="own_jaws", grasp_id="own_jaws-0001", depth_m=0.15),
+        row(2, gripper="own_cup", grasp_id="own_cup-0002", width_m=0.0),
+        row(3, gripper="own_hand", grasp_id="own_hand-0003", pregrasp_joints_rad=[0.0] * 16, grasp_joints_rad=[0.1] * 16),
+    ]  # fmt: skip
+    twin = twin_with(tmp_path, rows)
+    assert twin.record.grasps is not None
+    grasps = twin.record.grasps.model_copy(update={"other_grippers": others})
+    twin.record = twin.record.model_copy(update={"grasps": grasps})
+    (found,) = usable_grasps(twin, PANDA)
+    assert found.grasp.grasp_id == "own_jaws-0001" and found.transferred
+    tip = found.grasp.gripper_to_object @ transform(None, np.array([0, 0, PANDA.tip_depth_m]))
+    assert tip == pytest.approx(above([0, 0, 0.05]) @ transform(None, np.array([0, 0, 0.15])))
+
+
 def test_order_is_the_seeds_and_better_grasps_come_sooner_but_not_always() -> None:
     grasps = [TargetGrasp(Grasp(str(i), np.eye(4), 0.03), None, False, 0.5 * (i == 0)) for i in range(4)]
     orders = [ids(shuffled(grasps, np.random.default_rng(seed))) for seed in range(2000)]

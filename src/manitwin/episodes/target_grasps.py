@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.geometry.poses import transform
-from manitwin.robots.grippers.gripper import Gripper, load_gripper, shipped_grippers
+from manitwin.robots.grippers.gripper import Gripper
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.twin.grasp_table import JOINTS
@@ -39,7 +38,8 @@ class TargetGrasp:
 def usable_grasps(twin: Twin, gripper: Gripper) -> tuple[TargetGrasp, ...]:
     """Return the verified grasps that are not retired: the gripper's own, else, of jaws, those of other jaws, transferred.
 
-    A transferred grasp has its fingertips where they were verified; what does not fit between the pads is left out.
+    A transferred grasp has its fingertips where they were verified; what does not fit between the pads is left out. Whose
+    grasps are of jaws their rows tell, as no file of a gripper of one's own need be at hand.
     """
     for name in _sources(twin, gripper):
         if found := _of_gripper(twin, name, gripper):
@@ -55,19 +55,13 @@ def shuffled(grasps: Iterable[TargetGrasp], rng: np.random.Generator) -> tuple[T
 
 
 def _sources(twin: Twin, gripper: Gripper) -> list[str]:
-    """Return the grippers whose grasps may be used: the one that is wanted, and for jaws the other parallel ones there are."""
+    """Return the grippers whose grasps may be used: the one that is wanted, and for jaws all others there are."""
     summary = twin.record.grasps
     if summary is None:
         return []
-    wanted = gripper.name
-    known = {wanted} | (_parallel_grippers() if isinstance(gripper, ParallelGripper) else frozenset())
-    names = [name for name in (summary.gripper, *sorted(summary.other_grippers)) if name in known]
+    wanted, jaws = gripper.name, isinstance(gripper, ParallelGripper)
+    names = [name for name in (summary.gripper, *sorted(summary.other_grippers)) if jaws or name == wanted]
     return sorted(names, key=lambda name: name != wanted)
-
-
-@cache
-def _parallel_grippers() -> frozenset[str]:
-    return frozenset(name for name in shipped_grippers() if isinstance(load_gripper(name), ParallelGripper))
 
 
 def _of_gripper(twin: Twin, name: str, gripper: Gripper) -> tuple[TargetGrasp, ...]:
@@ -77,7 +71,9 @@ def _of_gripper(twin: Twin, name: str, gripper: Gripper) -> tuple[TargetGrasp, .
     jointed, jaws = isinstance(gripper, MultiFingerGripper), isinstance(gripper, ParallelGripper)
     found = []
     for i in range(len(grasps)):
-        fits = grasps.width_m[i] + CLEARANCE_M <= gripper.opening_m
+        # a cup holds at no width, and a hand with joints says where these are
+        of_jaws = grasps.width_m[i] > 0 and grasps.columns[JOINTS[0]][i] is None
+        fits = of_jaws and grasps.width_m[i] + CLEARANCE_M <= gripper.opening_m
         if grasps.columns["retired"][i] or not (fits or name == gripper.name):
             continue
         shift = transform(None, np.array([0, 0, grasps.depth_m[i] - gripper.tip_depth_m if jaws else 0.0]))
