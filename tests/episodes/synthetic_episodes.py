@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from manitwin.episodes.attempts import Attempt
+from manitwin.episodes.attempts import NEVER_EXECUTED, Attempt
 from manitwin.episodes.recording import RATE_HZ, Recording
 from manitwin.episodes.stored_episode import RecordedObject, RecordedRobot, StoredEpisode
 
@@ -82,7 +82,7 @@ def with_granules(given: StoredEpisode, count: int = 9) -> StoredEpisode:
 def attempt(number: int, *, outcome: str = "kept", robot_name: str = "panda", **changes: Any) -> Attempt:
     category = CATEGORIES[number % len(CATEGORIES)]
     executed, ended = (
-        outcome not in ("no_plan", "no_room", "unsettled", "reached_already"),
+        outcome not in NEVER_EXECUTED,
         outcome in ("kept", "unplanned_contact", "disturbed"),
     )
     made = Attempt(

@@ -11,7 +11,7 @@ import pytest
 from synthetic_episodes import attempt
 
 from manitwin.episodes import attempts as table
-from manitwin.episodes.attempts import OUTCOMES, Attempt
+from manitwin.episodes.attempts import OUTCOMES, Attempt, success_of
 from manitwin.errors import EpisodesError
 
 
@@ -48,6 +48,21 @@ def test_merging_keeps_order_and_numbers_the_kept(tmp_path: Path, monkeypatch: p
 def test_merging_nothing_gives_an_empty_table(tmp_path: Path) -> None:
     assert table.merge_attempts([], tmp_path / "all.parquet") == (0, 0)
     assert list(table.read_attempts(tmp_path / "all.parquet")) == []
+
+
+def test_what_grasps_failed_of_and_who_has_none_is_counted_of_attempts_that_were_never_executed() -> None:
+    counted = success_of(
+        [
+            attempt(1, plan_failures='{"approach_blocked": 9}'),
+            attempt(2, outcome="no_plan", plan_failures='{"no_path": 1}'),
+            attempt(3, outcome="no_plan", plan_failures='{"lift_blocked": 4, "no_path": 2}'),
+            attempt(4, outcome="no_grasp", twin_id="lid", category="lid", plan_failures="{}"),
+            attempt(5, outcome="no_grasp", twin_id="lid", category="lid", plan_failures="{}"),
+        ]
+    )
+    assert list(counted.plan_failures.items()) == [("lift_blocked", 4), ("no_path", 3)]
+    assert counted.without_grasp == (("lid", "lid"),)
+    assert counted.total.executed == 1
 
 
 def test_unknown_outcomes_and_other_tables_are_refused(tmp_path: Path) -> None:

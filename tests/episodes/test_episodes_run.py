@@ -127,6 +127,24 @@ def test_other_objects_are_not_promised_where_scenes_have_their_own(bricks: Path
     assert not (tmp_path / "out").exists()
 
 
+def test_twins_without_a_grasp_for_the_hand_are_said_before_anything_is_made(bricks: Path, tmp_path: Path) -> None:
+    config = TrajectoriesConfig(seed=5, robot="ur5_suction")
+    with pytest.raises(UsageError, match="none of 3 twins has a verified grasp for suction, the hand of ur5_suction"):
+        make_episodes(bricks, tmp_path, 2, config, executor="inline")
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_became_of_twins_without_a_grasp_is_told_at_the_end(bricks: Path, tmp_path: Path) -> None:
+    scenes = tmp_path / "scenes"
+    layout = LayoutSettings(objects=(1, 1), robot="ur5_suction")
+    make_layouts(bricks, scenes, 1, LayoutsConfig(seed=3, layout=layout), executor="inline")
+    out = tmp_path / "episodes"
+    make_episodes(scenes, out, 1, TrajectoriesConfig(seed=5, robot="ur5_suction"), executor="inline")
+    told = "\n".join(collect(out, ["maniskill"]).lines)
+    assert "not kept: 1 no_grasp\nwhy no_grasp: no verified grasp for the robot's hand have " in told
+    assert "manitwin build --gripper" in told
+
+
 def test_what_is_no_place_of_twins_is_said(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no accepted twin"):
         make_episodes(tmp_path, tmp_path / "out", 1, CONFIG, executor="inline")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
@@ -17,13 +18,15 @@ from manitwin.twin.store import file_beside
 
 OUTCOMES = (
     "kept", "unplanned_contact", "disturbed", "misplaced", "toppled", "goal_missed", "dropped", "not_lifted", "replan_failed",
-    "unsettled", "reached_already", "no_plan", "no_room",
+    "unsettled", "reached_already", "no_grasp", "no_plan", "no_room",
 )  # fmt: skip
 """``kept`` succeeded and touched nothing by accident; ``unplanned_contact`` and ``disturbed`` (another object moved by more than
 1 cm or 5 degrees) succeeded otherwise; from ``misplaced`` to ``replan_failed`` the execution failed; ``unsettled`` is a start
-that did not stand, ``reached_already`` one of which the goal was true, ``no_room`` one that could not be set up; ``no_plan`` was
-never executed. ``goal_missed``: the skill's goal is not true at the end; ``failure`` says what of it."""
+that did not stand, ``reached_already`` one of which the goal was true, ``no_room`` one that could not be set up; ``no_grasp``
+(the twin has none for the robot's hand) and ``no_plan`` were never executed. ``goal_missed``: the skill's goal is not true at
+the end; ``failure`` says what of it."""
 
+NEVER_EXECUTED = ("unsettled", "reached_already", "no_grasp", "no_plan", "no_room")
 EXECUTION_FAILURES = ("misplaced", "toppled", "goal_missed", "dropped", "not_lifted", "replan_failed")
 
 ATTEMPTS = "attempts.parquet"
@@ -102,7 +105,7 @@ class Attempt:
     @property
     def planned(self) -> bool:
         """True where a plan was found, so that it was executed."""
-        return self.outcome not in ("no_plan", "no_room", "unsettled", "reached_already")
+        return self.outcome not in NEVER_EXECUTED
 
     @property
     def succeeded(self) -> bool:
@@ -203,21 +206,36 @@ class Tally:
 
 @dataclass(frozen=True)
 class Success:
-    """Attempts in all, by category and by outcome, and the objects (id, category) that never succeeded."""
+    """Attempts in all, by category and by outcome, and the objects (id, category) that never succeeded.
+
+    ``plan_failures``: of attempts without a plan, what grasps failed of, frequent reasons first. ``without_grasp``: the objects
+    that have no grasp for the hand.
+    """
 
     total: Tally = field(default_factory=Tally)
     by_category: Mapping[str, Tally] = field(default_factory=dict)
     outcomes: Mapping[str, int] = field(default_factory=dict)
     never: tuple[tuple[str, str], ...] = ()
+    plan_failures: Mapping[str, int] = field(default_factory=dict)
+    without_grasp: tuple[tuple[str, str], ...] = ()
+
+
+def _frequent_first(counted: Counter[str]) -> dict[str, int]:
+    return dict(sorted(counted.items(), key=lambda item: (-item[1], item[0])))
 
 
 def success_of(attempts: Iterable[Attempt]) -> Success:
     """Count attempts."""
     total, by_category, outcomes = Tally(), dict[str, Tally](), Counter[str]()
     categories, successful = dict[str, str](), set[str]()
+    failures, without_grasp = Counter[str](), set[tuple[str, str]]()
     for attempt in attempts:
         total.add(attempt)
         outcomes[attempt.outcome] += 1
+        if attempt.outcome == "no_plan":
+            failures.update(json.loads(attempt.plan_failures))
+        elif attempt.outcome == "no_grasp":
+            without_grasp.add((attempt.twin_id, attempt.category))
         if attempt.twin_id:
             by_category.setdefault(attempt.category, Tally()).add(attempt)
             categories.setdefault(attempt.twin_id, attempt.category)
@@ -226,6 +244,8 @@ def success_of(attempts: Iterable[Attempt]) -> Success:
     return Success(
         total,
         dict(sorted(by_category.items())),
-        dict(sorted(outcomes.items(), key=lambda item: (-item[1], item[0]))),
+        _frequent_first(outcomes),
         tuple(sorted((each, name) for each, name in categories.items() if each not in successful)),
+        _frequent_first(failures),
+        tuple(sorted(without_grasp)),
     )

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from manitwin.episodes.attempts import ATTEMPTS, merge_attempts, read_attempts, success_of
+from manitwin.episodes.attempts import ATTEMPTS, Success, merge_attempts, read_attempts, success_of
 from manitwin.episodes.batch import BATCH_RECORD, BATCHES, REMEDY_OF_REPEATS
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import EpisodeFile, has_granules
@@ -17,6 +17,7 @@ from manitwin.errors import EpisodesError, UsageError, choose_from
 
 LEROBOT, MANISKILL = "lerobot", "maniskill"
 FORMATS = (LEROBOT, MANISKILL)
+MOST_NAMED = 10
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,21 @@ def collect(out: Path, formats: list[str]) -> Collected:
     return _collected(out)
 
 
+def _why_never_executed(success: Success) -> list[str]:
+    """Write what grasps could not be planned for, and whose twins have none for the hand, with the remedy."""
+    lines = []
+    if failures := success.plan_failures:
+        total = sum(failures.values())
+        counted = ", ".join(f"{count} {reason}" for reason, count in failures.items())
+        lines.append(f"why no_plan: of {total} grasps and poses that were tried {counted}")
+    if lacking := success.without_grasp:
+        named = ", ".join(f"{twin_id} {category}" for twin_id, category in lacking[:MOST_NAMED])
+        more = f" and {len(lacking) - MOST_NAMED} more" if len(lacking) > MOST_NAMED else ""
+        lines.append(f"why no_grasp: no verified grasp for the robot's hand have {named}{more}")
+        lines.append("  remedy: build them for it too: manitwin build --gripper, see docs/grippers.md")
+    return lines
+
+
 def _collected(out: Path) -> Collected:
     success = success_of(read_attempts(out / ATTEMPTS))
     total, outcomes = success.total, dict(sorted(success.outcomes.items()))
@@ -102,6 +118,7 @@ def _collected(out: Path) -> Collected:
         f"{total.attempted} attempted, {total.executed} planned and executed, {total.succeeded} succeeded"
         f" ({total.succeeded / max(1, total.executed):.1%} of the executed), {total.kept} kept",
         f"not kept: {failed or 'none'}",
+        *_why_never_executed(success),
     ]
     if success.never:
         lines.append("no success with: " + ", ".join(f"{twin_id} {category}" for twin_id, category in success.never))

@@ -25,7 +25,7 @@ from manitwin.episodes.episodes_stage import EPISODES, EpisodesStage
 from manitwin.episodes.retirement import Retirement, find_retirements, retire
 from manitwin.episodes.setting import Begins
 from manitwin.episodes.settings import TrajectoriesConfig
-from manitwin.episodes.skills.hands import check_hand
+from manitwin.episodes.skills.hands import check_grasps, check_hand
 from manitwin.episodes.skills.registry import load_skill
 from manitwin.episodes.skills.skill import Skill
 from manitwin.episodes.tasks.task_files import TASKS, read_tasks
@@ -205,9 +205,9 @@ def make_episodes(
 
     ``twins`` names where the twins of scenes are now, None: where they were as the layouts were made.
     ``count`` is how many there are at the end; where there are as many already, none is made.
-    Raises UsageError for a place without twins or scenes, settings that tasks or scenes answer themselves, an unknown robot or
-    skill, an ``out`` that has episodes of scenes where twins are given or the other way, or made with other settings, or where
-    another run is at work there.
+    Raises UsageError for a place without twins or scenes, twins of which none has a grasp for the robot's hand, settings that
+    tasks or scenes answer themselves, an unknown robot or skill, an ``out`` that has episodes of scenes where twins are given or
+    the other way, or made with other settings, or where another run is at work there.
     """
     if not 1 <= count <= LARGEST_COUNT:
         raise UsageError(f"{count:.6g} episodes; ask for 1 or more, at most {LARGEST_COUNT}")
@@ -232,7 +232,9 @@ def make_episodes(
             deal = batches(robot.name, count, config.batch, task_ids=ids, there=there)
         elif source.scenes is None:
             stage = EpisodesStage(config, source.dataset, None)
-            twin_ids = twins_for(skill, pool_of(source.dataset), stage.begins)
+            pool = pool_of(source.dataset)
+            check_grasps(robot, skill, [twin.twin_id for twin in pool.twins], stage.has_grasps)
+            twin_ids = twins_for(skill, pool, stage.begins)
             deal = batches(robot.name, count, config.batch, twin_ids=twin_ids, there=there)
         else:
             deal = batches(robot.name, count, config.batch, scene_ids=scene_ids(Path(source.scenes)), there=there)

@@ -53,7 +53,7 @@ class EpisodesStage:
     """Make the episodes of a batch. Each draws from a generator of its own, by the run's seed and its number in the whole."""
 
     name = "episodes"
-    version = "6"
+    version = "7"
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = (EPISODES, ATTEMPTS, "batch")
     needs: Resource = "cpu"
@@ -176,6 +176,10 @@ class EpisodesStage:
             lambda: [each.grasp for each in self._grasps(target.twin_id).values()],
             self._robot.gripper,
         )
+
+    def has_grasps(self, twin_id: str) -> bool:
+        """Tell whether a twin has a verified grasp that the robot's hand may use."""
+        return bool(self._grasps(twin_id))
 
     def _is_graspable(self, twin_id: str) -> bool:
         return self._twin(twin_id).record.grasps is not None

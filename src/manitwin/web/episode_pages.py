@@ -28,6 +28,7 @@ MEANINGS: Mapping[str, str] = {
     "replan_failed": "no way on from how it lay in the hand",
     "unsettled": "did not stand still at the beginning",
     "reached_already": "the goal was true at the beginning",
+    "no_grasp": "no verified grasp of the object is for this hand",
     "no_plan": "no grasp could be planned",
     "no_room": "no room, or no partner, to set it up",
 }

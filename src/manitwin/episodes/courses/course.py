@@ -196,10 +196,16 @@ class Course(ABC):
 
     def tiers(self) -> list[tuple[Grasp, ...]]:
         """Return the grasps that can be planned with (``tiers_of``), and count those that the target's weight would turn in."""
+        self.tell_no_grasp()
         tiers = tiers_of(self.start)
         if turning := len(self.start.problem.grasps) - sum(map(len, tiers)):
             self.facts.plan_failures["weight_not_borne"] += turning
         return tiers
+
+    def tell_no_grasp(self) -> None:
+        """Have the outcome say so where the target has no grasp for this hand: that is not for want of a plan."""
+        if not self.start.problem.grasps:
+            self.facts.outcome = "no_grasp"
 
     def height_m(self, execution: Execution) -> float:
         """Return how high the target's centre of mass is."""

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 from manitwin.episodes.skills.handover import Handover
 from manitwin.episodes.skills.held_skill import HeldSkill
+from manitwin.episodes.skills.press import Press
 from manitwin.episodes.skills.push import Push
 from manitwin.episodes.skills.registry import PICK_PLACE, SKILLS
 from manitwin.episodes.skills.skill import Skill
@@ -35,6 +38,20 @@ def check_hand(robot: Robot, skill: Skill | None) -> None:
     raise UsageError(
         f"skill {skill.name} wants a hand of two jaws, {robot.name} has {robot.gripper.name} ({robot.gripper.kind}); "
         f"give one of {_with_jaws()}, or with this robot one of the skills {others}"
+    )
+
+
+def check_grasps(robot: Robot, skill: Skill | None, twin_ids: Sequence[str], has_grasps: Callable[[str], bool]) -> None:
+    """Raise UsageError where none of the twins has a grasp for a robot's hand: every attempt would be in vain.
+
+    ``has_grasps`` tells of a twin's id whether it has one. What the closed hand does asks for none.
+    """
+    if isinstance(skill, Press | Push) or not twin_ids or any(has_grasps(twin_id) for twin_id in twin_ids):
+        return
+    hand = robot.gripper.name
+    raise UsageError(
+        f"none of {len(twin_ids)} twins has a verified grasp for {hand}, the hand of {robot.name}; build them for it too "
+        f"(manitwin build --gripper {hand}, or its .toml file: docs/grippers.md), or give a robot with another hand"
     )
 
 

@@ -21,6 +21,7 @@ MEANINGS = {
     "goal_missed": "it is not where, or not done, what the skill's goal asks for",
     "unsettled": "the start did not stand still",
     "reached_already": "the skill's goal was true before anything moved",
+    "no_grasp": "the object has no verified grasp for this hand",
     "no_plan": "no grasp could be planned",
     "no_room": "the scene could not be set up",
 }
