@@ -1,11 +1,14 @@
-"""The least and the largest of what an environment takes: an arm's joints, and what its hand is told."""
+"""What an environment takes: an arm's joints, and what its hand is told; the least and the largest, and what is no action."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.two_arms import TwoArmPlanner
+from manitwin.errors import UsageError
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.grippers.suction import SuctionGripper
 from manitwin.robots.robot import Robot
@@ -22,6 +25,23 @@ def action_limits(robot: Robot, planner: PickPlacePlanner) -> tuple[np.ndarray, 
     arms = [each.arm.limits_rad for each in planners]
     lowest, highest = zip(*arms, *hands, strict=True)
     return np.concatenate(lowest).astype(np.float32), np.concatenate(highest).astype(np.float32)
+
+
+def checked_action(action: object, names: Sequence[str]) -> np.ndarray:
+    """Return an action ``(n + h,)`` as floats; ``names`` are those of its numbers.
+
+    Raises UsageError for another shape and for what is no finite number: physics that is told so much as one has no state left.
+    """
+    try:
+        told = np.asarray(action, float)
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"action: no numbers ({error}); give {len(names)}: {', '.join(names)}") from error
+    if told.shape != (len(names),):
+        raise UsageError(f"action has shape {told.shape}; give {len(names)} numbers: {', '.join(names)}")
+    if not np.isfinite(told).all():
+        wrong = ", ".join(name for name, value in zip(names, told, strict=True) if not np.isfinite(value))
+        raise UsageError(f"action is not finite for {wrong}; look at what the policy returned")
+    return told
 
 
 def _hand_limits(robot: Robot) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium import spaces
 
 from manitwin.episodes.courses.course import Start
-from manitwin.episodes.environment.action_limits import action_limits
+from manitwin.episodes.environment.action_limits import action_limits, checked_action
 from manitwin.episodes.environment.arms import Arms, by_arm
 from manitwin.episodes.environment.start_noise import DrawnStart, StartNoise, draw_start
 from manitwin.episodes.episode import closing_of, settled, world_of
@@ -134,11 +134,15 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         return self._observation(), info if drawn is None else info | {"start_noise": drawn.info}
 
     def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """Carry out an action for 1/20 s; the episode ends with success, or is cut off after the most steps."""
+        """Carry out an action for 1/20 s; the episode ends with success, or is cut off after the most steps.
+
+        Raises UsageError before ``reset``, and for an action of another shape or that is not finite; nothing moves then.
+        """
         world = self._world
         if world is None:
             raise UsageError("step before reset; call reset first")
-        told = np.clip(np.asarray(action, float), self._lowest, self._highest)
+        names = (*self._robot.arm_joints, *self._robot.hand_action_names)
+        told = np.clip(checked_action(action, names), self._lowest, self._highest)
         joints = len(self._robot.arm_joints)
         self._move(world, told[:joints], told[joints:])
         self._steps += 1

@@ -1,0 +1,58 @@
+"""What an environment does with actions that are none: it says so, and is where it was."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from grasped_twins import write_brick
+from manitwin.episodes.environment.action_limits import checked_action
+from manitwin.episodes.environment.make import make_env
+from manitwin.episodes.settings import TasksConfig
+from manitwin.episodes.tasks.task_files import read_tasks
+from manitwin.episodes.tasks.tasks_run import make_tasks
+from manitwin.errors import UsageError
+from manitwin.scenes.layouts.layouts_run import make_layouts
+from manitwin.scenes.settings import LayoutsConfig, LayoutSettings
+
+NAMES = ("shoulder", "elbow", "gripper_opening_m")
+
+
+@pytest.mark.parametrize(
+    ("action", "said"),
+    [
+        ([0.1, np.nan, 0.04], "action is not finite for elbow; look at what the policy returned"),
+        ([np.inf, 0.0, -np.inf], "action is not finite for shoulder, gripper_opening_m"),
+        ([0.1, 0.2], r"action has shape \(2,\); give 3 numbers: shoulder, elbow, gripper_opening_m"),
+        ([[0.1, 0.2, 0.04]], r"action has shape \(1, 3\)"),
+        (0.1, r"action has shape \(\)"),
+        ("left", "action: no numbers"),
+        (None, "action"),
+    ],
+)
+def test_what_is_no_action_is_said(action: object, said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        checked_action(action, NAMES)
+
+
+def test_actions_are_floats() -> None:
+    assert checked_action((0, 1, 0.04), NAMES).tolist() == [0.0, 1.0, 0.04]
+
+
+def test_environment_goes_on_from_where_it_was_after_what_was_no_action(tmp_path: Path) -> None:
+    for number in range(2):
+        write_brick(tmp_path / "things", number, ("brick", "block")[number])
+    layouts = LayoutsConfig(seed=2, layout=LayoutSettings(objects=(2, 2), robot="panda", clutter="sparse"))
+    make_layouts(tmp_path / "things", tmp_path / "s", 1, layouts, executor="inline")
+    config = TasksConfig(seed=3, per_scene=1, two_literal_share=0.0, tries_of_kind=2)
+    make_tasks(tmp_path / "s", tmp_path / "tasks", config, executor="inline")
+    env = make_env(tmp_path / "tasks", read_tasks(tmp_path / "tasks")[0].task_id)
+    before, _ = env.reset(seed=0)
+    for action in (np.full(8, np.nan), np.zeros(7)):
+        with pytest.raises(UsageError, match="action"):
+            env.step(action)
+    after, *_ = env.step(np.append(before["joint_positions_rad"], before["gripper_opening_m"]))
+    assert after["joint_positions_rad"] == pytest.approx(before["joint_positions_rad"], abs=1e-3)
+    env.close()
