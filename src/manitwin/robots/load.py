@@ -95,6 +95,7 @@ def _load(path: Path) -> Robot:
         velocity_limits_rad_s=definition.velocity_fraction * limits_of(tree, definition.arm_joints, "velocity"),
         acceleration_limits_rad_s2=np.full(len(definition.arm_joints), definition.acceleration_rad_s2),
         workspace=definition.workspace,
+        fastest_rad_s=limits_of(tree, definition.arm_joints, "velocity"),
     )
     if isinstance(gripper, ParallelGripper):
         _check_jaws(robot, gripper)

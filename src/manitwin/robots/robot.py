@@ -46,6 +46,9 @@ class Robot:
     Two ``arms`` (``two_arms``) are robots of their own, each with its base in the world and the same hand of two jaws: joints,
     links and limits are then those of the first, then of the second; ``tip_link``, ``gripper_to_tip`` and ``workspace`` those
     of the first. A robot of one arm has none.
+
+    ``velocity_limits_rad_s`` are those that plans keep within, ``fastest_rad_s`` the URDF's own, which no arm exceeds (None: not
+    known).
     """
 
     name: str
@@ -65,6 +68,7 @@ class Robot:
     acceleration_limits_rad_s2: np.ndarray
     workspace: Workspace
     arms: tuple[Robot, ...] = ()
+    fastest_rad_s: np.ndarray | None = None
 
     @property
     def has_jaws(self) -> bool:

@@ -147,6 +147,7 @@ def _together(definition: TwoArmsDefinition, arms: list[Robot], sha256: str) -> 
             [first.acceleration_limits_rad_s2, second.acceleration_limits_rad_s2]
         ),
         arms=(first, second),
+        fastest_rad_s=np.concatenate([each.fastest_rad_s for each in arms if each.fastest_rad_s is not None]),
     )
 
 

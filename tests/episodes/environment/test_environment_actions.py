@@ -1,19 +1,22 @@
-"""What an environment does with actions that are none: it says so, and is where it was."""
+"""What an environment does with actions that are none, and with such as no arm can follow."""
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
 from grasped_twins import write_brick
 from manitwin.episodes.environment.action_limits import checked_action
+from manitwin.episodes.environment.environment import TaskEnvironment
 from manitwin.episodes.environment.make import make_env
+from manitwin.episodes.recording import RATE_HZ
 from manitwin.episodes.settings import TasksConfig
 from manitwin.episodes.tasks.task_files import read_tasks
 from manitwin.episodes.tasks.tasks_run import make_tasks
 from manitwin.errors import UsageError
+from manitwin.robots.load import load_robot
 from manitwin.scenes.layouts.layouts_run import make_layouts
 from manitwin.scenes.settings import LayoutsConfig, LayoutSettings
 
@@ -41,18 +44,35 @@ def test_actions_are_floats() -> None:
     assert checked_action((0, 1, 0.04), NAMES).tolist() == [0.0, 1.0, 0.04]
 
 
-def test_environment_goes_on_from_where_it_was_after_what_was_no_action(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def env(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TaskEnvironment]:
+    root = tmp_path_factory.mktemp("bricks")
     for number in range(2):
-        write_brick(tmp_path / "things", number, ("brick", "block")[number])
+        write_brick(root / "things", number, ("brick", "block")[number])
     layouts = LayoutsConfig(seed=2, layout=LayoutSettings(objects=(2, 2), robot="panda", clutter="sparse"))
-    make_layouts(tmp_path / "things", tmp_path / "s", 1, layouts, executor="inline")
+    make_layouts(root / "things", root / "s", 1, layouts, executor="inline")
     config = TasksConfig(seed=3, per_scene=1, two_literal_share=0.0, tries_of_kind=2)
-    make_tasks(tmp_path / "s", tmp_path / "tasks", config, executor="inline")
-    env = make_env(tmp_path / "tasks", read_tasks(tmp_path / "tasks")[0].task_id)
+    make_tasks(root / "s", root / "tasks", config, executor="inline")
+    made = make_env(root / "tasks", read_tasks(root / "tasks")[0].task_id)
+    yield made
+    made.close()
+
+
+def test_environment_goes_on_from_where_it_was_after_what_was_no_action(env: TaskEnvironment) -> None:
     before, _ = env.reset(seed=0)
     for action in (np.full(8, np.nan), np.zeros(7)):
         with pytest.raises(UsageError, match="action"):
             env.step(action)
     after, *_ = env.step(np.append(before["joint_positions_rad"], before["gripper_opening_m"]))
     assert after["joint_positions_rad"] == pytest.approx(before["joint_positions_rad"], abs=1e-3)
-    env.close()
+
+
+def test_joints_go_no_faster_than_their_motors_whatever_they_are_told(env: TaskEnvironment) -> None:
+    observation, _ = env.reset(seed=0)
+    home, fastest_rad_s = observation["joint_positions_rad"], load_robot("panda").fastest_rad_s
+    assert fastest_rad_s is not None
+    for steps in range(1, 6):
+        observation, *_ = env.step(env.action_space.high)
+        gone = np.abs(observation["joint_positions_rad"] - home)
+        assert (gone <= 1.1 * fastest_rad_s * steps / RATE_HZ + 0.02).all()
+    assert gone.min() > 0.8 * fastest_rad_s.min() * 5 / RATE_HZ, "it goes as fast as it can"

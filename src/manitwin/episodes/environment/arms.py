@@ -12,12 +12,16 @@ from manitwin.physics.sapien.controls.control import control_of
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.trial import TrialSettings
 
+ROUNDING = 1.001  # recorded actions are float32, and those of a plan at the limit are within it but for that
+
 
 class Arms:
     """All arms of a world and their hands; joints ``(n,)`` and what hands are told ``(h,)`` are in the arms' order."""
 
-    def __init__(self, world: RobotWorld, closing: TrialSettings, joints_rad: np.ndarray):
-        """Take a world whose hands are open, its joints at ``joints_rad``."""
+    def __init__(
+        self, world: RobotWorld, closing: TrialSettings, joints_rad: np.ndarray, fastest_rad_s: np.ndarray | None = None
+    ):
+        """Take a world whose hands are open, its joints at ``joints_rad``; ``fastest_rad_s``: as fast as joints may be told."""
         self._world = world
         self._hands = []
         for number in range(len(world.robots)):
@@ -26,6 +30,7 @@ class Arms:
         world.use(0)
         self._told = self._open = np.concatenate([hand.told for hand in self._hands])
         lowest_rad, highest_rad = zip(*(arm.limits_rad for arm in world.robots), strict=True)
+        self._last_rad, self._fastest_rad_s = np.asarray(joints_rad, float), fastest_rad_s
         self._targets = JointTargets(joints_rad, np.concatenate(lowest_rad), np.concatenate(highest_rad))
         self._per_frame = closing.steps_per_frame  # hands are told anew so often, as in episodes
         self.feel = any(not arm.robot.has_jaws for arm in world.robots)
@@ -35,8 +40,15 @@ class Arms:
         return may_hold(hand, self._told, self._open)
 
     def towards(self, joints_rad: np.ndarray, hand: np.ndarray, count: int) -> Iterator[int]:
-        """Tell joints and hands what they are to do timestep by timestep; yields the number, from 1, of each to be simulated."""
+        """Tell joints and hands what they are to do timestep by timestep; yields the number, from 1, of each to be simulated.
+
+        A joint is told no more than its fastest speed allows: the drives would follow a jump as no motor can.
+        """
         before, dt = self._told, self._world.timestep_s
+        if self._fastest_rad_s is not None:
+            most_rad = ROUNDING * self._fastest_rad_s * count * dt
+            joints_rad = np.clip(joints_rad, self._last_rad - most_rad, self._last_rad + most_rad)
+        self._last_rad = joints_rad
         for number, (target, speed) in enumerate(zip(*self._targets.towards(joints_rad, count), strict=True), start=1):
             velocities = speed / (count * dt)
             # as episodes do: the drives pull to where the arm is to be in the middle of the step

@@ -54,8 +54,9 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
     ``action (n + h,) float32``: what the arm's n joints are to be at the end of the step, rad, in the order of
     ``robot.arm_joints``, and what the hand is told, by ``robot.hand_action_names``: the distance between jaws (m), more than
     0.5 for a cup's vacuum, or the targets of a hand's joints (rad). Of two arms there are the joints of both, then what both
-    hands are told. What is beyond the limits is clipped. Within a step joints move as ``JointTargets`` says, hands evenly
-    from what they were told. Jaws that close on something press the harder the smaller their target is
+    hands are told. What is beyond the limits is clipped, and a joint goes no faster than ``robot.fastest_rad_s``. Within a step
+    joints move as ``JointTargets`` says, hands evenly from what they were told. Jaws that close on something press the harder
+    the smaller their target is
     (``FINGER_STIFFNESS_N_M``). ``observation``: see docs/policies.md. ``info``: ``success``, ``failure`` (the first literal
     that is not true, and why), ``literals`` (each with whether it holds).
     """
@@ -125,7 +126,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         start.moved, start.partners = self._setting.sequence.moved, self._setting.sequence.partners
         self._start, self._steps = start, 0
         start_rad = np.array(self._robot.home_rad if drawn is None else drawn.joints_rad, float)
-        self._arms = Arms(world, self._closing, start_rad)
+        self._arms = Arms(world, self._closing, start_rad, self._robot.fastest_rad_s)
         self._velocities = np.zeros(len(start_rad))
         self._watches = self._event_watches(start, world)
         self._poses = deque([self._object_poses()], maxlen=REST_ROWS)
