@@ -6,12 +6,14 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from lerobot_sets import HEIGHT_PX, WIDTH_PX, camera, color_rgb, episodes, written
 from synthetic_episodes import episode, robot, with_granules
 
+from manitwin.episodes.hdf5_file import write_episodes
 from manitwin.episodes.lerobot.read import LeRobotSet, read_lerobot
 from manitwin.episodes.lerobot.videos import CameraVideos, Clip
 from manitwin.episodes.lerobot.write import write_lerobot
@@ -62,6 +64,24 @@ def test_frames_tell_which_literal_of_a_goal_is_worked_on(found: LeRobotSet, tmp
     two = replace(two, recording=replace(two.recording, active_literal=numbers))
     write_lerobot([two], tmp_path / "set")
     assert np.array_equal(read_lerobot(tmp_path / "set").frames(0)["active_literal"], numbers)
+
+
+def test_pose_of_what_is_moved_is_that_of_what_is_handled_of_a_goal_of_several_literals(tmp_path: Path) -> None:
+    given = episode(0)
+    first, second = given.objects[1].name, given.objects[0].name
+    numbers = (np.arange(given.recording.steps) > 3).astype(np.uint8)
+    two = replace(
+        given,
+        attempt=replace(given.attempt, goal=f"near({first}, {second}, 0.1) and lifted({second}, 0.1)"),
+        recording=replace(given.recording, active_literal=numbers, target=0),
+    )
+    write_lerobot([two], tmp_path / "set")
+    told = read_lerobot(tmp_path / "set").frames(0)["observation.target_pose"][:, :3]
+    assert np.array_equal(told[:4], two.recording.object_positions_m[:4, 1])
+    assert np.array_equal(told[4:], two.recording.object_positions_m[4:-1, 0])
+    write_episodes(tmp_path / "episodes.h5", [two])
+    with h5py.File(tmp_path / "episodes.h5") as file:
+        assert np.array_equal(file["traj_0/obs/extra/obj_pose"][:-1, :3], told)
 
 
 def test_frames_count_granules_where_a_set_has_them(found: LeRobotSet, tmp_path: Path) -> None:

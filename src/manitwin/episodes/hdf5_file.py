@@ -19,6 +19,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, TypeAdapter, ValidationError
 
 from manitwin.episodes.attempts import Attempt, attempt_from
+from manitwin.episodes.handled_objects import handled_objects
 from manitwin.episodes.recording import RATE_HZ, Recording, joint_delta, tip_delta, tip_poses
 from manitwin.episodes.stored_episode import (
     RecordedArm,
@@ -188,7 +189,6 @@ def _write(group: h5py.Group, episode: StoredEpisode) -> None:
     speeds = np.append(np.diff(hand, axis=0) * np.float32(RATE_HZ), np.zeros((1, hand.shape[1]), np.float32), axis=0)
     velocities = np.hstack([recording.joint_velocities_rad_s, speeds])
     ended = np.arange(steps) == steps - 1
-    target = recording.target
     poses = np.concatenate([recording.object_positions_m, recording.object_quaternions_wxyz], axis=2)
     states = np.concatenate(
         [poses, recording.object_linear_velocities_m_s, recording.object_angular_velocities_rad_s], axis=2
@@ -198,7 +198,7 @@ def _write(group: h5py.Group, episode: StoredEpisode) -> None:
         "obs/agent/qpos": positions,
         "obs/agent/qvel": velocities,
         "obs/extra/tcp_pose": tip_poses(recording.tip_position_m, recording.tip_quaternion_wxyz),
-        "obs/extra/obj_pose": poses[:, target],
+        "obs/extra/obj_pose": poses[np.arange(steps + 1), handled_objects(episode)],
         "actions": np.hstack([recording.action_joint_positions_rad, recording.action_hand]),
         "terminated": ended,
         "truncated": np.zeros(steps, bool),

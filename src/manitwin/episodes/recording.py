@@ -23,7 +23,7 @@ class Recording:
     touched with more than 0.5 N what it should not, since the state before.
     Where there are granules, ``granule_positions_m (T + 1, N, 3)`` are their middles and ``granules_in_objects (T + 1, O)``
     says how many each object holds. Of a goal of several literals ``active_literal (T,)`` is the number of the one that is
-    worked on; the target is that of the last one, while contacts are those of what is handled at the time.
+    worked on; the target is that of the last one, while contacts are those of what is handled at the time (``handled_objects``).
 
     Two arms stand side by side in all arrays of joints, hands, tips and fingers, the first one's numbers before the second's.
     """

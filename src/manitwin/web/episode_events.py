@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from manitwin.episodes.goals.goal import Literal
 from manitwin.episodes.goals.goal_text import parse_goal
+from manitwin.episodes.handled_objects import handled_objects, of_states
 from manitwin.episodes.planning.problem import Phase
 from manitwin.episodes.recording import RATE_HZ, Recording
 from manitwin.episodes.stored_episode import StoredEpisode
@@ -71,7 +72,7 @@ def phases(recording: Recording) -> list[Span]:
     known = {int(each): each.name.lower() for each in Phase}
     return [
         Span(first, last, known.get(value, f"phase {value}"))
-        for first, last, value in _runs(_of_states(recording.phase))
+        for first, last, value in _runs(of_states(recording.phase))
     ]
 
 
@@ -85,7 +86,7 @@ def literals(episode: StoredEpisode) -> list[Span]:
         return [Span(0, recording.steps, " and ".join(said))]
     return [
         Span(first, last, said[value] if value < len(said) else f"literal {value + 1}")
-        for first, last, value in _runs(_of_states(recording.active_literal))
+        for first, last, value in _runs(of_states(recording.active_literal))
     ]
 
 
@@ -109,7 +110,7 @@ def happenings(episode: StoredEpisode, called: Callable[[str], str]) -> list[Hap
 
     Raises EpisodesError where the facts tell of events that are none.
     """
-    recording, moved = episode.recording, [called(name) for name in _moved(episode)]
+    recording, moved = episode.recording, [called(episode.objects[number].name) for number in handled_objects(episode)]
     rate, last = float(RATE_HZ), recording.steps
     found: list[Happening] = []
     for number, forces_n in enumerate(np.split(recording.finger_forces_n, episode.robot.arm_count, axis=1)):
@@ -130,20 +131,6 @@ def happenings(episode: StoredEpisode, called: Callable[[str], str]) -> list[Hap
         Happening(span.first / rate, "literal", f"now: {span.label}") for span in literals(episode)[1:]
     ]  # the first one begins with the episode
     return sorted(found, key=lambda each: each.time_s)[:MOST_EVENTS]
-
-
-def _moved(episode: StoredEpisode) -> list[str]:
-    """Return the name of what is handled at each state: the subject of the literal that is worked on, else the target.
-
-    Contacts are recorded of what is handled then.
-    """
-    recording, names = episode.recording, {each.name for each in episode.objects}
-    target = episode.objects[recording.target].name
-    subjects = [each.subject for each in _parsed(episode.attempt.goal)]
-    if recording.active_literal is None:
-        return [target] * (recording.steps + 1)
-    known = [each if each in names else target for each in subjects]
-    return [known[value] if value < len(known) else target for value in _of_states(recording.active_literal)]
 
 
 def _granules(episode: StoredEpisode, called: Callable[[str], str]) -> list[Happening]:
@@ -184,11 +171,6 @@ def _told(episode: StoredEpisode, called: Callable[[str], str]) -> list[Happenin
         time_s = min(max(event.values.get("time_s", end_s), 0.0), end_s)
         found.append(Happening(time_s, "told", label))
     return found
-
-
-def _of_states(of_actions: np.ndarray) -> np.ndarray:
-    """Return for ``(T + 1,)`` states what is told of ``(T,)`` actions: that of the action that follows, or the last one."""
-    return np.append(of_actions, of_actions[-1:])
 
 
 def _runs(values: np.ndarray) -> list[tuple[int, int, int]]:

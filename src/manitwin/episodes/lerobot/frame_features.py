@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from manitwin.episodes.handled_objects import handled_objects
 from manitwin.episodes.lerobot.lerobot_format import DEFAULT_FEATURES
 from manitwin.episodes.recording import RATE_HZ, Recording, joint_delta, tip_delta, tip_poses
 from manitwin.episodes.stored_episode import RecordedRobot, StoredEpisode
@@ -74,14 +75,14 @@ def frames_of(episode: StoredEpisode, episode_index: int, first_index: int, task
     steps, now = recording.steps, slice(0, recording.steps)
     number, last = np.arange(steps), np.arange(steps) == recording.steps - 1
     state = np.hstack([recording.joint_positions_rad, recording.hand])
-    target = recording.target
-    poses = [recording.object_positions_m[now, target], recording.object_quaternions_wxyz[now, target]]
+    handled = handled_objects(episode)[now]
+    poses = [recording.object_positions_m[number, handled], recording.object_quaternions_wxyz[number, handled]]
     return {
         "observation.state": state[now],
         "observation.velocity": recording.joint_velocities_rad_s[now],
         "observation.tip_pose": tip_poses(recording.tip_position_m, recording.tip_quaternion_wxyz)[now],
         "observation.target_pose": np.hstack(poses),
-        GRANULES: _granule_counts(episode.recording),
+        GRANULES: _granule_counts(recording, handled),
         "action": np.hstack([recording.action_joint_positions_rad, recording.action_hand]),
         "action.joint_delta": joint_delta(recording),
         "action.tip_delta": tip_delta(recording),
@@ -97,12 +98,12 @@ def frames_of(episode: StoredEpisode, episode_index: int, first_index: int, task
     }
 
 
-def _granule_counts(recording: Recording) -> np.ndarray:
-    """Return how many granules are in the target, in other vessels and in none ``(T, 3)``; zeros where there are none."""
+def _granule_counts(recording: Recording, handled: np.ndarray) -> np.ndarray:
+    """Return how many granules are in what is ``handled (T,)``, in other vessels and in none ``(T, 3)``; zeros without any."""
     positions, held = recording.granule_positions_m, recording.granules_in_objects
     if positions is None or held is None:
         return np.zeros((recording.steps, 3), np.int64)
-    in_target = held[:-1, recording.target].astype(np.int64)
+    in_target = held[np.arange(recording.steps), handled].astype(np.int64)
     in_others = held[:-1].sum(1, dtype=np.int64) - in_target
     return np.stack([in_target, in_others, positions.shape[1] - in_target - in_others], axis=1)
 

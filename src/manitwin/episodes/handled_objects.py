@@ -1,0 +1,38 @@
+"""What is handled at each state of an episode: of a goal of several literals one object after the other."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manitwin.episodes.goals.goal_text import parse_goal
+from manitwin.episodes.stored_episode import StoredEpisode
+from manitwin.errors import UsageError
+
+
+def handled_objects(episode: StoredEpisode) -> np.ndarray:
+    """Return the number of the object that is handled ``(T + 1,) int``: the subject of the literal that is worked on.
+
+    Contacts are recorded of that one. Where there is one literal, or none names an object, it is the recording's target.
+    """
+    recording = episode.recording
+    target, worked_on = recording.target, recording.active_literal
+    if worked_on is None:
+        return np.full(recording.steps + 1, target)
+    numbers = {each.name: number for number, each in enumerate(episode.objects)}
+    subjects = np.array([numbers.get(name, target) for name in _subjects(episode.attempt.goal)] or [target])
+    literals = of_states(worked_on).astype(int)
+    return np.where(literals < len(subjects), subjects[np.minimum(literals, len(subjects) - 1)], target)
+
+
+def of_states(of_actions: np.ndarray) -> np.ndarray:
+    """Return for ``(T + 1,)`` states what is told of ``(T,)`` actions: that of the action that follows, or the last one."""
+    return np.append(of_actions, of_actions[-1:])
+
+
+def _subjects(goal: str | None) -> list[str]:
+    if not goal:
+        return []
+    try:
+        return [each.subject for each in parse_goal(goal).literals]
+    except UsageError:
+        return []
