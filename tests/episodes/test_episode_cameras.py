@@ -12,6 +12,7 @@ from manitwin.geometry.poses import transform, transform_points
 from manitwin.render.cameras import project
 from manitwin.robots.grippers.suction import SuctionGripper
 from manitwin.robots.load import load_robot, shipped_robots
+from manitwin.robots.two_arms import base_to_world
 
 SIZE = 256
 
@@ -37,6 +38,21 @@ def test_front_camera_sees_the_hand_at_home(name: str) -> None:
     tip = tip_pose(robot, robot.home_rad)
     point = transform_points(tip, np.array([[0, 0, robot.gripper.tip_depth_m]]))
     assert inside(*project(point, named_cameras(["front"], robot)[0].placed(tip, SIZE, SIZE))).all()
+
+
+def test_front_camera_of_two_arms_sees_the_table_between_them_past_both() -> None:
+    robot = load_robot("two_pandas")
+    camera = named_cameras(["front"], robot)[0]
+    front = camera.placed(np.eye(4), SIZE, SIZE)
+    bases = [base_to_world(arm) for arm in robot.arms]
+    places = np.array([[x, y, z] for x in (0.3, 0.45, 0.6) for y in (-0.25, 0.0, 0.25) for z in (0.0, 0.45)])
+    seen = np.vstack([transform_points(base, places) for base in bases])
+    assert inside(*project(seen, front)).all()
+    eye = camera.camera_to_mount[:2, 3]
+    for base in bases:
+        shares = np.linspace(0, 1, 101)[:, None, None]
+        sights = eye + shares * (seen[:, :2] - eye)
+        assert np.linalg.norm(sights - base[:2, 3], axis=2).min() > 0.25, "an arm stands before the table"
 
 
 @pytest.mark.parametrize("name", shipped_robots())

@@ -12,9 +12,11 @@ from manitwin.geometry.poses import transform
 from manitwin.render.cameras import Camera, look_at
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.robots.robot import Robot
+from manitwin.robots.two_arms import base_to_world
 
 FOV_Y_RAD = 0.75
 WRIST_FOV_Y_RAD = 1.2  # about that of the small cameras that are mounted on hands (69 degrees)
+BESIDE_M = 0.1  # so far beside the bases of two arms a camera sees
 WRIST_CLEARANCE_M = 0.045  # of the camera from the palm
 
 
@@ -38,7 +40,8 @@ class NamedCamera:
 
 def named_cameras(names: Iterable[str], robot: Robot) -> list[NamedCamera]:
     """Return cameras by name: ``front`` looks at the robot from beyond its workspace, ``side`` from its right, ``top`` straight
-    down (the robot at the left), ``wrist`` along the hand's approach, past the fingers.
+    down (the robot at the left), ``wrist`` along the hand's approach, past the fingers. At two arms ``front`` looks across the
+    line between them, from the first one's left.
 
     They are placed by the robot's workspace and hand. Raises UsageError for a name that is none of these.
     """
@@ -52,8 +55,21 @@ def named_cameras(names: Iterable[str], robot: Robot) -> list[NamedCamera]:
 
 
 def _front(robot: Robot) -> NamedCamera:
+    if robot.arms:
+        return _front_of_two(robot)
     reach = robot.workspace.max_radius_m
     return _standing("front", np.array([0.62 * reach + 1.15, 0.0, 0.95]), np.array([0.45 * reach, 0.0, 0.22]))
+
+
+def _front_of_two(robot: Robot) -> NamedCamera:
+    """Across the line between both bases, on the first arm's left: beyond its workspace the second arm stands in the way."""
+    first, second = (base_to_world(arm)[:3, 3] for arm in robot.arms)
+    middle, along = (first + second) / 2, (second - first)[:2]
+    apart_m = float(np.hypot(*along))
+    left = np.array([-along[1], along[0], 0.0]) / apart_m
+    away_m = (apart_m / 2 + BESIDE_M) / np.tan(FOV_Y_RAD / 2)
+    above = middle + np.array([0.0, 0.0, 0.22])
+    return _standing("front", above + away_m * left + np.array([0.0, 0.0, 0.73]), above)
 
 
 def _side(robot: Robot) -> NamedCamera:

@@ -81,7 +81,7 @@ class EpisodeFilmsStage:
     """Draw the kept episodes of a batch: one film a camera, all episodes in it, frame t of an episode showing state t."""
 
     name = "films"
-    version = "4"
+    version = "5"
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = (FILMS, "first_frames")
     needs: Resource = "cpu"
