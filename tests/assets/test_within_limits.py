@@ -18,7 +18,7 @@ from manitwin.formats.isolated import Limits
 READER = """
 import os, sys, types
 
-def read(path, root, limits):
+def read(path, root, limits, joints="part"):
     text = open(path).read()
     if "hang" in text:
         while True:

@@ -18,10 +18,11 @@ from manitwin.episodes.cameras import named_cameras
 from manitwin.episodes.settings import PicturesConfig
 from manitwin.episodes.skills.registry import skill_names
 from manitwin.errors import UsageError
+from manitwin.geometry.length_unit import StatedUnit
 from manitwin.models.fakes.catalog import REHEARSALS
 from manitwin.models.registry import backends
 from manitwin.models.weights.catalog import KNOWN_WEIGHTS
-from manitwin.pipeline.manifest import Units, Up
+from manitwin.pipeline.manifest import Up
 from manitwin.robots.grippers.gripper import shipped_grippers
 from manitwin.robots.load import load_robot, shipped_robots, shipped_two_arms
 from manitwin.scenes.perception.segmentation import FORMATS as SEGMENTATIONS
@@ -37,7 +38,7 @@ def literal(section: type, name: str) -> set[str]:
 @pytest.mark.parametrize(
     ("said", "known"),
     [
-        (choices.UNITS, set(get_args(Units))),
+        (choices.UNITS, set(get_args(StatedUnit))),
         (choices.UP, set(get_args(Up))),
         (choices.EXECUTORS, set(EXECUTORS)),
         (choices.GRIPPERS, set(shipped_grippers())),
