@@ -100,9 +100,10 @@ def link_masses(draft: Draft[Item], articulation: Articulation) -> list[LinkMass
         if link.mass_kg is None or link.center_of_mass_m is None or given is None:
             break
         even = link.mass_kg * np.array(shape["inertia_m2"])
-        said = even if link.inertia_kg_m2 is None else np.array(link.inertia_kg_m2)
-        inertia = with_triangle_slack(ratio * said)
-        kept.append(LinkMass(ratio * link.mass_kg, np.array(link.center_of_mass_m), inertia, given.source))
+        lacks = link.inertia_kg_m2 is None
+        inertia = with_triangle_slack(ratio * (even if lacks else np.array(link.inertia_kg_m2)))
+        source = f"{given.source}, inertia of an even filling" if lacks else given.source
+        kept.append(LinkMass(ratio * link.mass_kg, np.array(link.center_of_mass_m), inertia, source))
     if len(kept) == len(articulation.links):
         return kept
     density = mass_kg / sum(shape["volume_m3"] for shape in shapes)

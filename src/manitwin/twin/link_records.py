@@ -113,7 +113,10 @@ class Link(Record):
 
 
 class GivenLink(Record):
-    """A link of an imported asset; mass and centre of mass where it gives both and an inertia, null where that cannot be true."""
+    """A link of an imported asset: mass, centre of mass and inertia where it gives all three, else none of them.
+
+    The inertia alone is null where it cannot be that of the mass.
+    """
 
     name: str = Field(min_length=1)
     mass_kg: Annotated[Finite, Field(gt=0, le=LARGEST_KG)] | None

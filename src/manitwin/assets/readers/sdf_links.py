@@ -10,11 +10,17 @@ from lxml import etree  # type: ignore[import-untyped]
 from manitwin.assets.articulation import Node, Tree, rigid_links
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.joints import Joints
+from manitwin.assets.readers.declared_joints import (
+    JOINT_KINDS,
+    Limits,
+    unit_direction,
+    why_it_cannot_move,
+    why_no_joint_of_a_twin,
+)
 from manitwin.assets.readers.sdf_shapes import ModelFrames, pose_of
 from manitwin.formats.xml_file import text_of
-from manitwin.geometry.articulation import ArticulatedJoint, JointKind
+from manitwin.geometry.articulation import ArticulatedJoint
 
-_KINDS: dict[str, JointKind] = {"revolute": "revolute", "continuous": "continuous", "prismatic": "prismatic"}
 _COUPLES = "gearbox"  # it holds nothing: it couples two joints
 _UNLIMITED = 1e15  # SDFormat's default is 1e16
 _AXES_OF_THE_MODEL = (1, 4)  # up to this version an axis was written in the model's frame
@@ -102,16 +108,12 @@ def _kept(
     written, name = joint.get("type") or "", str(joint.get("name"))
     if written == "fixed":
         return None, ""
-    kind = _KINDS.get(written)
-    if kind is None:
-        return None, f"{name[:60]!r} is {written}, which twins do not have"
-    if joint.find("axis/mimic") is not None:
-        return None, f"{name[:60]!r} copies another one (mimic), which twins do not have"
-    placed = _pose(joint, ends, frames)
+    if cause := why_no_joint_of_a_twin(name, written, mimics=joint.find("axis/mimic") is not None):
+        return None, cause
+    kind, placed = JOINT_KINDS[written], _pose(joint, ends, frames)
     axis, limits = _axis(joint, placed, frames, version), _limits(joint)
     if axis is None or limits is None:
-        what = "axis has no direction" if axis is None else "limits leave it no way"
-        return None, f"{name[:60]!r} cannot move: its {what}"
+        return None, why_it_cannot_move(name, axis, limits)
     lower, upper = limits if kind != "continuous" else (None, None)
     if lower is not None and upper is not None and not lower <= 0 <= upper:
         return None, f"{name[:60]!r} stands outside of its limits"
@@ -148,17 +150,13 @@ def _axis(joint: etree._Element, placed: np.ndarray, frames: ModelFrames, versio
     It is written in the joint's frame, unless it says otherwise, and up to SDFormat 1.4 in that of the model.
     """
     element = joint.find("axis/xyz")
-    try:
-        axis = np.array([float(word) for word in (text_of(joint, "axis/xyz") or "0 0 1").replace(",", " ").split()])
-    except ValueError:
-        return None
-    length = float(np.linalg.norm(axis)) if axis.shape == (3,) else 0.0
-    if not math.isfinite(length) or length < 1e-9:
+    axis = unit_direction(text_of(joint, "axis/xyz") or "0 0 1")
+    if axis is None:
         return None
     frame = None if element is None else element.get("expressed_in")
     of_model = (text_of(joint, "axis/use_parent_model_frame") or "").lower() in ("true", "1") or _is_old(version)
     turn = np.eye(3) if frame is None and of_model else (placed if frame is None else frames.to_model(frame))[:3, :3]
-    return np.asarray(turn @ (axis / length))
+    return np.asarray(turn @ axis)
 
 
 def _is_old(version: str | None) -> bool:
@@ -168,8 +166,7 @@ def _is_old(version: str | None) -> bool:
         return False
 
 
-def _limits(joint: etree._Element) -> tuple[float | None, float | None] | None:
-    """Return the limits, (None, None) where there are none; None where no position lies between them."""
+def _limits(joint: etree._Element) -> Limits:
     lower, upper = (_number(joint, f"axis/limit/{key}") for key in ("lower", "upper"))
     if lower is None or upper is None or max(-lower, upper) >= _UNLIMITED:
         return None, None

@@ -10,13 +10,19 @@ from lxml import etree  # type: ignore[import-untyped]
 from manitwin.assets.articulation import Node, Tree, rigid_links
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.joints import Joints
-from manitwin.geometry.articulation import ArticulatedJoint, JointKind
+from manitwin.assets.readers.declared_joints import (
+    JOINT_KINDS,
+    Limits,
+    unit_direction,
+    why_it_cannot_move,
+    why_no_joint_of_a_twin,
+)
+from manitwin.geometry.articulation import ArticulatedJoint
 from manitwin.robots.urdf import UrdfTree, child_of, origin_of, parent_of
 
 Placed = tuple[etree._Element, np.ndarray]
 """A link, and its pose in the first one's frame."""
 _LET_GO = ("floating", "planar")
-_KINDS: dict[str, JointKind] = {"revolute": "revolute", "continuous": "continuous", "prismatic": "prismatic"}
 _AXIS = np.array([1.0, 0, 0])
 """The URDF specification's, where a joint names none."""
 
@@ -85,15 +91,11 @@ def _kept(joint: etree._Element, child_to_asset: np.ndarray) -> tuple[Articulate
     written, name = joint.get("type") or "", str(joint.get("name"))
     if written == "fixed":
         return None, ""
-    kind = _KINDS.get(written)
-    if kind is None:
-        return None, f"{name[:60]!r} is {written}, which twins do not have"
-    if joint.find("mimic") is not None:
-        return None, f"{name[:60]!r} copies another one (mimic), which twins do not have"
-    axis, limits = _axis(joint), _limits(joint)
+    if cause := why_no_joint_of_a_twin(name, written, mimics=joint.find("mimic") is not None):
+        return None, cause
+    kind, axis, limits = JOINT_KINDS[written], _axis(joint), _limits(joint)
     if axis is None or limits is None:
-        what = "axis has no direction" if axis is None else "limits leave it no way"
-        return None, f"{name[:60]!r} cannot move: its {what}"
+        return None, why_it_cannot_move(name, axis, limits)
     lower, upper = limits
     if kind == "revolute" and lower is None:
         kind = "continuous"
@@ -120,7 +122,7 @@ def _kept(joint: etree._Element, child_to_asset: np.ndarray) -> tuple[Articulate
 def _placed(joint: etree._Element, joints: Joints) -> np.ndarray:
     """Return the pose of a joint's child in its parent."""
     origin = origin_of(joint)
-    kind, axis = _KINDS.get(joint.get("type") or ""), _axis(joint)
+    kind, axis = JOINT_KINDS.get(joint.get("type") or ""), _axis(joint)
     position = _standing(joint) if joints == "keep" else 0.0
     if position == 0.0 or kind is None or axis is None:
         return origin
@@ -136,8 +138,7 @@ def _standing(joint: etree._Element) -> float:
     return float(np.clip(0.0, limits[0], limits[1]))
 
 
-def _limits(joint: etree._Element) -> tuple[float | None, float | None] | None:
-    """Return the limits, (None, None) where there are none; None where no position lies between them."""
+def _limits(joint: etree._Element) -> Limits:
     limit = joint.find("limit")
     if joint.get("type") == "continuous" or limit is None:
         return None, None
@@ -152,12 +153,7 @@ def _axis(joint: etree._Element) -> np.ndarray | None:
     element = joint.find("axis")
     if element is None:
         return _AXIS
-    try:
-        axis = np.array([float(word) for word in (element.get("xyz") or "").replace(",", " ").split()])
-    except ValueError:
-        return None
-    length = float(np.linalg.norm(axis)) if axis.shape == (3,) else 0.0
-    return axis / length if math.isfinite(length) and length > 1e-9 else None
+    return unit_direction(element.get("xyz") or "")
 
 
 def _number(element: etree._Element | None, key: str, default: float | None = None) -> float | None:
