@@ -47,8 +47,7 @@ class Robot:
     links and limits are then those of the first, then of the second; ``tip_link``, ``gripper_to_tip`` and ``workspace`` those
     of the first. A robot of one arm has none.
 
-    ``velocity_limits_rad_s`` are those that plans keep within, ``fastest_rad_s`` the URDF's own, which no arm exceeds (None: not
-    known).
+    ``velocity_limits_rad_s`` are those that plans keep within, ``fastest_rad_s`` the URDF's own, which no arm exceeds.
     """
 
     name: str
@@ -65,10 +64,10 @@ class Robot:
     disabled_pairs: tuple[tuple[str, str], ...]
     home_rad: np.ndarray
     velocity_limits_rad_s: np.ndarray
+    fastest_rad_s: np.ndarray
     acceleration_limits_rad_s2: np.ndarray
     workspace: Workspace
     arms: tuple[Robot, ...] = ()
-    fastest_rad_s: np.ndarray | None = None
 
     @property
     def has_jaws(self) -> bool:

@@ -143,11 +143,11 @@ def _together(definition: TwoArmsDefinition, arms: list[Robot], sha256: str) -> 
         disabled_pairs=(*first.disabled_pairs, *second.disabled_pairs),
         home_rad=np.concatenate([first.home_rad, second.home_rad]),
         velocity_limits_rad_s=np.concatenate([first.velocity_limits_rad_s, second.velocity_limits_rad_s]),
+        fastest_rad_s=np.concatenate([first.fastest_rad_s, second.fastest_rad_s]),
         acceleration_limits_rad_s2=np.concatenate(
             [first.acceleration_limits_rad_s2, second.acceleration_limits_rad_s2]
         ),
         arms=(first, second),
-        fastest_rad_s=np.concatenate([each.fastest_rad_s for each in arms if each.fastest_rad_s is not None]),
     )
 
 

@@ -38,6 +38,7 @@ def planar_arm(kind: str = "revolute", limit_rad: float = 3.0) -> Robot:
         disabled_pairs=(("base", "a"), ("a", "b"), ("b", "c"), ("c", "left"), ("c", "right"), ("left", "right")),
         home_rad=np.array([0.1, 0.2, 0.3]),
         velocity_limits_rad_s=np.array([1.0, 1.5, 2.0]),
+        fastest_rad_s=np.array([1.0, 1.5, 2.0]),
         acceleration_limits_rad_s2=np.array([3.0, 4.0, 5.0]),
         workspace=Workspace(0.2, 0.8, 1.0),
     )

@@ -18,9 +18,7 @@ ROUNDING = 1.001  # recorded actions are float32, and those of a plan at the lim
 class Arms:
     """All arms of a world and their hands; joints ``(n,)`` and what hands are told ``(h,)`` are in the arms' order."""
 
-    def __init__(
-        self, world: RobotWorld, closing: TrialSettings, joints_rad: np.ndarray, fastest_rad_s: np.ndarray | None = None
-    ):
+    def __init__(self, world: RobotWorld, closing: TrialSettings, joints_rad: np.ndarray, fastest_rad_s: np.ndarray):
         """Take a world whose hands are open, its joints at ``joints_rad``; ``fastest_rad_s``: as fast as joints may be told."""
         self._world = world
         self._hands = []
@@ -45,9 +43,8 @@ class Arms:
         A joint is told no more than its fastest speed allows: the drives would follow a jump as no motor can.
         """
         before, dt = self._told, self._world.timestep_s
-        if self._fastest_rad_s is not None:
-            most_rad = ROUNDING * self._fastest_rad_s * count * dt
-            joints_rad = np.clip(joints_rad, self._last_rad - most_rad, self._last_rad + most_rad)
+        most_rad = ROUNDING * self._fastest_rad_s * count * dt
+        joints_rad = np.clip(joints_rad, self._last_rad - most_rad, self._last_rad + most_rad)
         self._last_rad = joints_rad
         for number, (target, speed) in enumerate(zip(*self._targets.towards(joints_rad, count), strict=True), start=1):
             velocities = speed / (count * dt)
