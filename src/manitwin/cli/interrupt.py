@@ -106,6 +106,29 @@ def first_interrupt_calls(stop: Callable[[], None], numbers: tuple[signal.Signal
             signal.signal(number, handler)
 
 
+@contextmanager
+def until_interrupted(numbers: tuple[signal.Signals, ...]) -> Iterator[Callable[[], None]]:
+    """Yield what waits for the first of these signals, also where that has come already; a second one ends what does not stop.
+
+    It reads a pipe that Python's handler in C writes to. A lock may be waited for for ever: a signal that comes just before is
+    only looked at after, and an Event that is set where it comes may wait for the lock that its own ``wait`` holds.
+    """
+    heard, tell = os.pipe()
+    os.set_blocking(tell, False)
+
+    def wait() -> None:
+        while os.read(heard, 1)[0] not in numbers:  # others have handlers of their own
+            pass
+
+    try:
+        with first_interrupt_calls(lambda: None, numbers):
+            signal.set_wakeup_fd(tell, warn_on_full_buffer=False)
+            yield wait
+    finally:
+        os.close(heard)
+        os.close(tell)
+
+
 class Interrupts:
     """Handle interrupts of a command: ``command`` is its name, once it is known."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-import threading
 from typing import Annotated
 
 import typer
@@ -11,7 +10,7 @@ import typer
 from manitwin.cli import choices
 from manitwin.cli.choices import LARGEST_COUNT
 from manitwin.cli.console import out_console
-from manitwin.cli.interrupt import first_interrupt_calls
+from manitwin.cli.interrupt import until_interrupted
 
 
 def fake(
@@ -39,13 +38,12 @@ def fake(
     if name is None:
         raise UsageError(f"no service is named; give one of {', '.join(REHEARSALS)}")
     given = Faults.parse(fault or [])
-    stop = threading.Event()
     # an interrupt that was raised inside of a line's printing would print that line again
-    with first_interrupt_calls(stop.set, (signal.SIGINT,)):
+    with until_interrupted((signal.SIGINT,)) as wait:
         with serving(name, port=port, faults=given, key=key, polls=polls) as server:
             out_console.print(f"{name} at {server.url}, until interrupted (Ctrl-C)")
             if server.key_variable is not None:
                 out_console.print(f"export {server.key_variable}={server.key}")
             out_console.print(f"manitwin {server.command} {server.option} {server.spec}")
-            stop.wait()
+            wait()
         out_console.print("stopped")
