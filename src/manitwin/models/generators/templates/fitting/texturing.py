@@ -172,7 +172,7 @@ def _unseen_colours(
     of_face: np.ndarray,
     colours: Mapping[str, tuple[float, float, float]],
 ) -> np.ndarray:
-    """Return a colour ``(F, 3)`` for each face, from those, ``of_face (F, 3)``, that the photos show of its part."""
+    """Return a colour ``(F, 3)`` for each unseen face, from those, ``of_face (F, 3)``, that the photos show of its part."""
     centers = points[mesh.faces].mean(axis=1)
     tones = np.zeros((len(centers), 3))
     shown_as: dict[tuple[float, float, float], np.ndarray] = {}  # what is seen of a part speaks for others of its look
@@ -182,22 +182,27 @@ def _unseen_colours(
             shown_as[colours[name]] = np.median(of_face[known], axis=0)
     for number, name in enumerate(mesh.names):
         own = mesh.part == number
-        known = own & seen
-        if not own.any():
+        known, wanted = own & seen, own & ~seen
+        if not wanted.any():
             continue
         if known.sum() < _LEAST_SEEN:
-            tones[own] = shown_as.get(colours[name], 255 * np.array(colours[name]))
+            tones[wanted] = shown_as.get(colours[name], 255 * np.array(colours[name]))
             continue
         some, there = of_face[known], centers[known]
-        places = _across(centers[own]) if _is_turned(centers[own]) else centers[own]
+        places = _across(centers) if _is_turned(centers[own]) else centers
         count = min(len(some), max(_NEAREST, len(some) // 8))
-        _, near = cKDTree(places[seen[own]]).query(places, k=count)
-        quiet = np.median(some[near.reshape(len(places), -1)], axis=1)
+        _, near = cKDTree(places[known]).query(places[wanted], k=count)
+        quiet = _medians(some, near.reshape(int(wanted.sum()), -1))
         # at the border of what is seen the colours go over into each other
-        distance, close = cKDTree(there).query(centers[own], k=6)
+        distance, close = cKDTree(there).query(centers[wanted], k=6)
         share = np.exp(-((distance[:, 0] / _BORDER) ** 2))[:, None]
-        tones[own] = share * some[close].mean(axis=1) + (1 - share) * quiet
+        tones[wanted] = share * some[close].mean(axis=1) + (1 - share) * quiet
     return tones
+
+
+def _medians(colours: np.ndarray, groups: np.ndarray) -> np.ndarray:
+    """Return the median (G, 3) of the ``colours (N, 3)`` of each group ``(G, K)`` of their numbers."""
+    return np.column_stack([np.median(channel[groups], axis=1) for channel in np.ascontiguousarray(colours.T)])
 
 
 def _is_turned(centers: np.ndarray) -> bool:
