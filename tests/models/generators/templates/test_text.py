@@ -104,10 +104,40 @@ def test_parts_are_described_by_their_name() -> None:
         ("a red mug with a wooden handle, 9 cm tall", {"height": 0.09}),
         ("a mug of the 70's", {}),
         ("an umbrella 3' long", {"length": 0.9144}),
+        ("a six-inch spoon", {"": 0.1524}),
+        ("a skillet, ten inches", {"": 0.254}),
+        ("a spoon of ½ ft", {"": 0.1524}),
+        ("a 3/4 foot long spoon", {"length": 0.2286}),
+        ("a 5-1/2 inch mug", {"": 0.1397}),
+        ("a hammer, 1 foot 2 inches long", {"length": 0.3556}),
+        ("a hammer 1'2\" long", {"length": 0.3556}),
+        ("a ruler, .3 m", {"": 0.3}),
+        ("a screwdriver of 0.1524 m", {"": 0.1524}),
+        ("a spoon, 2 dm", {"": 0.2}),
+        ("a yard long umbrella", {}),
+        ("an umbrella, 1 yard", {"": 0.9144}),
+        ("a 10 km mug", {"": 1e4}),
+        ("a two in one mug", {}),
     ],
 )
 def test_lengths_are_read_with_their_unit_and_direction(text: str, lengths: dict[str, float]) -> None:
     assert read(text).lengths_m == pytest.approx(lengths)
+
+
+@pytest.mark.parametrize(
+    ("text", "category"),
+    [
+        ("a bottle, green glass, 0.3 metres", "bottle"),
+        ("vase, clear glass", "vase"),
+        ("a mug, glass", "mug"),
+        ("a tall, clear glass", "glass"),
+        ("a wine glass, clear glass", "wine glass"),
+    ],
+)
+def test_glass_behind_a_thing_and_a_comma_is_what_it_is_of(text: str, category: str) -> None:
+    wanted = read(text)
+    assert wanted.category == category
+    assert category == "glass" or wanted.wishes[""].material == MATERIALS["glass"]
 
 
 def test_light_and_dark_move_a_colour() -> None:
@@ -146,6 +176,10 @@ def test_another_thing_whose_name_ends_as_a_templates_is_refused(text: str) -> N
     [
         ("a box 10 cm long, 6 cm wide and 4 cm tall", "several lengths"),
         ("a box, 20 x 15 x 10 cm", "several lengths"),
+        ("a box, 20x15 cm", "several lengths"),
+        ("a mug of 9-10 cm", "several lengths"),
+        ("a mug, 9 to 10 cm tall", "several lengths"),
+        ("a small large mug", "two sizes of one thing, small and large"),
         ("a knife with a 12 cm long handle", "length of a part"),
         ("a two-litre soda bottle", "a volume"),
         ("a 2 kg dumbbell", "a mass"),

@@ -122,11 +122,14 @@ class _Said:
 def described(words: Sequence[str], of: Prior | None = None) -> Described:
     """Return what words say; those before the name of a thing ``of`` a prior may say what it is for instead.
 
-    A word that is both a colour and a material (copper) is the latter where no other is said. Raises UsageError for two colours
-    or two materials of one thing.
+    A word that is both a colour and a material (copper) is the latter where no other is said. Raises UsageError for two colours,
+    two materials or two sizes of one thing.
     """
     said, unused = _read(words, of)
-    relative = [RELATIVE[word] for word in unused if word in RELATIVE]
+    sizes = [word for word in unused if word in RELATIVE]
+    relative = [RELATIVE[word] for word in sizes]
+    if relative and min(relative) < 0.5 < max(relative):
+        raise UsageError(f"two sizes of one thing, {' and '.join(sizes)}: say one")
     left = tuple(word for word in unused if word not in RELATIVE)
     color = _color(said, words)
     look = _material(said)

@@ -80,6 +80,8 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
         for start in range(end):
             if words[start] in FILLER_WORDS or "," in words[start:end] or (start > parted and not shown):
                 continue
+            if end - start == 1 and material_of(words[start]) is not None and _names_one(words[:start], names):
+                continue
             phrase = " ".join(words[start:end])
             prior = named(phrase) or named(phrase.replace(" ", ""))
             meant = [names.get(phrase)]
@@ -95,6 +97,12 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
             own = _own_materials(words[start:end], templates[category], load_priors()[category])
             return NamedCategory(category, own, _without_counter(words[:start]), tail)
     raise UsageError(_no_category(text, words, templates))
+
+
+def _names_one(words: Sequence[str], names: Mapping[str, str]) -> bool:
+    """Tell whether a thing is named before a comma: the glass of 'a bottle, green glass' is what the bottle is of."""
+    commas = [at for at, word in enumerate(words) if word == ","]
+    return any(" ".join(words[start:at]) in names for at in commas for start in range(at))
 
 
 def _parts(words: Sequence[str], at: int) -> bool:

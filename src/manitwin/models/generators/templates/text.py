@@ -20,19 +20,17 @@ from manitwin.models.generators.templates.described import (
 from manitwin.models.generators.templates.looks import look_of
 from manitwin.models.generators.templates.matter import is_composite
 from manitwin.models.generators.templates.named_category import find_category, plain_words
+from manitwin.models.generators.templates.stated_lengths import (
+    DIRECTIONS,
+    LENGTH,
+    in_figures,
+    lengths_in,
+    several_lengths,
+)
 from manitwin.models.generators.templates.template import Template
 
 MAX_CHARACTERS = 400
-_UNITS_M = {
-    r"millimet(?:re|er)s?": 1e-3, "mm": 1e-3, r"centimet(?:re|er)s?": 1e-2, "cm": 1e-2, r"met(?:re|er)s?": 1.0, "m": 1.0,
-    "inch(?:es)?": 0.0254, "in": 0.0254, "foot|feet|ft": 0.3048,
-}  # fmt: skip
-_AMOUNT = rf"(\d{{1,4}}(?:\.\d{{1,3}})?) ?({'|'.join(_UNITS_M)})\b\.?"
-_MEASURES = "height|width|length|diameter|depth"
-_LENGTH = re.compile(rf"{_AMOUNT} ?(?:in (?={_MEASURES}))?(\w{{0,12}})")
-_NAMED_LENGTH = re.compile(rf"\b({_MEASURES})(?: of)? ({_AMOUNT})")
-_OF_A_PART = re.compile(rf" (?:with|having|and) an? {_LENGTH.pattern}")
-_SEVERAL = re.compile(rf"\d ?(?:x|by|×) ?{_LENGTH.pattern}")
+_OF_A_PART = re.compile(rf" (?:with|having|and) an? {LENGTH.pattern}")
 _NOT_TAKEN = (
     (re.compile(r"\b(?:no(?!\.? ?\d)|not|without)\b"), "what a thing is not"),
     (
@@ -42,10 +40,6 @@ _NOT_TAKEN = (
     (re.compile(r"\b\d[\d.]* ?(?:kg|kilograms?|kilos?|g|grams?|lbs?|pounds?)\b"), "a mass"),
 )
 """What no template can be told, by what it is called: left out in silence, the thing would be another one."""
-DIRECTIONS = {
-    "tall": "height", "high": "height", "height": "height", "wide": "width", "width": "width", "broad": "width",
-    "diameter": "width", "across": "width", "long": "length", "length": "length", "deep": "depth", "thick": "height",
-}  # fmt: skip
 _PART_NAMES = {
     "lid": ("cap",), "cap": ("lid",), "top": ("cap", "lid"), "stopper": ("cap",), "cork": ("cap",), "grip": ("handle",),
     "blade": ("head",), "strap": ("band",), "display": ("screen",), "bristle": ("bristles",),
@@ -78,9 +72,9 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
     """
     if len(text) > MAX_CHARACTERS:
         raise UsageError(f"a text of {len(text)} characters; at most {MAX_CHARACTERS} describe an object")
-    plain, lengths = _plain(text), lengths_in(text)
-    _check_taken(text, plain, lengths)
-    rest = _LENGTH.sub(lambda m: "" if m[3] in DIRECTIONS else m[3], plain)
+    plain, lengths = in_figures(text), lengths_in(text)
+    _check_taken(text, plain)
+    rest = LENGTH.sub(lambda m: "" if m[3] in DIRECTIONS else m[3], plain)
     main, *features = _WITH.split(rest, maxsplit=1)
     found = find_category(main.split(), text, templates)
     template, prior = templates[found.category], load_priors()[found.category]
@@ -177,33 +171,12 @@ def _of_part(words: list[str]) -> Described:
     return Described(said.wish, None, (*said.unused, *(word for word in words if word in RELATIVE)))
 
 
-def lengths_in(text: str) -> dict[str, float]:
-    """Return the lengths (m) that a text states by their direction, '' for the longest."""
-    found = _LENGTH.findall(_plain(text))
-    return {DIRECTIONS.get(direction, ""): float(number) * _metres(unit) for number, unit, direction in found}
-
-
-def _metres(unit: str) -> float:
-    return next(metres for spelt, metres in _UNITS_M.items() if re.fullmatch(spelt, unit))
-
-
-def _plain(text: str) -> str:
-    """Return the words in lower case: a decimal comma as a point, marks of inches and feet as words, a length before its name."""
-    plain = re.sub(r"(?<=\d),(?=\d{3}\b)", "", text.lower())
-    plain = re.sub(r"(?<=\d),(?=\d)", ".", plain)
-    plain = re.sub(r"(?<=\d) ?(?:\"|″|'')", " inches ", plain)
-    plain = re.sub(r"(?<=\d) ?(?:'|′)(?!\w)", " ft ", plain)  # the 70's are no feet
-    plain = re.sub(r"(\d+) (\d)/(\d)\b", lambda m: f"{int(m[1]) + int(m[2]) / max(int(m[3]), 1):g}", plain)
-    plain = " ".join(plain.replace(",", " , ").replace("-", " ").split())
-    return _NAMED_LENGTH.sub(lambda m: f"{m[2]} {m[1]}", plain)
-
-
-def _check_taken(text: str, plain: str, lengths: Mapping[str, float]) -> None:
+def _check_taken(text: str, plain: str) -> None:
     """Raise UsageError for what a template cannot be told."""
     for pattern, what in _NOT_TAKEN:
         if (said := pattern.search(plain)) is not None:
             raise UsageError(f"{text!r}: a template cannot be told {what} ({said[0]!r}); leave it out, or say a length")
-    if len(_LENGTH.findall(plain)) > 1 or len(lengths) > 1 or _SEVERAL.search(plain):
+    if several_lengths(text):
         raise UsageError(
             f"{text!r} states several lengths: a template is scaled as a whole; say one, such as '9 cm tall'"
         )
