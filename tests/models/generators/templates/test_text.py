@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from manitwin.errors import UsageError
+from manitwin.models.annotators.priors import load_priors
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.described import Wish
 from manitwin.models.generators.templates.looks import COLORS, MATERIALS
@@ -447,3 +448,20 @@ def test_what_is_said_behind_a_part_is_that_part_s() -> None:
 def test_dark_and_light_wood_are_so() -> None:
     wood = sum(MATERIALS["wood"].rgb)
     assert sum(whole("a dark wood bowl").rgb or ()) < wood < sum(whole("a light wooden bowl").rgb or ())
+
+
+def test_a_frying_pan_of_any_metal_is_of_plate() -> None:
+    interval = load_priors()["frying pan"].mass_kg  # 0.35 kg to 3.2 kg; YCB's skillet has 0.95 kg
+    for text in ("a frying pan", "an aluminium frying pan", "a stainless steel skillet", "a cast iron skillet"):
+        for seed in range(6):
+            made = make(TEMPLATES["frying pan"], read(text), np.random.default_rng(seed))
+            assert interval.low <= sum(made.masses_kg.values()) <= interval.high, (text, seed)
+
+
+def test_a_thing_that_is_stated_small_has_walls_that_can_be_made() -> None:
+    for text in ("a steel mug, 7 cm", "a steel bowl, 7 cm", "a tiny steel mug"):
+        wanted = read(text)
+        made = make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
+        assert made.measures["wall_m"] > 0.00079, text
+        if wanted.lengths_m:
+            assert np.ptp(made.mesh.vertices, axis=0).max() == pytest.approx(0.07, rel=1e-6), text

@@ -54,11 +54,22 @@ def make(template: Template, wanted: Wanted, rng: np.random.Generator, said: Map
     looks_by_slot = _looks(template, wanted, rng)
     measures = template.drawn(rng) | dict(said or {})
     if "wall_m" in measures:
-        measures["wall_m"] = max(LEAST_WALL_M, measures["wall_m"] * next(iter(looks_by_slot.values())).wall)
+        measures["wall_m"] = max(LEAST_WALL_M, measures["wall_m"] * _wall(template, next(iter(looks_by_slot.values()))))
     model = template.build(**measures)
     mesh = model.assembly.mesh()
     _check_parts(template, wanted, mesh)
-    return dressed(template, model, mesh, measures, looks_by_slot, wanted.wishes, _scale(template, wanted, mesh))
+    scale = _scale(template, wanted, mesh)
+    if measures.get("wall_m", 1.0) * scale < LEAST_WALL_M:
+        measures["wall_m"] = LEAST_WALL_M / scale
+        model = template.build(**measures)
+        mesh = model.assembly.mesh()
+        scale = _scale(template, wanted, mesh)
+    return dressed(template, model, mesh, measures, looks_by_slot, wanted.wishes, scale)
+
+
+def _wall(template: Template, look: Look) -> float:
+    """Return how thick a wall of a look is, over the one that the template states."""
+    return 1.0 if template.of_plate and look.surface in METALS else look.wall
 
 
 def dressed(

@@ -101,7 +101,8 @@ class Template:
     ``category`` is one of the priors', ``names`` what it is called besides. ``slots`` are the looks by slot, each a list of
     'colour material' or 'material' to draw from; the first slot is what colours and materials without a part's name mean. A
     measure ``wall_m`` is that of ceramic and follows the material. ``contents_kg_m3`` is the mean density of parts that are
-    closed containers, with what is in them. ``of_sheet`` are parts that are hollow behind a sheet where they are of metal.
+    closed containers, with what is in them. ``of_sheet`` are parts that are hollow behind a sheet where they are of metal;
+    ``of_plate``: what is of metal has the wall that is stated, and none of sheet.
     """
 
     category: str
@@ -112,6 +113,7 @@ class Template:
     names: tuple[str, ...] = ()
     contents_kg_m3: Mapping[str, float] = field(default_factory=dict)
     of_sheet: tuple[str, ...] = ()
+    of_plate: bool = False
 
     def drawn(self, rng: np.random.Generator) -> dict[str, float]:
         """Draw all measures."""
