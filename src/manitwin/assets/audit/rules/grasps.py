@@ -59,7 +59,11 @@ def grasps_off_object(measured: MeasuredAsset) -> Iterator[Complaint]:
         return
     for grasps, held, points, gripper in measured.once(held_sets):
         reach = REACH_M if gripper is not None and gripper.kind != "multi_finger" else PALM_REACH_M
-        off = distance_to_matter(measured, points, reach) > reach
+        poses, widths = np.asarray(grasps.gripper_to_asset, float)[held], np.asarray(grasps.width_m, float)[held]
+        aside = poses[:, :3, 0] * np.nan_to_num(widths, posinf=0.0)[:, None] / 2
+        off = np.ones(len(points), bool)
+        for fingers in (points, points + aside, points - aside):  # between those around a mug is its hollow
+            off[off] = distance_to_matter(measured, fingers[off], reach) > reach
         if off.mean() > SHARE_OFF:
             yield Complaint(
                 f"{off.mean():.0%} of {len(held)} grasps of {grasps.gripper} that are said to hold have their fingertips more"

@@ -1,0 +1,68 @@
+"""Rules that hold matter against a shape leave room for hollows and for heads that are heavier than their handles."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import trimesh
+from made_mug import DEPTH_M, clean, frame, scaled
+
+from manitwin.assets.asset import AnnotatedFrame, Asset, Inertial
+from manitwin.assets.audit.check import audit_asset
+from manitwin.assets.audit.rules import RULES
+from manitwin.geometry.poses import transform
+
+
+def found(asset: Asset) -> set[str]:
+    return {finding.code for finding in audit_asset(asset, RULES)}
+
+
+def box(sides: tuple[float, float, float], x: float) -> trimesh.Trimesh:
+    return trimesh.creation.box(sides, transform(translation=np.array([x, 0, 0])))
+
+
+def test_a_frame_in_the_plane_of_an_opening_is_at_the_object() -> None:
+    wide = scaled(replace(clean(), frames=()), 2)
+    assert wide.name == "mug"
+    at_the_rim, above = (
+        AnnotatedFrame("functional", 0, transform(translation=np.array([0, 0, z]))) for z in (0.2 + 1e-6, 0.4)
+    )
+    assert "FRM005" not in found(replace(wide, frames=(at_the_rim,))), "75 mm from the wall, a hair above the hull"
+    assert "FRM005" in found(replace(wide, frames=(above,)))
+
+
+def test_fingers_around_a_mug_have_its_hollow_between_them() -> None:
+    around = frame(np.array([0, 0, -1.0]), np.array([0, 1.0, 0]), np.array([0, 0, 0.08 + DEPTH_M]))
+    beside = transform(translation=np.array([0.3, 0, 0])) @ around
+    mug = clean()
+    for pose, codes in ((around, set()), (beside, {"GRA006"})):
+        poses = np.repeat(pose[None], 8, axis=0)
+        grasps = replace(mug.grasps[0], gripper_to_asset=poses, width_m=np.full(8, 0.08))
+        assert found(replace(mug, grasps=(grasps,))) & {"GRA006"} == codes
+
+
+def test_a_heavy_head_leaves_little_inertia_about_a_centre_that_is_in_it() -> None:
+    handle, head = box((0.3, 0.03, 0.03), 0.0), box((0.05, 0.12, 0.04), 0.175)
+    both = trimesh.util.concatenate([handle, head])
+    masses = np.array([500 * handle.volume, 7850 * head.volume])
+    center = masses @ [handle.center_mass, head.center_mass] / masses.sum()
+    inertia = np.zeros((3, 3))
+    for mesh, mass in zip((handle, head), masses, strict=True):
+        arm = mesh.center_mass - center
+        own = mesh.moment_inertia / mesh.volume
+        inertia += mass * (own + (arm @ arm) * np.eye(3) - np.outer(arm, arm))
+    hammer = replace(
+        clean(),
+        name="thing",
+        visual=(both,),
+        collision=(),
+        frames=(),
+        grasps=(),
+        rests=(),
+        inertial=Inertial(float(masses.sum()), center, inertia),
+    )
+    assert "INE005" not in found(hammer)
+    assert "INE005" in found(replace(hammer, inertial=replace(hammer.inertial, inertia_kg_m2=inertia / 10)))
+    even = replace(hammer.inertial, center_of_mass_m=both.bounds.mean(0))
+    assert "INE005" in found(replace(hammer, inertial=even)), "about a centre in its middle it is too little"
