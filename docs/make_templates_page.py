@@ -36,10 +36,11 @@ the right part; their source is `template:CATEGORY`. What is not here is refused
   twenty. A text is one thing: "two forks" and "a set of spoons" are refused and point here; a pair of pliers is one.
 - **What it is**: one of the names below, or another word for it that the [priors](priors.md) know. The last noun counts: a mug
   rack is no mug. The twin is called as the text calls it (a skillet is a skillet, made by the frying pan's template).
-- **How it looks**: colours and materials before or after the name are those of the whole; behind *with*, of a part, and of
-  further ones behind *and*: `a small hammer with a red handle and a black head`. What the text does not say is drawn from the
-  seed. Two colours or two materials of one part are refused. What is in a thing, or what it is for, says nothing of it (a glass
-  of red wine, a brush for wood); nor does a word that is not known: the check `text_understood` names such.
+- **How it looks**: colours and materials before or after the name are those of the whole (a colour of a steel tool is its
+  handle's); behind *with*, of a part, and of further ones behind *and*: `a small hammer with a red handle and a black head`. What
+  the text does not say is drawn from the seed. Two colours or two materials of one part are refused. What is in a thing, or
+  what it is for, says nothing of it (a glass of red wine, a brush for wood); nor does a word that is not known: the check
+  `text_understood` names such.
 - **How large it is**: `9 cm` is the longest extent; `9 cm tall`, `wide`, `long` is that direction. Units may be spelt out, and
   inches, feet, yards and fractions are read. A size that no such thing has is refused. `small` and `large` choose within the
   usual sizes.

@@ -465,3 +465,12 @@ def test_a_thing_that_is_stated_small_has_walls_that_can_be_made() -> None:
         assert made.measures["wall_m"] > 0.00079, text
         if wanted.lengths_m:
             assert np.ptp(made.mesh.vertices, axis=0).max() == pytest.approx(0.07, rel=1e-6), text
+
+
+def test_a_colour_of_a_tool_is_its_handle_s() -> None:
+    red = tuple(int(COLORS["red"][i : i + 2], 16) / 255 for i in (0, 2, 4))
+    for text in ("a red claw hammer", "hammer, red", "red pliers", "a red chisel", "a red paring knife"):
+        wanted = read(text)
+        assert wanted.wishes == {"handle": Wish(red)}, text
+    for text in ("a red frying pan", "a red screwdriver", "a red mug", "a red steel hammer", "a silver hammer"):
+        assert "" in read(text).wishes, text

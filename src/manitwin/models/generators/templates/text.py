@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from manitwin.errors import UsageError
 from manitwin.models.annotators.priors import Prior, load_priors
+from manitwin.models.annotators.walls import METALS
 from manitwin.models.generators.templates.described import (
     FILLER_WORDS,
     RELATIVE,
@@ -45,6 +46,8 @@ _PART_NAMES = {
     "blade": ("head",), "strap": ("band",), "display": ("screen",), "bristle": ("bristles",),
 }  # fmt: skip
 """Other words for slots of templates, the best first."""
+_TOOL_HEADS = ("head", "blade")
+_COLORED_MATTER = {"plastic", "rubber"}
 _COMMON_PARTS = ("handle", "lid", "cap", "rim", "blade")
 _WITH = re.compile(r" (?:with|having|featuring) | and an? (?=.)| (?:that|which) has ")
 
@@ -80,16 +83,21 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
     template, prior = templates[found.category], load_priors()[found.category]
     try:
         parts, whole = _part_before(found.before, template)
+        parts += _features(features[0], template) if features else []
         before = described(whole, prior)
         slot = _slot_meant(before.wish, template, prior)
         if slot is not None:
-            parts = [*parts, (slot, Described(before.wish))]
+            parts = [(slot, Described(before.wish)), *parts]
             before = replace(before, wish=Wish())
         words = _joined(before, described(found.own), described_behind(found.tail))
+        coated = _slot_coated(words.wish, template)
+        if coated is not None and coated not in {part for part, _ in parts}:
+            parts = [(coated, Described(words.wish)), *parts]
+            words = replace(words, wish=Wish())
         wishes = {} if words.wish == Wish() else {"": words.wish}
         unused = list(words.unused)
-        for part, said in [*parts, *(_features(features[0], template) if features else [])]:
-            wishes[part] = said.wish
+        for part, said in parts:
+            wishes[part] = said.wish.over(wishes.get(part, Wish()))
             unused += said.unused
     except UsageError as error:
         raise UsageError(f"{text!r}: {error}") from None
@@ -104,6 +112,17 @@ def _slot_meant(wish: Wish, template: Template, prior: Prior) -> str | None:
     first = next(iter(usual))
     of_it = [slot for slot, surfaces in usual.items() if wish.material.surface in surfaces]
     return of_it[0] if of_it and first not in of_it else None
+
+
+def _slot_coated(wish: Wish, template: Template) -> str | None:
+    """Return the part that a colour of the whole is of, where nobody paints the whole: of a red hammer the handle."""
+    if wish.rgb is None or wish.material is not None or wish.kind:
+        return None
+    usual = {slot: {look_of(words).surface for words in choices if words} for slot, choices in template.slots.items()}
+    first = next(iter(usual))
+    if first not in _TOOL_HEADS or not usual[first].issubset(METALS):
+        return None
+    return next((slot for slot, surfaces in usual.items() if surfaces & _COLORED_MATTER), None)
 
 
 def _joined(before: Described, own: Described, tail: Described) -> Described:
