@@ -23,22 +23,22 @@ TEMPLATES: Mapping[str, tuple[str, ...]] = {
     ),
     "left_of": (
         "put {a} to the left of {b}", "place {a} on the left side of {b}", "set {a} down left of {b}",
-        "move {a} so that {it} is to the left of {b}", "{a} should be left of {b}: move {it} there",
+        "move {a} so that {they} {are} to the left of {b}", "{a} should be left of {b}: move {it} there",
         "pick up {a} and put {it} beside {b}, on the left",
     ),
     "right_of": (
         "put {a} to the right of {b}", "place {a} on the right side of {b}", "set {a} down right of {b}",
-        "move {a} so that {it} is to the right of {b}", "{a} should be right of {b}: move {it} there",
+        "move {a} so that {they} {are} to the right of {b}", "{a} should be right of {b}: move {it} there",
         "pick up {a} and put {it} beside {b}, on the right",
     ),
     "behind": (
         "put {a} behind {b}", "place {a} at the back of {b}", "set {a} down behind {b}, as you see it",
-        "move {a} so that {it} is behind {b}", "{a} should be behind {b}: move {it} there",
+        "move {a} so that {they} {are} behind {b}", "{a} should be behind {b}: move {it} there",
         "pick up {a} and put {it} farther away from you than {b}, just behind {it_b}",
     ),
     "in_front_of": (
         "put {a} in front of {b}", "place {a} before {b}", "set {a} down in front of {b}, as you see it",
-        "move {a} so that {it} is in front of {b}", "{a} should be in front of {b}: move {it} there",
+        "move {a} so that {they} {are} in front of {b}", "{a} should be in front of {b}: move {it} there",
         "pick up {a} and put {it} between you and {b}, close to {it_b}",
     ),
     "near": (
@@ -47,11 +47,11 @@ TEMPLATES: Mapping[str, tuple[str, ...]] = {
     ),
     "away_from": (
         "move {a} away from {b}", "put {a} farther away from {b}", "set {a} down well clear of {b}",
-        "take {a} and put {it} somewhere far from {b}", "{a} is too close to {b}: move {it} away",
+        "take {a} and put {it} somewhere far from {b}", "{a} {are} too close to {b}: move {it} away",
         "pick up {a} and keep {it} apart from {b}",
     ),
     "upright": (
-        "stand {a} up", "put {a} upright", "{a} has fallen over: stand {it} up", "set {a} back on {its} base",
+        "stand {a} up", "put {a} upright", "{a} {have} fallen over: stand {it} up", "set {a} back on {its} base",
         "pick up {a} and put {it} down upright", "please stand {a} upright again",
     ),
     "lifted": (
@@ -71,11 +71,11 @@ TEMPLATES: Mapping[str, tuple[str, ...]] = {
         "pick up {a}, pour it out into {b} and put {it} back", "please fill {b} with what is in {a}",
     ),
     "pushed_to": (
-        "push {a} to the mark", "slide {a} over to the mark", "push {a} along until {it} is at the mark",
+        "push {a} to the mark", "slide {a} over to the mark", "push {a} along until {they} {are} at the mark",
         "without lifting {it}, move {a} to the mark", "shove {a} over to the mark", "please push {a} to the marked place",
     ),
     "stirred": (
-        "stir what is in {b} with {a}", "use {a} to stir {b}", "give {b} a stir with {a}", "stir {b} once around with {a}",
+        "stir what is in {b} with {a}", "use {a} to stir {b}", "give {b} a stir with {a}", "stir around in {b} with {a}",
         "pick up {a} and stir what is in {b}", "please mix what {b} holds with {a}",
     ),
     "wiped": (
@@ -89,7 +89,7 @@ TEMPLATES: Mapping[str, tuple[str, ...]] = {
     ),
     "aimed": (
         "point {a} at {b}", "aim {a} at {b}", "direct {a} at {b}", "pick up {a} and point {it} at {b}",
-        "take {a} and aim {it} at {b}", "please hold {a} so that {it} points at {b}",
+        "take {a} and aim {it} at {b}", "please hold {a} so that {they} {point} at {b}",
     ),
     "handed_over": (
         "hand {a} over to the other arm", "give {a} to the other hand", "pass {a} from one hand to the other",
@@ -152,6 +152,10 @@ def _filled(template: str, subject: Name, second: Name | None) -> str:
         a=f"the {subject.words}",
         b="" if second is None else f"the {second.words}",
         it="them" if subject.plural else "it",
+        they="they" if subject.plural else "it",
+        are="are" if subject.plural else "is",
+        have="have" if subject.plural else "has",
+        point="point" if subject.plural else "points",
         its="their" if subject.plural else "its",
         it_b="them" if second is not None and second.plural else "it",
     )

@@ -1,0 +1,38 @@
+"""Instructions of goals are grammatical of one thing and of a pair, and say what is done."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from manitwin.episodes.goals.goal import Literal
+from manitwin.episodes.goals.goal_instructions import TEMPLATES, goal_instructions
+from manitwin.twin.record import Language
+
+OF_ONE = {"upright", "lifted", "pressed", "handed_over"}
+
+
+def said(predicate: str, category: str) -> list[str]:
+    told = {"color": "red", "material": "steel", "size": "12 x 9 x 8 cm", "shape": "long", "function": "work"}
+    thing = Language(category=category, **told, caption=f"A {category}.", captions=[])
+    bowl = Language(category="bowl", **told, caption="A bowl.", captions=[])
+    literal = Literal(predicate, "object_00", None if predicate in OF_ONE else "object_01")
+    words = {"object_00": thing, "object_01": bowl}
+    return [
+        each
+        for held_out in (False, True)
+        for each in goal_instructions(literal, words, seed=0, count=60, held_out=held_out)
+    ]
+
+
+@pytest.mark.parametrize("predicate", TEMPLATES)
+def test_verbs_go_with_one_thing_and_with_a_pair(predicate: str) -> None:
+    for each in said(predicate, "scissors"):
+        assert not re.search(r"\b(?:them|they|scissors(?: for work)?) (?:is|has|points)\b|\bthem (?:are|point)\b", each), each
+    for each in said(predicate, "mug"):
+        assert not re.search(r"\b(?:they|them|their|are|have)\b", each), each
+
+
+def test_a_stir_is_not_said_to_go_around_once() -> None:
+    assert not [each for each in said("stirred", "mug") if "once" in each]
