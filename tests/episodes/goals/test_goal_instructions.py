@@ -36,3 +36,8 @@ def test_verbs_go_with_one_thing_and_with_a_pair(predicate: str) -> None:
 
 def test_a_stir_is_not_said_to_go_around_once() -> None:
     assert not [each for each in said("stirred", "mug") if "once" in each]
+
+
+def test_an_end_that_may_be_no_tip_is_not_called_one() -> None:
+    """Of a capped marker the closed end of its body goes into the holder."""
+    assert not [each for each in said("inserted", "marker") if "tip" in each]

@@ -63,7 +63,7 @@ TEMPLATES: Mapping[str, tuple[str, ...]] = {
         "take {a} and slip {it} over the peg", "please hang {a} up so that the peg goes through {it}",
     ),
     "inserted": (
-        "put {a} into the holder", "insert {a} into the holder", "stand {a} in the holder, tip down",
+        "put {a} into the holder", "insert {a} into the holder", "stand {a} up in the holder",
         "pick up {a} and put {it} into the holder", "slip {a} into the holder", "please put {a} away in the holder",
     ),
     "poured": (
