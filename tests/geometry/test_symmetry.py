@@ -39,3 +39,26 @@ def test_mug_has_the_mirror_through_its_handle_only() -> None:
     assert found.axis is None and len(found.motions) == 2
     assert found.apart_m(np.array([0, 0.04, 0.05]), np.array([0, -0.04, 0.05])) == pytest.approx(0, abs=2e-3)
     assert found.apart_m(np.array([0.075, 0, 0.05]), np.array([-0.04, 0, 0.05])) > 0.05
+
+
+@pytest.mark.parametrize(("sides", "turns"), [(3, 6), (5, 10), (6, 12)])
+def test_prism_has_all_turns_of_its_sides_and_flips(sides: int, turns: int) -> None:
+    found = of(trimesh.creation.cylinder(0.025, 0.14, sections=sides))
+    assert found.axis is None and (np.linalg.det(found.motions) > 0).sum() == turns
+
+
+def test_cube_has_24_turns_of_which_two_make_a_third() -> None:
+    found = of(trimesh.creation.box([0.06, 0.06, 0.06]))
+    turns = found.motions[np.linalg.det(found.motions) > 0]
+    assert len(turns) == 24 and len(found.motions) == 48
+    made = np.einsum("aij,bjk->abik", turns, turns).reshape(-1, 1, 3, 3)
+    assert np.abs(made - turns).max((2, 3)).min(1).max() < 1e-9
+
+
+def test_ball_is_the_same_after_any_turn_and_a_cylinder_is_not() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.035)
+    ball.apply_translation([0.1, 0.0, 0.0])
+    found = of(ball)
+    assert found.ball and not of(cylinder(0.03, 0.12)).ball
+    oblique = np.array([0.1, 0.0, 0.0]) + 0.035 * np.array([0.48, 0.6, 0.64])
+    assert found.apart_m(np.array([0.135, 0.0, 0.0]), oblique) == pytest.approx(0, abs=1e-3)

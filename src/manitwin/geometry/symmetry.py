@@ -1,7 +1,8 @@
-"""The symmetries of a solid by its surface: mirror planes, half and quarter turns, and bodies of revolution."""
+"""The symmetries of a solid by its surface: mirror planes, turns by a half to an eighth, bodies of revolution, and balls."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,23 +15,27 @@ from manitwin.geometry.sampling import sample_surface
 _TESTED, _SURFACE = 1500, 30_000  # samples that are moved, and those that they are to fall on
 _OFF_SHARE = 0.015  # of the box's diagonal: how far nearly all of a moved surface may be from the surface
 _KEPT_SHARE = 0.99
-_TURNS = (np.pi, np.pi / 2, -np.pi / 2)
+_FOLDS = (2, 3, 4, 5, 6, 7, 8)  # a prism of more sides is round, by ``_OFF_SHARE``
 _ODD_TURNS = (0.61, 1.87)  # radians: no share of a turn that a prism or a flower has
+_MOST_MOTIONS, _ONE_MOTION = 64, 1e-3  # a cube has 48; of two matrices that differ by less one is kept
 
 
 @dataclass(frozen=True)
 class Symmetries:
     """Motions ``(K, 3, 3)`` about ``center_m (3,)`` that move a solid onto itself; ``axis (3,)`` of a body of revolution.
 
-    The first motion is the identity.
+    The first motion is the identity; two of them after each other are one of them too. ``ball``: so is any turn.
     """
 
     center_m: np.ndarray
     motions: np.ndarray
     axis: np.ndarray | None
+    ball: bool = False
 
     def apart_m(self, first_m: np.ndarray, second_m: np.ndarray) -> float:
         """Return the least distance (m) of two places ``(3,)``, where symmetric places are one."""
+        if self.ball:
+            return float(abs(np.linalg.norm(first_m - self.center_m) - np.linalg.norm(second_m - self.center_m)))
         first, moved = first_m - self.center_m, self.motions @ (second_m - self.center_m)
         apart = np.linalg.norm(moved - first, axis=1)
         if self.axis is not None:
@@ -60,12 +65,35 @@ def find_symmetries(mesh: trimesh.Trimesh, rng: np.random.Generator) -> Symmetri
 
     found: list[Symmetries] = []
     for axes in (np.eye(3), box_to_object[:3, :3].T, inertia_axes):
-        tried = [-np.eye(3), *(np.eye(3) - 2 * np.outer(axis, axis) for axis in axes)]
-        tried += [_turned(axis, angle) for axis in axes for angle in _TURNS]
-        motions = np.array([np.eye(3), *(motion for motion in tried if kept(motion))])
-        round_about = [axis for axis in axes if all(kept(_turned(axis, angle)) for angle in _ODD_TURNS)]
-        found.append(Symmetries(center, motions, round_about[0] if round_about else None))
-    return max(found, key=lambda some: (some.axis is not None, len(some.motions)))
+        mirrors = [-np.eye(3), *(np.eye(3) - 2 * np.outer(axis, axis) for axis in axes)]
+        round_about = [axis for axis in axes if _is_round(axis, kept)]
+        turns = [turn for axis in axes for turn in _turns_about(axis, kept)]
+        motions = _closed([*(mirror for mirror in mirrors if kept(mirror)), *turns], kept)
+        found.append(Symmetries(center, motions, round_about[0] if round_about else None, len(round_about) > 1))
+    return max(found, key=lambda some: (some.ball, some.axis is not None, len(some.motions)))
+
+
+def _is_round(axis: np.ndarray, kept: Callable[[np.ndarray], bool]) -> bool:
+    return all(kept(_turned(axis, angle)) for angle in _ODD_TURNS)
+
+
+def _turns_about(axis: np.ndarray, kept: Callable[[np.ndarray], bool]) -> list[np.ndarray]:
+    """Return the least turn about an axis that is kept, and the half turn where that is too; of what is round a quarter turn."""
+    if _is_round(axis, kept):
+        return [_turned(axis, np.pi / 2)]
+    folds = [fold for fold in _FOLDS if kept(_turned(axis, 2 * np.pi / fold))]
+    return [_turned(axis, 2 * np.pi / fold) for fold in sorted({*folds[:1], *folds[-1:]})]
+
+
+def _closed(generators: list[np.ndarray], kept: Callable[[np.ndarray], bool]) -> np.ndarray:
+    """Return the identity and all motions ``(K, 3, 3)`` that generators make after each other, as far as these are kept too."""
+    motions = [np.eye(3)]
+    for motion in motions:  # which grows meanwhile
+        for product in (each @ motion for each in generators):
+            new = np.abs(np.array(motions) - product).max((1, 2)).min() > _ONE_MOTION
+            if new and len(motions) < _MOST_MOTIONS and kept(product):
+                motions.append(product)
+    return np.array(motions)
 
 
 def _turned(axis: np.ndarray, angle_rad: float) -> np.ndarray:

@@ -15,6 +15,7 @@ from pycocotools.cocoeval import COCOeval
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import inverse, transform_points
 from manitwin.geometry.ray_caster import RayCaster
+from manitwin.scenes.perception.bop_models import BopModel
 from manitwin.scenes.perception.classes import Classes
 from manitwin.scenes.perception.scene_truth import SceneTruth
 from manitwin.scenes.perception.segmentation import FORMATS, write_segmentation
@@ -213,6 +214,24 @@ def test_bop_symmetries_keep_the_models_as_they_are(written: Path) -> None:
         )
     assert box["diameter"] == pytest.approx(1000 * np.linalg.norm([0.12, 0.08, 0.06]), rel=0.01)
     assert [box[f"size_{axis}"] for axis in "xyz"] == pytest.approx([120, 80, 60], rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "discrete", "continuous"),
+    [
+        (trimesh.creation.box((0.06, 0.06, 0.06)), 23, 0),
+        (trimesh.creation.cylinder(0.025, 0.14, sections=6), 11, 0),
+        (trimesh.creation.icosphere(subdivisions=3, radius=0.035), 23, 3),
+    ],
+    ids=["cube", "hexagonal prism", "ball"],
+)
+def test_bop_lists_each_turn_of_regular_shapes(mesh: trimesh.Trimesh, discrete: int, continuous: int) -> None:
+    grey = np.full((len(mesh.vertices), 3), 128, np.uint8)
+    info = BopModel("regular", mesh, grey).info()
+    for suffix in ("", "_with_color"):
+        assert len(info[f"symmetries_discrete{suffix}"]) == discrete
+        axes = [each["axis"] for each in info.get(f"symmetries_continuous{suffix}", [])]
+        assert np.allclose(np.abs(np.array(axes).reshape(-1, 3)).sum(0), continuous / 3), "one each way"
 
 
 def test_clouds_are_the_pictures_at_their_pixels(written: Path, truths: list[SceneTruth]) -> None:

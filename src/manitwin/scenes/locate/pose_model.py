@@ -109,13 +109,14 @@ class PoseModel:
     def same_poses(self) -> np.ndarray:
         """Return the proper motions ``(S, 4, 4)`` of the object frame after which the shape is where it was; identity first.
 
-        A body of revolution is turned in steps about its axis, also after each turn that swaps its ends.
+        A body of revolution is turned in steps about its axis, also after each turn that swaps its ends; a ball so after each
+        turn of a cube.
         """
         found = self.symmetries
         turns = [motion for motion in found.motions if np.linalg.det(motion) > 0]
         if found.axis is not None:
             axis = found.axis
-            swaps = [motion for motion in turns if motion @ axis @ axis < 0][:1]
+            swaps = turns[1:] if found.ball else [motion for motion in turns if motion @ axis @ axis < 0][:1]
             steps = np.arange(ROUND_STEPS) * (2 * np.pi / ROUND_STEPS)
             about = [trimesh.transformations.rotation_matrix(float(angle), axis)[:3, :3] for angle in steps]
             turns = [each @ swap for swap in (np.eye(3), *swaps) for each in about]

@@ -83,13 +83,21 @@ class BopModel:
         return info
 
     def _named(self, turns: list[np.ndarray], is_round: bool, suffix: str) -> dict[str, Any]:
-        """Return symmetries in BOP's form, mm about its origin; a body of revolution keeps the turns that swap its ends."""
+        """Return symmetries in BOP's form, mm about its origin; a body of revolution keeps the turns that swap its ends.
+
+        A ball is round about three axes, and keeps the turns of a cube: BOP takes each turn after each about an axis.
+        """
         found: dict[str, Any] = {}
         offset_mm = (self.symmetries.center_m - self.center_m) * MM
         axis = self.symmetries.axis
         if is_round and axis is not None:
-            found[f"symmetries_continuous{suffix}"] = [{"axis": axis.tolist(), "offset": offset_mm.tolist()}]
-            turns = [motion for motion in turns if motion @ axis @ axis < 0][:1]
+            ball = self.symmetries.ball
+            axes = (axis, *(motion @ axis for motion in turns)) if ball else (axis,)
+            apart = [each for i, each in enumerate(axes) if all(abs(each @ other) < 0.5 for other in axes[:i])]
+            found[f"symmetries_continuous{suffix}"] = [
+                {"axis": each.tolist(), "offset": offset_mm.tolist()} for each in apart
+            ]
+            turns = turns if ball else [motion for motion in turns if motion @ axis @ axis < 0][:1]
         if turns:
             found[f"symmetries_discrete{suffix}"] = [
                 transform(motion, offset_mm - motion @ offset_mm).ravel().tolist() for motion in turns
