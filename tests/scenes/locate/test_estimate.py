@@ -5,12 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import cKDTree
 
 from manitwin.geometry.poses import transform_points
-from manitwin.scenes.locate.estimate import AMBIGUOUS_MARGIN, LEAST_SCORE, Location, locate_in_view
+from manitwin.scenes.locate.comparison import Evidence, scores_of
+from manitwin.scenes.locate.estimate import (
+    AMBIGUOUS_MARGIN,
+    AMBIGUOUS_SIGMA,
+    LEAST_SCORE,
+    Location,
+    locate_in_view,
+    margins,
+)
 from manitwin.scenes.locate.input_files import view_of_cloud
 from manitwin.scenes.locate.pose_model import PoseModel
-from manitwin.scenes.locate.search import observed_points
+from manitwin.scenes.locate.search import Candidates, observed_points
 from seen_solids import seen_from
 
 
@@ -57,6 +66,44 @@ def test_a_body_of_revolution_has_one_pose_and_any_turn_of_it_is_the_same() -> N
     assert found.status == "found" and can.symmetries.axis is not None
     axis = found.poses[0].object_to_camera[:3, 2] @ seen.object_to_camera[:3, 2]
     assert abs(axis) > np.cos(np.deg2rad(3)), "either end may be up"
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        trimesh.creation.box((0.06, 0.06, 0.06)),
+        trimesh.creation.cylinder(0.025, 0.14, sections=6),
+        trimesh.creation.icosphere(subdivisions=3, radius=0.035),
+    ],
+    ids=["cube", "hexagonal prism", "ball"],
+)
+def test_a_cube_a_prism_and_a_ball_have_one_pose(mesh: trimesh.Trimesh) -> None:
+    model = PoseModel.of_mesh("regular", mesh)
+    seen = seen_from(model, 0.6)
+    found = locate_in_view(seen.view, seen.mask, model)
+    assert found.status == "found"
+    there = transform_points(seen.object_to_camera, model.points)
+    apart, _ = cKDTree(there).query(transform_points(found.poses[0].object_to_camera, model.points))
+    assert apart.mean() < 0.03 * model.diameter_m
+
+
+def test_what_a_pose_shows_too_much_far_from_the_thing_speaks_against_it_and_not_for_it() -> None:
+    told_apart, both = (candidates_of(far) for far in (0, 20))
+    assert margins(told_apart)[1][1] > AMBIGUOUS_SIGMA
+    assert margins(both)[0][1] > margins(told_apart)[0][1]
+    assert margins(both)[1][1] > margins(told_apart)[1][1]
+
+
+def candidates_of(far: int) -> Candidates:
+    """Two poses: the second explains 150 pixels of 2400 less, and shows ``far`` of 1200 too much that stand for 182 each."""
+    inside, about = 2400, 1200
+    weight = np.concatenate([np.full(inside, 3.0), np.full(about, 182.0)])
+    gains = np.zeros((2, inside + about))
+    gains[:, :inside] = 1.0
+    gains[1, :150], gains[1, inside : inside + far] = 0.0, -1.0
+    nothing = np.zeros(inside + about)
+    evidence = Evidence(np.zeros((inside + about, 3)), nothing, nothing, weight, inside, nothing)
+    return Candidates(np.tile(np.eye(4), (2, 1, 1)), scores_of(gains, evidence), 0.005, evidence, gains)
 
 
 def test_the_same_view_has_the_same_answer_and_a_cloud_of_it_the_same_pose(stool: PoseModel) -> None:

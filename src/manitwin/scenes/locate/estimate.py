@@ -99,8 +99,12 @@ def locate_in_view(
 def pose_distances_m(model: PoseModel, poses: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return for each of ``poses (K, 4, 4)`` the mean distance (m) of its surface points from those in pose ``other (4, 4)``.
 
-    The least over the shape's symmetries: ADD of Hinterstoisser et al. 2012 with BOP's symmetries.
+    The least over the shape's symmetries: ADD of Hinterstoisser et al. 2012 with BOP's symmetries. Of a ball it is what its
+    centre has moved.
     """
+    if model.symmetries.ball:
+        moved = poses - other
+        return np.asarray(np.linalg.norm(moved[:, :3, :3] @ model.symmetries.center_m + moved[:, :3, 3], axis=1))
     points = model.points[:: max(1, len(model.points) // _POINTS)]
     there = transform_points(other, points)
     same = model.same_poses
@@ -119,8 +123,12 @@ def visible_shares(model: PoseModel, poses: np.ndarray, evidence: Evidence, tole
 
 
 def margins(found: Candidates) -> tuple[np.ndarray, np.ndarray]:
-    """Return by how much each candidate scores less than the best, and the same in standard errors of the pixels, ``(K,)``."""
-    less = (found.gains[0] - found.gains) * found.evidence.weight
+    """Return by how much each candidate scores less than the best, and the same in standard errors of the pixels, ``(K,)``.
+
+    Each sampled pixel counts once in the standard errors, and not for all that it stands for: the noise of each is its own, and a
+    few that stand for many far from the thing would drown what those of the thing say.
+    """
+    less = found.gains[0] - found.gains
     spread = np.sqrt((less**2).sum(1))
     return found.scores[0] - found.scores, less.sum(1) / np.maximum(spread, 1e-12)
 
