@@ -19,6 +19,9 @@ from manitwin.scenes.perception.bop_models import BopModel
 from manitwin.scenes.perception.classes import Classes
 from manitwin.scenes.perception.scene_truth import SceneTruth
 from manitwin.scenes.perception.segmentation import FORMATS, write_segmentation
+from manitwin.twin.dataset_root import twin_name
+from scene_twins import slab, write_thing
+from twin_folders import twin_id
 
 # pycocotools 2.0.11 returns arrays in NumPy 1's way
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -232,6 +235,12 @@ def test_bop_lists_each_turn_of_regular_shapes(mesh: trimesh.Trimesh, discrete: 
         assert len(info[f"symmetries_discrete{suffix}"]) == discrete
         axes = [each["axis"] for each in info.get(f"symmetries_continuous{suffix}", [])]
         assert np.allclose(np.abs(np.array(axes).reshape(-1, 3)).sum(0), continuous / 3), "one each way"
+
+
+def test_colors_of_bop_models_are_srgb_as_their_pictures_are(tmp_path: Path) -> None:
+    write_thing(tmp_path, 0, slab("box", 0.1, 0.1, 0.1))
+    model = BopModel.of_twin(tmp_path / twin_name(twin_id(0)))
+    assert (model.colors == [229, 79, 79]).all(), "the factor (200, 20, 20) / 255 is linear (glTF 2.0, 3.9.2)"
 
 
 def test_clouds_are_the_pictures_at_their_pixels(written: Path, truths: list[SceneTruth]) -> None:

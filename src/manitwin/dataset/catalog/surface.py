@@ -9,6 +9,7 @@ import numpy as np
 import trimesh
 
 from manitwin.geometry.sampling import sample_surface
+from manitwin.models.annotators.surface_color import base_colors_at
 from manitwin.render.cameras import Camera, framing_camera
 from manitwin.render.renderer import BACKDROP, shared_renderer
 from manitwin.twin.loaded_twin import Twin
@@ -41,7 +42,7 @@ class View:
 
 
 def surface_points(twin: Twin, count: int, seed: int) -> SurfacePoints:
-    """Sample points evenly by area over a twin's visual surface, each with the colour of the texture there."""
+    """Sample points evenly by area over a twin's visual surface, each with the base colour there."""
     rng = np.random.default_rng([seed, zlib.crc32(twin.record.twin_id.encode())])
     vertices, faces = trimesh.util.append_faces(
         [part.vertices for part in twin.visual], [part.faces for part in twin.visual]
@@ -58,22 +59,8 @@ def surface_points(twin: Twin, count: int, seed: int) -> SurfacePoints:
 
 
 def _colors(part: trimesh.Trimesh, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return the base colours ``(N, 3) uint8`` of a visual part at points on its faces."""
-    if not len(faces):
-        return np.zeros((0, 3), np.uint8)
-    visual = part.visual
-    weights = trimesh.triangles.points_to_barycentric(part.triangles[faces], points, method="cross")
-    weights = np.nan_to_num(weights, nan=1 / 3)  # of a face without area any corner will do
-    if isinstance(visual, trimesh.visual.ColorVisuals):
-        corners = np.asarray(visual.vertex_colors)[part.faces[faces], :3].astype(float)
-        return np.rint((corners * weights[..., None]).sum(1)).astype(np.uint8)
-    assert isinstance(visual, trimesh.visual.TextureVisuals)
-    if visual.uv is None:
-        found = visual.material.main_color
-    else:  # of a material without a picture one colour comes back
-        uv = np.asarray(visual.uv)[part.faces[faces]]
-        found = visual.material.to_color((uv * weights[..., None]).sum(1))
-    return np.broadcast_to(np.asarray(found, np.uint8)[..., :3], (len(faces), 3))
+    """Return the base colours ``(N, 3) uint8`` sRGB of a visual part at points on its faces."""
+    return np.rint(255 * base_colors_at(part, faces, points)).astype(np.uint8)
 
 
 def views_around(twin: Twin, size_px: int) -> list[View]:

@@ -196,6 +196,7 @@ def base_colors_at(part: trimesh.Trimesh, faces: np.ndarray, points: np.ndarray)
     if material.baseColorTexture is None or uv is None:
         return np.repeat(linear_to_srgb(factor)[None], len(points), axis=0)
     corners = trimesh.triangles.points_to_barycentric(part.triangles[faces], points)
+    corners = np.nan_to_num(corners, nan=1 / 3)  # of a face without area any corner will do
     at = np.einsum("ni,nij->nj", corners, uv[part.faces[faces]])
     image = np.asarray(material.baseColorTexture.convert("RGB"))
     height, width = image.shape[:2]

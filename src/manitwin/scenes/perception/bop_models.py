@@ -15,10 +15,12 @@ from scipy.spatial.distance import pdist
 from manitwin.geometry.poses import transform
 from manitwin.geometry.sampling import sample_surface
 from manitwin.geometry.symmetry import Symmetries, find_symmetries
+from manitwin.models.annotators.surface_color import base_colors_at
 from manitwin.render.raycast import merged
 from manitwin.twin.loaded_twin import Twin
 
 MM = 1000.0
+_WITHIN = 0.01
 COLOR_SAMPLES = 4000
 MOST_COLOR_APART = 24.0
 """Of 255, the median distance in RGB of a surface and itself after a turn: what noise and shading of a capture make."""
@@ -26,7 +28,7 @@ MOST_COLOR_APART = 24.0
 
 @dataclass(frozen=True)
 class BopModel:
-    """A twin as a BOP object: its mesh in the object frame (m), and the colour ``(V, 3) uint8`` of each vertex."""
+    """A twin as a BOP object: its mesh in the object frame (m), and the base colour ``(V, 3) uint8`` sRGB of each vertex."""
 
     twin_id: str
     mesh: trimesh.Trimesh
@@ -119,13 +121,13 @@ class BopModel:
 
 
 def _vertex_colors(part: trimesh.Trimesh) -> np.ndarray:
-    """Return the base colour ``(V, 3) uint8`` at the vertices of a visual part."""
-    visual = part.visual
-    if isinstance(visual, trimesh.visual.ColorVisuals):
-        return np.asarray(visual.vertex_colors)[:, :3]
-    assert isinstance(visual, trimesh.visual.TextureVisuals)
-    found = visual.material.main_color if visual.uv is None else visual.material.to_color(visual.uv)
-    return np.broadcast_to(np.asarray(found, np.uint8)[..., :3], (len(part.vertices), 3))
+    """Return the base colour ``(V, 3) uint8`` sRGB at the vertices of a visual part."""
+    corners = np.asarray(part.faces)
+    face = np.zeros(len(part.vertices), int)
+    face[corners.ravel()] = np.repeat(np.arange(len(corners)), 3)
+    # a little into a face of each: at a picture's very border its other side begins
+    at = _WITHIN * part.triangles_center[face] + (1 - _WITHIN) * np.asarray(part.vertices)
+    return np.rint(255 * base_colors_at(part, face, at)).astype(np.uint8)
 
 
 def _diameter(vertices_m: np.ndarray) -> float:
