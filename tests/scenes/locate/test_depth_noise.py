@@ -7,7 +7,7 @@ import pytest
 
 from manitwin.errors import UsageError
 from manitwin.scenes.locate.depth_noise import DepthNoise
-from manitwin.scenes.locate.depth_view import DepthView, measured_noise_m
+from manitwin.scenes.locate.depth_view import MOST_ROUNDING_M, DepthView, measured_noise_m
 
 K = np.array([[300.0, 0, 100], [0, 300, 100], [0, 0, 1]])
 
@@ -36,3 +36,11 @@ def test_depths_beside_a_jump_are_lost_and_none_is_invented() -> None:
 def test_a_mask_of_lone_pixels_has_no_noise_to_measure() -> None:
     with pytest.raises(UsageError, match="hardly two side by side"):
         measured_noise_m(DepthView(np.ones((40, 40)), K), np.indices((40, 40)).sum(0) % 3 == 0)
+
+
+def test_coarse_steps_are_noise_though_most_neighbours_are_the_same() -> None:
+    slope = np.round((0.8 + 0.0005 * np.arange(200)[None] * np.ones((200, 1))) / 0.01) * 0.01
+    everywhere = np.ones_like(slope, bool)
+    assert measured_noise_m(DepthView(slope, K), everywhere) < 1e-6
+    assert measured_noise_m(DepthView(slope, K, step_m=0.01), everywhere) == pytest.approx(0.01 / np.sqrt(12))
+    assert measured_noise_m(DepthView(slope, K, step_m=0.1), everywhere) == MOST_ROUNDING_M

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 from scipy.spatial import cKDTree
 
 from manitwin.geometry.poses import transform_points
@@ -17,7 +21,7 @@ from manitwin.scenes.locate.estimate import (
     locate_in_view,
     margins,
 )
-from manitwin.scenes.locate.input_files import view_of_cloud
+from manitwin.scenes.locate.input_files import read_view, view_of_cloud
 from manitwin.scenes.locate.pose_model import PoseModel
 from manitwin.scenes.locate.search import Candidates, observed_points
 from seen_solids import seen_from
@@ -114,6 +118,21 @@ def test_the_same_view_has_the_same_answer_and_a_cloud_of_it_the_same_pose(stool
     by_cloud: Location = locate_in_view(*view_of_cloud(points, "cloud"), stool)
     assert by_cloud.status == "found"
     assert add(stool, by_cloud.poses[0].object_to_camera, seen.object_to_camera) < 0.05
+
+
+def test_depths_in_steps_of_a_centimetre_show_the_thing_and_no_other(
+    stool: PoseModel, jar: PoseModel, tmp_path: Path
+) -> None:
+    seen = seen_from(stool, 0.6)
+    depth = np.rint(np.nan_to_num(seen.view.depth_m, posinf=0.0) / 0.01).astype(np.uint8)
+    k, (height, width) = seen.view.intrinsics, depth.shape
+    camera = {"fx": k[0, 0], "fy": k[1, 1], "cx": k[0, 2] - 0.5, "cy": k[1, 2] - 0.5, "width": width, "height": height}
+    (tmp_path / "camera.json").write_text(json.dumps(camera | {"depth_unit_m": 0.01}))
+    Image.fromarray(depth).save(tmp_path / "depth.png")
+    view, _ = read_view(tmp_path / "depth.png", tmp_path / "camera.json", None, None)
+    found = locate_in_view(view, seen.mask, stool)
+    assert found.status == "found" and add(stool, found.poses[0].object_to_camera, seen.object_to_camera) < 0.05
+    assert locate_in_view(view, seen.mask, jar).status == "none"
 
 
 def test_too_little_is_no_answer(stool: PoseModel) -> None:

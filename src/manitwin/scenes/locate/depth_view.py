@@ -15,6 +15,8 @@ PART_OF_JUMP = 0.1
 """Metres: second differences above it are edges of things and tell nothing of the noise."""
 _OF_SECOND_DIFFERENCE = 1.4826 / np.sqrt(6.0)
 """Median absolute second difference of a plane with white noise to the noise's standard deviation."""
+MOST_ROUNDING_M = 0.003
+"""The standard deviation of steps of a centimetre: of coarser ones no thing of a hand's size is told from another."""
 
 
 @dataclass(frozen=True)
@@ -22,12 +24,13 @@ class DepthView:
     """``depth_m (H, W)`` along the viewing axis: 0 unknown, inf nothing there. ``rgb (H, W, 3) uint8`` or None.
 
     Camera frame: x right, y down, z ahead (OpenCV's). ``intrinsics (3, 3)`` count pixels so that the centre of the upper left one
-    is (0.5, 0.5).
+    is (0.5, 0.5). Depths are whole multiples of ``step_m``; 0: they are not rounded.
     """
 
     depth_m: np.ndarray
     intrinsics: np.ndarray
     rgb: np.ndarray | None = None
+    step_m: float = 0.0
 
     def rays(self, pixels: np.ndarray) -> np.ndarray:
         """Return the directions ``(N, 3)`` through the centres of pixels ``(N,)``, counted row by row, with z = 1."""
@@ -62,8 +65,8 @@ def known_depth(view: DepthView) -> np.ndarray:
 def measured_noise_m(view: DepthView, mask: np.ndarray) -> float:
     """Return the standard deviation (m) of the depth noise on what ``mask (H, W) bool`` shows, from second differences.
 
-    A surface bends little from one pixel to the next, noise does not know its neighbour. Raises UsageError where no three pixels
-    in a row have a depth.
+    A surface bends little from one pixel to the next, noise does not know its neighbour. It is no less than what rounding makes:
+    of coarse steps most neighbours are the same. Raises UsageError where no three pixels in a row have a depth.
     """
     known = known_depth(view) & mask
     depth = np.where(known, view.depth_m, 0.0)
@@ -78,4 +81,5 @@ def measured_noise_m(view: DepthView, mask: np.ndarray) -> float:
             f"the mask has {int(known.sum())} pixels with a depth, hardly two side by side; give a mask of one thing that"
             " the depth picture shows"
         )
-    return float(_OF_SECOND_DIFFERENCE * np.median(told))
+    rounding_m = min(view.step_m / np.sqrt(12.0), MOST_ROUNDING_M)
+    return max(float(_OF_SECOND_DIFFERENCE * np.median(told)), float(rounding_m))

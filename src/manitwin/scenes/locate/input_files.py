@@ -38,7 +38,8 @@ def read_view(depth: Path, camera: Path, rgb: Path | None, mask: Path | None) ->
         if mask is None
         else _labels(mask, said, camera, "save masks as a PNG of one channel, 0 where the thing is not")
     )
-    return DepthView(numbers * said.depth_unit_m, said.intrinsics, pixels), None if told is None else told > 0
+    view = DepthView(numbers * said.depth_unit_m, said.intrinsics, pixels, said.depth_unit_m)
+    return view, None if told is None else told > 0
 
 
 def read_cloud(path: Path) -> tuple[DepthView, np.ndarray]:
