@@ -41,9 +41,9 @@ the right part; their source is `template:CATEGORY`. What is not here is refused
   the text does not say is drawn from the seed. Two colours or two materials of one part are refused. What is in a thing, or
   what it is for, says nothing of it (a glass of red wine, a brush for wood); nor does a word that is not known: the check
   `text_understood` names such.
-- **How large it is**: `9 cm` is the longest extent; `9 cm tall`, `wide`, `long` is that direction. Units may be spelt out, and
-  inches, feet, yards and fractions are read. A size that no such thing has is refused. `small` and `large` choose within the
-  usual sizes.
+- **How large it is**: `9 cm` is the longest extent, of a pan or pot its diameter; `9 cm tall`, `wide`, `long` is that
+  direction. Units may be spelt out, and inches, feet, yards and fractions are read. A size that no such thing has is refused.
+  `small` and `large` choose within the usual sizes.
 - **What it cannot be told** is refused and not left out: several lengths or that of a part (a template is scaled as a whole), a
   volume, a mass, what a thing is not. So is the longer name of another thing (a magnifying glass is no glass).
 - **What it is made of** decides the mass: the volume of each part times its density; of a closed container, with its contents;

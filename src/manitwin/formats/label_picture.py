@@ -6,7 +6,7 @@ import io
 
 import cv2
 import numpy as np
-from PIL import Image
+from PIL import Image, UnidentifiedImageError
 
 from manitwin.formats.bounded_file import Refusal
 from manitwin.formats.printable import printable_line
@@ -33,5 +33,7 @@ def parse_label_picture(content: bytes, name: str, refuse: Refusal, *, remedy: s
                 raise refuse(f"{called}: {picture.size[0]} x {picture.size[1]} pixels; {remedy}")
             return np.asarray(picture, _MODES[picture.mode])
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        cause = printable_line(str(error), max_characters=120)
+        cause = (
+            "not a PNG" if isinstance(error, UnidentifiedImageError) else printable_line(str(error), max_characters=120)
+        )
         raise refuse(f"{called}: is no PNG that can be read ({cause}); {remedy}") from error

@@ -29,7 +29,9 @@ def said(predicate: str, category: str) -> list[str]:
 @pytest.mark.parametrize("predicate", TEMPLATES)
 def test_verbs_go_with_one_thing_and_with_a_pair(predicate: str) -> None:
     for each in said(predicate, "scissors"):
-        assert not re.search(r"\b(?:them|they|scissors(?: for work)?) (?:is|has|points)\b|\bthem (?:are|point)\b", each), each
+        assert not re.search(
+            r"\b(?:them|they|scissors(?: for work)?) (?:is|has|points)\b|\bthem (?:are|point)\b", each
+        ), each
     for each in said(predicate, "mug"):
         assert not re.search(r"\b(?:they|them|their|are|have)\b", each), each
 

@@ -458,6 +458,26 @@ def test_a_frying_pan_of_any_metal_is_of_plate() -> None:
             assert interval.low <= sum(made.masses_kg.values()) <= interval.high, (text, seed)
 
 
+def test_a_length_of_a_pan_is_its_diameter_and_not_that_of_its_handle() -> None:
+    for text, diameter_m in (("a 10-inch frying pan", 0.254), ("a 20 cm saucepan", 0.2), ("a 24 cm pot", 0.24)):
+        wanted = read(text)
+        extents = np.ptp(make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0)).mesh.vertices, axis=0)
+        assert extents[1] == pytest.approx(diameter_m, rel=1e-3) and extents[0] > 1.3 * diameter_m, text
+    long = make(TEMPLATES["frying pan"], read("a frying pan, 45 cm long"), np.random.default_rng(0))
+    assert np.ptp(long.mesh.vertices, axis=0).max() == pytest.approx(0.45, rel=1e-6)
+
+
+@pytest.mark.parametrize("text", ["a -9 cm mug", "a mug (-9 cm)", "a mug, height: -3.5 in"])
+def test_a_length_below_zero_is_refused(text: str) -> None:
+    with pytest.raises(UsageError, match="below zero"):
+        read(text)
+
+
+@pytest.mark.parametrize("text", ["a 9-cm mug", "a mug - 9 cm tall", "a T-9 mug"])
+def test_a_dash_is_no_sign(text: str) -> None:
+    assert read(text).category == "mug"
+
+
 def test_a_thing_that_is_stated_small_has_walls_that_can_be_made() -> None:
     for text in ("a steel mug, 7 cm", "a steel bowl, 7 cm", "a tiny steel mug"):
         wanted = read(text)

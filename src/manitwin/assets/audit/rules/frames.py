@@ -119,7 +119,8 @@ def far_from_object(measured: MeasuredAsset) -> Iterator[Complaint]:
     limit = max(AWAY_M, AWAY_SHARE * measured.longest_m)
     points = np.array([frame.frame_to_asset[:3, 3] for frame in frames], float)
     distance = measured.distance_m(points, limit)
-    if len(measured.hull):  # a frame in the middle of a bowl or of its opening is far from its wall, and where it should be
+    # a frame in the middle of a bowl or of its opening is far from its wall, and where it should be
+    if len(measured.hull):
         distance = np.where(measured.hull.within(points, limit), 0.0, distance)
     far = [f"{f.kind} {f.number}" for f, away in zip(frames, distance, strict=True) if away > limit]
     yield from _complain(far, f"up to {1000 * float(distance.max()):.3g} mm away from the object's surface")

@@ -189,8 +189,9 @@ def _scale(template: Template, wanted: Wanted, mesh: PartedMesh) -> float:
     Which side is meant by width is told by the size: of a keyboard of 40 cm the longer one.
     """
     extents = np.ptp(mesh.vertices, axis=0)
+    meant = mesh.faces[mesh.part == mesh.names.index(template.length_of)] if template.length_of else mesh.faces
     now = {
-        "": [extents.max()],
+        "": [np.ptp(mesh.vertices[meant.ravel()], axis=0).max()],
         "height": [extents[2]],
         "width": [extents[:2].min(), extents[:2].max()],
         "length": [extents.max()],

@@ -102,7 +102,8 @@ class Template:
     'colour material' or 'material' to draw from; the first slot is what colours and materials without a part's name mean. A
     measure ``wall_m`` is that of ceramic and follows the material. ``contents_kg_m3`` is the mean density of parts that are
     closed containers, with what is in them. ``of_sheet`` are parts that are hollow behind a sheet where they are of metal;
-    ``of_plate``: what is of metal has the wall that is stated, and none of sheet.
+    ``of_plate``: what is of metal has the wall that is stated, and none of sheet. ``length_of`` is the part that a length without
+    a direction is of: a pan of 24 cm has that diameter, without its handle; '' for the whole.
     """
 
     category: str
@@ -114,6 +115,7 @@ class Template:
     contents_kg_m3: Mapping[str, float] = field(default_factory=dict)
     of_sheet: tuple[str, ...] = ()
     of_plate: bool = False
+    length_of: str = ""
 
     def drawn(self, rng: np.random.Generator) -> dict[str, float]:
         """Draw all measures."""

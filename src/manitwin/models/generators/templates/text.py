@@ -41,6 +41,7 @@ _NOT_TAKEN = (
     (re.compile(r"\b\d[\d.]* ?(?:kg|kilograms?|kilos?|g|grams?|lbs?|pounds?)\b"), "a mass"),
 )
 """What no template can be told, by what it is called: left out in silence, the thing would be another one."""
+_NEGATIVE = re.compile(r"(?:^|(?<=[^\d\W]) |(?<=[(,:]) ?)[-−]\.?\d[\d.]*")
 _PART_NAMES = {
     "lid": ("cap",), "cap": ("lid",), "top": ("cap", "lid"), "stopper": ("cap",), "cork": ("cap",), "grip": ("handle",),
     "blade": ("head",), "strap": ("band",), "display": ("screen",), "bristle": ("bristles",),
@@ -192,6 +193,8 @@ def _of_part(words: list[str]) -> Described:
 
 def _check_taken(text: str, plain: str) -> None:
     """Raise UsageError for what a template cannot be told."""
+    if (below := _NEGATIVE.search(text)) is not None:
+        raise UsageError(f"{text!r}: a length below zero ({below[0].strip()!r}); state it without the sign")
     for pattern, what in _NOT_TAKEN:
         if (said := pattern.search(plain)) is not None:
             raise UsageError(f"{text!r}: a template cannot be told {what} ({said[0]!r}); leave it out, or say a length")

@@ -39,7 +39,9 @@ def _template(category: str, row: dict[str, Any], build: Builder) -> Template:
     slots = {name: tuple(looks) for name, looks in row["slots"].items()}
     names, of_sheet = tuple(row.get("names", ())), tuple(row.get("of_sheet", ()))
     contents, of_plate = row.get("contents_kg_m3", {}), row.get("of_plate", False)
-    return Template(category, row["group"], measures, slots, build, names, contents, of_sheet, of_plate)
+    return Template(
+        category, row["group"], measures, slots, build, names, contents, of_sheet, of_plate, row.get("length_of", "")
+    )
 
 
 def _unit(name: str) -> Literal["m", ""]:
