@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +11,12 @@ import pytest
 
 from located_views import BESIDE_M, BrickView, brick_view
 from manitwin.geometry.poses import inverse, rotation_angle_rad, rotation_from_quaternion_wxyz
+from manitwin.geometry.symmetry import Symmetries
 from manitwin.scenes.locate.carried_frames import carry_frames, carry_placements
 from manitwin.scenes.locate.proposals import Plane
 from manitwin.scenes.locate.report import location_document
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.point_records import FunctionalPoint
 
 NOISE_M = 0.001
 
@@ -27,9 +32,19 @@ def table_of(seen: BrickView) -> Plane:
     return Plane(normal, float(normal @ seen.object_to_camera[:3, 3]))
 
 
+def _with_points(twin: Twin, *functional: FunctionalPoint) -> Twin:
+    other = copy(twin)
+    assert twin.record.points is not None
+    points = twin.record.points.model_copy(update={"functional": list(functional)})
+    other.record = twin.record.model_copy(update={"points": points})
+    return other
+
+
 def test_points_are_where_the_pose_puts_them_and_uncertain_where_poses_differ(seen: BrickView) -> None:
     points = seen.twin.record.points
     assert points is not None and points.functional
+    unlike = Symmetries(seen.model.center, np.eye(3)[None], None)  # as if the brick had a knob
+    seen = replace(seen, model=replace(seen.model, symmetries=unlike))
     frames = carry_frames(seen.thing(seen.object_to_camera), seen.twin)
     for frame, point in zip(frames, points.functional, strict=True):
         own = inverse(seen.object_to_camera) @ frame.frame_to_camera
@@ -42,6 +57,23 @@ def test_points_are_where_the_pose_puts_them_and_uncertain_where_poses_differ(se
     aside[0, 3] += 0.05
     assert not any(each.certain for each in carry_frames(seen.thing(seen.object_to_camera, aside), seen.twin))
     assert carry_frames(seen.thing(), seen.twin) == ()
+
+
+def test_a_point_that_a_symmetry_moves_is_not_certain(seen: BrickView) -> None:
+    """Of a brick that is half turned nothing that depth shows has changed, and its handle is on the other side."""
+    points = seen.twin.record.points
+    assert points is not None and len(seen.model.same_poses) > 1
+    thing = seen.thing(seen.object_to_camera)
+    assert not any(each.certain for each in carry_frames(thing, seen.twin))
+    (handle,) = points.functional
+    middle = handle.model_copy(update={"position_m": tuple(seen.model.center), "frame": None})
+    assert all(each.certain for each in carry_frames(thing, _with_points(seen.twin, middle)))
+    both = [
+        handle.model_copy(update={"id": f"f{number}", "position_m": tuple((same @ [*handle.position_m, 1.0])[:3])})
+        for number, same in enumerate(seen.model.same_poses)
+    ]
+    alike = carry_frames(thing, _with_points(seen.twin, *both))
+    assert all(each.certain for each in alike), "one of that label is there in any case"
 
 
 def test_the_pose_that_it_stands_in_is_its_own_and_all_rest_on_the_table(seen: BrickView) -> None:

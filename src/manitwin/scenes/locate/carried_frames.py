@@ -14,6 +14,7 @@ from manitwin.scenes.locate.depth_view import DepthView
 from manitwin.scenes.locate.proposals import Plane
 from manitwin.scenes.locate.recognition import Thing
 from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.point_records import FunctionalPoint
 
 _EDGE_PX = 7
 """About a mask: pixels of the thing's own edge that the mask has missed are no neighbours."""
@@ -26,7 +27,8 @@ class CarriedFrame:
     """A functional point of a twin in the camera's frame: ``frame_to_camera (4, 4)``, m.
 
     Z is its direction. Without a frame of its own it is the point's, +Z along the normal, and X any (``kind`` is None).
-    ``certain``: it is at one place in all poses of the answer.
+    ``certain``: it, or another of that label, is at its place in all poses of the answer, and after all motions that leave the
+    shape where it was: depth tells no lid of a can from its base.
     """
 
     point_id: str
@@ -57,28 +59,37 @@ def carry_frames(thing: Thing, twin: Twin, factor: float = 1.0) -> tuple[Carried
     """Return a twin's functional points at its best pose, the thing being ``factor`` times its size; none if it was not found."""
     poses = [pose.object_to_camera for pose in thing.location.poses]
     points = twin.record.points
-    if not poses or points is None:
+    if not poses or points is None or not points.functional:
         return ()
+    owns = [_own_frame(point, factor) for point in points.functional]
+    places_m = np.array([own[:3, 3] for own in owns])
+    labels = np.array([point.label for point in points.functional])
+    there_m = np.array([transform_points(pose @ same, places_m) for pose in poses for same in thing.model.same_poses])
     found = []
-    for point in points.functional:
-        frame = point.frame
-        if frame is None:
-            own = transform(_with_z(np.array(point.normal)), np.array(point.position_m))
-        else:
-            own = transform(rotation_from_quaternion_wxyz(np.array(frame.quaternion_wxyz)), np.array(frame.position_m))
-        own[:3, 3] *= factor
-        apart_m = [float(np.linalg.norm((pose @ own)[:3, 3] - (poses[0] @ own)[:3, 3])) for pose in poses]
+    for point, own in zip(points.functional, owns, strict=True):
+        apart_m = np.linalg.norm(there_m[:, labels == point.label] - (poses[0] @ own)[:3, 3], axis=2)
         found.append(
             CarriedFrame(
                 point.id,
                 point.label,
-                None if frame is None else frame.kind,
+                None if point.frame is None else point.frame.kind,
                 poses[0] @ own,
-                None if frame is None else factor * frame.size_m,
-                max(apart_m) < ALIKE_M,
+                None if point.frame is None else factor * point.frame.size_m,
+                bool(apart_m.min(1).max() < ALIKE_M),
             )
         )
     return tuple(found)
+
+
+def _own_frame(point: FunctionalPoint, factor: float) -> np.ndarray:
+    """Return a point's frame ``(4, 4)`` in the object's, the thing being ``factor`` times its size."""
+    frame = point.frame
+    if frame is None:
+        own = transform(_with_z(np.array(point.normal)), np.array(point.position_m))
+    else:
+        own = transform(rotation_from_quaternion_wxyz(np.array(frame.quaternion_wxyz)), np.array(frame.position_m))
+    own[:3, 3] *= factor
+    return own
 
 
 def carry_placements(
