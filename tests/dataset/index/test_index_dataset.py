@@ -37,7 +37,7 @@ def dataset(place: Path) -> Dataset:
 
 def test_nothing_is_read_before_it_is_asked_for(tmp_path: Path) -> None:
     lazy = Dataset(tmp_path / "not there").filter("nonsense").split().train
-    with pytest.raises(UsageError, match="has no index"):
+    with pytest.raises(UsageError, match="no data set"):
         len(lazy)
 
 

@@ -171,6 +171,9 @@ def test_every_column_can_be_written_without_quotes(root: DatasetRoot, index: In
 
 
 def test_no_index_says_what_to_run(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="give the folder or URL that manitwin build wrote"):
+        Index(tmp_path).count()
+    (tmp_path / "twins").mkdir()
     with pytest.raises(UsageError, match="has no index; run manitwin index"):
         Index(tmp_path).count()
 

@@ -13,7 +13,7 @@ from manitwin.errors import UsageError
 from manitwin.formats.bounded_file import Refusal, open_regular, with_remedy
 from manitwin.formats.parquet_file import check_parquet
 from manitwin.formats.printable import printable_line
-from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.dataset_root import TWINS, DatasetRoot
 from manitwin.twin.store import canonical_json
 
 INDEX = "index"
@@ -83,6 +83,20 @@ def read_part_list(root: DatasetRoot) -> PartList | None:
             f"{root.full(PARTS)}: its tables are of another version of manitwin; run manitwin index {root.url}"
         )
     return found
+
+
+def no_index(root: DatasetRoot) -> UsageError:
+    """Return the error of a place without an index: it can be made where there are twins, and only there."""
+    if not root.has_twins:
+        return no_dataset(root)
+    return UsageError(f"{root.url}: has no index; run manitwin index {root.url}")
+
+
+def no_dataset(root: DatasetRoot) -> UsageError:
+    """Return the error of a place without twins."""
+    return UsageError(
+        f"{root.url}: no data set ({TWINS}/ is missing); give the folder or URL that manitwin build wrote"
+    )
 
 
 def remedy_of(root: DatasetRoot) -> str:

@@ -14,7 +14,14 @@ import duckdb
 import pyarrow as pa
 
 from manitwin.dataset.index.conditions import check_condition, sql_texts
-from manitwin.dataset.index.part_list import PartList, read_part_list, remedy_of, require_files, require_regular
+from manitwin.dataset.index.part_list import (
+    PartList,
+    no_index,
+    read_part_list,
+    remedy_of,
+    require_files,
+    require_regular,
+)
 from manitwin.dataset.index.tables import ORDER, TABLES
 from manitwin.errors import UsageError, choose_from
 from manitwin.twin.dataset_root import DatasetRoot
@@ -157,7 +164,7 @@ class Index:
         if self._open is None:
             parts = read_part_list(self.root)
             if parts is None:
-                raise UsageError(f"{self.root.url}: has no index; run manitwin index {self.root.url}")
+                raise no_index(self.root)
             require_regular(self.root, parts)
             try:
                 self._open = (parts, _connect(self.root, parts, self.memory_gb))

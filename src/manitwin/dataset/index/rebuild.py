@@ -10,12 +10,12 @@ from pathlib import Path, PurePosixPath
 from pebble import ProcessExpired, ProcessPool
 from pyarrow.fs import LocalFileSystem
 
-from manitwin.dataset.index.part_list import INDEX, IndexPart, PartList, in_order_of_twins, sweep
+from manitwin.dataset.index.part_list import INDEX, IndexPart, PartList, in_order_of_twins, no_dataset, sweep
 from manitwin.dataset.index.parts import merged, rows_of_twins, write_rows
 from manitwin.dataset.index.tables import TABLES, joined, parquet
 from manitwin.engine.worker_processes import WorkerContext, hidden_main_module
-from manitwin.errors import TwinError, UsageError
-from manitwin.twin.dataset_root import TWINS, DatasetRoot
+from manitwin.errors import TwinError
+from manitwin.twin.dataset_root import DatasetRoot
 
 CHUNK = 64
 """Twins of a task: some seconds of work, some thousand rows."""
@@ -56,9 +56,7 @@ def rebuild(
     worker process dies: nothing has changed then.
     """
     if not root.has_twins:
-        raise UsageError(
-            f"{root.url}: no data set ({TWINS}/ is missing); give the folder or URL that manitwin build wrote"
-        )
+        raise no_dataset(root)
     ids = list(root.twin_ids())
     on_start(len(ids))
     chunks = [ids[start : start + CHUNK] for start in range(0, len(ids), CHUNK)]

@@ -7,7 +7,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from manitwin.dataset.index.part_list import PartList, read_part_list, require_files
+from manitwin.dataset.index.part_list import PartList, no_index, read_part_list, require_files
 from manitwin.dataset.index.parts import file_system, files_of, merged, read_rows
 from manitwin.dataset.index.tables import TABLES
 from manitwin.errors import UsageError
@@ -34,7 +34,7 @@ def parts_of_index(root: DatasetRoot, finished: set[str]) -> PartList:
     """Return the parts of a data set's index; raises UsageError where it lacks finished twins or has others."""
     parts = read_part_list(root)
     if parts is None or not parts.parts:
-        raise UsageError(f"{root.url}: has no index; run manitwin index {root.url}")
+        raise no_index(root)
     require_files(root, parts)
     indexed = {
         row["twin_id"] for table in ("twins", "rejections") for row in rows_of_table(root, parts, table, ["twin_id"])
