@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
+from served_view import serving
 
-from conftest import serving
 from drawn_episodes import GRASPED, RELEASED, STEPS, attempt, stored, write_run
 from drawn_scenes import write_scenes
 from manitwin.web.plain_files import write_plain_files

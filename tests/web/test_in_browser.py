@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from served_view import Served, serving
 
-from conftest import Served, serving
 from manitwin.twin.dataset_root import twin_name
 from manitwin.web.plain_files import write_plain_files
 from manitwin.web.serve import BETWEEN_LINKS_S

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
+from served_view import serving
 
-from conftest import serving
 from drawn_scenes import write_scenes
 from manitwin.scenes.scene_files import scene_files
 from manitwin.web.plain_files import write_plain_files
