@@ -20,7 +20,7 @@ from manitwin.render.raycast import merged
 from manitwin.twin.loaded_twin import Twin
 
 MM = 1000.0
-_WITHIN = 0.01
+_INTO_FACE = 0.01  # of the way to its middle
 COLOR_SAMPLES = 4000
 MOST_COLOR_APART = 24.0
 """Of 255, the median distance in RGB of a surface and itself after a turn: what noise and shading of a capture make."""
@@ -125,8 +125,8 @@ def _vertex_colors(part: trimesh.Trimesh) -> np.ndarray:
     corners = np.asarray(part.faces)
     face = np.zeros(len(part.vertices), int)
     face[corners.ravel()] = np.repeat(np.arange(len(corners)), 3)
-    # a little into a face of each: at a picture's very border its other side begins
-    at = _WITHIN * part.triangles_center[face] + (1 - _WITHIN) * np.asarray(part.vertices)
+    # not at the corner itself: at a texture's very border its other side begins
+    at = _INTO_FACE * part.triangles_center[face] + (1 - _INTO_FACE) * np.asarray(part.vertices)
     return np.rint(255 * base_colors_at(part, face, at)).astype(np.uint8)
 
 

@@ -42,6 +42,7 @@ _NOT_TAKEN = (
 )
 """What no template can be told, by what it is called: left out in silence, the thing would be another one."""
 _NEGATIVE = re.compile(r"(?:^|(?<=[^\d\W]) |(?<=[(,:]) ?)[-−]\.?\d[\d.]*")
+"""A minus before a number, behind a word, a bracket or a comma: behind a digit it parts a range, within a word it joins."""
 _PART_NAMES = {
     "lid": ("cap",), "cap": ("lid",), "top": ("cap", "lid"), "stopper": ("cap",), "cork": ("cap",), "grip": ("handle",),
     "blade": ("head",), "strap": ("band",), "display": ("screen",), "bristle": ("bristles",),

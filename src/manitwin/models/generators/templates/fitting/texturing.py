@@ -172,7 +172,10 @@ def _unseen_colours(
     of_face: np.ndarray,
     colours: Mapping[str, tuple[float, float, float]],
 ) -> np.ndarray:
-    """Return a colour ``(F, 3)`` for each unseen face, from those, ``of_face (F, 3)``, that the photos show of its part."""
+    """Return a colour ``(F, 3)`` for each face that is not ``seen``, 0 for the others.
+
+    It comes from those, ``of_face (F, 3)``, that the photos show of its part.
+    """
     centers = points[mesh.faces].mean(axis=1)
     tones = np.zeros((len(centers), 3))
     shown_as: dict[tuple[float, float, float], np.ndarray] = {}  # what is seen of a part speaks for others of its look
