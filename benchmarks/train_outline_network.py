@@ -25,7 +25,14 @@ from composite_variants import Variant
 from composites import composite
 
 from manitwin.models.matting.fine_outline import band_px
-from manitwin.models.matting.outline_network import AROUND_PX, NEAR_PX, VALUES, outline_values, patches
+from manitwin.models.matting.outline_network import (
+    AROUND_PX,
+    NEAR_PX,
+    VALUES,
+    outline_values,
+    patch_windows,
+    patches,
+)
 from manitwin.models.matting.study import judged_candidates, largest_piece
 
 VARIANTS: tuple[Variant, ...] = ("plain", "plain", "labelled", "matched")
@@ -78,7 +85,12 @@ def _near_outline(
     some = rng.choice(len(rows), min(len(rows), PATCHES_OF_A_MASK), replace=False)
     rows, columns = rows[some], columns[some]
     turns, mirrored = int(rng.integers(4)), bool(rng.random() < 0.5)
-    return [(_turned(patches(values, rows, columns), turns, mirrored).astype(np.float16), truth[rows, columns])]
+    return [
+        (
+            _turned(patches(patch_windows(values), rows, columns), turns, mirrored).astype(np.float16),
+            truth[rows, columns],
+        )
+    ]
 
 
 def _turned(given: np.ndarray, turns: int, mirrored: bool) -> np.ndarray:

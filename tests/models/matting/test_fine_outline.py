@@ -13,6 +13,7 @@ from manitwin.models.matting.outline_network import (
     VALUES,
     outline_model,
     outline_values,
+    patch_windows,
     patches,
     share_near_outline,
 )
@@ -113,7 +114,7 @@ def test_patches_have_the_pixels_around_where_they_are() -> None:
     rng = np.random.default_rng(2)
     values = rng.normal(size=(40, 50, VALUES + 1)).astype(np.float32)
     rows, columns = np.array([20, 3]), np.array([25, 0])
-    made = patches(values, rows, columns)
+    made = patches(patch_windows(values), rows, columns)
     assert made.shape == (2, VALUES * (NEAR_PX**2 + AROUND_PX**2) + 1)
     near = made[0, : VALUES * NEAR_PX**2].reshape(VALUES, NEAR_PX, NEAR_PX)
     around = made[0, VALUES * NEAR_PX**2 : -1].reshape(VALUES, AROUND_PX, AROUND_PX)

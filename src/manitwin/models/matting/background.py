@@ -106,9 +106,10 @@ def _fit_surfaces(lab: np.ndarray) -> tuple[list[tuple[np.ndarray, int]], float]
     colours = small.reshape(-1, 3).astype(float)
     ring = border_ring(height, width).ravel()
     left = ring.copy()
+    bases = {degree: _basis(height, width, degree).reshape(height * width, -1) for degree in (1, 2, 3)}
     fits: list[tuple[np.ndarray, int]] = []
     while len(fits) < MAX_SURFACES and (not fits or left.sum() > 0.05 * ring.sum()):
-        coefficients, degree, distance = _grow_surface(colours, left, height, width)
+        coefficients, degree, distance = _grow_surface(colours, left, (height, width), bases)
         explained = left & (distance < 6)
         if fits and explained.sum() < 0.04 * ring.sum():
             break
@@ -117,8 +118,13 @@ def _fit_surfaces(lab: np.ndarray) -> tuple[list[tuple[np.ndarray, int]], float]
     return fits, float(left.sum() / ring.sum())
 
 
-def _grow_surface(colours: np.ndarray, left: np.ndarray, height: int, width: int) -> tuple[np.ndarray, int, np.ndarray]:
-    """Grow one surface from the densest border colour: fit, take in what is connected and explained, raise the degree."""
+def _grow_surface(
+    colours: np.ndarray, left: np.ndarray, shape: tuple[int, int], bases: dict[int, np.ndarray]
+) -> tuple[np.ndarray, int, np.ndarray]:
+    """Grow one surface from the densest border colour: fit, take in what is connected and explained, raise the degree.
+
+    ``bases`` are the terms of the surfaces (H * W, K) by degree.
+    """
     ring_colours = colours[left]
     modes = ring_colours[:: max(1, len(ring_colours) // 200)]
     weights = np.array([0.5, 1.0, 1.0])  # lightness varies along a background more than colour does
@@ -127,14 +133,14 @@ def _grow_surface(colours: np.ndarray, left: np.ndarray, height: int, width: int
     used = left & (((colours - start) ** 2 * weights).sum(1) < 100)
     for step in range(20):
         degree = 1 if step < 5 else 2 if step < 12 else 3
-        basis = _basis(height, width, degree).reshape(height * width, -1)
+        basis = bases[degree]
         a = basis[used]
         coefficients = np.linalg.solve(a.T @ a + 1e-4 * len(a) * np.eye(a.shape[1]), a.T @ colours[used])
         residual = colours - basis @ coefficients
         spread = 1.4826 * np.median(np.abs(residual[used] - np.median(residual[used], 0)), axis=0) + 0.3
         distance = np.sqrt((residual**2 / spread**2).sum(1))
         inlier = distance < max(4.5, 9 - 0.5 * step)
-        grown = connected_to(inlier.reshape(height, width), left.reshape(height, width)).ravel()
+        grown = connected_to(inlier.reshape(shape), left.reshape(shape)).ravel()
         if grown.sum() < 0.02 * len(colours):
             break
         used = grown
@@ -163,16 +169,18 @@ def _distance(
     nearest = np.argmin([f[0] for f in found], axis=0)
 
     def pick(index: int) -> np.ndarray:
-        stack = np.stack([f[index] for f in found])
-        return np.take_along_axis(stack, nearest[None] if stack.ndim == 3 else nearest[None, ..., None], 0)[0]
+        picked = found[0][index]
+        for number in range(1, len(found)):
+            here = nearest == number
+            picked = np.where(here if picked.ndim == 2 else here[..., None], found[number][index], picked)
+        return picked
 
     return pick(0), pick(1), pick(2), max(noises)
 
 
 def _mahalanobis(residual: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     whitening = np.linalg.cholesky(np.linalg.inv(covariance)).astype(np.float32)
-    white = (residual.reshape(-1, 3) @ whitening).reshape(residual.shape)
-    return length(white)
+    return length(cv2.transform(residual, whitening.T))
 
 
 def _explain_seams(

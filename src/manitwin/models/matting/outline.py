@@ -7,6 +7,7 @@ import numpy as np
 
 from manitwin.models.matting.background import Background, connected_to
 
+BY_ROWS_FROM_PX = 6  # of a disk's radius: a larger one is applied row by row, sixteen times as fast at 60
 OBJECT_DISTANCE = 6.0  # of a border pixel's Mahalanobis distance: what the background's fit takes for explained
 
 
@@ -17,17 +18,33 @@ def disk(radius: int) -> np.ndarray:
 
 def dilated(mask: np.ndarray, radius: int) -> np.ndarray:
     """Dilate a mask by a disk."""
-    return cv2.dilate(mask.astype(np.uint8), disk(radius)) > 0
+    if radius < BY_ROWS_FROM_PX:
+        return cv2.dilate(mask.astype(np.uint8), disk(radius)) > 0
+    return _dilated_by_rows(mask.astype(np.uint8), radius) > 0
 
 
 def eroded(mask: np.ndarray, radius: int) -> np.ndarray:
-    """Erode a mask by a disk."""
-    return cv2.erode(mask.astype(np.uint8), disk(radius)) > 0
+    """Erode a mask by a disk; what lies beyond the picture takes nothing away."""
+    return ~dilated(~mask, radius)
 
 
 def opened(mask: np.ndarray, radius: int) -> np.ndarray:
     """Open a mask by a disk: drop what is thinner than it."""
-    return cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, disk(radius)) > 0
+    return dilated(eroded(mask, radius), radius)
+
+
+def _dilated_by_rows(mask: np.ndarray, radius: int) -> np.ndarray:
+    """Dilate a mask (H, W) uint8 by a disk: by each of its rows, which grow towards its middle, moved to where that row is."""
+    found, wider, reach, height = np.zeros_like(mask), mask, 0, len(mask)
+    reaches = (disk(radius)[: radius + 1].sum(axis=1).astype(int) - 1) // 2
+    for off, row_reach in zip(range(radius, -1, -1), reaches, strict=True):
+        if row_reach > reach:
+            wider = cv2.dilate(wider, np.ones((1, 2 * (row_reach - reach) + 1), np.uint8))
+            reach = row_reach
+        if off < height:
+            found[off:] |= wider[: height - off]
+            found[: height - off] |= wider[off:]
+    return found
 
 
 def without_small_holes(mask: np.ndarray) -> np.ndarray:

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import hashlib
 import io
+from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
 import cv2
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy import ndimage
 
 from manitwin.models.matting.background import length
@@ -49,9 +51,10 @@ def share_near_outline(rgb: np.ndarray, mask: np.ndarray, band_px: int) -> np.nd
     values, near = outline_values(rgb[box], rough[box], band_px)
     told = (rough[box] > 0.5).astype(np.float32)
     rows, columns = np.nonzero(near)
+    windows = patch_windows(values)
     for first in range(0, len(rows), AT_ONCE):
         some = np.s_[first : first + AT_ONCE]
-        told[rows[some], columns[some]] = _answers(patches(values, rows[some], columns[some]))
+        told[rows[some], columns[some]] = _answers(patches(windows, rows[some], columns[some]))
     share[box] = told
     return share
 
@@ -93,28 +96,47 @@ def outline_values(rgb: np.ndarray, rough: np.ndarray, band_px: int) -> tuple[np
     return values, near
 
 
-def patches(values: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Return the patches (N, F) float32 around pixels, given the ``outline_values`` of a picture.
+@dataclass(frozen=True)
+class PatchWindows:
+    """What patches are cut from, each a view: ``pixels (H, W, VALUES, NEAR_PX, NEAR_PX)``, ``around (H, W, VALUES, AROUND_PX,
+    AROUND_PX)`` and ``contrast (H, W)``, by the pixel in their middle."""
+
+    pixels: np.ndarray
+    around: np.ndarray
+    contrast: np.ndarray
+
+
+def patch_windows(values: np.ndarray) -> PatchWindows:
+    """Return the windows around each pixel of a picture, given its ``outline_values``."""
+    reach = AROUND_PX // 2 * STEP_PX
+    off = reach - NEAR_PX // 2
+    padded = np.pad(values[..., :VALUES], ((reach, reach), (reach, reach), (0, 0)), mode="edge")
+    pixels = _windows(padded, NEAR_PX)[off : len(values) + off, off : values.shape[1] + off]
+    around = _windows(cv2.blur(padded, (STEP_PX, STEP_PX)), 2 * reach + 1)[..., ::STEP_PX, ::STEP_PX]
+    return PatchWindows(pixels, around, values[..., VALUES])
+
+
+def patches(windows: PatchWindows, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Return the patches (N, F) float32 around pixels.
 
     First ``(VALUES, NEAR_PX, NEAR_PX)`` pixels, then ``(VALUES, AROUND_PX, AROUND_PX)`` means of ``STEP_PX`` squares, then the
     contrast.
     """
-    reach = AROUND_PX // 2 * STEP_PX
-    off = reach - NEAR_PX // 2
-    padded = np.pad(values[..., :VALUES], ((reach, reach), (reach, reach), (0, 0)), mode="edge")
-    pixels = np.lib.stride_tricks.sliding_window_view(padded, (NEAR_PX, NEAR_PX), axis=(0, 1))
-    coarse = np.lib.stride_tricks.sliding_window_view(
-        cv2.blur(padded, (STEP_PX, STEP_PX)), (2 * reach + 1, 2 * reach + 1), axis=(0, 1)
-    )[..., ::STEP_PX, ::STEP_PX]
     count = len(rows)
     return np.concatenate(
         [
-            pixels[rows + off, columns + off].reshape(count, -1),
-            coarse[rows, columns].reshape(count, -1),
-            values[rows, columns, VALUES, None],
+            windows.pixels[rows, columns].reshape(count, -1),
+            windows.around[rows, columns].reshape(count, -1),
+            windows.contrast[rows, columns, None],
         ],
         axis=1,
     )
+
+
+def _windows(padded: np.ndarray, side_px: int) -> np.ndarray:
+    """Return the windows (H, W, K, side, side) of a picture (H', W', K), whose rows lie together in memory."""
+    by_value = np.ascontiguousarray(np.moveaxis(padded, 2, 0))
+    return np.moveaxis(sliding_window_view(by_value, (side_px, side_px), axis=(1, 2)), 0, 2)
 
 
 def outline_model() -> str:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from scipy.spatial import cKDTree
 
 from manitwin.models.matting.background import border_ring, length
 from manitwin.models.matting.outline import dilated, eroded
@@ -124,15 +125,25 @@ def _colours_of_background(lab: np.ndarray, ring: np.ndarray) -> np.ndarray:
     centre = (np.array(ring.shape) - 1) / 2
     bearing = np.arctan2((rows - centre[0]) / ring.shape[0], (columns - centre[1]) / ring.shape[1])
     sector = ((bearing / (2 * np.pi) + 0.5) * SECTORS).astype(int) % SECTORS
-    cells, at = np.unique(np.rint(lab[rows, columns] * WEIGHTS / 6).astype(np.int32), axis=0, return_inverse=True)
+    cells, at = _distinct(np.rint(lab[rows, columns] * WEIGHTS / 6).astype(np.int64))
     seen = np.zeros((len(cells), SECTORS), bool)
-    seen[at.ravel(), sector] = True
+    seen[at, sector] = True
     wide = seen.sum(1) >= LEAST_SECTORS
     if not wide.any():
         wide[:] = True
     apart = np.linalg.norm(cells[:, None] - cells[wide][None].astype(float), axis=2).min(1) * 6
-    kept = (apart < NEAR_LAB)[at.ravel()]
+    kept = (apart < NEAR_LAB)[at]
     return np.asarray(lab[rows[kept], columns[kept]][:: max(1, int(kept.sum()) // MOST_SAMPLES)])
+
+
+def _distinct(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distinct rows (M, 3) of ``cells`` (N, 3) int64, sorted, and the number (N,) of each; none is beyond +-2^19."""
+    half, bits = 1 << 19, 20
+    keys, at = np.unique(
+        ((cells[:, 0] + half) << 2 * bits) + ((cells[:, 1] + half) << bits) + cells[:, 2] + half, return_inverse=True
+    )
+    low = (1 << bits) - 1
+    return np.column_stack([keys >> 2 * bits, (keys >> bits) & low, keys & low]) - half, at
 
 
 def _cut(lab: np.ndarray, ring: np.ndarray, known: np.ndarray, far_lab: float) -> np.ndarray:
@@ -163,14 +174,8 @@ def _shaded(lab: np.ndarray, share: float) -> np.ndarray:
 def _distance_from(known: np.ndarray, lab: np.ndarray) -> np.ndarray:
     """Return how far each pixel (H, W) is from the nearest of the ``known`` colours, in L*a*b* with less weight on L*."""
     samples, pixels = known * WEIGHTS, lab * WEIGHTS
-    cells, inverse = np.unique(np.rint(samples / 2).astype(np.int32), axis=0, return_inverse=True)
-    counts = np.bincount(inverse.ravel())
+    cells, inverse = _distinct(np.rint(samples / 2).astype(np.int64))
+    counts = np.bincount(inverse)
     centres = cells[counts >= 3] * np.float32(2) if (counts >= 3).any() else cells * np.float32(2)
-    nearest = np.full(lab.shape[0] * lab.shape[1], np.inf, np.float32)
-    flat = pixels.reshape(-1, 3)
-    own = (flat**2).sum(1)
-    for start in range(0, len(centres), 64):
-        part = centres[start : start + 64]
-        squared = own[:, None] - 2 * flat @ part.T + (part**2).sum(1)[None]
-        nearest = np.minimum(nearest, squared.min(1))
-    return np.asarray(np.sqrt(np.maximum(nearest, 0)).reshape(lab.shape[:2]))
+    apart, _ = cKDTree(centres).query(pixels.reshape(-1, 3))
+    return np.asarray(apart, np.float32).reshape(lab.shape[:2])
