@@ -14,8 +14,11 @@ import typer.main
 import typer.testing
 
 from manitwin.cli.console import out_console
+from manitwin.engine.process_bounds import one_thread_each
 from manitwin.errors import RendererMissing
 from manitwin.render.device import require_renderer
+
+one_thread_each()  # before NumPy is loaded: tests run side by side, and threads of theirs would wait for each other
 
 SHARED_DATA = Path(__file__).resolve().parent.parent.parent / "shared" / "data"
 

@@ -13,6 +13,8 @@ from typing import Any
 
 import pytest
 
+from manitwin.engine.process_bounds import ONE_THREAD
+
 HEAD = """
 import json, logging, os, signal, sys, threading, time
 from forked_worker import MODULE, started
@@ -70,7 +72,8 @@ pytestmark = pytest.mark.skipif(
 def program(text: str) -> subprocess.Popen[str]:
     """Start a Python program beside the helper module."""
     places = filter(None, (str(Path(__file__).parent), os.environ.get("PYTHONPATH")))
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(places)}
+    unbounded = {name: value for name, value in os.environ.items() if name not in ONE_THREAD}
+    environment = unbounded | {"PYTHONPATH": os.pathsep.join(places)}
     return subprocess.Popen(
         [sys.executable, "-c", HEAD + text], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
     )
@@ -93,7 +96,7 @@ def test_forked_workers_share_imports_and_nothing_that_a_program_keeps_to_itself
     assert first["parent"] == second["parent"] != said["driver"]
     for worker in (first, second):
         assert worker["imported"] and worker["blocked"] and worker["terminates"]
-        assert (worker["handlers"], worker["threads"]) == (0, os.environ.get("OMP_NUM_THREADS", "1"))
+        assert (worker["handlers"], worker["threads"]) == (0, "1")
     assert said["exit_codes"] == [0, -signal.SIGKILL]
     assert not any(said["there"]), "the server ends with the workers"
     assert said["later"]["parent"] == said["driver"] and not said["later"]["imported"]

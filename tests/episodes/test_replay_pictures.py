@@ -183,6 +183,7 @@ def test_granules_are_drawn_where_they_were(robot: Robot, recording: Recording) 
     assert np.linalg.norm(places[1] - places[0]) > 5
 
 
+@pytest.mark.slow
 def test_links_for_small_pictures_have_fewer_triangles_and_look_alike() -> None:
     panda = load_robot("panda")
     joints, hand = np.array([0.0, -0.3, 0.0, -2.2, 0.0, 2.0, 0.785]), np.array([0.04])

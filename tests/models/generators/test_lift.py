@@ -297,6 +297,7 @@ def test_a_can_seen_nearly_from_above_is_no_egg() -> None:
     assert fitted_or_lifted(None, _drawn(askew), "apple")
 
 
+@pytest.mark.slow
 def test_a_tin_with_its_shadow_and_letters_for_holes_is_no_cushion() -> None:
     def tin(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         open_lid = (np.hypot(x + 0.1, y) < 0.25) | (np.hypot(x - 0.05, y + 0.05) < 0.25)

@@ -54,7 +54,13 @@ def test_the_sides_of_a_box_follow_from_its_outline(
     assert np.array(sorted((width, depth))) / height == pytest.approx(np.array(across) / sides[2], rel=0.1)
 
 
-@pytest.mark.parametrize("sides", [(0.2, 0.05, 0.07), (0.08, 0.05, 0.2), (0.3, 0.2, 0.06)])
+@pytest.mark.parametrize(
+    "sides",
+    [
+        (0.2, 0.05, 0.07),
+        *(pytest.param(sides, marks=pytest.mark.slow) for sides in ((0.08, 0.05, 0.2), (0.3, 0.2, 0.06))),
+    ],
+)
 def test_a_nameless_box_from_near_is_a_box_of_these_sides_and_is_not_called_one(
     sides: tuple[float, float, float],
 ) -> None:

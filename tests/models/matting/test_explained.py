@@ -55,6 +55,7 @@ def test_doubtful_cut_out_is_believed_where_a_shape_explains_it_and_says_so() ->
     assert any(f"doubtful by itself ({by_itself:.2f})" in finding for finding in matte.findings)
 
 
+@pytest.mark.slow
 def test_shape_that_explains_none_changes_nothing() -> None:
     picture, says = scene((CENTER, RADIUS_PX)), Says(False)
     with pytest.raises(Rejected, match="cannot be told from the background"):

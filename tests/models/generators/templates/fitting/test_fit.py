@@ -142,7 +142,7 @@ def test_bottle_that_leans_in_the_photo_stands_on_its_base() -> None:
     assert (high - low)[0] / (high - low)[2] == pytest.approx(0.33, rel=0.06)
 
 
-@pytest.mark.parametrize(("shown", "said"), [("spoon", "mug"), ("bottle", "bowl")])
+@pytest.mark.parametrize(("shown", "said"), [("spoon", "mug"), pytest.param("bottle", "bowl", marks=pytest.mark.slow)])
 def test_photo_of_another_thing_is_no_confident_fit(shown: str, said: str) -> None:
     fitted = fit(said, photo_of(shown, View(0.4, np.radians(30), 0.0, 0.2), {}))
     assert fitted is not None and fitted.confidence < 0.5 * LEAST_CONFIDENCE
@@ -200,7 +200,9 @@ def test_same_photo_gives_the_same_bytes(tmp_path: Path) -> None:
     assert files[0] == files[1]
 
 
-@pytest.mark.parametrize(("radius_px", "primitive"), [(48, "template:hammer"), (80, "inflation")])
+@pytest.mark.parametrize(
+    ("radius_px", "primitive"), [pytest.param(48, "template:hammer", marks=pytest.mark.slow), (80, "inflation")]
+)
 def test_doubtful_template_is_taken_before_an_inflation_and_a_wrong_one_is_not(
     radius_px: int, primitive: str, tmp_path: Path
 ) -> None:
@@ -213,6 +215,7 @@ def test_doubtful_template_is_taken_before_an_inflation_and_a_wrong_one_is_not(
     assert fitted["confidence"] < LEAST_CONFIDENCE and fitted["residual"]["outline"] > 0.009
 
 
+@pytest.mark.slow
 def test_body_with_loops_beside_it_is_no_can(tmp_path: Path) -> None:
     rgba = photo_of("can", View(0.0, np.radians(12), 0.0, 0.15), {})
     rows, columns = np.nonzero(rgba[..., 3])
@@ -228,8 +231,10 @@ def test_outline_of_a_box_is_no_round_thing_where_the_name_says_that_it_is_not_r
     rgba = photo_of("basket", View(0.0, np.radians(8), 0.0, 0.15), {})
     rgba[..., 3] = np.where(ndimage.binary_fill_holes(rgba[..., 3] > 127), 255, 0)
     assert lift(rgba, hint_from_name("basket")).notes["primitive"] == "revolution"  # explains the outline as well
-    residual = replace(fit("basket", rgba).residual, outline=3 * MOST_OUTLINE)
-    doubtful = replace(fit("basket", rgba), residual=residual, confidence=confidence_of(residual))
+    fitted = fit("basket", rgba)
+    assert fitted is not None
+    residual = replace(fitted.residual, outline=3 * MOST_OUTLINE)
+    doubtful = replace(fitted, residual=residual, confidence=confidence_of(residual))
     with pytest.raises(Rejected, match="a basket is not round"):
         fitted_or_lifted(doubtful, rgba, "basket")
     assert fitted_or_lifted(None, rgba, "basket").notes["primitive"] == "revolution"
@@ -268,6 +273,7 @@ def test_a_nameless_thing_that_no_likely_name_explains_is_lifted() -> None:
     assert from_photo(photo, None, likely=unlikely).glb == lifted.glb
 
 
+@pytest.mark.slow
 def test_a_nameless_ellipse_is_what_explains_it_better_than_any_ellipse_is() -> None:
     pan = photo_of("frying pan", View(np.radians(-90.0), np.radians(35.0), 0.0, 0.1), {})
     seen = from_photo(pan, None, likely=(("frying pan", 0.9),))

@@ -52,12 +52,18 @@ def silhouette(pixels: np.ndarray, faces: np.ndarray, edges: tuple[np.ndarray, n
     which = np.repeat(np.arange(len(count)), count)
     row = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count) + first[which]
     step = end - start
+    mask = np.zeros((side_px, side_px), np.uint8)
+    if not len(which):
+        return mask
     x = start[which, 0] + (row - start[which, 1]) * step[which, 0] / step[which, 1]
     column = np.clip(np.ceil(x), 0, side_px).astype(np.int64)
     sign = np.where(step[which, 1] > 0, 1.0, -1.0)
-    width = side_px + 1
-    turns = np.bincount(row * width + column, weights=sign, minlength=side_px * width).reshape(side_px, width)
-    return np.asarray((np.abs(np.cumsum(turns, axis=1)[:, :side_px]) > 0.5).astype(np.uint8))
+    top, bottom, left, right = row.min(), row.max() + 1, column.min(), column.max()
+    height, width = bottom - top, right - left + 1
+    turns = np.bincount((row - top) * width + column - left, weights=sign, minlength=height * width)
+    winding = np.cumsum(turns.astype(np.int16).reshape(height, width)[:, :-1], axis=1, dtype=np.int16)
+    mask[top:bottom, left:right] = winding != 0
+    return mask
 
 
 def seen_faces(pixels: np.ndarray, distance: np.ndarray, faces: np.ndarray, side_px: int) -> np.ndarray:
