@@ -9,6 +9,7 @@ from pydantic import ValidationError
 from manitwin.errors import ManiTwinError
 from manitwin.models.annotators import priors
 from manitwin.models.annotators.priors import Interval, load_materials, load_priors, lookup, named
+from manitwin.models.generators.lift.hint import hint_from_name
 
 # Calli et al. 2015, "The YCB Object and Model Set", and its list of object masses: kg.
 YCB = {
@@ -227,3 +228,16 @@ def test_no_point_is_named_that_a_shape_does_not_show() -> None:
     assert "stem end" in [part.label for part in lookup("apple").functional]
     assert [part.label for part in lookup("toy").functional] == ["body", "base"]
     assert "chuck" in [part.label for part in lookup("cordless drill").functional]
+
+
+def test_only_what_is_operated_has_controls() -> None:
+    for name in ("carabiner", "hose connector", "yo yo", "goggles", "wall socket", "pacifier"):
+        assert "controls" not in [part.label for part in lookup(name).functional]
+    assert "controls" in [part.label for part in lookup("faucet").functional]
+
+
+def test_a_pipe_is_a_long_round_thing_with_two_ends() -> None:
+    pipe = lookup("steel pipe")
+    assert [part.label for part in pipe.functional] == ["end", "middle", "other end"]
+    hint = hint_from_name("steel pipe")
+    assert hint.round and not hint.boxy
