@@ -9,7 +9,7 @@ import numpy as np
 
 from manitwin.episodes.planning.problem import Phase
 from manitwin.episodes.recording import Recording
-from manitwin.geometry.poses import quaternion_wxyz
+from manitwin.geometry.poses import quaternion_wxyz, without_sign_changes
 from manitwin.physics.sapien.contacts import Touches
 from manitwin.physics.sapien.world import RobotWorld
 
@@ -62,7 +62,7 @@ class Recorder:
         self._unplanned.append(unplanned)
 
     def recording(self, tip_poses: Callable[[np.ndarray], np.ndarray]) -> Recording:
-        """Return what was recorded; quaternions never change their sign on the way.
+        """Return what was recorded; quaternions never change their sign on the way (``without_sign_changes``).
 
         ``tip_poses`` is the forward kinematics: of joints ``(n,)``, those of all arms, the tips ``(arms, 4, 4)``.
         """
@@ -73,9 +73,9 @@ class Recorder:
             np.array([tip_poses(q) for q in told["joint_positions_rad"]]),
         )
         granules_m = states.pop("granule_positions_m")
-        object_quaternions = _continuous(np.array(states.pop("object_quaternions_wxyz")))
-        tip_quaternions = _continuous(quaternion_wxyz(tips[:, :, :3, :3]))
-        told_quaternions = _continuous(np.concatenate([tip_quaternions[:1], quaternion_wxyz(told_tips[:, :, :3, :3])]))
+        object_quaternions = without_sign_changes(np.array(states.pop("object_quaternions_wxyz")))
+        tip_quaternions = without_sign_changes(quaternion_wxyz(tips[:, :, :3, :3]))
+        told_quaternions = without_sign_changes(quaternion_wxyz(told_tips[:, :, :3, :3]), tip_quaternions[0])
         return Recording(
             target=self._world.target,
             **{name: np.array(values, np.float32) for name, values in states.items()},
@@ -88,7 +88,7 @@ class Recorder:
             action_joint_positions_rad=np.array(told["joint_positions_rad"], np.float32),
             action_hand=np.array(told["hand"], np.float32),
             action_tip_position_m=_flat(told_tips[:, :, :3, 3]),
-            action_tip_quaternion_wxyz=_flat(told_quaternions[1:]),
+            action_tip_quaternion_wxyz=_flat(told_quaternions),
             phase=np.array(told["phase"], np.uint8),
             granule_positions_m=None if granules_m[0] is None else np.array(granules_m, np.float32),
             active_literal=None if None in told["active_literal"] else np.array(told["active_literal"], np.uint8),
@@ -117,10 +117,3 @@ def _columns(rows: Sequence[_State] | Sequence[_Action]) -> dict[str, list[Any]]
 def _flat(of_arms: np.ndarray) -> np.ndarray:
     """Return what arms have ``(T, arms, k)`` side by side, as the file has it ``(T, arms k)``."""
     return of_arms.reshape(len(of_arms), -1).astype(np.float32)
-
-
-def _continuous(quaternions: np.ndarray) -> np.ndarray:
-    """Choose the sign of quaternions ``(T, ..., 4)`` that is nearest to the row before, the first one's as it is."""
-    dots = np.sum(quaternions[1:] * quaternions[:-1], axis=-1, keepdims=True)
-    flips = np.cumprod(np.where(dots < 0, -1.0, 1.0), axis=0)
-    return np.concatenate([quaternions[:1], quaternions[1:] * flips])

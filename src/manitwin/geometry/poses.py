@@ -10,6 +10,8 @@ OBJECT_TO_GLTF = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0
 
 GLTF_TO_OBJECT = OBJECT_TO_GLTF.T
 
+LEAST_LEADING = 1e-3  # of a quaternion's number that says its sign: 0.1 degrees from none
+
 
 def quaternion_wxyz(rotation: np.ndarray) -> np.ndarray:
     """Convert rotation matrices ``(..., 3, 3)`` to unit quaternions ``(..., 4)`` wxyz with w >= 0."""
@@ -64,3 +66,18 @@ def rotation_angle_rad(rotation: np.ndarray) -> float:
     """Return the angle of a rotation ``(3, 3)``; as exact near zero as elsewhere: |R - I| = 2 sqrt(2) sin(angle / 2)."""
     half_sine = float(np.linalg.norm(rotation - np.eye(3))) / np.sqrt(8)
     return float(2 * np.arcsin(min(1.0, half_sine)))
+
+
+def without_sign_changes(quaternions: np.ndarray, before: np.ndarray | None = None) -> np.ndarray:
+    """Choose the signs of quaternions ``(T, ..., 4)`` wxyz so that each is nearest to the one of the row before.
+
+    The first row follows ``before (..., 4)``, or has w >= 0; where that is next to nothing, as of hands that look straight down,
+    x >= 0, and so on: the noise of w would draw the sign.
+    """
+    if before is None:
+        leading = np.argmax(np.abs(quaternions[:1]) > LEAST_LEADING, axis=-1, keepdims=True)
+        before = (quaternions[:1] * np.sign(np.take_along_axis(quaternions[:1], leading, axis=-1)))[0]
+    rows = np.concatenate([before[None], quaternions])
+    dots = np.sum(rows[1:] * rows[:-1], axis=-1, keepdims=True)
+    result: np.ndarray = quaternions * np.cumprod(np.where(dots < 0, -1.0, 1.0), axis=0)
+    return result

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -75,3 +76,18 @@ def test_joints_go_no_faster_than_their_motors_whatever_they_are_told(env: TaskE
         gone = np.abs(observation["joint_positions_rad"] - home)
         assert (gone <= 1.1 * fastest_rad_s * steps / RATE_HZ + 0.02).all()
     assert gone.min() > 0.8 * fastest_rad_s.min() * 5 / RATE_HZ, "it goes as fast as it can"
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"max_steps": 0}, "max_steps is 0; give a whole number, 1 or more"),
+        ({"max_steps": 2.5}, "max_steps is 2.5"),
+        ({"picture_px": 0, "cameras": ("front",)}, "picture_px is 0; give a whole number, 1 or more"),
+        ({"picture_px": -3}, "picture_px is -3"),
+        ({"cameras": "front"}, r"cameras is 'front'; give a tuple of names: \('front',\)"),
+    ],
+)
+def test_settings_that_are_none_are_refused_by_name(given: dict[str, Any], said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        make_env("tasks", **given)

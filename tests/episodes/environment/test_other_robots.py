@@ -15,6 +15,7 @@ from manitwin.episodes.collect import batch_folders, stored_episodes
 from manitwin.episodes.environment.action_limits import action_limits
 from manitwin.episodes.episodes_run import make_episodes
 from manitwin.episodes.planning.two_arms import planner_of
+from manitwin.episodes.recording import tip_poses
 from manitwin.episodes.settings import TasksConfig, TrajectoriesConfig
 from manitwin.episodes.skills.hands import skills_of
 from manitwin.episodes.stored_episode import StoredEpisode
@@ -57,7 +58,10 @@ def replayed(env: gymnasium.Env, episode: StoredEpisode, hand: float | None = No
         observation, _, terminated, _, info = env.step(action)
         assert env.observation_space.contains(observation)
         if hand is None:
-            np.testing.assert_array_equal(observation["object_poses"][:, :3], recording.object_positions_m[number])
+            objects = np.hstack([recording.object_positions_m[number], recording.object_quaternions_wxyz[number]])
+            tips = tip_poses(recording.tip_position_m, recording.tip_quaternion_wxyz)
+            np.testing.assert_array_equal(observation["object_poses"], objects)
+            np.testing.assert_array_equal(observation["tip_pose"], tips[number])
             np.testing.assert_array_equal(observation["joint_positions_rad"], recording.joint_positions_rad[number])
         if terminated:
             break

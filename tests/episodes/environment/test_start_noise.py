@@ -78,6 +78,15 @@ def test_start_is_what_was_drawn_and_that_of_its_seed(folder: Path) -> None:
     env.close()
 
 
+def test_tip_has_the_sign_that_it_has_at_home_wherever_it_starts(folder: Path) -> None:
+    plain, env = environment(folder, None), environment(folder, manitwin.StartNoise(joints_rad=0.1))
+    home = plain.reset(seed=0)[0]["tip_pose"][3:]
+    for seed in range(12):  # the hand looks down at home, where w is next to 0
+        assert env.reset(seed=seed)[0]["tip_pose"][3:] @ home > 0.9
+    plain.close()
+    env.close()
+
+
 def test_arm_stays_where_it_was_drawn(folder: Path) -> None:
     env = environment(folder, SMALL)
     first, info = env.reset(seed=1)

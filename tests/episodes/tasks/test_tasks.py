@@ -15,6 +15,7 @@ from grasped_twins import write_brick
 from manitwin.episodes.attempts import ATTEMPTS, read_attempts
 from manitwin.episodes.collect import batch_folders, collect, stored_episodes
 from manitwin.episodes.episodes_run import make_episodes
+from manitwin.episodes.recording import Recording
 from manitwin.episodes.settings import TasksConfig, TrajectoriesConfig
 from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.episodes.tasks.bddl import bddl_of
@@ -172,18 +173,27 @@ def test_a_skill_is_not_asked_of_tasks_which_say_themselves_what_is_done(folder:
     assert not (tmp_path / "out").exists()
 
 
+def assert_same_state(seen: dict[str, np.ndarray], recording: Recording, number: int) -> None:
+    """What is observed is what was recorded, to the last bit and to the signs of quaternions: a policy is trained on these."""
+    objects = np.hstack([recording.object_positions_m[number], recording.object_quaternions_wxyz[number]])
+    tip = np.append(recording.tip_position_m[number], recording.tip_quaternion_wxyz[number])
+    np.testing.assert_array_equal(seen["object_poses"], objects)
+    np.testing.assert_array_equal(seen["tip_pose"], tip)
+    np.testing.assert_array_equal(seen["joint_positions_rad"], recording.joint_positions_rad[number])
+    np.testing.assert_array_equal(seen["joint_velocities_rad_s"], recording.joint_velocities_rad_s[number])
+    np.testing.assert_array_equal(seen["gripper_opening_m"], recording.hand[number])
+
+
 def replayed(env: gymnasium.Env, episode: StoredEpisode, off_rad: float = 0.0) -> dict:
     """Give an episode's commands to an environment; ``off_rad`` turns the arm's base, else the states have to be the same."""
     recording, info = episode.recording, {}
     actions = np.column_stack([recording.action_joint_positions_rad, recording.action_gripper_opening_m])
     actions[:, 0] += off_rad
-    env.reset(seed=0)
+    assert_same_state(env.reset(seed=0)[0], recording, 0)
     for number, action in enumerate(actions, start=1):
         seen, reward, terminated, _, info = env.step(action)
         if not off_rad:
-            np.testing.assert_array_equal(seen["object_poses"][:, :3], recording.object_positions_m[number])
-            np.testing.assert_array_equal(seen["joint_positions_rad"], recording.joint_positions_rad[number])
-            np.testing.assert_array_equal(seen["gripper_opening_m"], recording.hand[number])
+            assert_same_state(seen, recording, number)
         assert reward == float(info["success"])
         if terminated:
             break
@@ -199,6 +209,11 @@ def test_recorded_commands_reach_success_in_the_environment_and_wrong_ones_do_no
     for episode in {each.attempt.episode_id: each for each in (*kept[:2], *double, *guarded)}.values():
         env = manitwin.make_env(folder, episode.attempt.task_id)
         assert replayed(env, episode)["success"], episode.attempt
+        assert list(env.unwrapped.fixtures) == episode.facts.get("fixtures", [])
+        if episode.attempt.skill == "push":
+            place = env.unwrapped.places_m["mark"]
+            ended_m = episode.recording.object_positions_m[-1, episode.recording.target]
+            assert np.linalg.norm((ended_m - place)[:2]) < 0.03
         env.close()
     env = manitwin.make_env(folder, kept[0].attempt.task_id)
     missed = replayed(env, kept[0], off_rad=0.5)

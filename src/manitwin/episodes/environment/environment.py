@@ -13,11 +13,13 @@ from gymnasium import spaces
 from manitwin.episodes.courses.course import Start
 from manitwin.episodes.environment.action_limits import action_limits, checked_action
 from manitwin.episodes.environment.arms import Arms, by_arm
+from manitwin.episodes.environment.observed_poses import ObservedPoses
 from manitwin.episodes.environment.start_noise import DrawnStart, StartNoise, draw_start
 from manitwin.episodes.episode import closing_of, settled, world_of
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.execution import REST_ROWS, STILL_ROWS, WATCH_S
+from manitwin.episodes.fixtures import to_json
 from manitwin.episodes.goals.evaluation import Evaluation, evaluate
 from manitwin.episodes.judging import is_reached_already, state_of
 from manitwin.episodes.outcome import is_at_rest
@@ -28,7 +30,6 @@ from manitwin.episodes.sequence import course_of, problem_of
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.tasks.task_setting import TaskSetting
 from manitwin.errors import UsageError
-from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.robots.robot import Robot
 
@@ -112,6 +113,16 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         """The names of the objects in the order of ``object_poses``."""
         return self._setting.scene.names
 
+    @property
+    def fixtures(self) -> tuple[dict[str, Any], ...]:
+        """The fixtures beside the objects (pegs, holders, boards), which stay, as recorded episodes have them in their facts."""
+        return tuple(to_json(fixture) for fixture in self._setting.goal.fixtures)
+
+    @property
+    def places_m(self) -> dict[str, np.ndarray]:
+        """The marked places ``(3,)`` of the goal in the world, by name."""
+        return {name: np.array(place_m) for name, place_m in self._setting.goal.places_m.items()}
+
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -191,6 +202,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         """Leave the world before, and let a problem come to rest in another, the arm at home or with its joints elsewhere."""
         self._leave()
         self._world = world = world_of(problem, self._robot, self._settings, self._closing.force_n)
+        self._observed = ObservedPoses(world)
         if joints_rad is not None:
             for arm, part in zip(world.robots, by_arm(world, joints_rad), strict=True):
                 arm.put(part, arm.robot.open_hand)
@@ -257,12 +269,13 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
     def _observation(self) -> dict[str, Any]:
         world = self._world
         assert world is not None
+        tips, objects = self._observed.read(world)
         seen: dict[str, Any] = {
             "joint_positions_rad": self._arms.joint_positions(),
             "joint_velocities_rad_s": self._velocities,
             self._hand_name: self._arms.hands(),
-            "tip_pose": np.concatenate([_pose(arm.gripper_pose()) for arm in world.robots]),
-            "object_poses": np.array([_pose(pose) for pose in self._poses[-1]]),
+            "tip_pose": tips.ravel(),
+            "object_poses": objects,
         }
         found: dict[str, Any] = {}
         for name, value in seen.items():
@@ -276,7 +289,3 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
 
 def _box(most: float, *shape: int) -> spaces.Box:
     return spaces.Box(-most, most, shape, np.float32)
-
-
-def _pose(frame_to_world: np.ndarray) -> np.ndarray:
-    return np.concatenate([frame_to_world[:3, 3], quaternion_wxyz(frame_to_world[:3, :3])])

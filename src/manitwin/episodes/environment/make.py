@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from numbers import Integral
 from pathlib import Path
 
 from manitwin.engine.ledger.location import CONFIG
@@ -38,8 +39,11 @@ def make_env(
     start_noise: StartNoise | None = None,
 ) -> TaskEnvironment:
     """Return a task's environment, as ``manitwin.make_env`` says; raises UsageError for what is not there."""
-    if not max_steps >= 1:
-        raise UsageError(f"max_steps is {max_steps}; give 1 or more")
+    for name, number in (("max_steps", max_steps), ("picture_px", picture_px)):
+        if isinstance(number, bool) or not isinstance(number, Integral) or number < 1:
+            raise UsageError(f"{name} is {number!r}; give a whole number, 1 or more")
+    if isinstance(cameras, str):
+        raise UsageError(f"cameras is {cameras!r}; give a tuple of names: ({cameras!r},)")
     if not (start_noise is None or isinstance(start_noise, StartNoise)):
         raise UsageError(f"start_noise is {start_noise!r}; give a manitwin.StartNoise, or None")
     task = one_task(tasks, task_id)
