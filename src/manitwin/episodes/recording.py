@@ -17,7 +17,7 @@ class Recording:
     Action t is what the controllers are told to reach by state t + 1. Objects are in the scene's order, the target at
     ``target``. ``hand (T + 1, h)`` is what the hand is: the opening of jaws (m), a cup's plunger (m), or the joints of
     other hands (rad); ``action_hand (T, h)`` what it is told: the same, or 1 where a cup's vacuum is on, else 0. The tip is
-    the twin's grasp frame (+Z approach, X closing). ``phase (T,)`` holds numbers of ``planning.problem.Phase``.
+    the twin's grasp frame: its origin at the gripper's base, not between the fingertips, +Z approach, X closing. ``phase (T,)`` holds numbers of ``planning.problem.Phase``.
     ``finger_forces_n`` press on the target from two sides: the jaws, or thumb and palm and the other fingers; a cup's lip,
     where it has sealed, presses in both with the vacuum's force less the pull. ``unplanned_contact`` says that the robot
     touched with more than 0.5 N what it should not, since the state before.
@@ -76,8 +76,8 @@ def tip_delta(recording: Recording) -> np.ndarray:
     """Return ``(T, 6 + h) float32``: how the tip's target differs from its pose (of two arms each's), and what hands are told.
 
     Three metres and a rotation vector of three radians, both along the axes of the world, which are those of the robot's
-    base: ``p_target = p + d[:3]``, ``R_target = exp(d[3:6]) R``. This is the frame of ManiSkill's ``pd_ee_delta_pose``
-    (``root_translation:root_aligned_body_rotation``), not scaled to [-1, 1].
+    base: ``p_target = p + d[:3]``, ``R_target = exp(d[3:6]) R``. The axes are those of ManiSkill's ``pd_ee_delta_pose``
+    (``root_translation:root_aligned_body_rotation``), not scaled to [-1, 1]; its point is between the fingertips.
     """
     moved = (recording.action_tip_position_m - recording.tip_position_m[:-1]).reshape(-1, 3)
     before = Rotation.from_quat(recording.tip_quaternion_wxyz[:-1].reshape(-1, 4), scalar_first=True)
