@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from boxy_robot import tip_pose
-from manitwin.episodes.cameras import named_cameras
+from manitwin.episodes.cameras import NamedCamera, named_cameras
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.render.cameras import project
@@ -78,6 +78,20 @@ def test_wrist_camera_rides_on_the_hand_and_the_others_stand() -> None:
     for camera in named_cameras(["front", "wrist"], robot):
         here, there = (camera.placed(pose, SIZE, SIZE).position for pose in (np.eye(4), moved))
         np.testing.assert_allclose(there - here, moved[:3, 3] if camera.on_hand else np.zeros(3), atol=1e-12)
+
+
+@pytest.mark.parametrize("camera", named_cameras(["front", "side", "top", "wrist"], load_robot("panda")))
+def test_what_is_told_of_a_camera_puts_points_where_its_pictures_show_them(camera: NamedCamera) -> None:
+    robot = load_robot("panda")
+    tip = tip_pose(robot, robot.home_rad)
+    points = transform_points(tip, np.array([[0.02, -0.01, 0.11], [-0.04, 0.0, 0.1034], [0.0, 0.01, 0.2]]))
+    told = camera.to_json(320, SIZE)
+    frame = {"tip": tip, "world": np.eye(4)}[told["camera.frame"]]
+    seen = transform_points(np.linalg.inv(frame @ np.array(told["camera.camera_to_frame"])), points)
+    across = seen @ np.array(told["camera.intrinsics_px"]).T  # OpenCV's: x right, y down, z away
+    pixels, depth = project(points, camera.placed(tip, 320, SIZE))
+    np.testing.assert_allclose(across[:, :2] / across[:, 2:], pixels, atol=1e-9)
+    np.testing.assert_allclose(seen[:, 2], depth, atol=1e-12)
 
 
 def test_unknown_camera_names_those_there_are() -> None:

@@ -13,6 +13,7 @@ import pytest
 from grasped_twins import write_brick
 from manitwin.engine.stage import StagePart, heard_by
 from manitwin.episodes.attempts import ATTEMPTS, read_attempts
+from manitwin.episodes.cameras import named_cameras
 from manitwin.episodes.collect import batch_folders, collect, stored_episodes
 from manitwin.episodes.episode_pictures import draw_episodes, write_with_pictures
 from manitwin.episodes.episodes_run import make_episodes
@@ -23,6 +24,7 @@ from manitwin.episodes.settings import PicturesConfig, TrajectoriesConfig
 from manitwin.episodes.statistics.report import episode_statistics
 from manitwin.errors import EpisodesError, UsageError
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
+from manitwin.robots.load import load_robot
 from manitwin.scenes.layouts.layouts_run import make_layouts
 from manitwin.scenes.settings import LayoutsConfig, LayoutSettings
 
@@ -168,7 +170,9 @@ def test_pictures_are_drawn_afterwards_and_join_the_set(bricks: Path, tmp_path: 
     written = write_with_pictures(tmp_path, config.cameras)
     loaded = read_lerobot(tmp_path / "lerobot", decode_videos=True)
     assert written.episodes == len(loaded.episodes) == 2
-    assert {"observation.images.front", "observation.images.wrist"} <= set(loaded.info["features"])
+    for camera in named_cameras(config.cameras, load_robot("panda")):
+        told = loaded.info["features"][f"observation.images.{camera.name}"]["info"]
+        assert told.items() >= camera.to_json(64, 64).items()
     assert written.frames == sum(e.recording.steps for e in stored_episodes(batch_folders(tmp_path)))
 
 

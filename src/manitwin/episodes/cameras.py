@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from manitwin.errors import UsageError, choose_from
 from manitwin.geometry.poses import transform
-from manitwin.render.cameras import Camera, look_at
+from manitwin.render.cameras import OPENGL_TO_OPENCV, Camera, look_at
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.robots.robot import Robot
 from manitwin.robots.two_arms import base_to_world
@@ -36,6 +37,19 @@ class NamedCamera:
         """Return the camera in the world, for a hand at ``gripper_to_world (4, 4)``."""
         pose = gripper_to_world @ self.camera_to_mount if self.on_hand else self.camera_to_mount
         return Camera(pose, self.fov_y_rad, width_px, height_px)
+
+    def to_json(self, width_px: int, height_px: int) -> dict[str, Any]:
+        """Return what relates its pictures to the world, as LeRobot sets have it: intrinsics and pose along OpenCV's axes.
+
+        The pose is in ``world``, or for a camera on the hand in the frame of ``tip``, the first arm's. The centre of the upper
+        left pixel is (0.5, 0.5).
+        """
+        focal_px = self.placed(np.eye(4), width_px, height_px).focal_px
+        return {
+            "camera.intrinsics_px": [[focal_px, 0.0, width_px / 2], [0.0, focal_px, height_px / 2], [0.0, 0.0, 1.0]],
+            "camera.frame": "tip" if self.on_hand else "world",
+            "camera.camera_to_frame": (self.camera_to_mount @ OPENGL_TO_OPENCV).tolist(),
+        }
 
 
 def named_cameras(names: Iterable[str], robot: Robot) -> list[NamedCamera]:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Unpack
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
 from manitwin.config import Resource
 from manitwin.engine.drive import RunOptions, RunReport, drive
@@ -70,10 +70,11 @@ class BatchDrawing(Payload):
 
 
 class PicturesRecord(FolderRecord):
-    """``pictures.json``: at which frame of its camera's film each episode begins."""
+    """``pictures.json``: at which frame of its camera's film each episode begins, and each camera's intrinsics and pose."""
 
     batch_id: str
     first_frames: dict[str, int]
+    cameras: dict[str, dict[str, Any]] = Field(default_factory=dict)
     files: dict[str, str]
 
 
@@ -81,9 +82,9 @@ class EpisodeFilmsStage:
     """Draw the kept episodes of a batch: one film a camera, all episodes in it, frame t of an episode showing state t."""
 
     name = "films"
-    version = "5"
+    version = "6"
     reads: tuple[str, ...] = ()
-    writes: tuple[str, ...] = (FILMS, "first_frames")
+    writes: tuple[str, ...] = (FILMS, "first_frames", "cameras")
     needs: Resource = "cpu"
     backend = "sapien"
     model: str | None = None
@@ -99,7 +100,7 @@ class EpisodeFilmsStage:
         return load_robot(self._robot_name)
 
     def run(self, draft: Draft[BatchDrawing], folder: Path) -> dict[str, Any]:
-        """Write ``films/<camera>.mp4``, return the field ``first_frames``."""
+        """Write ``films/<camera>.mp4``, return the fields ``first_frames`` and ``cameras``."""
         cameras = named_cameras(self.settings.cameras, self._robot)
         first_frames: dict[str, int] = {}
         (folder / FILMS).mkdir()
@@ -110,7 +111,8 @@ class EpisodeFilmsStage:
                 pictures = self._frames(episode, cameras)
                 spans = [film.add(shown) for film, shown in zip(films, pictures, strict=True)]
                 first_frames[episode.attempt.episode_id] = spans[0].first_frame
-        return {"first_frames": first_frames}
+        size = self.settings.size_px
+        return {"first_frames": first_frames, "cameras": {each.name: each.to_json(size, size) for each in cameras}}
 
     def _film(self, folder: Path, camera: NamedCamera) -> EpisodesVideo:
         size = self.settings.size_px
@@ -179,7 +181,8 @@ class PicturesRecipe(FolderRecipe[PicturesRecord]):
     ) -> PicturesRecord:
         """Write the folder of a batch's pictures."""
         shutil.copytree(draft.path(FILMS), fresh, dirs_exist_ok=True)
-        said = {"batch_id": draft.item_id, "first_frames": draft.field("first_frames"), "files": digests_below(fresh)}
+        fields = {name: draft.field(name) for name in ("first_frames", "cameras")}
+        said = {"batch_id": draft.item_id, **fields, "files": digests_below(fresh)}
         return self.seal(fresh, said)
 
     def ending(self, record: PicturesRecord) -> Ending:
@@ -228,12 +231,15 @@ def write_with_pictures(out: Path, cameras: tuple[str, ...]) -> LeRobotSummary:
     """Write the LeRobot data set of a run again, with the films of these cameras."""
     folders = batch_folders(out)
     clips: dict[str, dict[str, Clip]] = {camera: {} for camera in cameras}
+    pinholes: dict[str, dict[str, Any]] = {}
     for folder in folders:
         place = out / PICTURES / batch_name(folder.name)
-        for episode_id, first in read_pictures(place).first_frames.items():
+        record = read_pictures(place)
+        pinholes |= record.cameras
+        for episode_id, first in record.first_frames.items():
             for camera in cameras:
                 clips[camera][episode_id] = Clip(place / f"{camera}.mp4", first)
-    videos = [CameraVideos(camera, clips[camera]) for camera in cameras]
+    videos = [CameraVideos(camera, clips[camera], pinholes.get(camera, {})) for camera in cameras]
     return write_lerobot(stored_episodes(folders), out / LEROBOT, videos=videos, granules=any_granules(folders))
 
 

@@ -15,6 +15,9 @@ import numpy as np
 
 from manitwin.geometry.poses import inverse, transform_points
 
+OPENGL_TO_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
+"""OpenGL's camera frame (x right, y up, looking along -z) to OpenCV's (x right, y down, looking along +z), and back."""
+
 # Eight views: every 45 degrees of azimuth. Four from the height of a person who looks at a thing on a table, two from
 # well above (into cavities) and two from below, on opposite sides: what is seen once only cannot be checked.
 ORBIT_ELEVATIONS_DEG = (20.0, 50.0, 20.0, -35.0, 20.0, 65.0, 20.0, -35.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -42,10 +42,11 @@ class Clip:
 
 @dataclass(frozen=True)
 class CameraVideos:
-    """A camera's pictures of episodes, by ``episode_id``; all of one size and codec."""
+    """A camera's pictures of episodes, by ``episode_id``; all of one size and codec. ``pinhole``: see ``NamedCamera.to_json``."""
 
     camera: str
     clips: Mapping[str, Clip]
+    pinhole: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -156,6 +157,7 @@ class VideoColumns:
                 "video.fps": RATE_HZ,
                 "video.channels": 3,
                 "has_audio": False,
+                **self.videos.pinhole,
             },
         }
 

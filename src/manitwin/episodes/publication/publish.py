@@ -67,9 +67,12 @@ def films_of(episodes: Path, batches: list[Path], allowed: Set[str], scratch: Pa
     """
     cameras = cameras_of(episodes)
     clips: dict[str, dict[str, Clip]] = {camera: {} for camera in cameras}
+    pinholes: dict[str, dict[str, Any]] = {}
     for batch in batches if cameras else ():
         place = episodes / PICTURES / batch_name(batch.name)
-        first_frames = read_pictures(place).first_frames
+        record = read_pictures(place)
+        first_frames = record.first_frames
+        pinholes |= record.cameras
         kept = {name: first for name, first in first_frames.items() if name in allowed}
         for camera in cameras if kept else ():
             film = place / f"{camera}.mp4"
@@ -77,7 +80,7 @@ def films_of(episodes: Path, batches: list[Path], allowed: Set[str], scratch: Pa
                 clips[camera] |= {name: Clip(film, first) for name, first in kept.items()}
             else:
                 clips[camera] |= cut_film(film, first_frames, allowed, scratch / f"{batch.name}-{camera}.mp4")
-    return [CameraVideos(camera, clips[camera]) for camera in cameras]
+    return [CameraVideos(camera, clips[camera], pinholes.get(camera, {})) for camera in cameras]
 
 
 def cut_film(film: Path, first_frames: dict[str, int], allowed: Set[str], place: Path) -> dict[str, Clip]:

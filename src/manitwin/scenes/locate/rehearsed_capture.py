@@ -8,9 +8,9 @@ import numpy as np
 
 from manitwin.errors import UsageError, choose_from
 from manitwin.geometry.poses import inverse
+from manitwin.render.cameras import OPENGL_TO_OPENCV
 from manitwin.scenes.locate.captured import Capture
 from manitwin.scenes.locate.depth_noise import DepthNoise
-from manitwin.scenes.perception.bop import OPENGL_TO_OPENCV
 from manitwin.scenes.perception.scene_truth import read_scene_truth
 from manitwin.scenes.scene_files import scene_files
 

@@ -10,6 +10,7 @@ import numpy as np
 from PIL import Image
 
 from manitwin.geometry.poses import inverse
+from manitwin.render.cameras import OPENGL_TO_OPENCV
 from manitwin.scenes.loaded_scene import object_pose
 from manitwin.scenes.perception.bop_models import MM, BopModel
 from manitwin.scenes.perception.classes import Classes
@@ -19,7 +20,6 @@ from manitwin.scenes.perception.scene_truth import PictureTruth, SceneTruth
 
 SPLIT = "train_pbr"
 NO_BOX = [-1, -1, -1, -1]
-OPENGL_TO_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 def write_bop(
