@@ -239,6 +239,9 @@ def test_the_environment_shows_pictures_of_what_is_there(folder: Path, tasks: li
     first, _ = env.reset(seed=0)
     assert env.observation_space.contains(first) and set(first["pictures"]) == {"front", "wrist"}
     assert all(picture.std() > 5 for picture in first["pictures"].values())
+    told = env.unwrapped.cameras
+    assert {name: each["camera.frame"] for name, each in told.items()} == {"front": "world", "wrist": "tip"}
+    assert told["front"]["camera.intrinsics_px"][0][2] == 16
     turned = np.append(env.unwrapped._robot.home_rad, 0.08).astype(np.float32)
     turned[0] += 0.3
     for _ in range(10):
@@ -246,6 +249,8 @@ def test_the_environment_shows_pictures_of_what_is_there(folder: Path, tasks: li
     assert all((then["pictures"][name] != picture).any() for name, picture in first["pictures"].items())
     assert np.array_equal(env.render(), then["pictures"]["front"])
     env.close()
+    with pytest.raises(UsageError, match="reset after close; make the environment again"):
+        env.reset(seed=0)
 
 
 def test_bddl_says_what_it_can_and_lists_the_rest(scenes: Path, tasks: list[TaskRecord]) -> None:

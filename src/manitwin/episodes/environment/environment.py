@@ -10,6 +10,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
+from manitwin.episodes.cameras import named_cameras
 from manitwin.episodes.courses.course import Start
 from manitwin.episodes.environment.action_limits import action_limits, checked_action
 from manitwin.episodes.environment.arms import Arms, by_arm
@@ -82,6 +83,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         self.render_mode = "rgb_array" if painter is not None else None
         self._setting, self._planner, self._settings, self._painter = setting, planner, settings, painter
         self._robot, self._max_steps, self._noise = robot, max_steps, start_noise
+        self._camera_names, self._picture_px = tuple(cameras), picture_px
         self._closing = closing_of(self._robot, settings)
         self._substeps = round(1 / RATE_HZ / settings.timestep_s)
         self._per_look = max(1, int(WATCH_S / settings.timestep_s + 1e-9))
@@ -119,6 +121,12 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         return tuple(to_json(fixture) for fixture in self._setting.goal.fixtures)
 
     @property
+    def cameras(self) -> dict[str, dict[str, Any]]:
+        """What relates the pixels of ``pictures`` to the world, by camera: ``NamedCamera.to_json``."""
+        size = self._picture_px
+        return {each.name: each.to_json(size, size) for each in named_cameras(self._camera_names, self._robot)}
+
+    @property
     def places_m(self) -> dict[str, np.ndarray]:
         """The marked places ``(3,)`` of the goal in the world, by name."""
         return {name: np.array(place_m) for name, place_m in self._setting.goal.places_m.items()}
@@ -130,8 +138,10 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
 
         A task begins in one way: ``seed`` draws nothing but what ``np_random`` gives. With noise of the start ``np_random``
         draws another start each time, and ``info["start_noise"]`` says which. Raises UsageError where the scene does not stay,
-        or no start is found.
+        no start is found, or there are no cameras any more since ``close``.
         """
+        if self._camera_names and self._painter is None:
+            raise UsageError("reset after close; make the environment again")
         super().reset(seed=seed)
         start, world, drawn = self._begun()
         start.moved, start.partners = self._setting.sequence.moved, self._setting.sequence.partners
