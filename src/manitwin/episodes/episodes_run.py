@@ -249,6 +249,8 @@ def make_episodes(
         report.remarks.append(f"{before} episodes are there already, more than the {count} asked for; none was added")
     elif before:
         report.remarks.append(f"{before} of {count} episodes were there already")
+    if source.scenes is None and (said := pool_of(source.dataset).about_joints):
+        report.remarks.append(said)
     return report
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from articulated_twins import write_articulated
 from manitwin.errors import TwinError, UsageError
 from manitwin.scenes.layouts.layouts_run import without_upright
 from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose, pool_of, read_pool
@@ -71,6 +72,13 @@ def test_twins_without_an_upright_placement_that_stayed_are_named(tmp_path: Path
     seal(folder, record)
     pool_of.cache_clear()
     assert without_upright(tmp_path) == (ids[1],)
+
+
+def test_twins_with_joints_are_counted_as_the_rigid_bodies_that_they_are_here(tmp_path: Path) -> None:
+    write_articulated(tmp_path / "one")
+    assert read_pool(tmp_path).about_joints == "twins with joints, each one rigid body here as it stands: 1"
+    write_things(tmp_path / "rigid", THINGS[:2])
+    assert read_pool(tmp_path / "rigid").about_joints is None
 
 
 def test_place_without_twins_says_so(tmp_path: Path) -> None:

@@ -60,6 +60,7 @@ def layout(
     from manitwin.api import make_layouts
     from manitwin.cli.progress import WatchedRun
     from manitwin.scenes.layouts.layouts_run import CONTACT_SHEET, layout_totals, without_upright
+    from manitwin.scenes.layouts.pool import pool_of
     from manitwin.twin.dataset_root import DatasetRoot
 
     sheet = sheet or settings.pictures or DatasetRoot(out).exists(CONTACT_SHEET)  # one that is there is kept up to date
@@ -72,6 +73,8 @@ def layout(
     totals = layout_totals(out)
     if settings.layout.upright and (lying := without_upright(dataset)):
         out_console.print(f"twins that have no upright placement and lie as they rest: {len(lying)}")
+    if said := pool_of(DatasetRoot(dataset).absolute()).about_joints:
+        out_console.print(said)
     _print_totals(totals)
     if sheet and totals.accepted:
         from manitwin.scenes.layouts.previews import write_contact_sheet

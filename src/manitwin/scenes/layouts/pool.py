@@ -43,7 +43,7 @@ class StandingPose:
 class PoolTwin:
     """A twin as far as drawing it needs; ``vessel``: it has an opening that its hulls keep.
 
-    ``frames`` are those of its functional points.
+    ``frames`` are those of its functional points. ``jointed``: it has joints, though it is one rigid body in scenes.
     """
 
     twin_id: str
@@ -52,6 +52,7 @@ class PoolTwin:
     poses: tuple[StandingPose, ...]
     vessel: bool
     frames: tuple[TwinFrame, ...] = ()
+    jointed: bool = False
 
     @property
     def stands(self) -> bool:
@@ -119,6 +120,12 @@ class Pool:
         while len(self._bodies) > KEPT_BODIES:
             del self._bodies[next(iter(self._bodies))]
         return found
+
+    @property
+    def about_joints(self) -> str | None:
+        """A line on the twins that have joints, which are locked in scenes and episodes; None where there are none."""
+        jointed = sum(twin.jointed for twin in self.twins)
+        return f"twins with joints, each one rigid body here as it stands: {jointed}" if jointed else None
 
     @cached_property
     def upright(self) -> Pool:
@@ -191,6 +198,7 @@ class _Standing(BaseModel):
     mesh: _Mesh
     language: _Language
     points: _Points = _Points()
+    joints: list[object] = []
 
 
 def _pool_twin(content: bytes, name: str) -> PoolTwin | None:
@@ -223,4 +231,5 @@ def _pool_twin(content: bytes, name: str) -> PoolTwin | None:
         poses,
         record.mesh.hulls.keeps_opening is True,
         twin_frames(record.points.functional),
+        jointed=bool(record.joints),
     )
