@@ -164,3 +164,30 @@ def test_a_bottle_that_lies_in_the_world_of_its_file_is_stood_up_and_one_that_a_
     for by_convention, vessel, height in ((True, True, 0.2), (False, True, 0.06), (True, False, 0.06)):
         choice = choose_up(lying, user="z", stands=True, opens_up=vessel, by_convention=by_convention)
         assert _stood(lying, choice).extents[2] == pytest.approx(height, abs=1e-3), choice.reason
+
+
+def _van() -> trimesh.Trimesh:
+    """A van of 120 by 64 by 64 mm along x, standing on four wheels with z up."""
+    body = trimesh.creation.box((0.12, 0.06, 0.05), trimesh.transformations.translation_matrix((0, 0, 0.039)))
+    wheels = [
+        trimesh.creation.cylinder(
+            0.014,
+            0.008,
+            transform=trimesh.transformations.translation_matrix((x, y, 0.014))
+            @ trimesh.transformations.rotation_matrix(np.pi / 2, (1, 0, 0)),
+        )
+        for x in (-0.04, 0.04)
+        for y in (-0.028, 0.028)
+    ]
+    return trimesh.boolean.union([body, *wheels], engine="manifold")
+
+
+def test_vehicle_of_square_section_stays_on_its_wheels() -> None:
+    van = _van()
+    assert choose_up(van, file_up="z", stands=True).turned_deg > 80, (
+        "a carton of this section would be stood on its end"
+    )
+    stood = _stood(van, choose_up(van, file_up="z", stands=True, level=True))
+    np.testing.assert_allclose(stood.extents, van.extents, atol=1e-6)
+    lengthwise_y = _turned(van, (0, 0, 90))
+    assert choose_up(lengthwise_y, stands=True, level=True).up == "z"

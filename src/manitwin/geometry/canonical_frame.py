@@ -58,6 +58,7 @@ def choose_up(
     file_up: str | None = None,
     stands: bool | None = None,
     opens_up: bool | None = None,
+    level: bool = False,
     said_by: str = "the user",
     by_convention: bool = False,
 ) -> UpChoice:
@@ -65,7 +66,8 @@ def choose_up(
 
     ``file_up`` is the up axis that the format declares (None: no rule; Z is tried before Y). ``stands``: whether such a
     thing is put down upright (None: unknown), ``opens_up`` whether an opening is the top of such a thing (False: it may be
-    hollow from below, as hats and toy bricks are). ``said_by`` names who said the axis ``user``, for the reason;
+    hollow from below, as hats and toy bricks are), ``level`` that what stands has its long axis level, as vehicles do, and is
+    stood on no end. ``said_by`` names who said the axis ``user``, for the reason;
     ``by_convention``: nobody meant this thing by it, it is the up axis of its world. In order: that axis, but by convention
     after the long axis of a round, long vessel; for things that lie, their likeliest side, the file's if nearly
     as likely; an opening upward, but of one that the file has underneath; for round, long things that stand, their long
@@ -83,7 +85,8 @@ def choose_up(
         pose = _likeliest_side(poses, _axis(axis))
         return _turned(pose, axis, "such a thing lies; this is the side it most likely lies on")
     opening = find_opening(solid)
-    axes = [axis] if file_up else _undeclared_axes(solid, stands)
+    on_end = bool(stands) and not level
+    axes = [axis] if file_up else _undeclared_axes(solid, on_end)
     unnamed = opens_up is None and stands is None
     if opening is not None and (opens_up is False or (unnamed and file_up is not None)):
         kept = _open_below(poses, axes, opening.axis)
@@ -93,7 +96,7 @@ def choose_up(
         pose_up = _nearest(poses, opening.axis, _TILTED_DEG)
         if pose_up is not None:
             return _turned(pose_up, axis, "its opening points up")
-    if stands:
+    if on_end:
         pose_up = _stood_up(solid, poses, _axis(axes[0]))
         if pose_up is not None:
             return _turned(pose_up, axes[0], _LAY.format(axes[0]))
@@ -157,12 +160,12 @@ def _stood_up(solid: trimesh.Trimesh, poses: list[StablePose], up: np.ndarray) -
     return max((pose for pose in ends if pose is not None), key=lambda pose: pose.probability, default=None)
 
 
-def _undeclared_axes(solid: trimesh.Trimesh, stands: bool | None) -> list[str]:
-    """Return Z and Y in the order to try: a round, long thing that stands has its axis up."""
+def _undeclared_axes(solid: trimesh.Trimesh, on_end: bool) -> list[str]:
+    """Return Z and Y in the order to try: a round, long thing that stands on an end has its axis up."""
     x, y, z = solid.extents
     moments = np.diag(np.asarray(solid.convex_hull.moment_inertia))
     round_about_y = abs(moments[0] - moments[2]) < _ROUND * max(moments[0], moments[2])
-    if stands and y > _ELONGATED * max(x, z) and round_about_y:
+    if on_end and y > _ELONGATED * max(x, z) and round_about_y:
         return ["y", "z"]
     return ["z", "y"]
 

@@ -42,7 +42,7 @@ class MeshStage:
     settings: MeshConfig
 
     name: ClassVar[str] = "mesh"
-    version: ClassVar[str] = "6"
+    version: ClassVar[str] = "7"
     reads: ClassVar[tuple[str, ...]] = (f"{_GENERATED}?", "generation?", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry")
     needs: ClassVar[Resource] = "cpu"
@@ -108,6 +108,7 @@ class MeshStage:
             file_up=file.up,
             stands=stands,
             opens_up=opens_up,
+            level=prior is not None and prior.level,
             said_by=said[1],
             by_convention=by_convention,
         )

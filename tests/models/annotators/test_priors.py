@@ -139,6 +139,14 @@ def test_lookup_tells_what_stands_and_what_holds_things() -> None:
     assert not lookup("bottle").container
 
 
+@pytest.mark.parametrize(
+    ("said", "level"), [("toy truck", True), ("shoe", True), ("toy rocket", False), ("can", False)]
+)
+def test_lookup_tells_what_stands_with_its_long_axis_level(said: str, level: bool) -> None:
+    prior = lookup(said)
+    assert prior is not None and prior.stands and prior.level is level
+
+
 def test_an_interval_out_of_order_is_refused() -> None:
     with pytest.raises(ValidationError, match="not in order"):
         Interval(low=2.0, typical=1.0, high=3.0)

@@ -106,11 +106,13 @@ class Material(Record):
 class Form(Record):
     """The shape, rest and parts that a family of categories shares; ``parts`` is the rule that tells them apart on a surface.
 
+    ``level``: what stands has its long axis level, and is put on no end.
     ``vessel``: closed, and weighs what it holds: its bulk densities are from empty to full.
     """
 
     shape: str
     stands: bool | None = None
+    level: bool = False
     container: bool
     mass_distribution: Distribution
     vessel: bool = False
