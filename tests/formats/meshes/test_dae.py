@@ -34,6 +34,7 @@ def test_texture_outside_the_folder_is_not_read(tmp_path: Path) -> None:
     mesh = read_mesh(_write(tmp_path / "inputs", texture="../secret.png"))
     assert mesh.parts[0].visual.material.baseColorTexture is None
     assert "outside" in mesh.findings[0]
+    assert tuple(mesh.parts[0].visual.material.baseColorFactor[:3]) == (204, 204, 204), "nothing says that it is white"
 
 
 def test_document_type_with_entities_is_refused(tmp_path: Path) -> None:

@@ -152,6 +152,19 @@ def test_texture_transform_moves_the_coordinates(tmp_path: Path) -> None:
     assert by_corner[(0, 0)] == (0.25, 0.5) and by_corner[(1, 0)] == (0.75, 0.5)
 
 
+@pytest.mark.parametrize(("factor", "kept"), [([1, 1, 1, 1], (204, 204, 204)), ([1, 0, 0, 1], (255, 0, 0))])
+def test_material_whose_texture_is_lost_is_grey_unless_it_has_a_tint(
+    tmp_path: Path, factor: list[float], kept: tuple[int, ...]
+) -> None:
+    maker = Maker()
+    tree = maker.scene({**_triangle(maker), "material": 0})
+    pbr = {"baseColorTexture": {"index": 0}, "baseColorFactor": factor}
+    tree |= {"materials": [{"name": "paint", "pbrMetallicRoughness": pbr}], "textures": [{"source": 0}]}
+    mesh = read_mesh(_save(tmp_path, tree | {"images": [{"uri": "gone.png"}]}))
+    assert tuple(mesh.parts[0].visual.material.baseColorFactor[:3]) == kept
+    assert mesh.findings == ["texture 'gone.png' is not there; carried on without it"]
+
+
 def test_animation_is_told_and_its_rest_pose_taken(tmp_path: Path) -> None:
     maker = Maker()
     tree = maker.scene(_triangle(maker))

@@ -188,3 +188,15 @@ def test_indices_of_normals_and_texture_coordinates_that_are_nowhere_are_left_ou
     path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//2 3//3\n")  # some: the file was cut
     with pytest.raises(InputError, match="normal 3 of 1"):
         read_mesh(path)
+
+
+@pytest.mark.parametrize(
+    ("kd", "kept"), [("1 1 1", (204, 204, 204)), ("0 0 0", (204, 204, 204)), ("1 0 0", (255, 0, 0))]
+)
+def test_material_whose_map_is_lost_is_grey_unless_it_has_a_tint(
+    tmp_path: Path, kd: str, kept: tuple[int, ...]
+) -> None:
+    (tmp_path / "a.mtl").write_text(f"newmtl paint\nKd {kd}\nmap_Kd gone.png\n")
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl paint\nf 1 2 3\n")
+    (part,) = read_mesh(tmp_path / "a.obj").parts
+    assert tuple(part.visual.material.baseColorFactor[:3]) == kept

@@ -102,6 +102,9 @@ def test_texture_outside_the_package_is_never_read(tmp_path: Path) -> None:
         mesh = read_mesh(_package(tmp_path / f"{number}.usdz", {"a.usdc": layer}))
         assert mesh.parts[0].visual.material.baseColorTexture is None
         assert any("texture" in finding for finding in mesh.findings)
+        assert tuple(mesh.parts[0].visual.material.baseColorFactor[:3]) == (204, 204, 204), (
+            "not USD's own default, dark grey"
+        )
 
 
 def test_layer_outside_the_package_is_refused(tmp_path: Path) -> None:

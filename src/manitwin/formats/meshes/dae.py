@@ -15,7 +15,14 @@ from trimesh.visual.material import PBRMaterial
 
 from manitwin.errors import InputError
 from manitwin.formats.meshes.source import MAX_PARTS, MeshSource
-from manitwin.formats.meshes.textures import bake_transform, color_by_corner, decode_texture, make_part, pbr_material
+from manitwin.formats.meshes.textures import (
+    bake_transform,
+    color_by_corner,
+    color_of_lost_texture,
+    decode_texture,
+    make_part,
+    pbr_material,
+)
 from manitwin.formats.xml_file import parse_xml
 
 _REMEDY = "export it again, or as glTF 2.0"
@@ -184,6 +191,7 @@ def _material(material: Any, textures: dict[str, Image.Image | None], source: Me
             data = source.sibling(path.removeprefix("./"), "texture")
             textures[path] = None if data is None else decode_texture(data, path, source)
         texture = textures[path]
+        color = color_of_lost_texture(color) if texture is None else color
     elif effect.diffuse is not None:
         color = tuple(float(c) for c in effect.diffuse[:3])
     shininess = effect.shininess if isinstance(effect.shininess, int | float) else 0.0

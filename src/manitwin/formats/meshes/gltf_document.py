@@ -12,7 +12,7 @@ from PIL import Image
 from trimesh.visual.material import PBRMaterial
 
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.textures import Buffer, decode_texture, pbr_material
+from manitwin.formats.meshes.textures import Buffer, color_of_lost_texture, decode_texture, pbr_material
 
 # glTF 2.0, section 3.6.2.2
 _DTYPES = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
@@ -187,6 +187,9 @@ class GltfMaterials:
     def _build(self, entry: dict[str, Any]) -> PBRMaterial:
         pbr = entry.get("pbrMetallicRoughness", {})
         factor, base = _base(entry)
+        texture = self._texture(base)
+        if texture is None and base:
+            factor = list(color_of_lost_texture(factor))
         metallic = float(pbr.get("metallicFactor", 1.0))
         if "metallicFactor" not in pbr and "metallicRoughnessTexture" not in pbr and self._forgets_metallic(entry):
             # trimesh writes none for materials that came without one (an OBJ's), which the specification reads as metal
@@ -197,7 +200,7 @@ class GltfMaterials:
             base_color=factor,
             metallic=metallic,
             roughness=float(pbr.get("roughnessFactor", 1.0)),
-            base_color_texture=self._texture(base),
+            base_color_texture=texture,
             metallic_roughness_texture=self._texture(pbr.get("metallicRoughnessTexture", {})),
             normal_texture=self._texture(entry.get("normalTexture", {})),
             alpha_mode=entry.get("alphaMode") if entry.get("alphaMode") in ("MASK", "BLEND") else None,

@@ -15,11 +15,18 @@ from trimesh.visual.material import PBRMaterial
 from manitwin.formats.meshes.obj_faces import Faces
 from manitwin.formats.meshes.point_hull import hull_part
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.textures import color_by_corner, decode_texture, make_part, material_of, pbr_material
+from manitwin.formats.meshes.textures import (
+    DEFAULT_COLOR,
+    color_by_corner,
+    color_of_lost_texture,
+    decode_texture,
+    make_part,
+    material_of,
+    pbr_material,
+)
 from manitwin.formats.meshes.triangles import triangle_fans
 from manitwin.formats.source_files import map_file_name
 
-DEFAULT_COLOR = (0.8, 0.8, 0.8)
 _MAX_PLAIN_BYTES = 64 << 20  # of a text that is held as lines; longer ones are read line by line
 _MAX_LINE = 64 << 20  # a face may have millions of corners
 _MAX_NUMBERS = 4096  # characters of a line of numbers
@@ -250,9 +257,11 @@ def read_mtl(text: str, source: MeshSource) -> dict[str, PBRMaterial]:
 
 def _material(name: str, values: dict[str, str], source: MeshSource) -> PBRMaterial:
     texture = _map(values.get("map_kd"), source)
-    color = _leading_numbers(values.get("kd")) or [0.8, 0.8, 0.8]
+    color = _leading_numbers(values.get("kd")) or DEFAULT_COLOR
     # exporters leave Kd black or grey beside a map and viewers ignore it there
-    base = [1.0, 1.0, 1.0] if texture is not None else (color * 3)[:3]
+    base = (1.0, 1.0, 1.0) if texture is not None else (*color, *color, *color)[:3]
+    if texture is None and "map_kd" in values:
+        base = color_of_lost_texture(base)
     opacity = (_leading_numbers(values.get("d")) or [1.0])[0]
     opacity = opacity if 0 < opacity < 1 else 1.0  # d 0 is an invisible object: a known mix-up with Tr
     shininess = max((_leading_numbers(values.get("ns")) or [0.0])[0], 0.0)

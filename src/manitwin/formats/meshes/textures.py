@@ -20,6 +20,8 @@ Buffer = bytes | memoryview
 
 # what real asset packs use; decoders for other formats of Pillow are not reached from untrusted files
 TEXTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF")
+DEFAULT_COLOR = (0.8, 0.8, 0.8)
+"""The colour of what has none: the default Kd of OBJ material libraries and of Blender."""
 _MAX_UV = 1e6  # textures may repeat, but not so often
 _MAX_NORMAL = 1e6
 _MAX_ATLAS = 4096
@@ -68,6 +70,15 @@ def _decoded(data: Buffer, name: str, source: MeshSource) -> Image.Image | None:
         image = Image.fromarray((np.asarray(image).astype(np.uint32) >> 8).astype(np.uint8))
     has_alpha = image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info
     return image.convert("RGBA" if has_alpha else "RGB")
+
+
+def color_of_lost_texture(color: Sequence[float]) -> tuple[float, ...]:
+    """Return the base colour of a material whose texture could not be read: the default grey, but a tint is kept.
+
+    A factor of white, grey or black beside a texture says nothing of what the texture showed.
+    """
+    red, green, blue = color[:3]
+    return (*DEFAULT_COLOR, *color[3:]) if red == green == blue else tuple(color)
 
 
 def pbr_material(

@@ -17,7 +17,7 @@ from trimesh.visual.material import PBRMaterial
 from manitwin.errors import InputError
 from manitwin.formats.bounded_file import open_regular
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.textures import decode_texture, linear_to_srgb, pbr_material
+from manitwin.formats.meshes.textures import color_of_lost_texture, decode_texture, linear_to_srgb, pbr_material
 
 _LAYERS = (".usd", ".usda", ".usdc")
 _MAX_MEMBERS = 10_000
@@ -199,7 +199,7 @@ class PreviewSurfaces:
                 return default, bands["rgba".index(output)] if output in "rgba" and "rgba".index(output) < len(
                     bands
                 ) else bands[0]
-            return default, None if image is None or channel != "rgb" else image
+            return (color_of_lost_texture(default) if image is None and channel == "rgb" else default), image
         value = attributes[0].Get() if attributes else socket.Get()
         return (default if value is None else value), None
 
