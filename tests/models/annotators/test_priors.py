@@ -11,6 +11,9 @@ from manitwin.models.annotators import priors
 from manitwin.models.annotators.priors import Interval, load_materials, load_priors, lookup, named
 from manitwin.models.generators.lift.hint import hint_from_name
 
+
+from manitwin.models.annotators.priors import Interval, load_materials, load_priors, lookup, named, normalised
+
 # Calli et al. 2015, "The YCB Object and Model Set", and its list of object masses: kg.
 YCB = {
     "chips can": 0.205, "coffee can": 0.414, "cracker box": 0.411, "sugar box": 0.514, "can": 0.349,
@@ -249,3 +252,23 @@ def test_a_pipe_is_a_long_round_thing_with_two_ends() -> None:
     assert [part.label for part in pipe.functional] == ["end", "middle", "other end"]
     hint = hint_from_name("steel pipe")
     assert hint.round and not hint.boxy
+
+
+@pytest.mark.parametrize(
+    ("said", "plain"),
+    [
+        ("Rührbesen", "ruhrbesen"),
+        ("crème brûlée dish", "creme brulee dish"),
+        ("Gießkanne", "giesskanne"),
+        ("smørkniv", "smorkniv"),
+        ("papi\u0101 ma\u0302che\u0301", "papia mache"),
+        ("an étagère's hook", "etagere hook"),
+    ],
+)
+def test_letters_with_marks_are_not_cut_out_of_a_name(said: str, plain: str) -> None:
+    assert normalised(said) == plain
+
+
+def test_lookup_finds_what_is_spelt_with_its_marks() -> None:
+    prior = lookup("Sauté Pân")
+    assert prior is not None and prior == lookup("saute pan")

@@ -22,6 +22,7 @@ from manitwin.formats.toml_file import parse_toml
 from manitwin.geometry.parts.features import Feature
 from manitwin.geometry.parts.membership import PartRole, PartRule
 from manitwin.geometry.parts.shape import HeadEnd, Shape
+from manitwin.models.annotators.diacritics import without_diacritics
 from manitwin.twin.point_records import GraspType
 from manitwin.twin.record_values import Estimate, Finite, Record
 
@@ -263,8 +264,8 @@ def unknown_prior() -> Prior:
 
 
 def normalised(name: str) -> str:
-    """Return a name in lower case without punctuation, articles and what follows a comma or bracket."""
-    head = re.split(r"[,(\[;:]", name.lower(), maxsplit=1)[0]
+    """Return a name in lower-case Latin letters without marks, punctuation, articles and what follows a comma or bracket."""
+    head = re.split(r"[,(\[;:]", without_diacritics(name), maxsplit=1)[0]
     words = re.sub(r"[^a-z0-9&+']+", " ", head.replace("’", "'").replace("'s ", " ").replace("'", "")).split()
     return " ".join(words[1:] if words[:1] in (["a"], ["an"], ["the"]) and len(words) > 1 else words)
 

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from manitwin.errors import UsageError
+from manitwin.models.annotators.diacritics import without_diacritics
 from manitwin.models.annotators.priors import Interval, Prior, found_by, load_materials, singulars
 from manitwin.models.generators.templates.described import materials_said
 from manitwin.models.generators.templates.looks import MATERIALS, SAID_OF, Look
@@ -74,7 +75,9 @@ def look_of_words(material: str | None) -> Look | None:
 
 def _look_in(name: str, called: str, prior: Prior) -> Look | None:
     """Return the material that the words around what a thing is called say, or that its name says among several usual ones."""
-    words = re.sub(r"[^a-z0-9,]+", " ", name.lower().replace("\u2019", "").replace("'", "").replace(",", " , ")).split()
+    words = re.sub(
+        r"[^a-z0-9,]+", " ", without_diacritics(name).replace("\u2019", "").replace("'", "").replace(",", " , ")
+    ).split()
     length = len(called.split())
     begins = [at for at in range(len(words)) if called in singulars(" ".join(words[at : at + length]))]
     if not begins:
