@@ -63,6 +63,14 @@ def test_steel_and_beige_cloth_are_not_pink(rgb: tuple[int, int, int], name: str
     assert color_name(lab_from_srgb(np.array(rgb) / 255)) == name
 
 
+@pytest.mark.parametrize(
+    "rgb",
+    [(217, 144, 88), (250, 181, 127), (217, 137, 86), (238, 170, 98)],  # ISCC-NBS 53 and 52; a bun's crust and crumb
+)
+def test_moderate_and_light_orange_are_orange_and_neither_pink_nor_tan(rgb: tuple[int, int, int]) -> None:
+    assert color_name(lab_from_srgb(np.array(rgb) / 255), metallic=False) == "orange"
+
+
 def test_dark_gold_in_a_photo_of_metal_is_gold_and_paint_keeps_its_name() -> None:
     for seen, name in (((118, 98, 44), "olive"), ((112, 84, 40), "brown"), ((190, 154, 84), "dark yellow")):
         lab = lab_from_srgb(np.array(seen) / 255)

@@ -16,7 +16,8 @@ from manitwin.geometry.sampling import sample_surface
 # 1955, level 2) and the basic colour terms of Berlin and Kay 1969; the shades are chosen by eye within those regions. Black and
 # dark grey are the centroids 267 and 266: between them lies L* 25, the Munsell value 2.5 at which ISCC-NBS parts the two. The
 # last six pinks are the yellowish pinks (25, 26, 28 to 30, 32), which people call pink, salmon, coral or peach; the greyish one
-# (32) has a little more chroma here and brownish pink and yellowish grey (33, 93) are beige, since cloth and stone were pink.
+# (32) has a little more chroma here and brownish pink and yellowish grey (33, 93) are beige, since cloth and stone were pink. The
+# paler oranges are 53 and 52: crusts of bread and buns were pink and tan.
 _SHADES: tuple[tuple[str, str], ...] = (
     ("blue", "0a18f0"), ("blue", "1e3cbe"), ("dark blue", "0a0a8c"), ("dark red", "8c0808"),
     ("black", "0a0a0a"), ("black", "222222"), ("dark grey", "555555"),
@@ -29,7 +30,8 @@ _SHADES: tuple[tuple[str, str], ...] = (
     ("pink", "e87ba0"), ("pink", "f6cfd6"), ("pink", "ffb7a5"), ("pink", "f99379"), ("pink", "f4c2c2"),
     ("pink", "d9a6a9"), ("pink", "c48379"), ("pink", "ccaaa3"), ("beige", "c2ac99"), ("beige", "bfb8a5"),
     ("orange", "f07c1c"), ("orange", "d9661f"),
-    ("orange", "f79b3e"), ("dark orange", "b0521c"), ("gold", "c79a2b"), ("gold", "b58a3c"),
+    ("orange", "f79b3e"), ("orange", "d99058"), ("orange", "fab57f"), ("dark orange", "b0521c"),
+    ("gold", "c79a2b"), ("gold", "b58a3c"),
     ("yellow", "f5d328"), ("yellow", "e3c01c"), ("yellow", "fae36b"), ("light yellow", "fbf0a5"),
     ("olive", "77762c"), ("olive", "5d5c26"), ("yellow-green", "a8c43a"), ("yellow-green", "c9d94f"),
     ("green", "2f9440"), ("green", "4aa84e"), ("green", "5c8a4c"), ("light green", "9bd49a"),
