@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 from manitwin.engine.stage import Draft
+from manitwin.formats.printable import printable_line
 from manitwin.pipeline.grasps import GRASP_POINTS
 from manitwin.pipeline.guesses import OF_NO_NAME, naming_checks, size_checks, template_checks
+from manitwin.twin.import_record import read_import_record
 from manitwin.twin.record_values import Check
 from manitwin.twin.shares import wilson_interval
 
@@ -53,7 +56,7 @@ def quality_checks(draft: Draft) -> list[dict[str, Any]]:
     checks += _unseen(draft)
     checks += template_checks(draft)
     checks += photos_checks(draft)
-    findings = draft.field("geometry")["findings"]
+    findings = [*findings_of_import(draft), *draft.field("geometry")["findings"]]
     checks.append(
         Check(
             name="input_as_declared",
@@ -66,6 +69,17 @@ def quality_checks(draft: Draft) -> list[dict[str, Any]]:
     for checks_of in (_physical_checks, _examined, _frame_checks, _collision_checks, _grasp_checks, _placement_checks):
         checks += checks_of(draft)
     return [check.model_dump() for check in checks]
+
+
+def findings_of_import(draft: Draft) -> list[str]:
+    """Return a finding where files that an imported asset names were not there: what they show is not in the twin."""
+    given = None if draft.payload.given is None else read_import_record(Path(draft.payload.given))
+    names = [] if given is None else given.missing_files
+    if not names:
+        return []
+    more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+    named = printable_line(names[0], max_characters=80)
+    return [f"files that the asset names were not there: {named}{more}; it may lack a part or a colour"]
 
 
 def _unseen(draft: Draft) -> list[Check]:

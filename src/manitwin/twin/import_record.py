@@ -22,6 +22,8 @@ TEMPLATE = "template"
 """The format of what a template knows of the thing that it made."""
 FITTED = "fitted"
 """The format of what a template knows of the thing in a photo that it was fitted to."""
+MISSING_FILE = "file "
+"""How an entry of ``missing`` begins that is a file which the asset names and has not."""
 FILLED = "filled"
 """The format of what a template knows of the thing whose measures somebody gave: ``attribution`` says who."""
 Positive = Annotated[Finite, Field(gt=0)]
@@ -111,6 +113,11 @@ class ImportRecord(Record):
     def has_places(self) -> bool:
         """Whether somebody put points, grasps or resting poses on the object: how it stands is then meant."""
         return bool(self.functional_points or self.grasp_points or self.grasps or self.rests) or self.format == "twin"
+
+    @property
+    def missing_files(self) -> list[str]:
+        """The files that the asset names and that were not there, as it names them."""
+        return [what.removeprefix(MISSING_FILE) for what in self.missing if what.startswith(MISSING_FILE)]
 
     @property
     def called(self) -> str:

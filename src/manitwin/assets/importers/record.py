@@ -22,7 +22,7 @@ from manitwin.assets.importers.telling_name import telling_name
 from manitwin.errors import AssetError
 from manitwin.geometry.canonical_frame import object_frame
 from manitwin.geometry.poses import GLTF_TO_OBJECT, inverse, transform_points
-from manitwin.twin.import_record import GivenGrasps, GivenPoint, ImportRecord
+from manitwin.twin.import_record import MISSING_FILE, GivenGrasps, GivenPoint, ImportRecord
 
 MAX_FRICTION = 10.0
 """Above any coefficient of dry friction: clean metals that seize have about 5."""
@@ -87,7 +87,7 @@ def import_record(asset: Asset, to_object: np.ndarray) -> ImportRecord:
         "licence": not asset.license,
     }
     missing += [what for what, is_absent in absent.items() if is_absent]
-    missing += [f"file {name}" for name in asset.missing_files]
+    missing += [f"{MISSING_FILE}{name}" for name in asset.missing_files]
     return _validated(
         asset,
         {
