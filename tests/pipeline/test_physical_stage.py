@@ -48,14 +48,21 @@ def said(value: float, source: str = "vlm:test") -> Estimate:
 
 
 def run(
-    mesh: trimesh.Trimesh, folder: Path, name: str | None, metric: bool = True, annotator: RulesAnnotator | None = None
+    mesh: trimesh.Trimesh,
+    folder: Path,
+    name: str | None,
+    metric: bool = True,
+    annotator: RulesAnnotator | None = None,
+    **geometry: str,
 ) -> Physical:
     (folder / "views").mkdir(exist_ok=True)
     part = visual(mesh, baseColorFactor=[200, 10, 10, 255])
     (folder / "canonical.glb").write_bytes(write_glb([part]))
     np.savez(folder / "canonical.npz", vertices=mesh.vertices, faces=mesh.faces)
     paths = {key: folder / key for key in ("canonical.glb", "canonical.npz", "views/")}
-    draft = Draft("id", Item(file=None, name=name), 0, {"geometry": {"metric": metric}, "cameras": []}, paths)
+    draft = Draft(
+        "id", Item(file=None, name=name), 0, {"geometry": {"metric": metric, **geometry}, "cameras": []}, paths
+    )
     fields = PhysicalStage(PhysicalConfig(), annotator or RulesAnnotator()).run(draft, folder)
     json.dumps(fields, allow_nan=False)
     return Physical(**fields["physical"])
@@ -125,6 +132,13 @@ def test_a_density_that_no_matter_has_is_rejected_without_a_name_too(tmp_path: P
     with pytest.raises(Rejected, match="kg/m3") as raised:
         run(cylinder(0.01, 0.02), tmp_path, None, annotator=Says(mass_kg=said(5.0)))
     assert raised.value.reason == "implausible_mass"
+
+
+def test_a_rejection_of_a_mesh_whose_unit_was_guessed_says_how_it_was_read(tmp_path: Path) -> None:
+    read_as = "1380 units are 13.8 m as declared, which is implausible; read as millimetres: 1.38 m"
+    with pytest.raises(Rejected) as raised:
+        run(cylinder(0.1, 1.38), tmp_path, "dumbbell", units="guessed", unit_finding=read_as)
+    assert raised.value.reason == "implausible_size" and str(raised.value).endswith(read_as)
 
 
 def test_mass_from_density_alone_is_density_times_volume(tmp_path: Path) -> None:

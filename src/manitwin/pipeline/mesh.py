@@ -194,6 +194,7 @@ def _geometry(
         "format": file.format,
         "units": unit.source,
         "unit_factor": unit.factor,
+        "unit_finding": unit.finding,
         "metric": unit.metric,
         "up": chosen.up,
         "up_reason": chosen.reason,

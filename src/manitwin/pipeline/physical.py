@@ -75,8 +75,9 @@ class PhysicalStage:
         obb_extents, obb_to_object[:3, 3] = obb_extents * scale, obb_to_object[:3, 3] * scale
         solid = trimesh.Trimesh(subject.solid.vertices * scale, subject.solid.faces, process=False)
         mass = mass_estimate(estimates, float(solid.volume))
-        self._check_size(object_name(draft), scale * longest, estimates.longest_axis_m)
-        self._check_mass(None if _known_mass(subject) else object_name(draft), mass, float(solid.volume))
+        unit = _guessed_unit(draft) if scale == 1.0 else ""
+        self._check_size(object_name(draft), scale * longest, estimates.longest_axis_m, unit)
+        self._check_mass(None if _known_mass(subject) else object_name(draft), mass, float(solid.volume), unit)
         parts = [bake_transform(part, np.diag([scale, scale, scale, 1.0])) for part in subject.parts]
         _write_meshes(draft, folder, solid, parts, scale, self.settings.max_texture_size)
         properties, uncertainty = spread_mass(solid, mass.value, estimates.wall_thickness_m)
@@ -137,7 +138,7 @@ class PhysicalStage:
             return None
         return mass_by_parts(solid, mass_kg, estimates.part_materials, prior, draft.seed)
 
-    def _check_size(self, name: str | None, longest_m: float, said: Estimate | None) -> None:
+    def _check_size(self, name: str | None, longest_m: float, said: Estimate | None, unit: str) -> None:
         prior = lookup(name)
         if prior is None or (said is not None and _is_confirmed(said)):
             return
@@ -145,10 +146,10 @@ class PhysicalStage:
             raise Rejected(
                 "implausible_size",
                 f"{longest_m:.4g} m long, but a {prior.category} has {_span(prior.longest_axis_m)} m; "
-                "check units and name",
+                f"check units and name{unit}",
             )
 
-    def _check_mass(self, name: str | None, mass: Estimate, volume_m3: float) -> None:
+    def _check_mass(self, name: str | None, mass: Estimate, volume_m3: float, unit: str) -> None:
         """Raise Rejected for the mass of no such thing; ``name`` is None of a template, whose mass is that of its parts."""
         if _is_confirmed(mass):
             return
@@ -165,8 +166,14 @@ class PhysicalStage:
             raise Rejected(
                 "implausible_mass",
                 f"{mass.value:.4g} kg in {volume_m3 * 1e6:.4g} ml is {density:.4g} kg/m3, as no object has; "
-                "check units and name",
+                f"check units and name{unit}",
             )
+
+
+def _guessed_unit(draft: Draft[Item]) -> str:
+    """Say how a mesh's numbers were read where that was a guess: a rejection for size or mass is then likely its fault."""
+    geometry = draft.field("geometry")
+    return f": {geometry['unit_finding']}" if geometry.get("units") == "guessed" else ""
 
 
 def _declared(mass: Estimate) -> str:
