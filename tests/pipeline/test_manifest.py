@@ -119,3 +119,14 @@ def test_folder_without_inputs_is_told_with_what_it_has(tmp_path: Path) -> None:
     (tmp_path / "photo.heic").unlink()
     with pytest.raises(UsageError, match="no image or mesh"):
         collect_items([tmp_path])
+
+
+def test_a_link_keeps_its_name_where_its_target_is_named_by_a_digest(tmp_path: Path) -> None:
+    (tmp_path / "blobs").mkdir()
+    (tmp_path / "blobs/3f2a90c1").write_text("v 0 0 0")
+    (tmp_path / "blobs/other.obj").write_text("v 0 0 1")
+    (tmp_path / "snapshot").mkdir()
+    (tmp_path / "snapshot/mug.obj").symlink_to("../blobs/3f2a90c1")
+    (tmp_path / "snapshot/cup.obj").symlink_to("../blobs/other.obj")
+    items, _ = collect_items([tmp_path / "snapshot"])
+    assert {Path(item.file or "").name for item in items} == {"mug.obj", "other.obj"}

@@ -250,9 +250,16 @@ def _item(
 
 
 def _resolved(path: str) -> str:
-    """Return the real path of a file: that of its folder is asked for once, since a manifest names many in few folders."""
+    """Return the real path of a file: that of its folder is asked for once, since a manifest names many in few folders.
+
+    A link to a file of another ending stays: stores of content, such as the cache of Hugging Face, keep ``mug.obj`` as a link to
+    a file that is named by its digest, beside which nothing lies that the mesh names.
+    """
     place = os.path.join(_real_folder(os.path.dirname(path)), os.path.basename(path))
-    return os.path.realpath(place) if os.path.islink(place) else place
+    if not os.path.islink(place):
+        return place
+    real = os.path.realpath(place)
+    return real if os.path.splitext(real)[1].lower() == os.path.splitext(place)[1].lower() else place
 
 
 @lru_cache(maxsize=4096)
