@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -272,3 +274,9 @@ def test_letters_with_marks_are_not_cut_out_of_a_name(said: str, plain: str) -> 
 def test_lookup_finds_what_is_spelt_with_its_marks() -> None:
     prior = lookup("Sauté Pân")
     assert prior is not None and prior == lookup("saute pan")
+
+
+def test_what_is_named_in_the_plural_says_what_it_is_counted_by() -> None:
+    plural = [prior for prior in load_priors().values() if re.search(r"[^su]s$", prior.category)]
+    uncounted = {prior.category for prior in plural if prior.counter is None}
+    assert uncounted == {"thermos", "camera lens", "bag of chips"}, "'a binoculars' is no English"
