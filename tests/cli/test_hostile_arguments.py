@@ -11,12 +11,14 @@ from typing import Any
 
 import pytest
 import typer
+from typer.testing import CliRunner
 
 import manitwin.cli.main as main_module
 from manitwin.cli import options
 from manitwin.cli.arguments import LONGEST_PLACE, PLACES, CheckedCommand
 from manitwin.cli.main import app
 from manitwin.config import LARGEST_SEED, MOST_SLOTS
+from manitwin.errors import UsageError
 from manitwin.scenes.settings import MOST_OBJECTS
 
 COMMANDS: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]
@@ -203,3 +205,27 @@ def test_ranges_of_objects_say_what_is_valid(
     status, said = run(monkeypatch, capsys, *arguments)
     assert status == 2 and "LOW..HIGH" in said
     check_one_line(said, "layout")
+
+
+def test_an_option_of_one_value_is_given_once(tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["export", "TWIN", "--to", "mjcf", "--to", "urdf", "--out", str(tmp_path / "out")])
+    assert isinstance(result.exception, UsageError)
+    assert str(result.exception) == "--to: given 2 times, and it takes one value; give it once"
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_option_of_several_values_and_a_flag_may_be_given_again(tmp_path: Path) -> None:
+    words = [
+        "build",
+        str(tmp_path / "no.glb"),
+        "--out",
+        "x",
+        "-q",
+        "-q",
+        "--gripper",
+        "panda",
+        "--gripper",
+        "wsg50_110",
+    ]
+    result = CliRunner().invoke(app, words)
+    assert "times" not in str(result.exception) and "not there" in str(result.exception)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
+from collections.abc import Iterable
 from typing import Any
 
 import typer
@@ -59,12 +61,24 @@ LONGEST_TEXT = 100_000
 """Characters: less than what Linux takes for one argument (``MAX_ARG_STRLEN``)."""
 
 
+def check_given_once(order: Iterable[Any]) -> None:
+    """Raise UsageError for an option of one value that is given again; ``order`` has the parameters as they were given."""
+    times = Counter(each for each in order if each.param_type_name == "option" and not (each.multiple or each.is_flag))
+    for option, count in times.items():
+        if count > 1:
+            raise UsageError(f"{_called(option)}: given {count} times, and it takes one value; give it once")
+
+
 class CheckedCommand(TyperCommand):
     """A command whose texts and places are looked at before they are converted; of numbers their own types say the range."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the command line; raises UsageError for an argument that is empty, too long, or no text."""
-        given, _, _ = self.make_parser(ctx).parse_args(args=list(args))
+        """Parse the command line; raises UsageError for an argument that is empty, too long, or no text, and for a second value.
+
+        Of two values of an option that takes one the parser would keep the last: half of what was asked for would be done.
+        """
+        given, _, order = self.make_parser(ctx).parse_args(args=list(args))
+        check_given_once(order)
         for parameter in self.params:
             values = given.get(parameter.name or "")
             for value in values if isinstance(values, list | tuple) else [values]:
