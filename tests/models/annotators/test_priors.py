@@ -126,6 +126,7 @@ def test_standard_sizes_are_in_the_intervals(name: str) -> None:
         ("scissors", "scissors"), ("eye glasses", "glasses"), ("can opener", "can opener"), ("headset", "headphones"),
         ("lego duplo brick", "building block"), ("concrete hollow block", "brick"), ("bread knife on a rack", "chef's knife"),
         ("trash bin", "trash can"), ("blue recycling bins", "trash can"), ("dish on a rack", "plate"),
+        ("bottle no cap", "bottle"), ("yellow bell pepper no stem", "bell pepper"), ("mug no 2", "mug"),
     ],
 )  # fmt: skip
 def test_lookup_understands_what_people_say(said: str, category: str) -> None:

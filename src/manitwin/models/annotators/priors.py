@@ -311,8 +311,8 @@ _NO_THING = re.compile(
 def found_by(name: str | None) -> tuple[Prior, str] | None:
     """Find the prior of what a person calls a thing, and the words, in the singular, by which it is found.
 
-    Tried in order: the whole name, or an alias of it; the part before 'of', 'with', 'for', 'in', 'on' or 'from'; the whole
-    again: each as it is, in the singular, and with words dropped from the front ('red coffee mugs' are coffee mugs,
+    Tried in order: the whole name, or an alias of it; the part before 'of', 'with', 'without', 'no', 'for', 'in', 'on' or 'from';
+    the whole again: each as it is, in the singular, and with words dropped from the front ('red coffee mugs' are coffee mugs,
     which are mugs), and before its last word stands alone with words dropped between ('lego duplo brick' is a lego brick). The
     last word decides what a thing is: a mug rack is no mug. Where none is found, numbers and colours at
     the end say nothing: 'mug_1' and 'pitcher blue' are a mug and a pitcher. File names are never looked up: they are not
@@ -320,7 +320,7 @@ def found_by(name: str | None) -> tuple[Prior, str] | None:
     """
     if not name or not (phrase := normalised(name)):
         return None
-    head = re.split(r" (?:made |full )?(?:of|with|for|in|on|without|from) ", phrase, maxsplit=1)[0].split()
+    head = re.split(r" (?:made |full )?(?:of|with|for|in|on|without|no|from) ", phrase, maxsplit=1)[0].split()
     words = phrase.split()
     tries = [words, *(head[i:] for i in range(len(head) - 1)), *_words_dropped(head), head[-1:]]
     tries += [words[i:] for i in range(1, len(words))]
