@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from manitwin.dataset.index.tables import SCHEMA_ID, TABLES
+from manitwin.engine.ledger.ledger import LEDGER
 from manitwin.errors import UsageError
 from manitwin.formats.bounded_file import Refusal, open_regular, with_remedy
 from manitwin.formats.parquet_file import check_parquet
@@ -93,7 +94,9 @@ def no_index(root: DatasetRoot) -> UsageError:
 
 
 def no_dataset(root: DatasetRoot) -> UsageError:
-    """Return the error of a place without twins."""
+    """Return the error of a place without twins: of a build that has not ended one yet, or of no build."""
+    if root.exists(LEDGER):
+        return UsageError(f"{root.url}: none of its twins is finished; manitwin status {root.url} says how far it is")
     return UsageError(
         f"{root.url}: no data set ({TWINS}/ is missing); give the folder or URL that manitwin build wrote"
     )
