@@ -10,11 +10,8 @@ from pydantic import ValidationError
 
 from manitwin.errors import ManiTwinError
 from manitwin.models.annotators import priors
-from manitwin.models.annotators.priors import Interval, load_materials, load_priors, lookup, named
-from manitwin.models.generators.lift.hint import hint_from_name
-
-
 from manitwin.models.annotators.priors import Interval, load_materials, load_priors, lookup, named, normalised
+from manitwin.models.generators.lift.hint import hint_from_name
 
 # Calli et al. 2015, "The YCB Object and Model Set", and its list of object masses: kg.
 YCB = {
