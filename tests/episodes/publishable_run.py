@@ -85,6 +85,9 @@ def write_record(folder: Path, source: TwinSource, twin_ids: set[str]) -> None:
     (folder / BATCH_RECORD).write_text(record.model_dump_json())
 
 
+PINHOLE = {"camera.intrinsics_px": [[80.0, 0.0, 32.0], [0.0, 80.0, 24.0], [0.0, 0.0, 1.0]], "camera.frame": "world"}
+
+
 def draw(folder: Path, both: list[StoredEpisode]) -> None:
     first_frames = {}
     with EpisodesVideo(folder / "front.mp4", width_px=WIDTH_PX, height_px=HEIGHT_PX) as film:
@@ -92,5 +95,12 @@ def draw(folder: Path, both: list[StoredEpisode]) -> None:
             number, steps = each.facts["number"], each.recording.steps
             span = film.add(picture(number, t, steps) for t in range(steps))
             first_frames[each.attempt.episode_id] = span.first_frame
-    record = PicturesRecord(batch_id=folder.name, config_sha256="", revision="", first_frames=first_frames, files={})
+    record = PicturesRecord(
+        batch_id=folder.name,
+        config_sha256="",
+        revision="",
+        first_frames=first_frames,
+        files={},
+        cameras={"front": PINHOLE},
+    )
     (folder / PICTURES_RECORD).write_text(record.model_dump_json())

@@ -15,6 +15,7 @@ from publishable_run import (
     BOWL,
     LICENCES,
     MUG,
+    PINHOLE,
     PLAIN,
     TOY,
     stored,
@@ -77,6 +78,7 @@ def test_films_are_cut_to_what_goes_out_and_show_every_picture_of_it(published: 
     wanted = [n for n in ALLOWED for _ in range(stored(n).recording.steps)]
     assert shown == wanted
     found = read_lerobot(out)
+    assert found.info["features"]["observation.images.front"]["info"].items() >= PINHOLE.items()
     for row, number in zip(found.episodes, ALLOWED, strict=True):
         mean = row_statistics(out, row["episode_index"])
         steps = stored(number).recording.steps
