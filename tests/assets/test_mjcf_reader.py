@@ -416,6 +416,12 @@ def test_a_height_field_alone_is_its_surface(tmp_path: Path) -> None:
     assert np.allclose(top, [2, 1, 0.5])
 
 
+def test_a_height_field_of_billions_of_points_is_refused_before_any_is_made(tmp_path: Path) -> None:
+    before = '<asset><hfield name="hill" nrow="100000" ncol="100000" size="1 1 1 1"/></asset>'
+    with pytest.raises(AssetError, match=r"a height field of 1e\+10 points, more than 1000000"):
+        read_asset(mjcf(tmp_path, '<geom type="hfield" hfield="hill"/>', before))
+
+
 def test_lights_with_pictures_do_not_matter(tmp_path: Path) -> None:
     light = '<light type="image" texture="sky"/>'
     assert read_asset(mjcf(tmp_path, f'{light}<body><geom size=".1"/></body>')).collision

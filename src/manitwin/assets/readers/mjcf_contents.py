@@ -58,6 +58,8 @@ def keep_rigid_objects(
             entry.getparent().remove(entry)
     for element in root.iter(etree.Element):
         _check_numbers(file, element)
+    for field in root.iter("hfield"):
+        _check_height_field(file, field, files)
     rewrite_dialects(root, files)
     return soft
 
@@ -118,3 +120,16 @@ def _check_numbers(file: Path, element: etree._Element) -> None:
             bounded = name in _OF_SHAPE_AND_MASS
             if math.isnan(value) or (bounded and abs(value) > MAX_NUMBER):
                 raise AssetError(f"{file.name}: <{element.tag} {name}> is {value}, no number that an object can have")
+
+
+def _check_height_field(file: Path, field: etree._Element, files: AssetFiles) -> None:
+    """Raise AssetError for a height field of more points than limits allow: MuJoCo makes room for all as it parses the file."""
+    points = 1.0
+    for key in ("nrow", "ncol"):
+        with suppress(ValueError):
+            points *= max(float(field.get(key, "1")), 1.0)
+    most = files.limits.max_faces // 2  # two triangles a point
+    if points > most:
+        raise AssetError(
+            f"{file.name}: a height field of {points:.4g} points, more than {most}; it is no single object"
+        )
