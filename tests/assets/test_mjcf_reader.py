@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import mujoco
@@ -416,10 +417,24 @@ def test_a_height_field_alone_is_its_surface(tmp_path: Path) -> None:
     assert np.allclose(top, [2, 1, 0.5])
 
 
-def test_a_height_field_of_billions_of_points_is_refused_before_any_is_made(tmp_path: Path) -> None:
-    before = '<asset><hfield name="hill" nrow="100000" ncol="100000" size="1 1 1 1"/></asset>'
-    with pytest.raises(AssetError, match=r"a height field of 1e\+10 points, more than 1000000"):
-        read_asset(mjcf(tmp_path, '<geom type="hfield" hfield="hill"/>', before))
+@pytest.mark.parametrize(
+    ("made", "geom", "what"),
+    [
+        (
+            'hfield name="a" nrow="100000" ncol="100000" size="1 1 1 1"',
+            'type="hfield" hfield="a"',
+            "height field of 1e+10",
+        ),
+        ('mesh name="a" builtin="cone" params="100000000 1"', 'type="mesh" mesh="a"', "built-in mesh of 1e+08"),
+        ('mesh name="a" builtin="plate" params="50000 50000"', 'type="mesh" mesh="a"', "built-in mesh of 2.5e+09"),
+        ('mesh name="a" builtin="supersphere" params="60000 1 1"', 'type="mesh" mesh="a"', "built-in mesh of 3.6e+09"),
+    ],
+)
+def test_surfaces_of_too_many_points_are_refused_before_any_is_made(
+    tmp_path: Path, made: str, geom: str, what: str
+) -> None:
+    with pytest.raises(AssetError, match=re.escape(f"a {what} points, more than 1000000")):
+        read_asset(mjcf(tmp_path, f"<geom {geom}/>", f"<asset><{made}/></asset>"))
 
 
 def test_lights_with_pictures_do_not_matter(tmp_path: Path) -> None:

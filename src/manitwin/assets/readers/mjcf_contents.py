@@ -58,8 +58,7 @@ def keep_rigid_objects(
             entry.getparent().remove(entry)
     for element in root.iter(etree.Element):
         _check_numbers(file, element)
-    for field in root.iter("hfield"):
-        _check_height_field(file, field, files)
+    _check_made_surfaces(file, root, files)
     rewrite_dialects(root, files)
     return soft
 
@@ -122,14 +121,20 @@ def _check_numbers(file: Path, element: etree._Element) -> None:
                 raise AssetError(f"{file.name}: <{element.tag} {name}> is {value}, no number that an object can have")
 
 
-def _check_height_field(file: Path, field: etree._Element, files: AssetFiles) -> None:
-    """Raise AssetError for a height field of more points than limits allow: MuJoCo makes room for all as it parses the file."""
-    points = 1.0
-    for key in ("nrow", "ncol"):
-        with suppress(ValueError):
-            points *= max(float(field.get(key, "1")), 1.0)
+def _check_made_surfaces(file: Path, root: etree._Element, files: AssetFiles) -> None:
+    """Raise AssetError for a height field or a built-in mesh of more points than limits allow: MuJoCo makes room for all.
+
+    The first number of a supersphere and a supertorus is a resolution both ways (MJCF, mesh/params).
+    """
+    sizes = [("height field", f"{field.get('nrow', '')} {field.get('ncol', '')}") for field in root.iter("hfield")]
+    for mesh in root.iter("mesh"):
+        params, squared = mesh.get("params", ""), mesh.get("builtin", "").startswith("super")
+        sizes.append(("built-in mesh", f"{params} {params.partition(' ')[0]}" if squared else params))
     most = files.limits.max_faces // 2  # two triangles a point
-    if points > most:
-        raise AssetError(
-            f"{file.name}: a height field of {points:.4g} points, more than {most}; it is no single object"
-        )
+    for what, counts in sizes:
+        points = 1.0
+        for word in counts.split():
+            with suppress(ValueError):
+                points *= max(float(word), 1.0)
+        if points > most:
+            raise AssetError(f"{file.name}: a {what} of {points:.4g} points, more than {most}; it is no single object")
