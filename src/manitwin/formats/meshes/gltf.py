@@ -14,6 +14,7 @@ from manitwin.errors import InputError
 from manitwin.formats.bounded_file import decode_text
 from manitwin.formats.json_file import parse_json
 from manitwin.formats.meshes.gltf_document import Accessors, GltfMaterials, split_glb, transformed_uv
+from manitwin.formats.meshes.gltf_draco import DRACO, decompress
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import (
     bake_transform,
@@ -28,6 +29,7 @@ _KNOWN_REQUIRED = (
     "KHR_texture_",
     "KHR_materials_",
     "KHR_mesh_quantization",
+    DRACO,
     "KHR_lights_punctual",
     "EXT_texture_webp",
     "KHR_xmp",
@@ -169,6 +171,8 @@ class _Primitives:
         if primitive.get("targets"):
             self._source.find("it has morph targets; its base shape was taken")
         attributes = primitive.get("attributes", {})
+        if decompress(primitive, self._accessors, self._source):
+            mode = 4
         vertices = self._rows(attributes, "POSITION", 3)
         if vertices is None:
             raise self._source.unreadable("a mesh has no positions", "export it again")

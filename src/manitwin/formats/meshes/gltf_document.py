@@ -61,6 +61,24 @@ class Accessors:
             self._arrays[position] = self._read(self._tree["accessors"][position])
         return self._arrays[position]
 
+    def has_data(self, index: Any) -> bool:
+        """Tell whether accessor ``index`` has data in a buffer."""
+        accessor = self._tree["accessors"][self._checked(index, "accessors")]
+        return "bufferView" in accessor or "sparse" in accessor
+
+    def is_filled(self, index: Any) -> bool:
+        """Tell whether accessor ``index`` has its array already."""
+        return self._checked(index, "accessors") in self._arrays
+
+    def count(self, index: Any) -> int:
+        """Return how many elements accessor ``index`` says that it has."""
+        return self._count(self._tree["accessors"][self._checked(index, "accessors")].get("count"))
+
+    def fill(self, index: Any, values: np.ndarray) -> None:
+        """Give accessor ``index`` the values ``(count, columns)`` that were compressed; see ``array``."""
+        position = self._checked(index, "accessors")
+        self._arrays[position] = _normalized(values, self._tree["accessors"][position])
+
     def view(self, index: Any) -> memoryview:
         """Return the bytes of buffer view ``index``."""
         view = self._tree["bufferViews"][self._checked(index, "bufferViews")]
@@ -122,10 +140,7 @@ class Accessors:
             values = np.zeros((count, columns), dtype=dtype)
         if "sparse" in accessor:
             values = self._patched(values, accessor["sparse"], columns, dtype)
-        if accessor.get("normalized") and dtype.kind in "iu":
-            # section 3.6.2.2: signed values map to max(c / limit, -1)
-            return np.maximum(values.astype(np.float32) / np.iinfo(dtype.str).max, -1.0)
-        return values
+        return _normalized(values, accessor)
 
     def _strided(self, view_index: Any, offset: Any, count: int, columns: int, dtype: np.dtype) -> np.ndarray:
         data = self.view(view_index)
@@ -162,6 +177,13 @@ class Accessors:
         if isinstance(value, bool) or not isinstance(value, int) or value < 0:
             raise self._source.unreadable(f"a size in it is {str(value)[:40]}, not a count", _REMEDY)
         return value
+
+
+def _normalized(values: np.ndarray, accessor: dict[str, Any]) -> np.ndarray:
+    if accessor.get("normalized") and values.dtype.kind in "iu":
+        # section 3.6.2.2: signed values map to max(c / limit, -1)
+        return np.maximum(values.astype(np.float32) / np.iinfo(values.dtype.str).max, -1.0)
+    return values
 
 
 class GltfMaterials:

@@ -20,7 +20,7 @@ FAULTS = {
     "truncated_mesh": "half of a mesh file",
     "empty_mesh": "a mesh file of no bytes",
     "expired_link": "the link of a finished file is no longer valid",
-    "draco_mesh": "a GLB compressed with Draco",
+    "draco_mesh": "a GLB compressed with Draco, whose data is broken",
     "webp_texture": "a GLB with a WebP texture",
     "two_meshes": "a USDZ with two meshes",
     "z_up_mesh": "a GLB that stands along Z",

@@ -137,13 +137,13 @@ def truncated(data: bytes) -> bytes:
 
 
 def draco_glb(seed: int = 0) -> bytes:
-    """Return a GLB whose geometry is only there compressed, as KHR_draco_mesh_compression says it."""
+    """Return a GLB whose geometry is only there compressed, as KHR_draco_mesh_compression says it, and cut off."""
 
     def compress(tree: dict[str, Any], binary: bytes) -> tuple[dict[str, Any], bytes]:
         for accessor in tree["accessors"]:
             accessor.pop("bufferView", None)
             accessor.pop("byteOffset", None)
-        data = b"DRACO\x02\x02\x01\x01\x00\x00" + bytes(53)  # a Draco 2.2 header: no decoder is here to go further
+        data = b"DRACO\x02\x02\x01\x01\x00\x00" + bytes(53)  # a header of Draco 2.2, and nothing that it promises
         tree["bufferViews"] = [{"buffer": 0, "byteOffset": 0, "byteLength": len(data)}]
         tree["buffers"] = [{"byteLength": len(data)}]
         for name in ("images", "textures", "materials", "samplers"):
