@@ -68,7 +68,9 @@ def replayed(env: gymnasium.Env, episode: StoredEpisode, hand: float | None = No
     return info
 
 
-@pytest.mark.parametrize(("robot", "open_hand"), [("ur5_suction", 0.0), ("xarm7_allegro", None)])
+@pytest.mark.parametrize(
+    ("robot", "open_hand"), [("ur5_suction", 0.0), pytest.param("xarm7_allegro", None, marks=pytest.mark.slow)]
+)
 @pytest.mark.filterwarnings("ignore:.*symmetric and normalized")
 def test_a_robot_with_another_hand_gets_tasks_and_repeats_them_in_their_environment(
     tmp_path: Path, robot: str, open_hand: float | None

@@ -56,6 +56,7 @@ def test_a_picture_is_looked_at_in_each_way_and_a_mirrored_look_is_turned_back(m
     assert np.allclose(object_share(photo), sum(one_way.values()) / len(WAYS), atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", WEIGHTS_FILES)
 def test_the_layers_are_those_of_a_feature_pyramid(file: str) -> None:
     """Encoder values as OpenCV has them; the decoder after them in SciPy, layer by layer."""
