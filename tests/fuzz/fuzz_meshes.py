@@ -1,4 +1,4 @@
-"""Mesh files of seven formats: the reader of meshes, and what a build does with a file before it."""
+"""Mesh files of every format: the reader of meshes, and what a build does with a file before it."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from PIL import Image
 from trimesh.visual import TextureVisuals
 
 from collada_document import DOCUMENT
+from draco_document import compressed_ball, document_of_ball, write_glb_of
 from handmade import visual
 from manitwin.errors import InputError
 from manitwin.formats.glb import write_glb
@@ -225,7 +226,21 @@ def msh(folder: Path) -> None:
     (folder / "ball.msh").write_bytes(header + vertices + normals + np.asarray(ball.faces, "<i4").tobytes())
 
 
+def off(folder: Path) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=1, radius=0.05)
+    lines = [f"OFF {len(ball.vertices)} {len(ball.faces)} 0", *(f"{x} {y} {z}" for x, y, z in ball.vertices)]
+    lines += [f"3 {a} {b} {c} 200 30 30" for a, b, c in ball.faces]
+    (folder / "ball.off").write_text("\n".join(lines) + "\n")
+
+
+def draco(folder: Path) -> None:
+    data = compressed_ball()
+    write_glb_of(folder / "ball.glb", document_of_ball(data), data)
+
+
 target("msh", msh, read)
+target("off", off, read)
+target("draco", draco, read, weight=0.1)
 target("dae", dae, read, files=("*.dae",), weight=0.5)
 target("usdz", usdz, read, weight=0.3)
 target("survey", meshes, survey, named=True, files=("*.gltf", "*.glb", "*.obj", "*.mtl", "*.ply", "*.dae"))

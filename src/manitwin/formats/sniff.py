@@ -16,7 +16,7 @@ from manitwin.formats.json_file import MAX_JSON_BYTES, parse_json
 from manitwin.formats.printable import printable_line
 
 IMAGE_FORMATS = ("png", "jpeg", "gif", "webp", "tiff", "bmp", "avif")
-MESH_FORMATS = ("glb", "gltf", "obj", "ply", "stl", "dae", "usdz", "msh")
+MESH_FORMATS = ("glb", "gltf", "obj", "ply", "stl", "dae", "usdz", "msh", "off")
 
 _HEAD_BYTES = 65536
 MSH_HEADER_BYTES = 16
@@ -37,7 +37,7 @@ NOT_READ = {
     **dict.fromkeys((".heic", ".heif"), HEIC_NOT_READ),
     **dict.fromkeys((".urdf", ".sdf", ".xacro", ".usd", ".usda", ".usdc"), _IMPORT),
     **dict.fromkeys((".dng", ".nef", ".cr2", ".cr3", ".arw", ".orf", ".rw2", ".raf", ".pef"), _CAMERA_RAW),
-    **dict.fromkeys((".fbx", ".blend", ".3ds", ".max", ".step", ".stp", ".iges", ".igs", ".3mf", ".off", ".x3d"), _EXPORT),
+    **dict.fromkeys((".fbx", ".blend", ".3ds", ".max", ".step", ".stp", ".iges", ".igs", ".3mf", ".x3d"), _EXPORT),
     **dict.fromkeys((".abc", ".wrl", ".ma", ".mb", ".c4d", ".skp", ".drc", ".vrm", ".fcstd", ".sldprt"), _EXPORT),
     **dict.fromkeys((".mp4", ".mov", ".avi", ".mkv", ".webm", ".m4v"), _VIDEO),
     **dict.fromkeys((".tga", ".dds", ".exr", ".hdr", ".psd", ".svg", ".jxl", ".jp2", ".ktx", ".ktx2", ".ico"), _IMAGE),
@@ -127,6 +127,8 @@ def _mesh_format(head: bytes, size: int, suffix: str, stream: BinaryIO) -> str |
         return "stl"
     if start.startswith("<") and re.search(r"<(\w+:)?COLLADA[\s>]", start):
         return "dae"
+    if re.match(r"(ST)?C?N?4?n?OFF(\d|\s)", start):
+        return "off"
     if start.startswith("{") and _is_gltf(start, size, stream):
         return "gltf"
     return "obj" if _is_obj(start, complete=size <= _HEAD_BYTES) else None

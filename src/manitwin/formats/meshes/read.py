@@ -13,6 +13,7 @@ from manitwin.formats.meshes.dae import read_dae
 from manitwin.formats.meshes.gltf import read_gltf
 from manitwin.formats.meshes.msh import read_msh
 from manitwin.formats.meshes.obj import read_obj
+from manitwin.formats.meshes.off import read_off
 from manitwin.formats.meshes.ply import read_ply
 from manitwin.formats.meshes.source import MeshLimits, MeshSource
 from manitwin.formats.meshes.stl import read_stl
@@ -28,6 +29,7 @@ _SUFFIXES = {
     "dae": (".dae",),
     "usdz": (".usdz",),
     "msh": (".msh",),
+    "off": (".off",),
 }
 _MAX_COORDINATE = 1e12
 """In the file's unit: a survey's millimetres stay below, and areas and volumes of such numbers are finite in single precision."""
@@ -95,7 +97,7 @@ def _read(format: str, source: MeshSource) -> tuple[list[trimesh.Trimesh], float
         return read_dae(source)
     if format == "usdz":
         return _read_usdz(source)
-    readers = {"obj": read_obj, "ply": read_ply, "stl": read_stl, "msh": read_msh}
+    readers = {"obj": read_obj, "ply": read_ply, "stl": read_stl, "msh": read_msh, "off": read_off}
     return readers[format](source), None, None
 
 
