@@ -18,6 +18,7 @@ COLORS = np.tile(np.array([[255, 0, 0]], np.uint8), (len(BALL.vertices), 1))
 
 
 def compressed_ball() -> bytes:
+    """Return the ball with texture coordinates and red vertices as Draco compresses it."""
     encoded = DracoPy.encode(
         BALL.vertices.astype(np.float32), BALL.faces.astype(np.uint32), tex_coord=UV, colors=COLORS
     )
@@ -63,6 +64,7 @@ def document_of_ball(data: bytes) -> dict[str, Any]:
 
 
 def write_glb_of(place: Path, tree: dict[str, Any], data: bytes) -> Path:
+    """Write a GLB of a document and its binary chunk; returns its place."""
     text = json.dumps(tree).encode()
     text += b" " * (-len(text) % 4)
     data += bytes(-len(data) % 4)
