@@ -20,6 +20,8 @@ MESH_FORMATS = ("glb", "gltf", "obj", "ply", "stl", "dae", "usdz", "msh", "off")
 
 _HEAD_BYTES = 65536
 MSH_HEADER_BYTES = 16
+OFF_KEYWORD = re.compile(r"(ST)?(C)?(N)?(4)?(n)?OFF(?=[\d\s])")
+"""How OFF begins; its vertices have texture coordinates, colours, normals, a fourth coordinate, any number of coordinates."""
 _NAME_CHARACTERS = 200
 _OBJ_KEYWORDS = frozenset(
     {"v", "vt", "vn", "vp", "f", "l", "p", "o", "g", "s", "mg", "usemtl", "mtllib", "usemap", "maplib", "cstype", "deg"}
@@ -127,7 +129,7 @@ def _mesh_format(head: bytes, size: int, suffix: str, stream: BinaryIO) -> str |
         return "stl"
     if start.startswith("<") and re.search(r"<(\w+:)?COLLADA[\s>]", start):
         return "dae"
-    if re.match(r"(ST)?C?N?4?n?OFF(\d|\s)", start):
+    if OFF_KEYWORD.match(start):
         return "off"
     if start.startswith("{") and _is_gltf(start, size, stream):
         return "gltf"

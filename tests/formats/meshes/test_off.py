@@ -29,7 +29,9 @@ def test_what_trimesh_writes_is_read(tmp_path: Path) -> None:
     assert np.allclose(part.vertices[part.faces], ball.vertices[ball.faces], atol=1e-6)
 
 
-@pytest.mark.parametrize("header", ["OFF\n4 1 0\n", "OFF 4 1 0\n", "OFF4 1 0\n", "OFF # of one face\n\n4 1 0\n"])
+@pytest.mark.parametrize(
+    "header", ["OFF\n4 1 0\n", "OFF 4 1 0\n", "OFF4 1 0\n", "\n  OFF\n4 1 0\n", "OFF # of one face\n\n4 1 0\n"]
+)
 def test_a_polygon_is_a_fan_however_the_counts_are_written(tmp_path: Path, header: str) -> None:
     (part,) = read_mesh(_saved(tmp_path, f"{header}{SQUARE}4 0 1 2 3\n")).parts
     assert len(part.faces) == 2 and part.area == pytest.approx(1)

@@ -17,7 +17,7 @@ from manitwin.assets.obj_groups import obj_groups
 from manitwin.assets.readers.upright import Y_UP_FORMATS
 from manitwin.assets.root import upward
 from manitwin.formats.meshes.read import MeshFile
-from manitwin.formats.meshes.textures import bake_transform, make_part, pbr_material, srgb_to_linear
+from manitwin.formats.meshes.textures import DEFAULT_COLOR, bake_transform, make_part, pbr_material, srgb_to_linear
 from manitwin.geometry.poses import GLTF_TO_OBJECT, transform_points
 from manitwin.robots.urdf import UrdfTree, geometry_of, origin_of, values_of
 
@@ -189,7 +189,7 @@ def mesh_parts(
 def plain_material(rgba: np.ndarray | None) -> trimesh.visual.material.PBRMaterial:
     """Return a material of one sRGB colour ``(4,)`` in 0..1; grey for None."""
     if rgba is None:
-        return pbr_material(base_color=(0.8, 0.8, 0.8))
+        return pbr_material(base_color=DEFAULT_COLOR)
     linear = srgb_to_linear(np.clip(rgba[:3], 0, 1))
     alpha = float(np.clip(rgba[3], 0, 1))
     return pbr_material(base_color=(*linear, alpha), alpha_mode="BLEND" if alpha < 1 else None)

@@ -16,7 +16,7 @@ from manitwin.assets.asset_files import MAX_SHAPES
 from manitwin.assets.readers.usd_layers import LayerFiles
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.textures import bake_transform, decode_texture, make_part, pbr_material
+from manitwin.formats.meshes.textures import DEFAULT_COLOR, bake_transform, decode_texture, make_part, pbr_material
 from manitwin.formats.meshes.triangles import triangle_fans
 from manitwin.formats.meshes.usdz import mesh_parts, mesh_polygons
 from manitwin.formats.meshes.usdz_package import PreviewSurfaces, texture_of
@@ -193,7 +193,7 @@ def _bare_mesh(mesh: UsdGeom.Mesh, source: MeshSource) -> trimesh.Trimesh:
 
 def _grey(mesh: trimesh.Trimesh, prim: Usd.Prim) -> trimesh.Trimesh:
     vertices, faces = np.asarray(mesh.vertices).reshape(-1, 3), np.asarray(mesh.faces).reshape(-1, 3)
-    return make_part(vertices, faces, material=pbr_material(base_color=(0.8, 0.8, 0.8)), name=prim.GetName())
+    return make_part(vertices, faces, material=pbr_material(base_color=DEFAULT_COLOR), name=prim.GetName())
 
 
 class LayeredSurfaces(PreviewSurfaces):

@@ -16,6 +16,7 @@ from trimesh.visual.material import PBRMaterial
 from manitwin.errors import InputError
 from manitwin.formats.meshes.source import MAX_PARTS, MeshSource
 from manitwin.formats.meshes.textures import (
+    DEFAULT_COLOR,
     bake_transform,
     color_by_corner,
     color_of_lost_texture,
@@ -182,7 +183,7 @@ def _part(triangles: Any, material: PBRMaterial, name: str, source: MeshSource) 
 def _material(material: Any, textures: dict[str, Image.Image | None], source: MeshSource) -> PBRMaterial:
     effect = getattr(material, "effect", None)
     if effect is None:
-        return pbr_material(base_color=(0.8, 0.8, 0.8))
+        return pbr_material(base_color=DEFAULT_COLOR)
     texture: Image.Image | None = None
     color: tuple[float, ...] = (1.0, 1.0, 1.0)
     if isinstance(effect.diffuse, collada.material.Map):

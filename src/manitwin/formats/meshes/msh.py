@@ -9,10 +9,9 @@ import trimesh
 
 from manitwin.formats.meshes.point_hull import hull_part
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.textures import make_part, pbr_material
+from manitwin.formats.meshes.textures import DEFAULT_COLOR, make_part, pbr_material
 from manitwin.formats.sniff import MSH_HEADER_BYTES, msh_bytes
 
-_GREY = (0.8, 0.8, 0.8)
 _REMEDY = "download it again, or export it as OBJ"
 
 
@@ -33,12 +32,12 @@ def read_msh(source: MeshSource) -> list[trimesh.Trimesh]:
     with np.errstate(invalid="ignore"):  # signalling NaNs, which the checks of every mesh find
         positions, directions, uv = np.split(numbers.astype(np.float64), [3 * vertices, 3 * (vertices + normals)])
     if not faces:
-        return [hull_part(positions.reshape(-1, 3), source, _GREY)]
+        return [hull_part(positions.reshape(-1, 3), source, DEFAULT_COLOR)]
     return [
         make_part(
             positions.reshape(-1, 3),
             indices,
-            material=pbr_material(base_color=_GREY),
+            material=pbr_material(base_color=DEFAULT_COLOR),
             name="mesh",
             uv=_from_upper_left(uv.reshape(-1, 2)) if coordinates else None,
             normals=directions.reshape(-1, 3) if normals else None,

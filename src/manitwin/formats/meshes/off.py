@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 import trimesh
 
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import DEFAULT_COLOR, color_by_corner, make_part, pbr_material
 from manitwin.formats.meshes.triangles import triangle_fans
+from manitwin.formats.sniff import OFF_KEYWORD
 
 _REMEDY = "export it again, or as OBJ"
-_HEADER = re.compile(r"(ST)?(C)?(N)?(4)?(n)?OFF\s*")
 _COLORS = (0, 1, 3, 4)  # numbers behind a face's corners: none, an index into a map of colours, RGB, RGBA
 
 
@@ -22,9 +20,9 @@ def read_off(source: MeshSource) -> list[trimesh.Trimesh]:
     Raises InputError: ``unreadable``, ``too_large``, ``no_faces``. Source: Geomview's manual, "OFF: Object File Format". The
     counts may stand behind the keyword, as in ModelNet40 (Wu et al. 2015), also without a space between.
     """
-    text = source.data().decode("utf-8", errors="replace").lstrip("\ufeff")
-    header = _HEADER.match(text)
-    if header is None or text[header.end() : header.end() + 6].upper() == "BINARY":
+    text = source.data().decode("utf-8", errors="replace").lstrip("\ufeff \t\r\n")
+    header = OFF_KEYWORD.match(text)
+    if header is None or text[header.end() :].lstrip()[:6].upper() == "BINARY":
         raise source.unreadable("it is no OFF text", _REMEDY)
     textured, colored, normals, *more = (said is not None for said in header.groups())
     if any(more):

@@ -20,7 +20,7 @@ from manitwin.formats.meshes.ply_rows import (
     check_rows,
 )
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.textures import color_by_corner, decode_texture, make_part, pbr_material
+from manitwin.formats.meshes.textures import DEFAULT_COLOR, color_by_corner, decode_texture, make_part, pbr_material
 from manitwin.formats.meshes.triangles import triangle_fans
 from manitwin.formats.source_files import ply_texture
 
@@ -132,7 +132,7 @@ def _part(tables: dict[str, Columns], texture: str | None, source: MeshSource) -
         ),
         None,
     )
-    material = pbr_material(base_color_texture=image, base_color=(1, 1, 1) if image is not None else (0.8, 0.8, 0.8))
+    material = pbr_material(base_color_texture=image, base_color=(1, 1, 1) if image is not None else DEFAULT_COLOR)
     wedge = face.get("texcoord")
     normals = _stacked(vertex, ("nx", "ny", "nz"))
     if image is not None and isinstance(wedge, Lists) and (wedge.sizes == 2 * polygons.sizes).all():

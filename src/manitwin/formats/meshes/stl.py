@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.textures import make_part, pbr_material
+from manitwin.formats.meshes.textures import DEFAULT_COLOR, make_part, pbr_material
 from manitwin.geometry.repair.welding import weld_equal
 
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -38,7 +38,7 @@ def read_stl(source: MeshSource) -> list[trimesh.Trimesh]:
             _REMEDY,
         )
     vertices, faces = weld_equal(corners, np.arange(len(corners)).reshape(-1, 3))
-    return [make_part(vertices, faces, material=pbr_material(base_color=(0.8, 0.8, 0.8)), name="mesh")]
+    return [make_part(vertices, faces, material=pbr_material(base_color=DEFAULT_COLOR), name="mesh")]
 
 
 def _ascii(data: bytes, source: MeshSource) -> np.ndarray:

@@ -17,7 +17,13 @@ from trimesh.visual.material import PBRMaterial
 from manitwin.errors import InputError
 from manitwin.formats.bounded_file import open_regular
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.textures import color_of_lost_texture, decode_texture, linear_to_srgb, pbr_material
+from manitwin.formats.meshes.textures import (
+    DEFAULT_COLOR,
+    color_of_lost_texture,
+    decode_texture,
+    linear_to_srgb,
+    pbr_material,
+)
 
 _LAYERS = (".usd", ".usda", ".usdc")
 _MAX_MEMBERS = 10_000
@@ -157,7 +163,7 @@ class PreviewSurfaces:
         material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
         key = str(material.GetPath()) if material else ""
         if key not in self._materials:
-            self._materials[key] = self._build(material) if material else pbr_material(base_color=(0.8, 0.8, 0.8))
+            self._materials[key] = self._build(material) if material else pbr_material(base_color=DEFAULT_COLOR)
         return self._materials[key]
 
     def _build(self, material: UsdShade.Material) -> PBRMaterial:
@@ -165,7 +171,7 @@ class PreviewSurfaces:
         shader, _, _ = material.ComputeSurfaceSource()
         if not shader or shader.GetIdAttr().Get() != "UsdPreviewSurface":
             self._source.find(f"material {name!r} is no UsdPreviewSurface; shown grey")
-            return pbr_material(name, base_color=(0.8, 0.8, 0.8))
+            return pbr_material(name, base_color=DEFAULT_COLOR)
         color, texture = self._input(shader, "diffuseColor", (0.18, 0.18, 0.18), "rgb")
         metallic, metallic_map = self._input(shader, "metallic", 0.0, "b")
         roughness, roughness_map = self._input(shader, "roughness", 0.5, "g")
