@@ -1,6 +1,6 @@
 """Build a twin of every mesh of a data folder and print what came of it, and what it cost.
 
-    python benchmarks/build_meshes.py DATA OUT [--jobs N] [--only NAME,NAME] [--quick]
+    python benchmarks/build_meshes.py DATA OUT [--jobs N] [--only NAME,NAME] [--quick] [--sample]
 
 DATA holds ``manifest.csv`` with the columns file, kind and category; meshes are taken as metric, named by their category.
 Objects without a twin or a grasp count as 0 of 100. CPU seconds are those of the worker, by stage, as run.json keeps them.
@@ -108,6 +108,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--only", default="")
     parser.add_argument("--quick", action="store_true", help="without second engine and robustness")
+    parser.add_argument("--sample", action="store_true", help="the second engine tries a sample of what held")
     arguments = parser.parse_args()
     only = set(filter(None, arguments.only.split(",")))
     manifest = write_manifest(arguments.data, arguments.out, arguments.kind, only)
@@ -117,6 +118,7 @@ def main() -> None:
             arguments.out / "twins",
             jobs=arguments.jobs,
             quick=arguments.quick,
+            second_opinion="sample" if arguments.sample else None,
             on_result=lambda r: print(".", end="", flush=True),
         )
     print()

@@ -1,6 +1,6 @@
 """Build the meshes of a data folder by two states of the code at once, and print what each stage costs beside the other.
 
-    python benchmarks/side_by_side.py OTHER DATA OUT [--only NAME,NAME] [--full]
+    python benchmarks/side_by_side.py OTHER DATA OUT [--only NAME,NAME] [--full] [--sample]
 
 ``OTHER`` is a checkout of the state to compare with (``git worktree add OTHER COMMIT``); DATA as ``build_meshes.py`` has it. Both
 builds run at the same time, one process each, so that the machine treats them alike whatever else it does: their ratio is what
@@ -25,7 +25,8 @@ from manitwin.twin.store import read_record
 HERE = Path(__file__).resolve().parent.parent
 BUILD = """
 import sys, manitwin
-manitwin.build(sys.argv[1], sys.argv[2], executor="inline", quick=sys.argv[3] == "quick")
+flags = {"second_opinion": "sample"} if sys.argv[4] == "sample" else {}
+manitwin.build(sys.argv[1], sys.argv[2], executor="inline", quick=sys.argv[3] == "quick", **flags)
 """
 CHAIN = "whole chain"
 
@@ -38,13 +39,16 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--only", default="")
     parser.add_argument("--full", action="store_true", help="with second engine and robustness")
+    parser.add_argument("--sample", action="store_true", help="the second engine tries a sample here, and all there")
     arguments = parser.parse_args()
     manifest = write_manifest(arguments.data, arguments.out, "mesh", set(filter(None, arguments.only.split(","))))
     environment = {"OMP_NUM_THREADS": "1", "LP_NUM_THREADS": "0"}  # as workers have it
     running = []
     for name, checkout in (("other", arguments.other), ("this", HERE)):
         paths = {"PYTHONPATH": str(checkout / "src")}
-        command = [sys.executable, "-c", BUILD, manifest, arguments.out / name, "full" if arguments.full else "quick"]
+        sampled = "sample" if arguments.sample and name == "this" else "all"
+        amount = "full" if arguments.full else "quick"
+        command = [sys.executable, "-c", BUILD, manifest, arguments.out / name, amount, sampled]
         running.append(subprocess.Popen(command, env={**os.environ, **environment, **paths}))
     if max([build.wait() for build in running]):
         sys.exit("a build failed")
