@@ -13,8 +13,10 @@ from trimesh.visual import TextureVisuals
 from manitwin.errors import Rejected
 from manitwin.formats.glb import write_glb
 from manitwin.geometry.poses import GLTF_TO_OBJECT
+from manitwin.models.annotators.priors import lookup
 from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name, is_cylinder, why_no_cylinder, why_not_round
 from manitwin.models.generators.lift.lifting import DISC_ELLIPSE_IOU, Lifted, lift
+from manitwin.models.generators.lift.plain_solids import PRIMITIVES, plain_solid
 from manitwin.models.generators.lift.seen_corners import box_from_corner
 from manitwin.models.generators.lift.surface import unseen_share
 from manitwin.models.generators.lift.texture import beside
@@ -70,8 +72,9 @@ def from_photo(
     """Return the template that the name means where its fit explains the photo, else the photo lifted; raises Rejected.
 
     What has no template, and no name or that of a box, is a box where its outline is that of one seen from a corner; so is what
-    lies otherwise than its template does where a box explains it much better (a long speaker). What has no name has the shape
-    of a template of the ``likely`` names, each with its probability, where one explains the photo.
+    lies otherwise than its template does where a box explains it much better (a long speaker). What has no template is a plain
+    solid where one explains the photo closely. What has no name has the shape of a template of the ``likely`` names, each with
+    its probability, where one explains the photo better.
     ``focal_mm`` is the lens as 35 mm equivalent, where it is known.
     """
     template = template_for(name)
@@ -80,8 +83,11 @@ def from_photo(
         box = box_from_corner(rgba, focal_mm)
         if box is not None:
             return _shape_alone(box, rgba, primitive="box", source="the outline's six corners")
+    plain = plain_solid(rgba, hint, focal_mm) if template is None else None
     if name is None:
-        return _without_name(rgba, likely, focal_mm)
+        return _without_name(rgba, likely, focal_mm, plain)
+    if plain is not None:
+        return _plain(plain, rgba)
     fitted = (
         None if template is None else fit(template.category, rgba, or_of=kinds_of(template.category), focal_mm=focal_mm)
     )
@@ -175,9 +181,17 @@ def from_fit(fitted: Fitted, rgba: np.ndarray, name: str | None) -> Job:
     return Job(write_glb([visual_part(surface)]), notes_of(fitted), surface.unseen_share, known)
 
 
-def _without_name(rgba: np.ndarray, likely: Sequence[tuple[str, float]], focal_mm: float | None) -> Job:
-    """Return the shape of a likely name's template where it explains the photo and a simpler solid hardly does, else lift it."""
+def _without_name(
+    rgba: np.ndarray, likely: Sequence[tuple[str, float]], focal_mm: float | None, plain: Fitted | None
+) -> Job:
+    """Return the shape of a likely name's template where it explains the photo and a simpler solid hardly does, else lift it.
+
+    A ``plain`` solid that explains the photo stands but for a template that does so better.
+    """
     fitted = _best_template(rgba, likely, focal_mm)
+    if plain is not None:
+        better = fitted is not None and fitted.residual.cost < plain.residual.cost
+        return _of_likely_name(fitted, rgba) if better and fitted is not None else _plain(plain, rgba)
     try:
         lifted = lift(rgba, ShapeHint())
     except Rejected:
@@ -186,8 +200,16 @@ def _without_name(rgba: np.ndarray, likely: Sequence[tuple[str, float]], focal_m
         lifted = None
     if lifted is None or (fitted is not None and _is_preferred(fitted, lifted)):
         assert fitted is not None
-        return _shape_alone(fitted, rgba, primitive=f"shape of template:{fitted.category}", source=OF_LIKELY_NAMES)
+        return _of_likely_name(fitted, rgba)
     return _lifted_job(lifted, lifted.notes)
+
+
+def _of_likely_name(fitted: Fitted, rgba: np.ndarray) -> Job:
+    return _shape_alone(fitted, rgba, primitive=f"shape of template:{fitted.category}", source=OF_LIKELY_NAMES)
+
+
+def _plain(plain: Fitted, rgba: np.ndarray) -> Job:
+    return _shape_alone(plain, rgba, primitive=PRIMITIVES[plain.category], source="plain solid fitted to the photo")
 
 
 def _is_preferred(fitted: Fitted, lifted: Lifted) -> bool:
@@ -217,7 +239,8 @@ def _lifted_job(lifted: Lifted, notes: dict[str, Any]) -> Job:
 def _shape_alone(fitted: Fitted, rgba: np.ndarray, *, primitive: str, source: str) -> Job:
     """Return the solid alone, nothing known of it: a thing with a box's shape is not called a box."""
     surface = texture_of([fitted], [rgba])
-    rests = "standing" if fitted.upright else "lying"
+    usual = lookup(fitted.category)
+    rests = "standing" if fitted.upright and (usual is None or usual.stands is not False) else "lying"
     notes = notes_of(fitted) | {"primitive": primitive, "source": source, "rests": rests}
     del notes["category"]
     return Job(write_glb([visual_part(surface)]), notes, surface.unseen_share)

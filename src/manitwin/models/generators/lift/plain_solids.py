@@ -1,0 +1,128 @@
+"""Plain solids that a photo may show of a thing that nobody named: blocks, slabs with round corners, cylinders, discs.
+
+An outline inflated in the picture's plane takes a book on a table for one that stands before the camera, as high as it looks.
+A plain solid seen from above explains such an outline almost to the pixel, and its edges are seen in the photo; then the view
+from which they are is believed with it.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import cv2
+import numpy as np
+
+from manitwin.geometry.solids.shapes import SolidError, box, cylinder, prism, rectangle
+from manitwin.models.generators.lift.hint import ShapeHint
+from manitwin.models.generators.templates.fitting.evidence import evidence_of
+from manitwin.models.generators.templates.fitting.fit import Fitted, fitted, made_of
+from manitwin.models.generators.templates.fitting.least_squares import Placed
+from manitwin.models.generators.templates.fitting.search import Candidate, search
+from manitwin.models.generators.templates.fitting.shape import Family
+from manitwin.models.generators.templates.template import Measure, Model, Template
+
+LEAST_IOU, MOST_OUTLINE = 0.985, 0.0022
+"""Overlap and distance of the outlines (of the longer side) from which on a plain solid explains a photo."""
+MOST_EDGES_MISSING = 0.67
+"""Of the solid's inner edges in the photo; 0.7 says nothing either way. Set with the limits above on made photos of 43 things."""
+LEAST_SOLIDITY = 0.96
+"""These solids are convex, so that their outlines are."""
+MOST_DISC = 0.15
+"""Thickness of a disc over its width: what is thicker may as well be a bowl seen from above."""
+PRIMITIVES = {"box": "box", "cutting board": "slab", "can": "cylinder", "coaster": "disc"}
+"""What the solids are, by the category of things that stand or lie as each does."""
+_EDGE = 0.02  # radius of a block's edges over its least side
+_ROUNDED = 0.2  # radius of a slab's upper and lower edges over its thickness
+
+
+def plain_solid(rgba: np.ndarray, hint: ShapeHint, focal_mm: float | None = None) -> Fitted | None:
+    """Return the plain solid that explains ``rgba (H, W, 4) uint8``, whose alpha is the mask; None where none does closely.
+
+    Of solids that ``hint`` speaks against none is tried. ``focal_mm`` is the lens as 35 mm equivalent, where it is known.
+    """
+    tried = [solid for solid in solids() if _may_be(solid, hint)]
+    if not tried or _solidity(rgba[..., 3] > 127) < LEAST_SOLIDITY:
+        return None
+    evidence = evidence_of(rgba, focal_mm)
+    found = [best for solid in tried for best in search([Family(solid)], evidence, settled=True)[:1]]
+    for best in sorted(filter(_explains, found), key=lambda each: each.residual.cost):
+        try:
+            made = made_of(best.family.template, best.family.measures(best.spreads))
+        except SolidError:
+            continue
+        return fitted(made, Placed(best.view, best.upright), best.residual, evidence)
+    return None
+
+
+@cache
+def solids() -> tuple[Template, ...]:
+    """Return the solids as templates, each under the category of things that stand or lie as it does."""
+    block = {"height_m": _fixed(0.1), "width": Measure(0.4, 1.0, 2.5, ""), "depth": Measure(0.3, 0.7, 1.5, "")}
+    slab = {
+        "length_m": _fixed(0.2),
+        "width": Measure(0.3, 0.65, 1.0, ""),
+        "thick": Measure(0.02, 0.08, 0.25, ""),
+        "corner": Measure(0.02, 0.1, 0.4, ""),
+    }
+    upright = {"height_m": _fixed(0.1), "width": Measure(0.3, 0.8, 2.5, ""), "top": Measure(0.8, 1.0, 1.25, "")}
+    disc = {"width_m": _fixed(0.1), "thick": Measure(0.02, 0.08, MOST_DISC, "")}
+    return (
+        Template("box", "household", block, {"body": ("cardboard",)}, _block),
+        Template("cutting board", "kitchen", slab, {"body": ("wood",)}, _slab),
+        Template("can", "kitchen", upright, {"body": ("steel",)}, _cylinder),
+        Template("coaster", "kitchen", disc, {"body": ("cork",)}, _disc),
+    )
+
+
+def _fixed(length_m: float) -> Measure:
+    return Measure(length_m, length_m, length_m, "m")
+
+
+def _block(*, height_m: float, width: float, depth: float) -> Model:
+    """Build a block."""
+    sides = (width * height_m, depth * height_m, height_m)
+    return Model().add("body", box(*sides, radius_m=_EDGE * min(sides)))
+
+
+def _slab(*, length_m: float, width: float, thick: float, corner: float) -> Model:
+    """Build a slab that lies; ``corner`` is the radius of its corners seen from above, over its width."""
+    across_m, thick_m, corner = width * length_m, thick * length_m, max(corner, 0.0)
+    outline = rectangle(length_m, across_m, radius_m=corner * across_m)
+    return Model().add("body", prism(outline, thick_m, radius_m=_ROUNDED * min(thick_m, corner * across_m)))
+
+
+def _cylinder(*, height_m: float, width: float, top: float) -> Model:
+    """Build a cylinder that stands; ``top`` is the radius of its upper end over that of its lower end."""
+    radius_m = 0.5 * width * height_m
+    return Model().add("body", cylinder(radius_m, height_m, top_radius_m=top * radius_m))
+
+
+def _disc(*, width_m: float, thick: float) -> Model:
+    """Build a disc that lies."""
+    return Model().add("body", cylinder(0.5 * width_m, thick * width_m))
+
+
+def _may_be(solid: Template, hint: ShapeHint) -> bool:
+    """Whether a solid may be what the hint tells of: what is open at the top is none of them."""
+    if hint.container:
+        return False
+    if hint.round:
+        return solid.build is _disc or (solid.build is _cylinder and not hint.flat)
+    if hint.boxy or hint.flat:
+        return solid.build in (_block, _slab)
+    return True
+
+
+def _explains(candidate: Candidate) -> bool:
+    left = candidate.residual
+    seen = left.iou >= LEAST_IOU and left.outline <= MOST_OUTLINE and left.edges <= MOST_EDGES_MISSING
+    thick = candidate.family.measures(candidate.spreads).get("thick", 0.0)
+    return candidate.upright and seen and not (candidate.family.template.build is _disc and thick > MOST_DISC)
+
+
+def _solidity(mask: np.ndarray) -> float:
+    """Return the area of a mask (H, W) over that of its convex hull."""
+    contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    if not contours:
+        return 0.0
+    return float(mask.sum() / max(cv2.contourArea(cv2.convexHull(np.concatenate(contours))), 1.0))

@@ -1,0 +1,88 @@
+"""Plain solids seen from above: what they are, how they lie, and outlines that no solid is believed for."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from manitwin.errors import Rejected
+from manitwin.models.generators.lift.hint import ShapeHint
+from manitwin.models.generators.lift.made_photo import from_photo
+from manitwin.models.generators.lift.plain_solids import plain_solid
+from manitwin.models.generators.templates.fitting.view import View, normalised
+
+SIDE_PX = 640
+TOP, SIDE = (200, 190, 170, 255), (120, 110, 95, 255)
+
+
+def _seen(outline_m: np.ndarray, height_m: float, elevation_deg: float, *, top: float = 1.0) -> np.ndarray:
+    """An RGBA picture of a convex outline (N, 2) raised to a height, its upper face scaled by ``top`` and lighter."""
+    lower = np.column_stack([outline_m, np.zeros(len(outline_m))])
+    upper = np.column_stack([top * outline_m, np.full(len(outline_m), height_m)])
+    points, _, _ = normalised(np.concatenate([lower, upper]))
+    flat, _ = View(0.5, np.radians(elevation_deg), 0.0, 0.15).project(points)
+    flat = (flat - (flat.min(0) + flat.max(0)) / 2) / np.ptp(flat, axis=0).max()
+    pixels = np.rint(0.8 * SIDE_PX * flat + SIDE_PX / 2).astype(np.int32)
+    rgba = np.zeros((SIDE_PX, SIDE_PX, 4), np.uint8)
+    cv2.fillConvexPoly(rgba, cv2.convexHull(pixels), SIDE)
+    cv2.fillConvexPoly(rgba, cv2.convexHull(pixels[len(lower) :]), TOP)
+    return rgba
+
+
+def _rounded(x_m: float, y_m: float, radius_m: float) -> np.ndarray:
+    angles = np.radians(np.arange(0, 90, 6))
+    corner = radius_m * np.column_stack([np.cos(angles), np.sin(angles)])
+    middle = np.array([x_m / 2 - radius_m, y_m / 2 - radius_m])
+    quarters = [(1, 1), (-1, 1), (-1, -1), (1, -1)]
+    return np.concatenate([(corner + middle) * signs for signs in quarters])
+
+
+def _circle(width_m: float) -> np.ndarray:
+    angles = np.radians(np.arange(0, 360, 4))
+    return width_m / 2 * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def test_a_nameless_slab_on_a_table_lies_and_is_as_thick_as_it_looks() -> None:
+    job = from_photo(_seen(_rounded(0.20, 0.13, 0.02), 0.016, 30), None)
+    assert job.notes["primitive"] == "slab" and job.notes["rests"] == "lying"
+    assert job.notes["source"] == "plain solid fitted to the photo"
+    assert job.known is None and not job.metric and "category" not in job.notes
+    measures = job.notes["measures"]
+    assert measures["width"] == pytest.approx(0.13 / 0.20, rel=0.08)
+    assert measures["thick"] == pytest.approx(0.016 / 0.20, rel=0.25)
+    assert job.notes["view"]["elevation_deg"] == pytest.approx(30, abs=5)
+
+
+def test_a_cylinder_seen_from_above_is_as_high_as_it_is() -> None:
+    found = plain_solid(_seen(_circle(0.08), 0.10, 35), ShapeHint())
+    assert found is not None and found.category == "can"
+    extents = np.ptp(found.made.mesh.vertices, axis=0)
+    assert extents[2] / extents[0] == pytest.approx(0.10 / 0.08, rel=0.08)
+
+
+def test_a_disc_whose_edge_is_seen_is_one_where_its_outline_alone_may_be_an_egg() -> None:
+    found = plain_solid(_seen(_circle(0.10), 0.008, 30), ShapeHint())
+    assert found is not None and found.category == "coaster"
+    ellipse = np.zeros((SIDE_PX, SIDE_PX, 4), np.uint8)
+    cv2.ellipse(ellipse, (320, 320), (240, 130), 0, 0, 360, TOP, -1)
+    assert plain_solid(ellipse, ShapeHint()) is None
+    with pytest.raises(Rejected, match="the outline is an ellipse"):
+        from_photo(ellipse, None)
+
+
+def test_a_rectangle_of_which_no_edge_is_seen_may_be_anything() -> None:
+    front = np.zeros((SIDE_PX, SIDE_PX, 4), np.uint8)
+    cv2.rectangle(front, (120, 60), (520, 580), TOP, -1)
+    assert plain_solid(front, ShapeHint()) is None
+
+
+def test_what_is_as_thick_as_a_bowl_is_no_disc() -> None:
+    assert plain_solid(_seen(_circle(0.10), 0.025, 55), ShapeHint(flat=True, round=True)) is None
+
+
+def test_what_is_said_to_be_open_or_of_another_form_is_not_tried() -> None:
+    slab = _seen(_rounded(0.20, 0.13, 0.02), 0.016, 30)
+    assert plain_solid(slab, ShapeHint(container=True)) is None
+    assert plain_solid(slab, ShapeHint(round=True)) is None
+    assert plain_solid(slab, ShapeHint(flat=True)) is not None
