@@ -34,6 +34,12 @@ def test_box_has_its_mirrors_and_half_turns_and_no_axis() -> None:
     assert found.apart_m(np.array([0.1, 0, 0]), np.array([0, 0.06, 0])) > 0.05
 
 
+def test_symmetries_are_about_the_centroid_of_the_surface() -> None:
+    mesh = trimesh.creation.revolve([(0, 0), (0.03, 0), (0.08, 0.06), (0, 0.06)], sections=64)
+    mesh.apply_translation([0.2, -0.1, 0.0])
+    assert of(mesh).center_m[:2] == pytest.approx([0.2, -0.1], abs=1e-9)
+
+
 def test_mug_has_the_mirror_through_its_handle_only() -> None:
     found = of(mug())
     assert found.axis is None and len(found.motions) == 2

@@ -55,7 +55,7 @@ def find_symmetries(mesh: trimesh.Trimesh, rng: np.random.Generator) -> Symmetri
     surface, _, _ = sample_surface(mesh, _SURFACE, rng)
     extents, box_to_object = oriented_bounding_box(mesh.vertices)
     off_m = _OFF_SHARE * float(np.linalg.norm(extents))
-    center = surface.mean(0)
+    center = np.average(mesh.triangles_center, axis=0, weights=mesh.area_faces)
     tree, local = cKDTree(surface - center), (surface - center)[:_TESTED]
     inertia_axes = np.linalg.svd(surface - center, full_matrices=False)[2]
 

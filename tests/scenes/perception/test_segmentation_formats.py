@@ -281,6 +281,16 @@ def test_a_scene_is_whole_in_one_split(scenes: Path, tmp_path: Path) -> None:
     assert sum(map(len, said.values())) == 2
 
 
+def test_bop_has_a_scene_in_the_split_of_the_other_formats(scenes: Path, tmp_path: Path) -> None:
+    write_segmentation(scenes, tmp_path / "coco", "coco", validation_share=0.5)
+    write_segmentation(scenes, tmp_path / "bop", "bop", validation_share=0.5)
+    for split in ("train", "val"):
+        images = json.loads((tmp_path / "coco" / "annotations" / f"instances_{split}.json").read_text())["images"]
+        there = sorted(path.name for path in (tmp_path / "bop" / f"{split}_pbr").glob("*"))
+        assert there == sorted({f"{int(image['scene_id'].removeprefix('layout_0_')):06d}" for image in images})
+        assert there, "one scene of the two is in each"
+
+
 def test_what_fails_leaves_nothing(scenes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object) -> np.ndarray:
         raise UsageError("front_ids.png: is no PNG")

@@ -17,15 +17,21 @@ from manitwin.scenes.perception.classes import Classes
 from manitwin.scenes.perception.object_views import Box, SeenShape, silhouette_of
 from manitwin.scenes.perception.output import Output
 from manitwin.scenes.perception.scene_truth import PictureTruth, SceneTruth
+from manitwin.scenes.perception.splits import split_of
 
-SPLIT = "train_pbr"
+KIND = "pbr"  # BOP's word for what is rendered
 NO_BOX = [-1, -1, -1, -1]
 
 
 def write_bop(
-    scenes: Iterable[SceneTruth], classes: Classes, out: Output, *, twin_folder: Callable[[str], Path]
+    scenes: Iterable[SceneTruth],
+    classes: Classes,
+    out: Output,
+    *,
+    twin_folder: Callable[[str], Path],
+    validation_share: float,
 ) -> None:
-    """Write ``models/``, ``camera.json`` and ``train_pbr/<scene>/`` with colours, depths, masks and their truth.
+    """Write ``models/``, ``camera.json`` and ``<split>_pbr/<scene>/`` with colours, depths, masks and their truth.
 
     Objects are twins, numbered from 1 in the order of their ids; ``objects.json`` says which, and their categories. Lengths are
     millimetres, cameras have OpenCV's axes, and K counts pixels from the centre of the upper left one.
@@ -42,7 +48,8 @@ def write_bop(
     for place, scene in enumerate(scenes):
         if place == 0:
             out.write_json("camera.json", _camera_of_all(scene.pictures[0]))
-        _write_scene(f"{SPLIT}/{place:06d}", scene, models, shapes, numbers, out)
+        split = split_of(scene.record.scene_id, validation_share)
+        _write_scene(f"{split}_{KIND}/{place:06d}", scene, models, shapes, numbers, out)
 
 
 def _write_scene(

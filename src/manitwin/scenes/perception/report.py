@@ -49,7 +49,7 @@ def segmentation_page(scenes: Iterable[SceneTruth], classes: Classes, form: str,
     lead = [
         f"{counts.pictures:,} pictures of {counts.scenes.total():,} scenes as {form}; {len(counts.shares):,} instances of"
         f" {len(classes.categories):,} categories, {len(classes.parts):,} kinds of parts."
-        + ("" if form == "bop" else f" Scenes by split: {splits}.")
+        f" Scenes by split: {splits}."
     ]
     balance = [_categories(counts, classes), _visible(counts)]
     if classes.parts:

@@ -55,7 +55,9 @@ FORMATS: Mapping[str, _Write] = {
     "cityscapes": lambda scenes, classes, out, asked: write_cityscapes(
         scenes, classes, out, validation_share=asked.validation_share
     ),
-    "bop": lambda scenes, classes, out, asked: write_bop(scenes, classes, out, twin_folder=asked.twin_folder),
+    "bop": lambda scenes, classes, out, asked: write_bop(
+        scenes, classes, out, twin_folder=asked.twin_folder, validation_share=asked.validation_share
+    ),
     "pointcloud": lambda scenes, classes, out, asked: write_point_clouds(
         scenes, classes, out, validation_share=asked.validation_share, points=asked.points
     ),
