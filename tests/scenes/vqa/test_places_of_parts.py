@@ -14,6 +14,7 @@ from manitwin.render.cameras import Camera, look_at
 from manitwin.scenes.layouts.previews import write_previews
 from manitwin.scenes.perception.scene_truth import PICTURES_FOLDER, read_scene_truth
 from manitwin.scenes.scene_files import read_scene, scene_files
+from manitwin.scenes.vqa.detection import is_sure_order
 from manitwin.scenes.vqa.directions import picture_directions
 from manitwin.scenes.vqa.generate import drafts_of
 from manitwin.scenes.vqa.part_words import is_told
@@ -106,6 +107,13 @@ def test_what_is_on_the_surface_is_counted_where_nothing_stands_on_another_thing
     file.write_text(json.dumps(scene))
     assert not drafts(tmp_path, "count_objects") and not drafts(tmp_path, "list_objects")
     assert drafts(tmp_path, "is_there")
+
+
+def test_a_list_has_an_order_where_both_middles_of_things_tell_the_same() -> None:
+    hammer, pan, mug = (183.0, 183.5), (222.0, 247.0), (241.0, 241.0)  # mean of the pixels, middle of the box
+    assert is_sure_order(np.array([hammer, pan]), 5) and is_sure_order(np.array([hammer, mug]), 5)
+    assert not is_sure_order(np.array([hammer, pan, mug]), 5)
+    assert not is_sure_order(np.array([mug, (243.0, 243.0)]), 5)
 
 
 def test_seen_from_above_nothing_goes_towards_the_camera() -> None:

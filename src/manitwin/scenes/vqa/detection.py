@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
+import numpy as np
+
 from manitwin.scenes.vqa.context import Context, listed, sentence
 from manitwin.scenes.vqa.question import BOX, CHOICE, LIST, YES_NO, Draft
 from manitwin.scenes.vqa.references import CONTAINERS, OTHER_VESSELS, a_or_an, one_of
 from manitwin.scenes.vqa.things import Seen
 
+APART_SHARE = 0.01
+"""How far (share of the picture's width) each thing of a list is to the right of the one before it, by either middle."""
 ABSENT = 4
 """How many categories that are not there are offered for each picture."""
 
@@ -76,12 +80,14 @@ def _existence(asked: Context) -> Iterator[Draft]:
 
 def _lists(asked: Context) -> Iterator[Draft]:
     in_order = sorted(asked.view.clear, key=lambda each: each.column)
-    yield Draft(
-        "list_objects", asked.view.name, LIST, {"surface": asked.surface},
-        ", ".join(each.thing.category for each in in_order),
-        sentence(f"from left to right: {listed([_described(each) for each in in_order])}"),
-        {"objects": asked.names(*in_order)},
-    )  # fmt: skip
+    middles_px = np.array([(each.column, sum(each.columns) / 2) for each in in_order])
+    if is_sure_order(middles_px, APART_SHARE * asked.view.camera.width_px):
+        yield Draft(
+            "list_objects", asked.view.name, LIST, {"surface": asked.surface},
+            ", ".join(each.thing.category for each in in_order),
+            sentence(f"from left to right: {listed([_described(each) for each in in_order])}"),
+            {"objects": asked.names(*in_order)},
+        )  # fmt: skip
     if any(each.thing.head in OTHER_VESSELS for each in in_order):
         return
     containers = [each for each in in_order if each.thing.head in CONTAINERS]
@@ -98,6 +104,14 @@ def _lists(asked: Context) -> Iterator[Draft]:
         sentence(f"there {verb} {number}: {listed([_described(each) for each in containers])}"),
         {"objects": asked.names(*containers), "counts": dict(Counter(each.thing.head for each in containers))},
     )  # fmt: skip
+
+
+def is_sure_order(middles_px: np.ndarray, least_px: float) -> bool:
+    """Whether each thing is at least so far to the right of the one before it by either of its middles ``(things, 2)`` px.
+
+    These are the mean of its pixels and the middle of its box, far apart of a pan with a long handle: a person may take either.
+    """
+    return bool((np.diff(middles_px, axis=0) >= least_px).all())
 
 
 def _described(seen: Seen) -> str:
