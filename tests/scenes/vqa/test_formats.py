@@ -9,6 +9,7 @@ import re
 from pathlib import Path
 
 import datasets
+import pyarrow.parquet as pq
 import pytest
 import webdataset
 from PIL import Image
@@ -69,6 +70,12 @@ def test_parquet_is_read_by_datasets(scenes: Path, tmp_path: Path) -> None:
     assert row["question"] in row["prompt"]
     assert json.loads(row["evidence"])["objects"]
     assert all(row["answer"] in row["options"] for row in read if row["kind"] in ("choice", "yes/no"))
+    (file,) = (tmp_path / "out/data").glob("train-*.parquet")
+    told = json.loads(pq.read_schema(file).metadata[b"huggingface"])["info"]["features"]
+    kinds = set(re.findall(r'"_type": "(\w+)"', json.dumps(told)))
+    assert kinds == {"Image", "Value", "Sequence"}, (
+        "`List` is not known to datasets before 4.0, which reads nothing then"
+    )
 
 
 # webdataset leaves its files to the garbage collector

@@ -63,14 +63,14 @@ _FEATURES: dict[str, tuple[pa.DataType, Any]] = {
             "evidence",
         )
     },
-    "options": (pa.list_(pa.string()), {"feature": {"dtype": "string", "_type": "Value"}, "_type": "List"}),
+    "options": (pa.list_(pa.string()), {"feature": {"dtype": "string", "_type": "Value"}, "_type": "Sequence"}),
     "points": (
         pa.list_(pa.list_(pa.float64())),
-        {"feature": {"feature": {"dtype": "float64", "_type": "Value"}, "_type": "List"}, "_type": "List"},
+        {"feature": {"feature": {"dtype": "float64", "_type": "Value"}, "_type": "Sequence"}, "_type": "Sequence"},
     ),
     "boxes": (
         pa.list_(pa.list_(pa.float64())),
-        {"feature": {"feature": {"dtype": "float64", "_type": "Value"}, "_type": "List"}, "_type": "List"},
+        {"feature": {"feature": {"dtype": "float64", "_type": "Value"}, "_type": "Sequence"}, "_type": "Sequence"},
     ),
 }  # fmt: skip
 
