@@ -16,8 +16,11 @@ from manitwin.assets.writers.exporter import TwinContent
 from manitwin.assets.writers.grasp_rows import grasp_rows
 from manitwin.errors import ExportError
 from manitwin.geometry.distance import distance_to_surface
+from manitwin.geometry.poses import transform_points
+from manitwin.geometry.ray_caster import RayCaster
 
-PANDA_OFFSET_XYZW = [0.0, 0.0, -0.7071, 0.7071]  # GraspGen config/grippers/franka_panda.yaml
+PANDA_OFFSET_XYZW = [0.0, 0.0, 0.0, 1.0]  # GraspGen config/grippers/franka_panda.yaml
+FINGERS_M = np.array([[0.04, 0, 0.1034], [-0.04, 0, 0.1034]])  # GraspGen config/grippers/franka_panda.py: apart along X
 
 
 def written(twin: TwinContent, folder: Path) -> Path:
@@ -39,10 +42,7 @@ def loaded(folder: Path, gripper: str = "franka_panda") -> tuple[trimesh.Trimesh
     mesh.apply_scale(content["object"]["scale"])
     poses, mask = np.array(content["grasps"]["transforms"]), np.array(content["grasps"]["object_in_gripper"])
     assert mask.dtype == bool
-    _, _, z, w = PANDA_OFFSET_XYZW
-    offset = np.eye(4)
-    offset[:2, :2] = [[1 - 2 * z * z, -2 * z * w], [2 * z * w, 1 - 2 * z * z]]
-    return mesh, poses[mask] @ offset, poses[~mask] @ offset
+    return mesh, poses[mask], poses[~mask]  # the loader's offset is the identity
 
 
 @pytest.mark.parametrize("make", TWINS)
@@ -62,6 +62,16 @@ def test_tips_of_the_hand_lie_at_the_object(make: Any, tmp_path: Path) -> None:
     mesh, held, _ = loaded(written(twin, tmp_path))
     tips = held[:, :3, 3] + 0.1034 * held[:, :3, 2]
     assert distance_to_surface(tips, mesh).max() < 0.04
+
+
+@pytest.mark.parametrize("make", TWINS)
+def test_the_object_is_between_the_fingers_of_graspgens_hand(make: Any, tmp_path: Path) -> None:
+    mesh, held, _ = loaded(written(make(), tmp_path))
+    tips = np.stack([transform_points(pose, FINGERS_M) for pose in held])  # (N, 2, 3)
+    inwards = (tips[:, 1] - tips[:, 0]) / 0.08
+    for side, direction in ((0, inwards), (1, -inwards)):
+        distance_m, face = RayCaster(mesh).first_hits(tips[:, side], direction)
+        assert ((face >= 0) & (distance_m < 0.08)).all()
 
 
 def test_gripper_block_says_how_the_poses_are_meant() -> None:

@@ -121,8 +121,8 @@ def best_and_diverse(rows: GraspRows, count: int) -> GraspRows:
 class GripperAsset:
     """A parallel gripper as GraspGen and GraspDataGen name it.
 
-    ``base_link`` is the frame that grasps are poses of, ``base_to_grasp_xyzw`` its rotation to the grasp frame (+Z approach, X
-    closing), as GraspGen's configuration has it. Each of ``finger_joints`` is the way (m) of one finger from closed, the first
+    ``base_link`` is the link of ``usd`` that isaac_grasp's poses are of, ``base_to_grasp_xyzw`` its rotation to the grasp frame
+    (+Z approach, X closing). Each of ``finger_joints`` is the way (m) of one finger from closed, the first
     that of ``finger_links[0]``, on the closing axis' side ``bite_axis (3,)``. ``open_limit``: at which limit of the joints it
     is open.
     """
@@ -147,7 +147,7 @@ class GripperAsset:
 
 
 ASSETS: dict[str, GripperAsset] = {
-    # GraspGen config/grippers/franka_panda.yaml; GraspDataGen scripts/graspgen/gripper_configurations.py; the public URDF:
+    # GraspDataGen scripts/graspgen/gripper_configurations.py; the public URDF:
     # panda_hand closes along its Y, panda_leftfinger on the side of +Y
     "panda": GripperAsset(
         name="franka_panda",

@@ -2,15 +2,14 @@
 
 Sources: GraspGen docs/GRASP_DATASET_FORMAT.md, docs/GRIPPER_DESCRIPTION.md and grasp_gen/dataset/dataset_utils.py:
 ``GraspJsonDatasetReader`` (which file by which name) and ``load_object_grasp_data``, which multiplies each transform by the
-gripper's ``transform_offset_from_asset_to_graspgen_convention``: the file holds poses of the gripper model's base link, not
-of the grasp frame.
+``transform_offset_from_asset_to_graspgen_convention`` of its own configuration of the gripper. That of ``franka_panda``
+(config/grippers) is the identity, its hand's fingers are apart along X (``GripperModel``): the file holds poses of the grasp
+frame, +Z approach and X closing, and not of the URDF's ``panda_hand``, which closes along Y.
 """
 
 from __future__ import annotations
 
 from typing import Any
-
-import numpy as np
 
 from manitwin.assets.writers.exporter import Exported, TwinContent
 from manitwin.assets.writers.grasp_rows import ASSETS, GraspRows, grasp_rows, parallel_gripper, parallel_grippers_of
@@ -19,7 +18,10 @@ from manitwin.assets.writers.mesh_files import object_mesh
 from manitwin.errors import ExportError
 from manitwin.twin.store import canonical_json
 
-FRAME = "transforms: poses of the gripper's base link in the frame of the object file (metres, +Z up), at its scale"
+FRAME = (
+    "transforms: poses of the gripper's base link, +Z approach and X closing, in the frame of the object file (metres, +Z up),"
+    " at its scale"
+)
 VALID_SHARE = 0.2  # GraspDataGen's default share of objects to validate with
 FEWEST = 5  # of those that held: GraspGen passes over an object with less (and, for its discriminator, with less that failed)
 
@@ -62,11 +64,10 @@ def export(twin: TwinContent) -> Exported:
 
 
 def _content(twin: TwinContent, object_file: str, gripper: dict[str, Any], rows: GraspRows) -> dict[str, Any]:
-    base_to_object = rows.gripper_to_object @ _grasp_to_base(rows.gripper)
     return {
         "object": {"file": object_file, "scale": 1.0},
         "gripper": gripper,
-        "grasps": {"transforms": base_to_object.tolist(), "object_in_gripper": rows.held.tolist()},
+        "grasps": {"transforms": rows.gripper_to_object.tolist(), "object_in_gripper": rows.held.tolist()},
         "frame": FRAME,
         "provenance": list(provenance_lines(twin.record)),
         "license": license_of(twin.record),
@@ -81,24 +82,19 @@ def _gripper(name: str, rows: GraspRows) -> tuple[dict[str, Any], list[str]]:
     block: dict[str, Any] = {
         "name": asset.name if asset else name,
         "depth": gripper.tip_depth_m if gripper else depths[-1],
-        "transform_offset_from_asset_to_graspgen_convention": [
-            [0.0, 0.0, 0.0],
-            list(asset.base_to_grasp_xyzw) if asset else [0.0, 0.0, 0.0, 1.0],
-        ],
+        "transform_offset_from_asset_to_graspgen_convention": [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]],
     }
     if gripper is not None:
         block["width"] = gripper.opening_m
     if asset is not None:
-        block["file_name"] = asset.usd
-        return block, []
+        return block, [
+            f"poses of a hand that closes along Y: GraspGen's own configuration of {asset.name} has it close along X, with the"
+            " identity as offset. One that GraspDataGen wrote in its place turns all grasps by a quarter."
+        ]
     return block, [
         f"which link of {name} the poses are of: they are of the grasp frame (+Z approach, X closing), with the identity as"
         " offset; GraspGen's configuration of that gripper must have the same offset."
     ]
-
-
-def _grasp_to_base(gripper: str) -> np.ndarray:
-    return ASSETS[gripper].grasp_to_base if gripper in ASSETS else np.eye(4)
 
 
 def _few(name: str, rows: GraspRows) -> list[str]:
