@@ -17,7 +17,10 @@ from made_twins import CORNERS_M
 from manitwin.dataset.publish.card import size, size_category
 from manitwin.dataset.publish.publish import publish_dataset
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
-from manitwin.twin.store import read_record
+from manitwin.twin.link_records import FACE_LINKS
+from manitwin.twin.part_records import FACE_PARTS
+from manitwin.twin.shape_file import SHAPE
+from manitwin.twin.store import RECORD, RUN, read_record
 
 
 def run_offline(code: str, folder: Path, scratch: Path) -> Any:
@@ -133,6 +136,13 @@ def test_totals_are_those_of_the_published_twins(dataset: Path, published: Path)
     assert "| CC0-1.0 | 1 | 0 |" in text and "unknown" not in text
     pictures = re.findall(r"!\[.*?\]\((.*?)\)", text)
     assert pictures and all((published / picture).is_file() for picture in pictures)
+
+
+def test_each_part_of_a_twin_and_what_retired_means_are_told(published: Path) -> None:
+    text = (published / "README.md").read_text()
+    parts = (RECORD, "visual.glb", "collision.zip", FACE_PARTS, FACE_LINKS, SHAPE, "grasps.parquet", "card.png", RUN)
+    assert [part for part in parts if f"| `{part}` |" not in text] == []
+    assert "`retired`" in text
 
 
 @pytest.mark.parametrize(("count", "word"), [(0, "n<1K"), (999, "n<1K"), (1000, "1K<n<10K"), (100_000, "100K<n<1M")])

@@ -172,6 +172,9 @@ for folder in manitwin.unpack_shard("{shard}", "unpacked"):
 | `twin.json` | everything that is known of the object, with sources, intervals and the sha256 of every file |
 | `visual.glb` | the textured mesh, metres, Y-up (glTF's rule) |
 | `collision.zip` | convex hulls `hull_00.obj` ..., metres, object frame, stored uncompressed |
+| `face_parts.npy` | of each face of `visual.glb` the number of its part in `twin.json`, 255 for none; where parts are known |
+| `face_links.npy` | of a twin with joints: the link of each face likewise |
+| `shape.json` | 66 numbers that describe the shape, and its radius of gyration |
 | `grasps.parquet` | every grasp that was tried, held or failed |
 | `rgb_00.webp` ... | pictures from eight sides |
 | `marked_00.webp` ... | the same with the numbered candidate points |
@@ -194,6 +197,7 @@ SI units everywhere: metres, kilograms, seconds, newtons, radians. Quaternions a
 - `outcome` of a grasp is `held`, or where it failed: collides, unreachable, misses, penetrates, drops, unstable, slips.
   A `proposer` that ends in `:unfiltered` is a sample taken before any filter, one that ends in `:jittered` a negative
   control: leave both out of success rates.
+- A grasp that is `retired` was verified, and then failed with a robot's arm or was taken back by a person: do not use it.
 - Mass, friction and size are estimates with an interval unless `mass_source` says `measured`."""
 
 
