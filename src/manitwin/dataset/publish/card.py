@@ -172,7 +172,7 @@ for folder in manitwin.unpack_shard("{shard}", "unpacked"):
 | `twin.json` | everything that is known of the object, with sources, intervals and the sha256 of every file |
 | `visual.glb` | the textured mesh, metres, Y-up (glTF's rule) |
 | `collision.zip` | convex hulls `hull_00.obj` ..., metres, object frame, stored uncompressed |
-| `face_parts.npy` | of each face of `visual.glb` the number of its part in `twin.json`, 255 for none; where parts are known |
+| `face_parts.npy` | the part of each face of `visual.glb` but those without area: its place in `twin.json`, 255 for none |
 | `face_links.npy` | of a twin with joints: the link of each face likewise |
 | `shape.json` | 66 numbers that describe the shape, and its radius of gyration |
 | `grasps.parquet` | every grasp that was tried, held or failed |
