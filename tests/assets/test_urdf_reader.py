@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from manitwin.assets.read import read_asset
 from manitwin.errors import AssetError
 from manitwin.formats.glb import write_glb
-from manitwin.formats.meshes.textures import make_part, pbr_material
+from manitwin.formats.meshes.textures import make_part, material_of, pbr_material
 
 BOX_SHAPE = '<geometry><box size="0.1 0.2 0.4"/></geometry>'
 
@@ -41,6 +41,23 @@ def test_origin_and_scale_are_applied_to_the_mesh(tmp_path: Path) -> None:
         f.name for f in tmp_path.glob("material*")
     }
     assert (asset.format, asset.name, asset.up, asset.unit_m) == ("urdf", "thing", "z", 1.0)
+
+
+def test_a_mesh_without_a_material_has_the_colour_of_its_visual(tmp_path: Path) -> None:
+    box = trimesh.creation.box([1, 1, 1])
+    for name in ("box.stl", "bare.obj"):
+        box.export(tmp_path / name)
+    (tmp_path / "lost.mtl").write_text("newmtl lost\nmap_Kd gone.png\n")
+    (tmp_path / "lost.obj").write_text(f"mtllib lost.mtl\nusemtl lost\n{(tmp_path / 'bare.obj').read_text()}")
+    (tmp_path / "own.mtl").write_text("newmtl own\nKd 1 0 0\n")
+    (tmp_path / "own.obj").write_text(f"mtllib own.mtl\nusemtl own\n{(tmp_path / 'bare.obj').read_text()}")
+    visuals = "".join(
+        f'<visual><geometry><mesh filename="{name}"/></geometry><material name="m"><color rgba="0 0 1 1"/></material></visual>'
+        for name in ("box.stl", "bare.obj", "lost.obj", "own.obj")
+    )
+    asset = read_asset(urdf(tmp_path, f'<link name="l">{visuals}</link>'))
+    colors = [material_of(part).baseColorFactor[:3].tolist() for part in asset.visual]
+    assert colors == [[0, 0, 255], [0, 0, 255], [204, 204, 204], [255, 0, 0]]
 
 
 def test_primitives_have_the_volume_of_what_they_say(tmp_path: Path) -> None:

@@ -17,12 +17,18 @@ from manitwin.assets.obj_groups import obj_groups
 from manitwin.assets.readers.upright import Y_UP_FORMATS
 from manitwin.assets.root import upward
 from manitwin.formats.meshes.read import MeshFile
-from manitwin.formats.meshes.textures import DEFAULT_COLOR, bake_transform, make_part, pbr_material, srgb_to_linear
+from manitwin.formats.meshes.textures import (
+    DEFAULT_COLOR,
+    bake_transform,
+    make_part,
+    material_of,
+    pbr_material,
+    srgb_to_linear,
+)
 from manitwin.geometry.poses import GLTF_TO_OBJECT, transform_points
 from manitwin.robots.urdf import UrdfTree, geometry_of, origin_of, values_of
 
 _SCHEMES = ("package://", "model://")
-_BARE_MESHES = (".stl",)  # a mesh that has a colour of its own keeps it
 
 
 class LinkShapes:
@@ -174,16 +180,27 @@ def mesh_parts(
 ) -> list[trimesh.Trimesh]:
     """Return the parts of a mesh file that a description names, in metres and scaled by ``(3,)``.
 
-    COLLADA's unit counts and its up axis does not, which ``turned_note`` says. A file without colours takes ``color``.
+    COLLADA's unit counts and its up axis does not, which ``turned_note`` says. Parts without a material take ``color``.
     """
     if mesh.format == "dae" and mesh.up == "y":
         files.remark(f"{path.name}: its COLLADA says that Y is up; {turned_note}")
     unit_m = mesh.unit_m if mesh.format == "dae" and mesh.unit_m is not None else 1.0
     factors = np.ones(3) if scale is None else scale
     parts = [bake_transform(part, np.diag([*(factors * unit_m), 1.0])) for part in mesh.parts]
-    if color is None or path.suffix.lower() not in _BARE_MESHES:
+    if color is None or mesh.format == "ply":  # a PLY whose texture is lost looks like one that has none
         return parts
-    return [make_part(p.vertices, p.faces, material=plain_material(color), name=p.metadata["name"]) for p in parts]
+    return [
+        make_part(p.vertices, p.faces, material=plain_material(color), name=p.metadata["name"]) if _is_bare(p) else p
+        for p in parts
+    ]
+
+
+def _is_bare(part: trimesh.Trimesh) -> bool:
+    """Whether a mesh file gives a part no material: what has one, also one whose texture is lost, keeps it."""
+    material = material_of(part)
+    grey = np.round(np.multiply(DEFAULT_COLOR, 255)).astype(int)
+    is_grey = np.array_equal(np.asarray(material.baseColorFactor)[:3].astype(int), grey)
+    return material.name is None and material.baseColorTexture is None and is_grey
 
 
 def plain_material(rgba: np.ndarray | None) -> trimesh.visual.material.PBRMaterial:
