@@ -120,6 +120,7 @@ def test_labels_without_an_accepted_twin_are_named(place: Path, tmp_path: Path) 
         ("file,plausible_mass_low_kg,plausible_mass_high_kg\na,1,\n", "not two numbers"),
         ("file,plausible_mass_low_kg,plausible_mass_high_kg\na,2,1\n", "no interval above 0"),
         ("file,plausible_mass_low_kg,plausible_mass_high_kg\na,nan,1\n", "no interval above 0"),
+        ("file,typical_grasp_type\na,paralel jaw\n", "did you mean 'parallel_jaw'"),
     ],
 )
 def test_labels_that_cannot_be_read_are_one_line(tmp_path: Path, content: str, message: str) -> None:
@@ -127,6 +128,12 @@ def test_labels_that_cannot_be_read_are_one_line(tmp_path: Path, content: str, m
     path.write_text(content)
     with pytest.raises(UsageError, match=message):
         read_labels(path)
+
+
+@pytest.mark.parametrize("said", ["parallel_jaw;pinch", "parallel jaw; Pinch", "parallel-jaw;pinch"])
+def test_grasp_types_may_be_written_as_words(tmp_path: Path, said: str) -> None:
+    (label,) = read_labels(labels(tmp_path, {"file": "a", "typical_grasp_type": said}))
+    assert label.grasp_types == ("parallel_jaw", "pinch")
 
 
 def test_interval_is_wilsons() -> None:

@@ -6,9 +6,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import get_args
 
 from manitwin.errors import UsageError, choose_from
 from manitwin.formats.csv_file import read_csv
+from manitwin.twin.point_records import GraspType
 
 LIST_COLUMNS = (
     "category_synonyms", "colors", "materials", "functional_parts", "good_grasp_regions", "bad_grasp_regions",
@@ -19,6 +21,7 @@ NUMBER_COLUMNS = (
 )  # fmt: skip
 COLUMNS = ("file", "twin_id", "kind", "category", *LIST_COLUMNS, *NUMBER_COLUMNS, "hollow", "stands_upright", "notes")
 MOST_ROWS = 1_000_000
+GRASP_TYPES: tuple[str, ...] = get_args(GraspType)
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,7 @@ class Label:
 
 
 def read_labels(path: Path) -> list[Label]:
-    """Read a file of labels; raises UsageError naming the line where a column is unknown or a number is none."""
+    """Read a file of labels; raises UsageError naming the line where a column or a grasp type is unknown or a number is none."""
     labels: list[Label] = []
     for line, row in read_csv(path, UsageError):
         for name in row:
@@ -85,10 +88,18 @@ def _label(said: Mapping[str, str], where: str) -> Label:
         parts=tuple(part.partition("=")[0].strip() for part in lists["functional_parts"]),
         good_regions=lists["good_grasp_regions"],
         bad_regions=lists["bad_grasp_regions"],
-        grasp_types=lists["typical_grasp_type"],
+        grasp_types=tuple(_grasp_type(said, where) for said in lists["typical_grasp_type"]),
         mass_kg=_interval(said, "plausible_mass_low_kg", "plausible_mass_high_kg", where),
         longest_side_m=_interval(said, "longest_side_low_m", "longest_side_high_m", where),
     )
+
+
+def _grasp_type(said: str, where: str) -> str:
+    """Return a grasp type by its name in records; people, and this program in words, write "parallel jaw"."""
+    name = "_".join(said.lower().replace("-", " ").split())
+    if name not in GRASP_TYPES:
+        raise UsageError(f"{where}: {choose_from('typical_grasp_type', said, GRASP_TYPES)}")
+    return name
 
 
 def _list(text: str) -> tuple[str, ...]:
