@@ -106,3 +106,7 @@ def test_twin_without_parallel_grasps_is_refused() -> None:
 
 def test_same_twin_gives_the_same_bytes() -> None:
     assert isaac_grasp.export(tray()) == isaac_grasp.export(tray())
+
+
+def test_that_graspgen_takes_another_frame_is_said() -> None:
+    assert any("closes along Y" in line and "graspgen" in line for line in isaac_grasp.export(brick()).cannot_say)

@@ -54,6 +54,12 @@ def export(twin: TwinContent) -> Exported:
             "mass, inertia and friction of the object: grasp_sim takes them as arguments.",
             "why a grasp failed: the format has a confidence of 0.0.",
             *(
+                f"poses of GraspGen's hand: its tools read this format too, but their hand closes along X, and these are of"
+                f" {ASSETS[gripper].base_link}, which closes along Y. Turn them by a quarter about Z, or take graspgen."
+                for gripper in grippers
+                if gripper in ASSETS
+            ),
+            *(
                 f"the model of {name}: its USD, links and joints are not known here, and the poses are of the grasp frame (+Z"
                 " approach, X closing); grasp_sim needs --gripper_file, --finger_colliders and --grasp_file_cspace_position."
                 for name in unknown
