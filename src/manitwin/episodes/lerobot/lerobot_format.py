@@ -21,6 +21,8 @@ DATA_FILES_SIZE_IN_MB, VIDEO_FILES_SIZE_IN_MB = 100, 200
 DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 EPISODES_PATH = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 VIDEO_PATH = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
+CODEC = "camera.codec"
+"""The key of a video feature's ``info`` for the codec of its files."""
 
 DEFAULT_FEATURES: dict[str, str] = {
     "timestamp": "float32",

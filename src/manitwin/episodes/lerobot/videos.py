@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from manitwin.episodes.lerobot.feature_statistics import Statistics
-from manitwin.episodes.lerobot.lerobot_format import QUANTILES, VIDEO_PATH, place_of, video_key
+from manitwin.episodes.lerobot.lerobot_format import CODEC, QUANTILES, VIDEO_PATH, place_of, video_key
 from manitwin.episodes.recording import RATE_HZ
 from manitwin.errors import EpisodesError
 from manitwin.formats.bounded_file import open_regular, with_remedy
@@ -24,6 +24,7 @@ _CODECS = {
     **dict.fromkeys(("mp4v", "FMP4", "MP4V"), "mpeg4"),
     **dict.fromkeys(("hev1", "hvc1", "hevc"), "hevc"),
 }
+_ENCODED_BY_LEROBOT = ("av1", "h264", "hevc")
 _SAMPLED_FRAMES = 50
 """Of an episode's pictures so many at most are looked at for statistics (lerobot: 100)."""
 
@@ -141,7 +142,11 @@ class VideoColumns:
 
     @property
     def info(self) -> dict[str, Any]:
-        """The entry of info.json."""
+        """The entry of info.json.
+
+        ``video.codec`` is there only of codecs that LeRobot encodes with: its tools (0.6) take it for what they cut, and split
+        no set and delete no episode where it is another one. Without it they take their default, AV1.
+        """
         assert self.facts is not None  # a set has at least one episode, and each has a clip
         facts = self.facts
         return {
@@ -151,12 +156,13 @@ class VideoColumns:
             "info": {
                 "video.height": facts.height_px,
                 "video.width": facts.width_px,
-                "video.codec": facts.codec,
                 "video.pix_fmt": "yuv420p",
                 "video.is_depth_map": False,
                 "video.fps": RATE_HZ,
                 "video.channels": 3,
                 "has_audio": False,
+                CODEC: facts.codec,
+                **({"video.codec": facts.codec} if facts.codec in _ENCODED_BY_LEROBOT else {}),
                 **self.videos.pinhole,
             },
         }

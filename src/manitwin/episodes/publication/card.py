@@ -9,6 +9,7 @@ from typing import Any
 from manitwin.dataset.publish.card import front_matter, licence_section
 from manitwin.dataset.publish.licences import LICENSES_MD
 from manitwin.episodes.attempts import ATTEMPTS, Success, Tally
+from manitwin.episodes.lerobot.lerobot_format import CODEC
 from manitwin.formats.markdown import markdown_escaped, table
 
 TAGS = ("LeRobot", "robotics", "manipulation", "pick-and-place", "simulation", "synthetic")
@@ -119,7 +120,7 @@ def _cameras(info: Mapping[str, Any]) -> str:
     if not films:
         return "none: no pictures were drawn"
     return ", ".join(
-        f"{name.rpartition('.')[2]} ({film['video.width']} x {film['video.height']}, {film['video.codec']})"
+        f"{name.rpartition('.')[2]} ({film['video.width']} x {film['video.height']}, {film.get(CODEC) or film['video.codec']})"
         for name, film in films.items()
     )
 
