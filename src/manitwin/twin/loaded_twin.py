@@ -163,7 +163,7 @@ class Twin:
     def grasps(self, verified_only: bool = True, gripper: str | None = None) -> Grasps:
         """Return the grasps of a gripper (by default the one that the twin was verified with).
 
-        Leaves out the unfiltered sample and the jittered controls.
+        Leaves out the unfiltered sample and the jittered controls. Retired grasps are there: ``columns["retired"]`` says which.
         """
         self.physical  # noqa: B018
         table = self.grasp_table().to_pydict()
