@@ -74,7 +74,7 @@ def parallel_grippers_of(twin: TwinContent) -> list[str]:
 
 
 def grasp_rows(twin: TwinContent, gripper: str, *, controls: bool) -> GraspRows:
-    """Return a gripper's grasps, held and failed, but those that a person has retired.
+    """Return a gripper's grasps, held and failed, but those that are retired.
 
     With ``controls`` also the unfiltered sample and the jittered ones: their verdicts are as true as the others'.
     """

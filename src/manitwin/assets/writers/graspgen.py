@@ -31,7 +31,7 @@ def export(twin: TwinContent) -> Exported:
 
     The object root is ``objects/``, the grasp root ``grasp_data/<gripper>/``, the splits' ``splits/<gripper>/``. Which split
     an object is in follows from the twin's id. The mesh is the visual one in the object frame, +Z up. Grasps that failed
-    are in it, with ``object_in_gripper`` false; those that a person has retired are not. Raises ExportError for a twin with
+    are in it, with ``object_in_gripper`` false; those that are retired are not. Raises ExportError for a twin with
     grasps of no parallel gripper.
     """
     grippers = parallel_grippers_of(twin)

@@ -197,7 +197,7 @@ SI units everywhere: metres, kilograms, seconds, newtons, radians. Quaternions a
 - `outcome` of a grasp is `held`, or where it failed: collides, unreachable, misses, penetrates, drops, unstable, slips.
   A `proposer` that ends in `:unfiltered` is a sample taken before any filter, one that ends in `:jittered` a negative
   control: leave both out of success rates.
-- A grasp that is `retired` was verified, and then failed with a robot's arm or was taken back by a person: do not use it.
+- A grasp that is `retired` was verified, and failed with a robot's arm since: do not use it.
 - Mass, friction and size are estimates with an interval unless `mass_source` says `measured`."""
 
 
