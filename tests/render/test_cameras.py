@@ -72,6 +72,13 @@ def test_hero_shows_the_broad_side() -> None:
     assert abs(backward[1]) > 0.7
 
 
+def test_hero_of_a_photo_is_on_its_side_though_more_is_seen_from_behind() -> None:
+    points = trimesh.creation.box([0.3, 0.02, 0.2]).vertices
+    points[points[:, 2] > 0, 1] -= 0.1  # it leans forward
+    assert hero_camera(points, **FRAMING).camera_to_object[1, 2] > 0.5
+    assert hero_camera(points, **FRAMING, from_front=True).camera_to_object[1, 2] < -0.5
+
+
 def test_pixel_rays_come_back_to_their_pixels() -> None:
     camera = Camera(look_at(np.array([1.0, 2.0, 0.5]), np.zeros(3)), 0.7, 31, 17)
     origins, directions = pixel_rays(camera)

@@ -26,6 +26,7 @@ ORBIT_ASPECTS = (1.0, 1.62, 2.62, 4.24)
 """Long by short side of the pictures: steps so close that a thing fills 60 % of both sides, up to one of 1 : 6."""
 HERO_ELEVATION_DEG, HERO_FLAT_ELEVATION_DEG = 26.0, 50.0
 FLAT = 0.3  # height, in the longer side of the footprint, below which a thing lies rather than stands
+AZIMUTHS_DEG, FRONT_AZIMUTHS_DEG = np.arange(-60.0, 300.0, 30.0), np.array([-60.0, -90.0, -120.0])
 FILL = 0.88  # share of the picture's half width that the silhouette may reach
 
 
@@ -170,17 +171,20 @@ def _fitted_camera(
     return shaped(long_px, short_px) if width > height else shaped(short_px, long_px)
 
 
-def hero_camera(points: np.ndarray, *, fov_y_deg: float, width_px: int, height_px: int) -> Camera:
+def hero_camera(
+    points: np.ndarray, *, fov_y_deg: float, width_px: int, height_px: int, from_front: bool = False
+) -> Camera:
     """Return the camera, of twelve three-quarter views, that shows the object best: much of it, and large.
 
     That is the largest silhouette in the object's unit. Flat things are seen from higher up, and turned towards the
-    picture's diagonal: there the area in the picture counts too.
+    picture's diagonal: there the area in the picture counts too. ``from_front``: what is not flat is seen from the side
+    of -Y, where a photo showed it.
     """
     extents = np.ptp(points, axis=0)
     flat = extents[2] < FLAT * extents[:2].max()
     elevation = HERO_FLAT_ELEVATION_DEG if flat else HERO_ELEVATION_DEG
     best: tuple[float, Camera] | None = None
-    for azimuth in np.arange(-60.0, 300.0, 30.0):
+    for azimuth in FRONT_AZIMUTHS_DEG if from_front and not flat else AZIMUTHS_DEG:
         camera = framing_camera(
             points,
             azimuth_deg=float(azimuth),

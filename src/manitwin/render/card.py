@@ -74,12 +74,12 @@ def make_card(
 
     ``parts`` are the textured meshes, ``solid`` the repaired one, ``hulls`` the vertices ``(V, 3)`` of each collision
     hull, all in the object frame in metres; ``mass`` is drawn over the hulls. The first column shows
-    ``photo (H, W, 3 or 4) uint8`` or ``prompt``; where the input was a mesh it shows the bare shape. Raises RendererMissing
-    where nothing renders.
+    ``photo (H, W, 3 or 4) uint8``, whose side the others show too, or ``prompt``; where the input was a mesh it shows the
+    bare shape. Raises RendererMissing where nothing renders.
     """
     mesh = merged(list(parts))
     outline = convex_corners(np.asarray(mesh.vertices))[0]  # all that a camera's choice depends on
-    hero = hero_camera(outline, fov_y_deg=FOV_Y_DEG, width_px=PANEL, height_px=PANEL)
+    hero = hero_camera(outline, fov_y_deg=FOV_Y_DEG, width_px=PANEL, height_px=PANEL, from_front=photo is not None)
     if photo is not None:
         first, caption = input_panel(photo, PANEL), "input photo, cut out"
     elif prompt is not None:

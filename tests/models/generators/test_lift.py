@@ -75,6 +75,18 @@ def test_rectangle_is_a_box_of_said_depth() -> None:
     )
 
 
+@pytest.mark.parametrize(("volume_share", "thick"), [(0.01, 0.02), (0.0001, 0.01), (None, 0.06)])
+def test_a_flat_box_has_the_volume_of_its_category_but_for_a_least_thickness(
+    volume_share: float | None, thick: float
+) -> None:
+    lifted = lift(
+        _drawn([(200, 100), (400, 100), (400, 500), (200, 500)]),
+        ShapeHint(boxy=True, flat=True, volume_share=volume_share),
+    )
+    assert lifted.notes["primitive"] == "box" and lifted.notes["rests"] == "lying"
+    assert np.sort(np.ptp(lifted.surface.vertices, axis=0)) == pytest.approx([thick, 0.5, 1.0], abs=0.005)
+
+
 def test_disc_is_a_sphere_with_a_flat_base() -> None:
     circle = [(300 + 200 * math.cos(a), 300 + 200 * math.sin(a)) for a in np.linspace(0, 2 * math.pi, 200)]
     lifted = lift(_drawn(circle), NO_HINT)

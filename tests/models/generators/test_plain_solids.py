@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import cv2
 import numpy as np
 import pytest
 
 from manitwin.errors import Rejected
+from manitwin.models.generators.lift import made_photo
 from manitwin.models.generators.lift.hint import ShapeHint
 from manitwin.models.generators.lift.made_photo import from_photo
 from manitwin.models.generators.lift.plain_solids import plain_solid
+from manitwin.models.generators.templates.fitting.fit import fit
+from manitwin.models.generators.templates.fitting.residual import Residual
 from manitwin.models.generators.templates.fitting.view import View, normalised
 
 SIDE_PX = 640
@@ -86,3 +91,18 @@ def test_what_is_said_to_be_open_or_of_another_form_is_not_tried() -> None:
     assert plain_solid(slab, ShapeHint(container=True)) is None
     assert plain_solid(slab, ShapeHint(round=True)) is None
     assert plain_solid(slab, ShapeHint(flat=True)) is not None
+
+
+@pytest.mark.parametrize(("outline", "primitive"), [(0.0029, "box"), (0.0018, "shape of template:remote control")])
+def test_the_front_of_a_box_is_a_likely_thing_seen_at_an_angle_only_where_that_explains_it_closely(
+    outline: float, primitive: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    front = np.zeros((SIDE_PX, SIDE_PX, 4), np.uint8)
+    cv2.rectangle(front, (120, 60), (520, 580), TOP, -1)
+    cv2.rectangle(front, (120, 60), (240, 122), (0, 0, 0, 0), -1)  # a torn corner: no rectangle explains all
+    slab = fit("remote control", front)
+    assert slab is not None
+    close = dataclasses.replace(slab, residual=Residual(0.9862, outline, 0.2, 0.3, 0.0, 200))
+    monkeypatch.setattr(made_photo, "fit", lambda *arguments, **options: close)
+    job = from_photo(front, None, likely=[("remote control", 0.4)])
+    assert job.notes["primitive"] == primitive

@@ -27,6 +27,7 @@ from manitwin.models.generators.lift.surface import (
 from manitwin.models.generators.lift.texture import Crop
 
 _FLAT_BOX_DEPTH_SHARE = 0.12  # of the shorter side: a book, a tray
+_LEAST_FLAT_SHARE = 0.02  # a card is thinner, but hulls and fingertips need a body
 UPRIGHT_TILT_DEG = 20.0  # an axis that leans less stands in the photo
 LEANING_DEG = 3.0  # what leans more is set upright about its own axis, as if seen from the side
 LEAST_BODY_SHARE = 0.55  # of the outline: the body that a round container's handles and spouts stick out of
@@ -182,13 +183,22 @@ def _in_picture(surface: LiftedSurface, silhouette: Silhouette) -> LiftedSurface
 def boxed(view: View, hint: ShapeHint) -> Made:
     """Return a box whose front is the outline's rectangle."""
     flat = hint.flat or hint.stands is False
-    share = _FLAT_BOX_DEPTH_SHARE if flat else DEPTH_SHARE
+    share = _flat_share(view.silhouette, hint) if flat else DEPTH_SHARE
     surface = make_box(view.silhouette, depth_share=share)
     # a box's own axes are those of its rectangle: it is compared by that
     found = Explained(view.silhouette.rectangle_iou)
     if flat:
-        return Made(laid(surface), found, {"rests": "lying", "depth_share": share})
+        return Made(laid(surface), found, {"rests": "lying", "depth_share": round(share, 4)})
     return Made(surface, found, {"rests": "standing", "depth_share": share})
+
+
+def _flat_share(silhouette: Silhouette, hint: ShapeHint) -> float:
+    """Return the thickness of a flat box over its shorter side: that of the usual volume of its category, where it is known."""
+    if not hint.flat or hint.volume_share is None:
+        return _FLAT_BOX_DEPTH_SHARE
+    sides = np.linalg.norm(np.diff(silhouette.corners[:3], axis=0), axis=1)
+    long, short = float(sides.max()), float(sides.min())
+    return float(np.clip(hint.volume_share * (long / short) ** 2, _LEAST_FLAT_SHARE, DEPTH_SHARE))
 
 
 def inflated(view: View, hint: ShapeHint) -> Made:

@@ -16,7 +16,7 @@ from manitwin.geometry.poses import GLTF_TO_OBJECT
 from manitwin.models.annotators.priors import lookup
 from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name, is_cylinder, why_no_cylinder, why_not_round
 from manitwin.models.generators.lift.lifting import DISC_ELLIPSE_IOU, Lifted, lift
-from manitwin.models.generators.lift.plain_solids import PRIMITIVES, plain_solid
+from manitwin.models.generators.lift.plain_solids import PRIMITIVES, explains_closely, plain_solid
 from manitwin.models.generators.lift.seen_corners import box_from_corner
 from manitwin.models.generators.lift.surface import unseen_share
 from manitwin.models.generators.lift.texture import beside
@@ -213,7 +213,12 @@ def _plain(plain: Fitted, rgba: np.ndarray) -> Job:
 
 
 def _is_preferred(fitted: Fitted, lifted: Lifted) -> bool:
-    """Whether a template is to be preferred to a solid that needs no name; an inflated outline explains nothing."""
+    """Whether a template is to be preferred to a solid that needs no name; an inflated outline explains nothing.
+
+    The front of a box, its corners round or seen from near, is what many flat things seen at an angle nearly look like.
+    """
+    if lifted.notes["primitive"] == "box" and not explains_closely(fitted.residual):
+        return False
     return lifted.notes["primitive"] == "inflation" or _explains_more(fitted, lifted.explained.silhouette_iou)
 
 

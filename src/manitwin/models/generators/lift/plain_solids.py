@@ -17,6 +17,7 @@ from manitwin.models.generators.lift.hint import ShapeHint
 from manitwin.models.generators.templates.fitting.evidence import evidence_of
 from manitwin.models.generators.templates.fitting.fit import Fitted, fitted, made_of
 from manitwin.models.generators.templates.fitting.least_squares import Placed
+from manitwin.models.generators.templates.fitting.residual import Residual
 from manitwin.models.generators.templates.fitting.search import Candidate, search
 from manitwin.models.generators.templates.fitting.shape import Family
 from manitwin.models.generators.templates.template import Measure, Model, Template
@@ -113,11 +114,15 @@ def _may_be(solid: Template, hint: ShapeHint) -> bool:
     return True
 
 
+def explains_closely(left: Residual) -> bool:
+    """Tell whether hardly anything is left unexplained: neither of the outline nor of the solid's inner edges."""
+    return left.iou >= LEAST_IOU and left.outline <= MOST_OUTLINE and left.edges <= MOST_EDGES_MISSING
+
+
 def _explains(candidate: Candidate) -> bool:
-    left = candidate.residual
-    seen = left.iou >= LEAST_IOU and left.outline <= MOST_OUTLINE and left.edges <= MOST_EDGES_MISSING
     thick = candidate.family.measures(candidate.spreads).get("thick", 0.0)
-    return candidate.upright and seen and not (candidate.family.template.build is _disc and thick > MOST_DISC)
+    is_close = candidate.upright and explains_closely(candidate.residual)
+    return is_close and not (candidate.family.template.build is _disc and thick > MOST_DISC)
 
 
 def _solidity(mask: np.ndarray) -> float:
