@@ -44,6 +44,8 @@ from manitwin.render.renderer import BACKDROP, shared_renderer
 from manitwin.twin.loaded_twin import Twin
 
 ELEVATIONS_DEG = (12.0, 35.0, 62.0)
+SEEN_IN_PHOTOS = {"envelope": 0.820, "mobile phone": 0.866, "remote control": 0.845}
+"""What real photos of other things (a plastic folder, a calculator, a pencil box) gave these names: more than any render did."""
 LIMITS = (0.5, 0.6, 0.7, 0.8, 0.9)
 LIMIT = NamingConfig().min_probability
 WITHIN = 1.6
@@ -96,6 +98,7 @@ def main() -> None:
         print_sizes(f"half {half}", part, highest_wrong(halves[1 - half]))
     if arguments.limits:
         highest = highest_wrong(rows)
+        highest |= {name: max(value, highest[name]) for name, value in SEEN_IN_PHOTOS.items()}
         with arguments.limits.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(["name", "highest_wrong"])
