@@ -26,7 +26,8 @@ ORBIT_ASPECTS = (1.0, 1.62, 2.62, 4.24)
 """Long by short side of the pictures: steps so close that a thing fills 60 % of both sides, up to one of 1 : 6."""
 HERO_ELEVATION_DEG, HERO_FLAT_ELEVATION_DEG = 26.0, 50.0
 FLAT = 0.3  # height, in the longer side of the footprint, below which a thing lies rather than stands
-AZIMUTHS_DEG, FRONT_AZIMUTHS_DEG = np.arange(-60.0, 300.0, 30.0), np.array([-60.0, -90.0, -120.0])
+HERO_AZIMUTHS_DEG = np.arange(-60.0, 300.0, 30.0)
+HERO_FRONT_AZIMUTHS_DEG = np.array([-60.0, -90.0, -120.0])  # about -Y, the front of what was made of a photo
 FILL = 0.88  # share of the picture's half width that the silhouette may reach
 
 
@@ -184,7 +185,7 @@ def hero_camera(
     flat = extents[2] < FLAT * extents[:2].max()
     elevation = HERO_FLAT_ELEVATION_DEG if flat else HERO_ELEVATION_DEG
     best: tuple[float, Camera] | None = None
-    for azimuth in FRONT_AZIMUTHS_DEG if from_front and not flat else AZIMUTHS_DEG:
+    for azimuth in HERO_FRONT_AZIMUTHS_DEG if from_front and not flat else HERO_AZIMUTHS_DEG:
         camera = framing_camera(
             points,
             azimuth_deg=float(azimuth),

@@ -74,8 +74,8 @@ def make_card(
 
     ``parts`` are the textured meshes, ``solid`` the repaired one, ``hulls`` the vertices ``(V, 3)`` of each collision
     hull, all in the object frame in metres; ``mass`` is drawn over the hulls. The first column shows
-    ``photo (H, W, 3 or 4) uint8``, whose side the others show too, or ``prompt``; where the input was a mesh it shows the
-    bare shape. Raises RendererMissing where nothing renders.
+    ``photo (H, W, 3 or 4) uint8``, whose side the next two show, or ``prompt``; where the input was a mesh it shows the bare
+    shape. Raises RendererMissing where nothing renders.
     """
     mesh = merged(list(parts))
     outline = convex_corners(np.asarray(mesh.vertices))[0]  # all that a camera's choice depends on

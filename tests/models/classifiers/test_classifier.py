@@ -34,6 +34,9 @@ def test_every_name_is_one_that_the_priors_know_and_no_class_counts_twice() -> N
     assert table.members.shape == (len(table.names), CLASSES) and table.members.sum(axis=0).max() == 1
     assert table.general_members.sum(axis=0).max() == 1
     assert load_limits().keys() == {*table.names, *table.general} and max(load_limits().values()) <= 1
+    # what real photos of a folder, a calculator and a pencil box were called, surer than any render
+    for name, wrong in (("envelope", 0.82), ("mobile phone", 0.866), ("remote control", 0.845)):
+        assert load_limits()[name] >= wrong
     hammer, cup = table.members[table.names.index("hammer")], table.members[table.names.index("cup")]
     assert np.flatnonzero(hammer).tolist() == [587] and np.flatnonzero(cup).tolist() == [967, 968]
 

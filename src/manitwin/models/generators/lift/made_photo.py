@@ -190,8 +190,9 @@ def _without_name(
     """
     fitted = _best_template(rgba, likely, focal_mm)
     if plain is not None:
-        better = fitted is not None and fitted.residual.cost < plain.residual.cost
-        return _of_likely_name(fitted, rgba) if better and fitted is not None else _plain(plain, rgba)
+        if fitted is not None and fitted.residual.cost < plain.residual.cost:
+            return _of_likely_name(fitted, rgba)
+        return _plain(plain, rgba)
     try:
         lifted = lift(rgba, ShapeHint())
     except Rejected:

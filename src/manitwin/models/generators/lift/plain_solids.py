@@ -12,11 +12,10 @@ from functools import cache
 import cv2
 import numpy as np
 
-from manitwin.geometry.solids.shapes import SolidError, box, cylinder, prism, rectangle
+from manitwin.geometry.solids.shapes import box, cylinder, prism, rectangle
 from manitwin.models.generators.lift.hint import ShapeHint
 from manitwin.models.generators.templates.fitting.evidence import evidence_of
-from manitwin.models.generators.templates.fitting.fit import Fitted, fitted, made_of
-from manitwin.models.generators.templates.fitting.least_squares import Placed
+from manitwin.models.generators.templates.fitting.fit import Fitted, first_built
 from manitwin.models.generators.templates.fitting.residual import Residual
 from manitwin.models.generators.templates.fitting.search import Candidate, search
 from manitwin.models.generators.templates.fitting.shape import Family
@@ -46,13 +45,7 @@ def plain_solid(rgba: np.ndarray, hint: ShapeHint, focal_mm: float | None = None
         return None
     evidence = evidence_of(rgba, focal_mm)
     found = [best for solid in tried for best in search([Family(solid)], evidence, settled=True)[:1]]
-    for best in sorted(filter(_explains, found), key=lambda each: each.residual.cost):
-        try:
-            made = made_of(best.family.template, best.family.measures(best.spreads))
-        except SolidError:
-            continue
-        return fitted(made, Placed(best.view, best.upright), best.residual, evidence)
-    return None
+    return first_built(sorted(filter(_explains, found), key=lambda each: each.residual.cost), evidence)
 
 
 @cache
@@ -105,13 +98,12 @@ def _disc(*, width_m: float, thick: float) -> Model:
 
 def _may_be(solid: Template, hint: ShapeHint) -> bool:
     """Whether a solid may be what the hint tells of: what is open at the top is none of them."""
+    kind = PRIMITIVES[solid.category]
     if hint.container:
         return False
     if hint.round:
-        return solid.build is _disc or (solid.build is _cylinder and not hint.flat)
-    if hint.boxy or hint.flat:
-        return solid.build in (_block, _slab)
-    return True
+        return kind == "disc" or (kind == "cylinder" and not hint.flat)
+    return kind in ("box", "slab") or not (hint.boxy or hint.flat)
 
 
 def explains_closely(left: Residual) -> bool:
@@ -120,9 +112,10 @@ def explains_closely(left: Residual) -> bool:
 
 
 def _explains(candidate: Candidate) -> bool:
-    thick = candidate.family.measures(candidate.spreads).get("thick", 0.0)
-    is_close = candidate.upright and explains_closely(candidate.residual)
-    return is_close and not (candidate.family.template.build is _disc and thick > MOST_DISC)
+    """Whether a candidate explains the photo seen by a camera that is not rolled, and is no disc that may be a bowl."""
+    family = candidate.family
+    thick = PRIMITIVES[family.template.category] == "disc" and family.measures(candidate.spreads)["thick"] > MOST_DISC
+    return candidate.upright and explains_closely(candidate.residual) and not thick
 
 
 def _solidity(mask: np.ndarray) -> float:

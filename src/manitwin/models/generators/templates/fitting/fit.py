@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,7 @@ from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.fitting.evidence import Evidence, evidence_of
 from manitwin.models.generators.templates.fitting.least_squares import Placed
 from manitwin.models.generators.templates.fitting.residual import Residual
-from manitwin.models.generators.templates.fitting.search import search
+from manitwin.models.generators.templates.fitting.search import Candidate, search
 from manitwin.models.generators.templates.fitting.shape import Family
 from manitwin.models.generators.templates.fitting.view import View
 from manitwin.models.generators.templates.looks import Look, look_of
@@ -101,7 +101,12 @@ def fit(
     templates = load_templates()
     evidence = evidence_of(rgba, focal_mm)
     families = [Family(templates[category], initial_measures), *(Family(templates[other]) for other in or_of)]
-    for best in search(families, evidence, settled=True):
+    return first_built(search(families, evidence, settled=True), evidence)
+
+
+def first_built(candidates: Iterable[Candidate], evidence: Evidence) -> Fitted | None:
+    """Return the first candidate whose measures give a solid, as found in a photo; None where none do."""
+    for best in candidates:
         try:
             made = made_of(best.family.template, best.family.measures(best.spreads))
         except SolidError:
