@@ -14,7 +14,8 @@ import cv2
 import numpy as np
 from composite_grounds import draw_ground
 from composite_shadows import draw_lamp, light_left
-from composite_things import HEIGHT_PX, WIDTH_PX, Kind, Part, draw_thing, overlaps, place_of
+from composite_shop import draw_exact_ground, shade_of_shop, shop_picture, shop_thing
+from composite_things import HEIGHT_PX, WIDTH_PX, Kind, Part, draw_thing, linear, overlaps, place_of
 from composite_variants import Variant, labelled, matched, small
 
 SEEDS: dict[Part, int] = {"tuning": 0, "held-out": 1, "calibration": 2, "training": 3}
@@ -59,10 +60,19 @@ def composite(part: Part, number: int, variant: Variant = "plain") -> Composite:
     elif variant == "matched":
         under = cv2.warpAffine(main.coverage, placements[0], (WIDTH_PX, HEIGHT_PX)) > 0.5
         things[0] = matched(own_rng, main, ground[under].mean(0) if under.any() else ground.mean((0, 1)))
+    exact = draw_exact_ground(own_rng)
+    if variant == "shop":
+        things[0] = shop_thing(own_rng, main, exact)
+        ground = np.broadcast_to(linear(exact), ground.shape).astype(np.float32)
+        setting = "shop"
     light = ground.copy()
     lamp = draw_lamp(rng)
     for thing, placement in zip(things, placements, strict=True):
         light *= light_left(rng, thing, placement, lamp)
+    if variant == "shop":
+        shade = shade_of_shop(own_rng, light / np.maximum(ground, 1e-9))
+        light = ground * shade
+    covered = np.zeros((HEIGHT_PX, WIDTH_PX), np.float32)
     truth = np.zeros((HEIGHT_PX, WIDTH_PX), bool)
     for thing, placement in zip(things, placements, strict=True):
         smooth = 0.45 * max(0.0, 1 / placement[0, 0] - 1) + 1e-3  # what is smaller than a pixel would flicker
@@ -72,8 +82,11 @@ def composite(part: Part, number: int, variant: Variant = "plain") -> Composite:
         )
         light = _over(rng, light, rgb, coverage, clear=thing.clear)
         truth |= coverage > 0.5
+        covered = np.maximum(covered, coverage)
     if main.clear:
         setting += ", clear"
+    if variant == "shop":
+        return Composite(*shop_picture(own_rng, light, covered, shade, exact), kind, main.category, setting)
     rgb = _photographed(rng, light)
     if variant == "small":
         rgb, truth = small(rgb, truth)
