@@ -188,3 +188,20 @@ def test_a_twin_whose_trial_cannot_be_repeated_is_left_out_with_the_reason(tmp_p
     done = write_affordances(tmp_path / "set", tmp_path / "out", points=60, trials=3)
     assert done.twins == 0 and "grasps.trial.force_n" in done.left_out[identity]
     assert "\n" not in done.left_out[identity]
+
+
+def test_maps_are_of_the_first_gripper_with_parallel_jaws(tmp_path: Path) -> None:
+    """A cup comes first in one twin, and is all that there is in the other."""
+    both, cup_alone = (write_thing(tmp_path / "set", number, can()) for number in range(2))
+    for identity in (both, cup_alone):
+        folder = tmp_path / "set" / twin_name(identity)
+        record = json.loads((folder / RECORD).read_bytes())
+        jaws = record["grasps"] | {"trial": tried_as_built()}
+        summary = {"summary": jaws, "reason": None, "detail": None, "transferable": 0, "transferred": 0}
+        record["grasps"] |= {"gripper": "suction"}
+        record["grasps"]["other_grippers"] = {jaws["gripper"]: summary} if identity == both else {}
+        del record["revision"], record["files"]
+        seal(folder, record)
+    done = write_affordances(tmp_path / "set", tmp_path / "out", points=200, trials=12)
+    assert (done.twins, done.with_grasp_map) == (1, 1) and list(done.left_out) == [cup_alone]
+    assert "suction has no parallel jaws" in done.left_out[cup_alone]

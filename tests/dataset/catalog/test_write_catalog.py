@@ -16,7 +16,7 @@ from manitwin.dataset.catalog.surface import surface_points
 from manitwin.dataset.catalog.write import write_catalog
 from manitwin.dataset.index.near_duplicates import NearDuplicates, NearPair
 from manitwin.dataset.index.rebuild import rebuild
-from manitwin.errors import UsageError
+from manitwin.errors import TwinError, UsageError
 from manitwin.formats.glb import write_glb
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
 from manitwin.twin.loaded_twin import Twin
@@ -172,3 +172,21 @@ def test_a_catalogue_is_the_same_again_and_never_over_another(dataset: Path, wri
         write_catalog(dataset, written)
     with pytest.raises(UsageError, match="no data set"):
         write_catalog(tmp_path, tmp_path / "out")
+
+
+def test_a_twin_that_cannot_be_read_is_left_out_with_the_reason(tmp_path: Path) -> None:
+    ids = [write_thing(tmp_path, number, thing) for number, thing in enumerate((can(), can()))]
+    rebuild(DatasetRoot(tmp_path), jobs=1)
+    (tmp_path / twin_name(ids[0]) / "visual.glb").unlink()
+    done = write_catalog(tmp_path, tmp_path / "catalog", size_px=32)
+    assert sum(done.twins.values()) == 1 and done.joined_groups == 0 and list(done.left_out) == [ids[0]]
+    listed = json.loads((tmp_path / "catalog" / "catalog.json").read_text())
+    assert [row["twin_id"] for row in listed["twins"]] == [ids[1]]
+    assert (
+        "visual.glb" in listed["left_out"][ids[0]]
+        and "visual.glb" in (tmp_path / "catalog" / "report.html").read_text()
+    )
+    (tmp_path / twin_name(ids[1]) / "visual.glb").unlink()
+    with pytest.raises(TwinError, match=r"no twin of .* can be read.*visual\.glb"):
+        write_catalog(tmp_path, tmp_path / "none", size_px=32)
+    assert not (tmp_path / "none").exists()

@@ -21,8 +21,11 @@ def catalog(
     from manitwin.dataset.catalog.write import write_catalog
 
     done = write_catalog(dataset, out, size_px=size_px, seed=seed)
+    for reason in done.left_out.values():
+        out_console.print(f"left out: {reason}")
     splits = ", ".join(f"{count:,} {name}" for name, count in done.twins.items())
     out_console.print(
         f"{sum(done.twins.values()):,} twins ({splits}) of {done.categories:,} categories, {done.pictures:,} pictures in {out};"
         f" {done.joined_groups:,} groups of near-duplicates stay together"
     )
+    raise typer.Exit(3 if done.left_out else 0)

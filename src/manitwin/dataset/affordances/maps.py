@@ -59,7 +59,7 @@ class SurfaceMaps:
 def surface_maps(twin: Twin, *, points: int, trials: int, seed: int) -> SurfaceMaps:
     """Compute the maps of a twin; without enough contacts there is no map ``grasp``. The same arguments give the same maps.
 
-    Raises TwinError for a twin that was rejected, UsageError for one of a gripper without parallel jaws.
+    Raises TwinError for a twin that was rejected, UsageError for one without a gripper of parallel jaws.
     """
     rng = np.random.default_rng([seed, zlib.crc32(twin.record.twin_id.encode())])
     vertices, faces = trimesh.util.append_faces(
@@ -75,7 +75,7 @@ def surface_maps(twin: Twin, *, points: int, trials: int, seed: int) -> SurfaceM
     sampled = sample_grasps(twin, solid, trials, rng)
     touches = {"grasp": _contacts(caster, sampled.grasps.take(np.flatnonzero(sampled.held)))}
     touches = {name: found for name, found in touches.items() if len(found[0]) >= 2 * LEAST_CONTACTS}
-    touches |= _task_contacts(twin, caster)
+    touches |= _task_contacts(twin, caster, sampled.gripper)
     maps = {name: contact_density(pool, contacts, spread_m) for name, (contacts, _) in touches.items()}
     agreement = {
         name: _agreement(pool, contacts, of_grasp, spread_m, rng)
@@ -99,9 +99,9 @@ def _agreement(
     return halves_agreement(points_m, contacts[half], contacts[~half], spread_m)
 
 
-def _task_contacts(twin: Twin, caster: RayCaster) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Return for each functional point that verified grasps serve their contacts ``(C, 3)``, and the grasp ``(C,)`` of each."""
-    grasps = twin.grasps()
+def _task_contacts(twin: Twin, caster: RayCaster, gripper: str) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Return for each functional point that a gripper's verified grasps serve their contacts ``(C, 3)``, and each one's grasp."""
+    grasps = twin.grasps(gripper=gripper)
     serves = np.array(grasps.columns["functional_point_id"], object)
     found = {}
     for point in twin.record.points.functional if twin.record.points else ():

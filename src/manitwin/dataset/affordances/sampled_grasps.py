@@ -17,6 +17,7 @@ from manitwin.physics.sapien.trial import SapienTrial
 from manitwin.pipeline.trial_replay import settings_of_trial
 from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.robots.grippers.parallel import ParallelGripper
+from manitwin.twin.grasp_summary import GraspSummary
 from manitwin.twin.loaded_twin import Twin
 
 PROPOSALS_A_ROUND, ROUNDS = 6000, 6
@@ -24,8 +25,9 @@ PROPOSALS_A_ROUND, ROUNDS = 6000, 6
 
 @dataclass(frozen=True)
 class SampledGrasps:
-    """Grasps that were tried, of which ``held (N,) bool`` did."""
+    """Grasps of a ``gripper`` that were tried, of which ``held (N,) bool`` did."""
 
+    gripper: str
     grasps: GraspProposals
     held: np.ndarray
 
@@ -34,14 +36,10 @@ def sample_grasps(twin: Twin, solid: trimesh.Trimesh, trials: int, rng: np.rando
     """Sample antipodal grasps all over a twin's surface and try ``trials`` of them as its own grasps were tried.
 
     They lie no denser at its grasp points, and nothing chooses among them; what a trial could only fail, as the open fingers
-    overlap the object, is left out before. Raises UsageError for a twin whose gripper has no
-    parallel jaws or is not one that is shipped, or whose record tells no trial that can be run.
+    overlap the object, is left out before. Raises UsageError for a twin none of whose grippers has parallel jaws, whose
+    gripper is not one that is shipped, or whose record tells no trial that can be run.
     """
-    summary = twin.record.grasps
-    assert summary is not None
-    gripper = load_gripper(summary.gripper)
-    if not isinstance(gripper, ParallelGripper):
-        raise UsageError(f"{twin.folder}: {summary.gripper} has no parallel jaws, of which alone contacts are known")
+    summary, gripper = _parallel(twin)
     body = twin.rigid_body()
     request = GraspRequest(
         solid=solid,
@@ -63,4 +61,20 @@ def sample_grasps(twin: Twin, solid: trimesh.Trimesh, trials: int, rng: np.rando
     settings = settings_of_trial(twin, summary.trial, gripper)
     trial = ConfirmedTrial(SapienTrial(), MujocoTrial())  # held is what it is in a build
     results = trial.run(body, gripper, chosen.gripper_to_object, settings)
-    return SampledGrasps(chosen, np.array([result.outcome == "held" for result in results], bool))
+    return SampledGrasps(summary.gripper, chosen, np.array([result.outcome == "held" for result in results], bool))
+
+
+def _parallel(twin: Twin) -> tuple[GraspSummary, ParallelGripper]:
+    """Return the first of a twin's grippers that has parallel jaws, of which alone contacts are known, and what it did."""
+    first = twin.record.grasps
+    assert first is not None
+    others = [other.summary for other in first.other_grippers.values() if other.summary is not None]
+    for summary in (first, *others):
+        gripper = load_gripper(summary.gripper)
+        if isinstance(gripper, ParallelGripper):
+            return summary, gripper
+    names = ", ".join(summary.gripper for summary in (first, *others))
+    raise UsageError(
+        f"{twin.folder}: {names} {'have' if others else 'has'} no parallel jaws, of which alone contacts are known;"
+        " build the twin with such a gripper too"
+    )

@@ -16,7 +16,7 @@ from manitwin.dataset.catalog.surface import POINTS, SurfacePoints, View, surfac
 from manitwin.dataset.index.near_duplicates import near_duplicates
 from manitwin.dataset.index.query import Index
 from manitwin.dataset.report_page import Picture, Section, Table, page
-from manitwin.errors import UsageError
+from manitwin.errors import TwinError, UsageError
 from manitwin.formats.image_file import png_of
 from manitwin.formats.label_picture import label_picture
 from manitwin.models.annotators.priors import lookup
@@ -32,12 +32,13 @@ SHOWN_TWINS, SHOWN_VIEWS = 24, (1, 11, 22)
 
 @dataclass(frozen=True)
 class Catalog:
-    """What was written: twins by split, pictures, categories, and groups of more than one twin."""
+    """What was written: twins by split, pictures, categories, groups of more than one twin; twins left out and why."""
 
     twins: dict[str, int]
     pictures: int
     categories: int
     joined_groups: int
+    left_out: dict[str, str]
 
 
 def write_catalog(
@@ -50,8 +51,9 @@ def write_catalog(
 ) -> Catalog:
     """Write pictures, clouds, captions and lists of all accepted twins of a local data set below ``out``, whole or not at all.
 
-    docs/catalog.md says what lies where. The same arguments give the same bytes. Raises UsageError for a data set at a URL,
-    without an index or without twins, and an ``out`` that is not empty.
+    docs/catalog.md says what lies where. The same arguments give the same bytes. A twin whose files cannot be read is left out.
+    Raises UsageError for a data set at a URL, without an index or without twins, and an ``out`` that is not empty; TwinError
+    where no twin can be read.
     """
     from manitwin.formats.output_folder import new_folder
 
@@ -64,26 +66,34 @@ def write_catalog(
         raise UsageError(f"{dataset}: has no accepted twin; build some, or give another data set")
     groups = groups_of(ids, near_duplicates(index))
     rows: list[dict[str, Any]] = []
+    left_out: dict[str, str] = {}
     samples: list[Picture] = []
     with new_folder(Path(out)) as folder:
         for twin_id in ids:
             on_twin(twin_id)
-            twin = Twin(root.local / root.twin_name(twin_id))
-            row = _row(twin, groups[twin_id])
-            points, views = surface_points(twin, POINTS[0], seed), views_around(twin, size_px)
+            try:
+                twin = Twin(root.local / root.twin_name(twin_id))
+                row = _row(twin, groups[twin_id])
+                points, views = surface_points(twin, POINTS[0], seed), views_around(twin, size_px)
+            except TwinError as error:
+                left_out[twin_id] = str(error)
+                continue
             _write_clouds(folder, row, points)
             _write_pictures(folder, row, views)
             rows.append(row)
             if len(samples) < SHOWN_TWINS:
                 shown = np.concatenate([views[number].rgb for number in SHOWN_VIEWS], axis=1)
                 samples.append(Picture(png_of(shown), f"{row['category']} ({row['split']}): {row['captions'][0]}"))
-        _write_lists(folder, rows)
-        joined = Counter(groups.values())
+        if not rows:
+            raise TwinError(f"no twin of {dataset} can be read; the first: {next(iter(left_out.values()))}")
+        _write_lists(folder, rows, left_out)
+        joined = Counter(groups[row["twin_id"]] for row in rows)
         done = Catalog(
             {name: sum(row["split"] == name for row in rows) for name, _ in SPLITS},
             sum(len(row["pictures"]) for row in rows),
             len({row["category"] for row in rows}),
             sum(count > 1 for count in joined.values()),
+            left_out,
         )
         _write(folder / "report.html", _page(rows, samples, done))
     return done
@@ -168,18 +178,19 @@ def _write_pictures(folder: Path, row: dict[str, Any], views: list[View]) -> Non
         row["pictures"].append({"file": f"{file}.png", "camera": view.camera.to_json()})
 
 
-def _write_lists(folder: Path, rows: list[dict[str, Any]]) -> None:
+def _write_lists(folder: Path, rows: list[dict[str, Any]], left_out: dict[str, str]) -> None:
     categories = sorted({row["category"] for row in rows})
     numbers = {name: number for number, name in enumerate(categories)}
-    _write(folder / "catalog.json", canonical_json({"dataset": DATASET, "categories": numbers, "twins": rows}).encode())
+    listed = {"dataset": DATASET, "categories": numbers, "twins": rows, "left_out": left_out}
+    _write(folder / "catalog.json", canonical_json(listed).encode())
     _write(folder / "ulip" / "taxonomy.json", canonical_json([_synset(rows, name) for name in categories]).encode())
     _write(folder / "ulip" / "labels.json", canonical_json({DATASET: categories}).encode())
     for split, _ in SPLITS:
         there = [row for row in rows if row["split"] == split]
         _write(folder / "openshape" / f"{split}.json", canonical_json([_openshape(row) for row in there]).encode())
         _write(folder / "ulip" / f"{split}.txt", "".join(f"{row['ulip']}\n" for row in there).encode())
-        listed = [f"{each['file']} {numbers[row['category']]}\n" for row in there for each in row["pictures"]]
-        _write(folder / "classification" / f"{split}.txt", "".join(listed).encode())
+        labelled = [f"{each['file']} {numbers[row['category']]}\n" for row in there for each in row["pictures"]]
+        _write(folder / "classification" / f"{split}.txt", "".join(labelled).encode())
         _write(folder / "captions" / f"{split}.json", canonical_json(_coco_captions(there)).encode())
     _write(folder / "classification" / "classes.txt", "".join(f"{name}\n" for name in categories).encode())
 
@@ -230,7 +241,11 @@ def _page(rows: list[dict[str, Any]], samples: list[Picture], done: Catalog) -> 
         + f". The most common category has {100 * largest / len(rows):.0f} % of them.",
         f"{done.joined_groups:,} groups of twins of one input or of nearly one shape and size are each in one split.",
     ]
-    return page("Catalogue", lead, [Section("Samples", samples), Section("Balance", [table])])
+    sections = [Section("Samples", samples), Section("Balance", [table])]
+    if done.left_out:
+        reasons = Table("Twins that were left out.", ("twin", "reason"), list(done.left_out.items()))
+        sections.append(Section("Left out", [reasons]))
+    return page("Catalogue", lead, sections)
 
 
 def _write(path: Path, content: bytes) -> None:
