@@ -42,10 +42,14 @@ the right part; their source is `template:CATEGORY`. What is not here is refused
   what it is for, says nothing of it (a glass of red wine, a brush for wood); nor does a word that is not known: the check
   `text_understood` names such.
 - **How large it is**: `9 cm` is the longest extent, of a pan or pot its diameter; `9 cm tall`, `wide`, `long` is that
-  direction. Units may be spelt out, and inches, feet, yards and fractions are read. A size that no such thing has is refused.
-  `small` and `large` choose within the usual sizes.
-- **What it cannot be told** is refused and not left out: several lengths or that of a part (a template is scaled as a whole), a
-  volume, a mass, what a thing is not. So is the longer name of another thing (a magnifying glass is no glass).
+  direction. `30 x 20 x 15 cm` is length, width and height, `30 x 20 cm` the longest side and the second. `15 cm wide and 7 cm
+  high` and `with a 20 cm blade` change the measures until what is made has these lengths, within 0.2 %; what would no longer be
+  such a thing is refused (a mug of 10 by 80 cm), but a box may be of any proportions. `500 ml`, `12 oz` and `1 pint` (of the
+  United States) are what a vessel holds to its brim, a closed one within its walls; `2 kg` is what the thing weighs: either
+  sets the size. A volume or a mass beside a length is refused. Units may be spelt out, and inches, feet, yards and fractions
+  are read. A size that no such thing has is refused. `small` and `large` choose within the usual sizes.
+- **What it cannot be told** is refused and not left out: two lengths of one side, from which to which a length is, what a
+  thing is not. So is the longer name of another thing (a magnifying glass is no glass).
 - **What it is made of** decides the mass: the volume of each part times its density; of a closed container, with its contents;
   hollow behind a sheet where a handle or a stand of sheet metal would be. It is no estimate, has no interval, and is not refused
   for being unlike that of most such things (a plastic fork); a finding says so.

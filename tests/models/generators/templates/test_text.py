@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 
 from manitwin.errors import UsageError
 from manitwin.models.annotators.priors import load_priors
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.described import Wish
 from manitwin.models.generators.templates.looks import COLORS, MATERIALS
-from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.made import Made, make
 from manitwin.models.generators.templates.text import MAX_CHARACTERS, Wanted, read_text
 
 TEMPLATES = load_templates()
@@ -175,21 +176,24 @@ def test_another_thing_whose_name_ends_as_a_templates_is_refused(text: str) -> N
 @pytest.mark.parametrize(
     ("text", "cause"),
     [
-        ("a box 10 cm long, 6 cm wide and 4 cm tall", "several lengths"),
-        ("a box, 20 x 15 x 10 cm", "several lengths"),
-        ("a box, 20x15 cm", "several lengths"),
+        ("a mug 9 cm tall, 12 cm high", "several lengths"),
         ("a mug of 9-10 cm", "several lengths"),
         ("a mug, 9 to 10 cm tall", "several lengths"),
         ("a small large mug", "two sizes of one thing, small and large"),
-        ("a knife with a 12 cm long handle", "length of a part"),
-        ("a two-litre soda bottle", "a volume"),
-        ("a 2 kg dumbbell", "a mass"),
+        ("a mug of 300 to 350 ml", "from which to which amount"),
+        ("a 300 ml mug, 9 cm tall", "states 300 ml and a length"),
+        ("a fork of 200 ml", "no vessel"),
+        ("a mug of 0 ml", "no size gives"),
+        ("a mug 10 cm tall and 80 cm wide", r"no mug can be given these lengths .*its width would be"),
+        ("a box 0 x 20 x 10 cm", "no box can be given these lengths"),
+        ("a box of 2 m x 2 m x 10 cm", "check the unit"),
+        ("a mug with a 3 cm saucer", "no 'saucer' here"),
         ("a mug without a handle", "what a thing is not"),
     ],
 )
 def test_what_a_template_cannot_be_told_is_refused_and_not_left_out(text: str, cause: str) -> None:
     with pytest.raises(UsageError, match=cause):
-        read(text)
+        made_of(text)
 
 
 def test_a_part_is_called_by_its_plural_where_that_is_its_name() -> None:
@@ -494,3 +498,101 @@ def test_a_colour_of_a_tool_is_its_handle_s() -> None:
         assert wanted.wishes == {"handle": Wish(red)}, text
     for text in ("a red frying pan", "a red screwdriver", "a red mug", "a red steel hammer", "a silver hammer"):
         assert "" in read(text).wishes, text
+
+
+def made_of(text: str) -> Made:
+    wanted = read(text)
+    return make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize(
+    ("text", "extents_m"),
+    [
+        ("a cardboard box 30 x 20 x 15 cm", (0.30, 0.20, 0.15)),
+        ("a box of 30cmx20cmx10cm", (0.30, 0.20, 0.10)),
+        ("a box 0.3 m x 20 cm x 150 mm", (0.30, 0.20, 0.15)),
+        ("a pizza box, 33 by 33 by 4 cm", (0.33, 0.33, 0.04)),
+        ("a box 20 cm wide, 10 cm deep and 30 cm tall", (0.20, 0.10, 0.30)),
+        ('a serving tray, 12 x 16"', (0.4064, 0.3048, None)),
+        ("a white porcelain bowl, 15cm wide and 7 cm high", (0.15, 0.15, 0.07)),
+        ("a mug, height 10 cm, diameter 8 cm", (None, 0.08, 0.10)),
+        ("a bottle 7 x 25 cm", (0.07, 0.07, 0.25)),
+        ("a frying pan of 28 cm, 5 cm deep", (None, 0.28, 0.05)),
+        ("a hammer 30 cm long and 12 cm wide", (0.30, 0.12, None)),
+    ],
+)
+def test_several_lengths_are_the_sides_of_what_is_made(text: str, extents_m: tuple[float | None, ...]) -> None:
+    for side, said in zip(np.ptp(made_of(text).mesh.vertices, axis=0), extents_m, strict=True):
+        assert said is None or side == pytest.approx(said, rel=0.005)
+
+
+@pytest.mark.parametrize(
+    ("text", "part", "length_m"),
+    [
+        ("a chef's knife with a 20 cm blade", "blade", 0.20),
+        ("a knife with a 20 cm blade and a 11 cm long wooden handle", "handle", 0.11),
+        ("a saucepan 16 cm in diameter and 9 cm high with a 15 cm handle", "handle", 0.15),
+    ],
+)
+def test_a_part_is_as_long_as_is_said(text: str, part: str, length_m: float) -> None:
+    mesh = made_of(text).mesh
+    names = {part, "edge"} if part == "blade" else {part}  # a blade's edge is a part of its own
+    faces = mesh.faces[np.isin(mesh.part, [mesh.names.index(name) for name in names])]
+    assert np.ptp(mesh.vertices[faces.ravel()], axis=0).max() == pytest.approx(length_m, rel=0.005)
+
+
+@pytest.mark.parametrize(
+    ("text", "volume_m3"),
+    [
+        ("a 250 ml mug", 250e-6),
+        ("a half-litre beer glass", 500e-6),
+        ("a 10 l bucket", 0.010),
+        ("a wine glass, 35 cl", 350e-6),
+        ("a 16 fl oz mug", 473.2e-6),
+        ("a 1 litre pitcher", 1e-3),
+        ("a 2 litre saucepan", 2e-3),
+    ],
+)
+def test_an_open_vessel_holds_as_much_as_is_said(text: str, volume_m3: float) -> None:
+    """Measured by level sections, of whose loops around the axis the inner one is the hollow's outline."""
+    made = made_of(text)
+    solid = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
+    low, high = solid.bounds[:, 2]
+    levels = np.linspace(low, high, 202)[1:-1]
+    held = [_hollow_m2(solid, level) * (high - low) / len(levels) for level in levels]
+    assert sum(held) == pytest.approx(volume_m3, rel=0.02)
+
+
+def _hollow_m2(solid: trimesh.Trimesh, level_m: float) -> float:
+    section = solid.section(plane_origin=[0, 0, level_m], plane_normal=[0, 0, 1])
+    loops = [] if section is None else [loop[:, :2] for loop in section.discrete]
+    around = []
+    for loop in loops:
+        x, y = loop.T
+        turns = np.unwrap(np.arctan2(y, x))
+        if abs(turns[-1] - turns[0]) > np.pi:
+            around.append(0.5 * abs(float(x[:-1] @ y[1:] - x[1:] @ y[:-1])))
+    return min(around) if len(around) > 1 else 0.0
+
+
+@pytest.mark.parametrize(
+    ("text", "outside_m3"),
+    [("a 500 ml plastic water bottle", 500e-6), ("a 12 oz soda can", 354.9e-6), ("a 330 ml can", 330e-6)],
+)
+def test_a_closed_vessel_of_a_thin_wall_is_as_large_as_what_it_holds(text: str, outside_m3: float) -> None:
+    made = made_of(text)
+    body = made.solids[list(made.masses_kg).index("body")][0]
+    assert outside_m3 < body.volume() < 1.08 * outside_m3
+
+
+@pytest.mark.parametrize(
+    ("text", "mass_kg"), [("a 2 kg dumbbell", 2.0), ("a mug weighing 300 g", 0.3), ("a 1 lb hammer", 0.4536)]
+)
+def test_a_thing_weighs_what_is_said(text: str, mass_kg: float) -> None:
+    assert sum(made_of(text).masses_kg.values()) == pytest.approx(mass_kg, rel=0.006)
+
+
+def test_what_is_said_of_a_part_behind_a_comma_is_of_that_part() -> None:
+    wanted = read("phillips head screwdriver, 15 cm, yellow handle")
+    assert wanted.category == "screwdriver" and wanted.lengths_m == {"": 0.15}
+    assert wanted.wishes == read("a screwdriver with a yellow handle").wishes

@@ -99,7 +99,13 @@ def make_filled(filled: Filled, text: str, rng: np.random.Generator) -> Made:
     if plain.category == filled.category:
         known = {*filled.template.slots, "", *parts_of(filled.template)}
         said = {part: wish for part, wish in plain.wishes.items() if part in known and wish != Wish()}
-        wanted = replace(wanted, wishes=_joined(filled.wishes, said), relative=None if lengths else plain.relative)
+        wanted = replace(
+            wanted,
+            wishes=_joined(filled.wishes, said),
+            relative=None if lengths else plain.relative,
+            part_lengths_m=plain.part_lengths_m,
+            amount=plain.amount,
+        )
     return make(filled.template, wanted, rng, filled.measures)
 
 

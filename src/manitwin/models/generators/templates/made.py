@@ -18,8 +18,10 @@ from manitwin.geometry.seams import has_three_places
 from manitwin.geometry.solids.parts import PartedMesh
 from manitwin.models.annotators.priors import lookup
 from manitwin.models.annotators.walls import METALS
+from manitwin.models.generators.templates.capacity import scale_with
 from manitwin.models.generators.templates.described import Wish
 from manitwin.models.generators.templates.looks import Look, look_of
+from manitwin.models.generators.templates.proportions import proportioned
 from manitwin.models.generators.templates.template import KnownPoint, Model, Template
 from manitwin.models.generators.templates.text import Wanted
 from manitwin.twin.import_record import GivenParts
@@ -55,16 +57,26 @@ def make(template: Template, wanted: Wanted, rng: np.random.Generator, said: Map
     measures = template.drawn(rng) | dict(said or {})
     if "wall_m" in measures:
         measures["wall_m"] = max(LEAST_WALL_M, measures["wall_m"] * _wall(template, next(iter(looks_by_slot.values()))))
+    if wanted.solves_measures:
+        measures = proportioned(template, measures, wanted.lengths_m, wanted.part_lengths_m)
     model = template.build(**measures)
     mesh = model.assembly.mesh()
     _check_parts(template, wanted, mesh)
-    scale = _scale(template, wanted, mesh)
-    if measures.get("wall_m", 1.0) * scale < LEAST_WALL_M:
-        measures["wall_m"] = LEAST_WALL_M / scale
-        model = template.build(**measures)
-        mesh = model.assembly.mesh()
-        scale = _scale(template, wanted, mesh)
-    return dressed(template, model, mesh, measures, looks_by_slot, wanted.wishes, scale)
+
+    def made_at(scale: float) -> Made:
+        walled, its_model, its_mesh = measures, model, mesh
+        if measures.get("wall_m", 1.0) * scale < LEAST_WALL_M:
+            walled = measures | {"wall_m": LEAST_WALL_M / scale}
+            its_model = template.build(**walled)
+            its_mesh = its_model.assembly.mesh()
+            scale = _scale(template, wanted, its_mesh) if wanted.amount is None else scale
+        return dressed(template, its_model, its_mesh, walled, looks_by_slot, wanted.wishes, scale)
+
+    if wanted.amount is None:
+        return made_at(_scale(template, wanted, mesh))
+    scale = scale_with(wanted.amount, made_at)
+    _check_size(template, float(np.ptp(mesh.vertices, axis=0).max()) * scale)
+    return made_at(scale)
 
 
 def _wall(template: Template, look: Look) -> float:
@@ -184,7 +196,7 @@ def _check_parts(template: Template, wanted: Wanted, mesh: PartedMesh) -> None:
 
 
 def _scale(template: Template, wanted: Wanted, mesh: PartedMesh) -> float:
-    """Return the scale that gives the stated size, or the relative one; 1 where the text says neither.
+    """Return the scale that gives the stated size, or the relative one; 1 where the text says neither, or several lengths.
 
     Which side is meant by width is told by the size: of a keyboard of 40 cm the longer one.
     """
@@ -200,20 +212,28 @@ def _scale(template: Template, wanted: Wanted, mesh: PartedMesh) -> float:
     prior = lookup(template.category)
     assert prior is not None, template.category
     interval = prior.longest_axis_m
-    if wanted.lengths_m:
-        direction, length = next(iter(wanted.lengths_m.items()))
-        scales = [length / float(side) for side in now[direction]]
-        usual = [scale for scale in scales if interval.low <= float(extents.max()) * scale <= interval.high]
-        scale = [*usual, *scales][0]
-        longest = float(extents.max()) * scale
-        if not interval.low / SIZE_MARGIN <= longest <= interval.high * SIZE_MARGIN:
-            raise UsageError(
-                f"a {template.category} of {longest:.3g} m: such are {interval.low:g} to {interval.high:g} m; check the unit"
-            )
+    if wanted.lengths_m or wanted.part_lengths_m:
+        scale = 1.0
+        if not wanted.solves_measures:
+            direction, length = next(iter(wanted.lengths_m.items()))
+            scales = [length / float(side) for side in now[direction]]
+            usual = [scale for scale in scales if interval.low <= float(extents.max()) * scale <= interval.high]
+            scale = [*usual, *scales][0]
+        _check_size(template, float(extents.max()) * scale)
         return scale
     if wanted.relative is None:
         return 1.0
     return float(interval.low + wanted.relative * (interval.high - interval.low)) / float(extents.max())
+
+
+def _check_size(template: Template, longest_m: float) -> None:
+    prior = lookup(template.category)
+    assert prior is not None, template.category
+    interval = prior.longest_axis_m
+    if not interval.low / SIZE_MARGIN <= longest_m <= interval.high * SIZE_MARGIN:
+        raise UsageError(
+            f"a {template.category} of {longest_m:.3g} m: such are {interval.low:g} to {interval.high:g} m; check the unit"
+        )
 
 
 def _scaled(point: KnownPoint, scale: float) -> KnownPoint:

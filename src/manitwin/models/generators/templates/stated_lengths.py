@@ -17,13 +17,23 @@ _AMOUNT = rf"({_NUMBER}) ?({_UNIT})\b\.?"
 _MEASURES = "height|width|length|diameter|depth"
 LENGTH = re.compile(rf"{_AMOUNT} ?(?:in (?={_MEASURES}))?(\w{{0,12}})")
 """A length as ``in_figures`` writes it: number, unit, and the word behind it, which may be a direction."""
+_OF_A_PART = re.compile(
+    rf"(?:^| )(with|having|and)( an?) {_AMOUNT}( long)?((?: \w+){{0,3}}?) (\w+)"
+    r"(?=$| ?[,;.]| (?:and|with|having|of|in|made|for)\b)"
+)
+"""'with a 20 cm blade', 'and a 9 cm long wooden handle'; the part is called by the last word."""
 _NAMED_LENGTH = re.compile(rf"\b({_MEASURES})(?: of)? ({_AMOUNT})")
-_BY = re.compile(rf"\d ?(?:x|by|×) ?[\d.]+ ?(?:{_UNIT})\b")
+_AMOUNT_OR_NUMBER = rf"({_NUMBER})(?: ?({_UNIT})\b\.?)?"
+_BY = re.compile(rf"{_AMOUNT_OR_NUMBER} x {_AMOUNT_OR_NUMBER}(?: x {_AMOUNT_OR_NUMBER})?(?: in (?:size|all))?")
+"""'30 x 20 x 15 cm': a number without a unit has that of the last one."""
+_TIMES = re.compile(rf"(?<=\d) ?(?:({_UNIT})\.?)? ?(?:x|by|×|\*) ?(?=\.?\d)")
 _RANGE = re.compile(rf"\d ?(?:-|–|—|\.{{2,3}}|(?:{_UNIT})?\.? ?(?:to|or|and)) ?{_AMOUNT}")
 DIRECTIONS = {
     "tall": "height", "high": "height", "height": "height", "wide": "width", "width": "width", "broad": "width",
     "diameter": "width", "across": "width", "long": "length", "length": "length", "deep": "depth", "thick": "height",
+    "longest": "", "secondside": "second",
 }  # fmt: skip
+"""``second``: the second longest side, as of a tray of 30 x 20 cm; ``secondside`` is what ``in_figures`` makes of it."""
 _NUMERALS = {
     "one": 1, "two": 2, "three": 3, "four": 4, "five": 5, "six": 6, "seven": 7, "eight": 8, "nine": 9, "ten": 10,
     "eleven": 11, "twelve": 12,
@@ -36,15 +46,25 @@ _FEET_AND_INCHES = re.compile(rf"({_NUMBER}) ?(?:foot|feet|ft)\.? (?:and )?({_NU
 
 
 def lengths_in(text: str) -> dict[str, float]:
-    """Return the lengths (m) that a text states by their direction, '' for the longest."""
-    found = LENGTH.findall(in_figures(text))
+    """Return the lengths (m) that a text states of the whole by their direction, '' for the longest."""
+    found = LENGTH.findall(without_lengths_of_parts(in_figures(text)))
     return {DIRECTIONS.get(direction, ""): float(number) * _metres(unit) for number, unit, direction in found}
 
 
+def lengths_of_parts(plain: str) -> dict[str, float]:
+    """Return the lengths (m) that a text, as ``in_figures`` writes it, states of parts, by the words for these."""
+    return {m[7]: float(m[3]) * _metres(m[4]) for m in _OF_A_PART.finditer(plain) if m[7] not in DIRECTIONS}
+
+
+def without_lengths_of_parts(plain: str) -> str:
+    """Return a text, as ``in_figures`` writes it, without the lengths of parts: 'with a blade'."""
+    return _OF_A_PART.sub(lambda m: m[0] if m[7] in DIRECTIONS else f" {m[1]}{m[2]}{m[6]} {m[7]}", plain)
+
+
 def several_lengths(text: str) -> bool:
-    """Tell whether a text states more than one length, or from which to which one is."""
-    plain = in_figures(text)
-    return len(LENGTH.findall(plain)) > 1 or any(each.search(plain) for each in (_BY, _RANGE))
+    """Tell whether a text states more than one length of one direction, or from which to which one is."""
+    plain = without_lengths_of_parts(in_figures(text))
+    return len(LENGTH.findall(plain)) > len(lengths_in(text)) or _RANGE.search(plain) is not None
 
 
 def in_figures(text: str) -> str:
@@ -62,10 +82,24 @@ def in_figures(text: str) -> str:
     plain = re.sub(r"(?<=\d)-(?=\d+/\d)", " ", plain)
     plain = _FRACTION.sub(_in_decimals, plain)
     plain = re.sub(r"(?<=\d) ?(?:-|–|—|\.{2,3}) ?(?=\.?\d)", "–", plain)
-    plain = " ".join(plain.replace(",", " , ").replace("-", " ").split())
+    plain = _TIMES.sub(lambda m: f" {m[1] or ''} x ", " ".join(plain.replace(",", " , ").replace("-", " ").split()))
+    plain = " ".join(plain.split())
     plain = _SPELT.sub(lambda m: str(_NUMERALS[m[1]]), plain)
     plain = _FEET_AND_INCHES.sub(lambda m: f"{12 * float(m[1]) + float(m[2]):g} inches", plain)
-    return _NAMED_LENGTH.sub(lambda m: f"{m[2]} {m[1]}", plain)
+    return _NAMED_LENGTH.sub(lambda m: f"{m[2]} {m[1]}", _BY.sub(_by_direction, plain))
+
+
+def _by_direction(found: re.Match[str]) -> str:
+    """Return three numbers as length, width and height, two as the longest side and the second; as they are without a unit."""
+    numbers, units = found.groups()[::2], found.groups()[1::2]
+    *_, last = (unit for number, unit in zip(numbers, units, strict=True) if number)
+    if last is None:
+        return found[0]
+    amounts = [(number, unit or last) for number, unit in zip(numbers, units, strict=True) if number]
+    if len(amounts) == 3:
+        return " ".join(f"{n} {u} {way}" for (n, u), way in zip(amounts, ("long", "wide", "tall"), strict=True))
+    amounts.sort(key=lambda amount: float(amount[0]) * _metres(amount[1]), reverse=True)
+    return " ".join(f"{n} {u} {way}" for (n, u), way in zip(amounts, ("longest", "secondside"), strict=True))
 
 
 def _in_decimals(found: re.Match[str]) -> str:

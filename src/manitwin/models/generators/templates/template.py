@@ -102,8 +102,9 @@ class Template:
     'colour material' or 'material' to draw from; the first slot is what colours and materials without a part's name mean. A
     measure ``wall_m`` is that of ceramic and follows the material. ``contents_kg_m3`` is the mean density of parts that are
     closed containers, with what is in them. ``of_sheet`` are parts that are hollow behind a sheet where they are of metal;
-    ``of_plate``: what is of metal has the wall that is stated, and none of sheet. ``length_of`` is the part that a length without
-    a direction is of: a pan of 24 cm has that diameter, without its handle; '' for the whole.
+    ``of_plate``: what is of metal has the wall that is stated, and none of sheet. ``length_of`` is the part that a length
+    without a direction is of: a pan of 24 cm has that diameter, without its handle; '' for the whole. What has
+    ``any_proportions``, a box, is as long, wide and high as is said; other things keep near their intervals.
     """
 
     category: str
@@ -116,6 +117,7 @@ class Template:
     of_sheet: tuple[str, ...] = ()
     of_plate: bool = False
     length_of: str = ""
+    any_proportions: bool = False
 
     def drawn(self, rng: np.random.Generator) -> dict[str, float]:
         """Draw all measures."""

@@ -21,26 +21,21 @@ from manitwin.models.generators.templates.described import (
 from manitwin.models.generators.templates.looks import look_of
 from manitwin.models.generators.templates.matter import is_composite
 from manitwin.models.generators.templates.named_category import find_category, plain_words
+from manitwin.models.generators.templates.stated_amounts import Amount, amounts_in, without_amounts
 from manitwin.models.generators.templates.stated_lengths import (
     DIRECTIONS,
     LENGTH,
     in_figures,
     lengths_in,
+    lengths_of_parts,
     several_lengths,
+    without_lengths_of_parts,
 )
 from manitwin.models.generators.templates.template import Template
 
 MAX_CHARACTERS = 400
-_OF_A_PART = re.compile(rf" (?:with|having|and) an? {LENGTH.pattern}")
-_NOT_TAKEN = (
-    (re.compile(r"\b(?:no(?!\.? ?\d)|not|without)\b"), "what a thing is not"),
-    (
-        re.compile(r"\b(?:\d[\d.]*|one|two|three|half) ?(?:ml|cl|dl|l|lit(?:re|er)s?|ounces?|oz|pints?|gallons?)\b"),
-        "a volume",
-    ),
-    (re.compile(r"\b\d[\d.]* ?(?:kg|kilograms?|kilos?|g|grams?|lbs?|pounds?)\b"), "a mass"),
-)
-"""What no template can be told, by what it is called: left out in silence, the thing would be another one."""
+_NEGATION = re.compile(r"\b(?:no(?!\.? ?\d)|not|without)\b")
+"""What no template can be told: left out in silence, the thing would be another one."""
 _NEGATIVE = re.compile(r"(?:^|(?<=[^\d\W]) |(?<=[(,:]) ?)[-−]\.?\d[\d.]*")
 """A minus before a number, behind a word, a bracket or a comma: behind a digit it parts a range, within a word it joins."""
 _PART_NAMES = {
@@ -51,6 +46,8 @@ _PART_NAMES = {
 _TOOL_HEADS = ("head", "blade")
 _COLORED_MATTER = {"plastic", "rubber"}
 _COMMON_PARTS = ("handle", "lid", "cap", "rim", "blade")
+_PART_BEHIND_COMMA = re.compile(rf" ?, (?=(?:an? )?(?:[a-z]+ ){{0,3}}(?:{'|'.join(_COMMON_PARTS)})s?(?:$| ?,| and\b))")
+"""'a screwdriver, yellow handle'."""
 _WITH = re.compile(r" (?:with|having|featuring) | and an? (?=.)| (?:that|which) has ")
 
 
@@ -59,7 +56,8 @@ class Wanted:
     """What a text asks for: ``wishes`` by the name of a part, '' for the whole; ``lengths_m`` by direction, '' for the longest.
 
     ``relative`` is where in the category's interval of sizes it is, None where the text does not say; ``unused`` are the words
-    that say nothing to a template.
+    that say nothing to a template; ``part_lengths_m`` those of parts or slots, of each its longest side; ``amount`` is the
+    volume or the mass.
     """
 
     category: str
@@ -67,6 +65,13 @@ class Wanted:
     lengths_m: Mapping[str, float] = field(default_factory=dict)
     relative: float | None = None
     unused: tuple[str, ...] = ()
+    part_lengths_m: Mapping[str, float] = field(default_factory=dict)
+    amount: Amount | None = None
+
+    @property
+    def solves_measures(self) -> bool:
+        """Whether one scale for the whole cannot give the stated lengths."""
+        return len(self.lengths_m) > 1 or bool(self.part_lengths_m)
 
 
 def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
@@ -79,8 +84,10 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
         raise UsageError(f"a text of {len(text)} characters; at most {MAX_CHARACTERS} describe an object")
     plain, lengths = in_figures(text), lengths_in(text)
     _check_taken(text, plain)
+    of_parts, plain = lengths_of_parts(plain), without_lengths_of_parts(plain)
+    said_in, plain = plain, without_amounts(plain)
     rest = LENGTH.sub(lambda m: "" if m[3] in DIRECTIONS else m[3], plain)
-    main, *features = _WITH.split(rest, maxsplit=1)
+    main, *features = _WITH.split(_PART_BEHIND_COMMA.sub(" with ", rest), maxsplit=1)
     found = find_category(main.split(), text, templates)
     template, prior = templates[found.category], load_priors()[found.category]
     try:
@@ -103,7 +110,14 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
             unused += said.unused
     except UsageError as error:
         raise UsageError(f"{text!r}: {error}") from None
-    return Wanted(found.category, wishes, lengths, words.relative, tuple(unused))
+    amounts = amounts_in(said_in, prior)
+    if len(amounts) + bool(lengths or of_parts) > 1:
+        stated = " and ".join([*(each.said for each in amounts), *(["a length"] if lengths or of_parts else [])])
+        raise UsageError(f"{text!r} states {stated}: say one volume, or one mass, or lengths")
+    part_lengths = {_slot_called(word, template): length for word, length in of_parts.items()}
+    return Wanted(
+        found.category, wishes, lengths, words.relative, tuple(unused), part_lengths, next(iter(amounts), None)
+    )
 
 
 def _slot_meant(wish: Wish, template: Template, prior: Prior) -> str | None:
@@ -196,15 +210,12 @@ def _check_taken(text: str, plain: str) -> None:
     """Raise UsageError for what a template cannot be told."""
     if (below := _NEGATIVE.search(text)) is not None:
         raise UsageError(f"{text!r}: a length below zero ({below[0].strip()!r}); state it without the sign")
-    for pattern, what in _NOT_TAKEN:
-        if (said := pattern.search(plain)) is not None:
-            raise UsageError(f"{text!r}: a template cannot be told {what} ({said[0]!r}); leave it out, or say a length")
+    if (said := _NEGATION.search(plain)) is not None:
+        raise UsageError(
+            f"{text!r}: a template cannot be told what a thing is not ({said[0]!r}); leave it out, or say a length"
+        )
     if several_lengths(text):
         raise UsageError(
-            f"{text!r} states several lengths: a template is scaled as a whole; say one, such as '9 cm tall'"
-        )
-    part = _OF_A_PART.search(plain)
-    if part is not None and part[3] not in ("", *(d for d in DIRECTIONS if plain.endswith(d))):
-        raise UsageError(
-            f"{text!r} states the length of a part: a template is scaled as a whole; say that of the whole"
+            f"{text!r} states several lengths of one side, or from which to which one is; say one of each, such as '9 cm tall and"
+            " 8 cm wide'"
         )

@@ -1,0 +1,74 @@
+"""What a made thing holds, and the scale that gives it a stated volume or mass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from manifold3d import CrossSection, Manifold, OpType
+
+from manitwin.errors import UsageError
+from manitwin.models.annotators.priors import load_priors
+
+if TYPE_CHECKING:
+    from manitwin.models.generators.templates.made import Made
+    from manitwin.models.generators.templates.stated_amounts import Amount
+
+CLOSED_WALLS_M = {"glass": 0.003, "plastic": 0.0005, "aluminium": 0.0001, "steel": 0.0003}
+"""Of blown and drawn containers by what they look like: bottles and jars of glass 2 to 4 mm, PET 0.3 to 0.7, cans 0.1 to 0.3."""
+TWO_WALLS_M = 0.005
+"""Of a thermos: two sheets of steel and what is between them."""
+LEVELS = 200
+MOST_ROUNDS, CLOSE = 8, 0.005
+LEAST, MOST = 1e-9, 1e3
+"""Of a volume or a mass that anything held by a hand has, m^3 or kg."""
+
+
+def capacity_m3(made: Made) -> float | None:
+    """Return what a thing holds up to its rim's lowest place, or within its walls where it is closed; None for no vessel."""
+    prior = load_priors()[made.category]
+    if prior.vessel:
+        solid, _ = made.solids[list(made.masses_kg).index("body")]
+        wall_m = TWO_WALLS_M if made.category == "thermos" else CLOSED_WALLS_M.get(made.looks["body"].surface, 0.001)
+        return max(float(solid.volume()) - wall_m * float(solid.surface_area()), 0.0)
+    if not prior.container:
+        return None
+    solid = Manifold.batch_boolean([each for each, _ in made.solids], OpType.Add)
+    low, high = solid.bounding_box()[2], solid.bounding_box()[5]
+    step_m = (high - low) / LEVELS
+    hollows_m2 = [_hollow_m2(solid.slice(low + (level + 0.5) * step_m)) for level in range(LEVELS)]
+    return sum(hollows_m2) * step_m or None
+
+
+def _hollow_m2(section: CrossSection) -> float:
+    """Return the area of the largest hole in a level section: where the rim is interrupted, at a spout, there is none."""
+    holes = [-area for loop in section.to_polygons() if (area := _area_m2(loop)) < 0]
+    return max(holes, default=0.0)
+
+
+def _area_m2(loop: np.ndarray) -> float:
+    """Return the area of a closed loop (N, 2), negative where it runs clockwise, as around a hole."""
+    x, y = loop.T
+    return 0.5 * float(x @ np.roll(y, -1) - np.roll(x, -1) @ y)
+
+
+def scale_with(amount: Amount, made_at: Callable[[float], Made]) -> float:
+    """Return the scale at which what is made has a stated volume or mass; walls and sheets keep theirs, so it is sought in steps.
+
+    Raises UsageError for a volume of what holds nothing, and an amount that no scale gives.
+    """
+    scale, wanted = 1.0, amount.mass_kg if amount.volume_m3 is None else amount.volume_m3
+    for _ in range(MOST_ROUNDS):
+        made = made_at(scale)
+        has = sum(made.masses_kg.values()) if amount.volume_m3 is None else capacity_m3(made)
+        if has is None:
+            raise UsageError(
+                f"a {made.category} is no vessel that has a volume ({amount.said}); say a length or a mass"
+            )
+        if wanted is None or not LEAST < wanted < MOST:
+            break
+        if has > 0 and abs(has / wanted - 1) < CLOSE:
+            return scale
+        scale *= float((wanted / max(has, 0.05 * wanted)) ** (1 / 3))
+    raise UsageError(f"no size gives a {made.category} of {amount.said}; say a length")

@@ -1,0 +1,117 @@
+"""Change a template's measures until the thing has several stated lengths at once: '30 x 20 x 15 cm', 'with a 20 cm blade'."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import product
+
+import numpy as np
+
+from manitwin.errors import UsageError
+from manitwin.geometry.solids.shapes import SolidError
+from manitwin.models.generators.templates.template import Template
+
+X, Y, Z = range(3)
+_AXES = {"height": (Z,), "width": (X, Y), "length": (X, Y, Z), "depth": (X, Y, Z), "": (X, Y, Z)}
+"""The axes along which a length with a direction may be; ``second`` is along that of the second largest extent."""
+_SPELT = {"": "longest side", "second": "second longest side"}
+WALL = "wall_m"
+MOST_STEPS, DIFFERENCE, CLOSE = 12, 0.01, 0.002
+MOST_M = 100.0
+MARGIN = 2.0
+"""Beyond the interval of a measure by more than this factor a thing is no longer what the template makes."""
+
+
+def proportioned(
+    template: Template,
+    measures: Mapping[str, float],
+    lengths_m: Mapping[str, float],
+    part_lengths_m: Mapping[str, float],
+) -> dict[str, float]:
+    """Return measures near the given ones with which a template's thing has the stated lengths.
+
+    ``lengths_m`` by direction, ``part_lengths_m`` of the longest side of a part or a slot. All is scaled as one, then the
+    measures but the wall are changed as little as can be, by their logarithms (Gauss-Newton, minimum norm). Raises UsageError
+    where no such thing has these lengths at once, or such a part.
+    """
+    changed = dict(measures)
+    free = [name for name in template.measures if name != WALL]
+    if template.length_of and "" in lengths_m:
+        part_lengths_m = {template.length_of: lengths_m[""], **part_lengths_m}
+        lengths_m = {direction: length for direction, length in lengths_m.items() if direction}
+    named_m = {_SPELT.get(name, name): length for name, length in [*lengths_m.items(), *part_lengths_m.items()]}
+    targets = np.array([*lengths_m.values(), *part_lengths_m.values()])
+    if not ((targets > 0) & (targets < MOST_M)).all():
+        raise UsageError(_impossible(template, named_m))
+    sides = _sides_m(template, changed, part_lengths_m)
+    said = [*_axes(sides, lengths_m, targets), *range(3, 3 + len(part_lengths_m))]
+    if len(said) < len(targets):
+        raise UsageError(_impossible(template, named_m))
+    larger = float(np.exp(np.log(targets / sides[said]).mean()))
+    for name in free:
+        changed[name] *= larger if template.measures[name].unit == "m" else 1.0
+    for _ in range(MOST_STEPS):
+        sides = _sides_m(template, changed, part_lengths_m)[said]
+        missing = np.log(targets / sides)
+        if np.abs(missing).max() < CLOSE:
+            if not template.any_proportions:
+                _check(template, changed, free, named_m)
+            return changed
+        slopes = np.empty((len(said), len(free)))
+        for column, name in enumerate(free):
+            longer = {**changed, name: changed[name] * (1 + DIFFERENCE)}
+            moved = _sides_m(template, longer, part_lengths_m)[said]
+            slopes[:, column] = np.log(moved / sides) / np.log1p(DIFFERENCE)
+        steps = np.clip(np.linalg.pinv(slopes, rcond=1e-3) @ missing, -0.5, 0.5)
+        for name, step in zip(free, steps, strict=True):
+            changed[name] *= float(np.exp(step))
+    raise UsageError(_impossible(template, named_m))
+
+
+def _axes(sides_m: np.ndarray, lengths_m: Mapping[str, float], targets_m: np.ndarray) -> list[int]:
+    """Return an axis for each length: of what the directions allow, those that change the shape least; none where they cannot be.
+
+    ``targets_m (K,)`` are the lengths and those of parts, whose sides now are behind the three extents in ``sides_m``.
+    """
+    second = (int(np.argsort(-sides_m[:3], kind="stable")[1]),) if "" in lengths_m else (X, Y, Z)
+    choices = [second if direction == "second" else _AXES[direction] for direction in lengths_m]
+    of_parts = [*range(3, len(sides_m))]
+    distinct = [axes for axes in product(*choices) if len({*axes}) == len(axes)]
+    if not distinct:
+        return []
+    return list(min(distinct, key=lambda axes: float(np.std(np.log(targets_m / sides_m[[*axes, *of_parts]])))))
+
+
+def _sides_m(template: Template, measures: Mapping[str, float], parts: Mapping[str, float]) -> np.ndarray:
+    """Return the extents along X, Y and Z of what the measures give, and the longest one of each of the parts."""
+    try:
+        model = template.build(**measures)
+        mesh = model.assembly.mesh()
+    except SolidError as error:
+        raise UsageError(f"no {template.category} has these lengths at once: {error}") from error
+    sides = list(np.ptp(mesh.vertices, axis=0))
+    for part in parts:
+        first = next(iter(template.slots))
+        worn = [name for name in mesh.names if part in (name, model.slots[name] or first)]
+        if not worn:
+            known = sorted({*template.slots, *mesh.names})
+            raise UsageError(f"a {template.category} has no {part!r} here. Its parts: {', '.join(known)}")
+        faces = mesh.faces[np.isin(mesh.part, [mesh.names.index(name) for name in worn])]
+        sides.append(float(np.ptp(mesh.vertices[faces.ravel()], axis=0).max()))
+    return np.array(sides)
+
+
+def _check(template: Template, measures: Mapping[str, float], names: list[str], named_m: Mapping[str, float]) -> None:
+    for name in names:
+        usual, value = template.measures[name], measures[name]
+        if not usual.low / MARGIN <= value <= usual.high * MARGIN:
+            unit = usual.unit or "(a ratio)"
+            raise UsageError(
+                f"{_impossible(template, named_m)}: its {name.removesuffix('_m').replace('_', ' ')} would be {value:.3g} {unit},"
+                f" such are {usual.low:g} to {usual.high:g}; check the numbers and the unit"
+            )
+
+
+def _impossible(template: Template, named_m: Mapping[str, float]) -> str:
+    said = ", ".join(f"{name} {length:g} m" for name, length in named_m.items())
+    return f"no {template.category} can be given {'these lengths' if len(named_m) > 1 else 'this length'} ({said})"

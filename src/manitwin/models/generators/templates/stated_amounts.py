@@ -1,0 +1,66 @@
+"""Read the volume or the mass that a sentence states: '500 ml', 'half a litre', '12 oz', '2 kg'."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from manitwin.errors import UsageError
+from manitwin.models.annotators.priors import Prior
+
+_VOLUMES_M3 = {
+    r"millilit(?:re|er)s?|ml": 1e-6, r"centilit(?:re|er)s?|cl": 1e-5, r"decilit(?:re|er)s?|dl": 1e-4,
+    r"lit(?:re|er)s?|l": 1e-3, r"fl(?:uid)?\.? (?:ounces?|oz)": 29.5735e-6, r"pints?": 473.176e-6, r"quarts?": 946.353e-6,
+    r"gallons?": 3.785412e-3,
+}  # fmt: skip
+"""Of the United States, where those of Britain have the same name."""
+_MASSES_KG = {
+    r"kilograms?|kilogrammes?|kilos?|kg": 1.0, r"grams?|grammes?|g": 1e-3, r"pounds?|lbs?": 0.45359237,
+}  # fmt: skip
+_OUNCE_M3, _OUNCE_KG = 29.5735e-6, 0.0283495
+_UNITS = "|".join([*_VOLUMES_M3, *_MASSES_KG, "ounces?|oz"])
+_NUMERALS = {"half": 0.5, "quarter": 0.25, "one": 1.0, "two": 2.0, "three": 3.0, "four": 4.0, "five": 5.0, "ten": 10.0}
+_AMOUNT = re.compile(
+    rf"(?:\b(?:weighing|of|holding|holds|weighs) )?(?:about )?(?<![\w.])(\d+(?:\.\d+)?|\.\d+|{'|'.join(_NUMERALS)}) ?(?:an? )?"
+    rf"({_UNITS})\b\.?(?: (?:capacity|in weight|in volume|heavy))?"
+)
+_RANGE = re.compile(rf"[\d.]+ ?(?:–|to|or) ?\d[\d.]* ?(?:{_UNITS})\b")
+
+
+@dataclass(frozen=True)
+class Amount:
+    """What a thing holds (m^3) or weighs (kg), whichever is said; ``said`` are the words."""
+
+    said: str
+    volume_m3: float | None = None
+    mass_kg: float | None = None
+
+
+def amounts_in(plain: str, prior: Prior) -> list[Amount]:
+    """Return the volumes and masses that a text, as ``in_figures`` writes it, states of a thing; ounces of a vessel are fluid.
+
+    Raises UsageError where the text says from which to which amount.
+    """
+    if (between := _RANGE.search(plain)) is not None:
+        raise UsageError(f"{between[0]!r} says from which to which amount; say one")
+    holds = prior.vessel or prior.container
+    found = []
+    for match in _AMOUNT.finditer(plain):
+        number = _NUMERALS[match[1]] if match[1] in _NUMERALS else float(match[1])
+        by_unit = [("volume_m3", _VOLUMES_M3), ("mass_kg", _MASSES_KG)]
+        said = f"{match[1]} {match[2]}"
+        for name, units in by_unit:
+            size = next((size for spelt, size in units.items() if re.fullmatch(spelt, match[2])), None)
+            if size is not None:
+                found.append(Amount(said, **{name: number * size}))
+                break
+        else:
+            found.append(
+                Amount(said, volume_m3=number * _OUNCE_M3) if holds else Amount(said, mass_kg=number * _OUNCE_KG)
+            )
+    return found
+
+
+def without_amounts(plain: str) -> str:
+    """Return a text, as ``in_figures`` writes it, without volumes and masses."""
+    return " ".join(_AMOUNT.sub(" ", plain).split())
