@@ -12,7 +12,7 @@ from manitwin.errors import Rejected
 from manitwin.models.generators.lift import made_photo
 from manitwin.models.generators.lift.hint import ShapeHint
 from manitwin.models.generators.lift.made_photo import from_photo
-from manitwin.models.generators.lift.plain_solids import plain_solid
+from manitwin.models.generators.lift.plain_solids import PlainSolids, is_rather, plain_solids
 from manitwin.models.generators.templates.fitting.fit import fit
 from manitwin.models.generators.templates.fitting.residual import Residual
 from manitwin.models.generators.templates.fitting.view import View, normalised
@@ -60,18 +60,18 @@ def test_a_nameless_slab_on_a_table_lies_and_is_as_thick_as_it_looks() -> None:
 
 
 def test_a_cylinder_seen_from_above_is_as_high_as_it_is() -> None:
-    found = plain_solid(_seen(_circle(0.08), 0.10, 35), ShapeHint())
+    found = plain_solids(_seen(_circle(0.08), 0.10, 35), ShapeHint()).close
     assert found is not None and found.category == "can"
     extents = np.ptp(found.made.mesh.vertices, axis=0)
     assert extents[2] / extents[0] == pytest.approx(0.10 / 0.08, rel=0.08)
 
 
 def test_a_disc_whose_edge_is_seen_is_one_where_its_outline_alone_may_be_an_egg() -> None:
-    found = plain_solid(_seen(_circle(0.10), 0.008, 30), ShapeHint())
+    found = plain_solids(_seen(_circle(0.10), 0.008, 30), ShapeHint()).close
     assert found is not None and found.category == "coaster"
     ellipse = np.zeros((SIDE_PX, SIDE_PX, 4), np.uint8)
     cv2.ellipse(ellipse, (320, 320), (240, 130), 0, 0, 360, TOP, -1)
-    assert plain_solid(ellipse, ShapeHint()) is None
+    assert plain_solids(ellipse, ShapeHint()).close is None
     with pytest.raises(Rejected, match="the outline is an ellipse"):
         from_photo(ellipse, None)
 
@@ -79,18 +79,18 @@ def test_a_disc_whose_edge_is_seen_is_one_where_its_outline_alone_may_be_an_egg(
 def test_a_rectangle_of_which_no_edge_is_seen_may_be_anything() -> None:
     front = np.zeros((SIDE_PX, SIDE_PX, 4), np.uint8)
     cv2.rectangle(front, (120, 60), (520, 580), TOP, -1)
-    assert plain_solid(front, ShapeHint()) is None
+    assert plain_solids(front, ShapeHint()).close is None
 
 
 def test_what_is_as_thick_as_a_bowl_is_no_disc() -> None:
-    assert plain_solid(_seen(_circle(0.10), 0.025, 55), ShapeHint(flat=True, round=True)) is None
+    assert plain_solids(_seen(_circle(0.10), 0.025, 55), ShapeHint(flat=True, round=True)).close is None
 
 
 def test_what_is_said_to_be_open_or_of_another_form_is_not_tried() -> None:
     slab = _seen(_rounded(0.20, 0.13, 0.02), 0.016, 30)
-    assert plain_solid(slab, ShapeHint(container=True)) is None
-    assert plain_solid(slab, ShapeHint(round=True)) is None
-    assert plain_solid(slab, ShapeHint(flat=True)) is not None
+    assert plain_solids(slab, ShapeHint(container=True)).close is None
+    assert plain_solids(slab, ShapeHint(round=True)).close is None
+    assert plain_solids(slab, ShapeHint(flat=True)).close is not None
 
 
 @pytest.mark.parametrize(("outline", "primitive"), [(0.0029, "box"), (0.0018, "shape of template:remote control")])
@@ -106,3 +106,33 @@ def test_the_front_of_a_box_is_a_likely_thing_seen_at_an_angle_only_where_that_e
     monkeypatch.setattr(made_photo, "fit", lambda *arguments, **options: close)
     job = from_photo(front, None, likely=[("remote control", 0.4)])
     assert job.notes["primitive"] == primitive
+
+
+@pytest.mark.parametrize(
+    ("left", "lifted", "rather"),
+    [
+        ((0.97, 0.0035, 0.30), "revolution", True),
+        ((0.97, 0.0035, 0.30), "inflation", True),
+        ((0.97, 0.0035, 0.55), "revolution", False),  # its edges are not seen
+        ((0.95, 0.0035, 0.30), "inflation", False),
+        ((0.997, 0.0006, 0.70), "revolution", True),  # the outline to the pixel
+        ((0.997, 0.0006, 0.70), "box", False),  # the front of a box has any depth
+        ((0.997, 0.0006, 0.85), "revolution", False),  # edges that it would show are missing
+    ],
+)
+def test_a_plain_solid_is_preferred_to_a_lifted_outline_by_its_edges_or_its_exact_outline(
+    left: tuple[float, float, float], lifted: str, rather: bool
+) -> None:
+    assert is_rather(Residual(*left, 0.3, 0.0, 200), lifted) is rather
+
+
+@pytest.mark.parametrize(("edges", "primitive"), [(0.3, "cylinder"), (0.55, "revolution")])
+def test_what_is_nearly_explained_is_the_plain_solid_where_its_edges_are_seen(
+    edges: float, primitive: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    photo = _seen(_circle(0.08), 0.10, 35)
+    close = plain_solids(photo, ShapeHint()).close
+    assert close is not None
+    near = dataclasses.replace(close, residual=Residual(0.97, 0.0035, edges, 0.3, 0.0, 200))
+    monkeypatch.setattr(made_photo, "plain_solids", lambda *arguments: PlainSolids(None, near))
+    assert from_photo(photo, None).notes["primitive"] == primitive

@@ -16,7 +16,13 @@ from manitwin.geometry.poses import GLTF_TO_OBJECT
 from manitwin.models.annotators.priors import lookup
 from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name, is_cylinder, why_no_cylinder, why_not_round
 from manitwin.models.generators.lift.lifting import DISC_ELLIPSE_IOU, Lifted, lift
-from manitwin.models.generators.lift.plain_solids import PRIMITIVES, explains_closely, plain_solid
+from manitwin.models.generators.lift.plain_solids import (
+    PRIMITIVES,
+    PlainSolids,
+    explains_closely,
+    is_rather,
+    plain_solids,
+)
 from manitwin.models.generators.lift.seen_corners import box_from_corner
 from manitwin.models.generators.lift.surface import unseen_share
 from manitwin.models.generators.lift.texture import beside
@@ -83,11 +89,11 @@ def from_photo(
         box = box_from_corner(rgba, focal_mm)
         if box is not None:
             return _shape_alone(box, rgba, primitive="box", source="the outline's six corners")
-    plain = plain_solid(rgba, hint, focal_mm) if template is None else None
+    plain = plain_solids(rgba, hint, focal_mm) if template is None else PlainSolids()
     if name is None:
         return _without_name(rgba, likely, focal_mm, plain)
-    if plain is not None:
-        return _plain(plain, rgba)
+    if plain.close is not None:
+        return _plain(plain.close, rgba)
     fitted = (
         None if template is None else fit(template.category, rgba, or_of=kinds_of(template.category), focal_mm=focal_mm)
     )
@@ -182,17 +188,18 @@ def from_fit(fitted: Fitted, rgba: np.ndarray, name: str | None) -> Job:
 
 
 def _without_name(
-    rgba: np.ndarray, likely: Sequence[tuple[str, float]], focal_mm: float | None, plain: Fitted | None
+    rgba: np.ndarray, likely: Sequence[tuple[str, float]], focal_mm: float | None, plain: PlainSolids
 ) -> Job:
     """Return the shape of a likely name's template where it explains the photo and a simpler solid hardly does, else lift it.
 
-    A ``plain`` solid that explains the photo stands but for a template that does so better.
+    A ``plain`` solid that explains the photo closely stands but for a template that does so better; another one only where it
+    explains the photo rather than what the outline is lifted to.
     """
     fitted = _best_template(rgba, likely, focal_mm)
-    if plain is not None:
-        if fitted is not None and fitted.residual.cost < plain.residual.cost:
+    if plain.close is not None:
+        if fitted is not None and fitted.residual.cost < plain.close.residual.cost:
             return _of_likely_name(fitted, rgba)
-        return _plain(plain, rgba)
+        return _plain(plain.close, rgba)
     try:
         lifted = lift(rgba, ShapeHint())
     except Rejected:
@@ -202,6 +209,8 @@ def _without_name(
     if lifted is None or (fitted is not None and _is_preferred(fitted, lifted)):
         assert fitted is not None
         return _of_likely_name(fitted, rgba)
+    if plain.nearest is not None and is_rather(plain.nearest.residual, lifted.notes["primitive"]):
+        return _plain(plain.nearest, rgba)
     return _lifted_job(lifted, lifted.notes)
 
 
