@@ -21,6 +21,12 @@ def viewed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
     return root, write_viewed(root)
 
 
+@pytest.fixture
+def place(viewed: tuple[Path, list[str]], tmp_path: Path) -> Path:
+    """A copy of the data set, to write reviews and defects into."""
+    return Path(shutil.copytree(viewed[0], tmp_path / "set"))
+
+
 @pytest.fixture(scope="session")
 def chromium() -> Iterator[Any]:
     """A real Chromium; skips where none is installed, fails there with BROWSER_REQUIRED."""

@@ -19,9 +19,9 @@ from manitwin.formats.json_file import parse_json_object
 from manitwin.twin.loaded_twin import Twin
 from manitwin.web import trial_document
 from manitwin.web.access import PERSON
-from manitwin.web.application import LINKS
+from manitwin.web.application import LINKS, message
 from manitwin.web.review_page import PATH, done_page, review_page
-from manitwin.web.served_files import VIEWS, TwinFolders
+from manitwin.web.served_files import INPUTS, VIEWS, TwinFolders
 from manitwin.web.twin_document import DOCUMENT
 
 MOST_BODY_BYTES = 64 << 10
@@ -33,7 +33,7 @@ def review_application(pages: ASGIApp, twins: TwinFolders, session: ReviewSessio
     """Return the pages of a review before those of ``application``, of which a blind one has pictures and shapes alone."""
 
     async def onward(request: Request) -> Response:
-        return await _answered(lambda: _onward(session, _person(request), request.query_params.get("after")))
+        return await _answered(lambda: _onward(session, twins, _person(request), request.query_params.get("after")))
 
     async def show(request: Request) -> Response:
         person, twin_id = _person(request), request.path_params["twin_id"]
@@ -91,7 +91,7 @@ class _Blind:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         name = scope["path"].split("/", 3)[-1] if scope["path"].count("/") > 2 else ""
-        shown = name in _SHAPES or VIEWS.fullmatch(name) or scope["path"].startswith("/static/")
+        shown = name in _SHAPES or name in INPUTS or VIEWS.fullmatch(name) or scope["path"].startswith("/static/")
         if shown:
             await self._pages(scope, receive, send)
         else:
@@ -102,12 +102,18 @@ def _person(request: Request) -> str:
     return str(request.scope.get(PERSON) or "")
 
 
-def _onward(session: ReviewSession, person: str, after: str | None) -> Response:
+def _onward(session: ReviewSession, twins: TwinFolders, person: str, after: str | None) -> Response:
+    """Lead to the first twin of the queue that can be read: one that cannot must not keep anybody from the others."""
     _require_known(session, person)
-    twin_id = session.next_twin(person, after)
-    if twin_id is None:
-        return HTMLResponse(done_page(LINKS, person, session.progress(person)), headers=_NOT_KEPT)
-    return RedirectResponse(f"{PATH}/{quote(twin_id, safe='')}", 303, headers=_NOT_KEPT)
+    unread: dict[str, str] = {}
+    for twin_id in session.queue(person, after):
+        try:
+            _accepted(twins.twin(twin_id))
+        except ManiTwinError as error:
+            unread[twin_id] = str(error)
+            continue
+        return RedirectResponse(f"{PATH}/{quote(twin_id, safe='')}", 303, headers=_NOT_KEPT)
+    return HTMLResponse(done_page(LINKS, person, session.progress(person), unread), headers=_NOT_KEPT)
 
 
 def _page(session: ReviewSession, twin: Twin, person: str) -> Response:
@@ -154,4 +160,4 @@ async def _answered(work: Callable[[], Response], *, as_json: bool = False) -> R
         status = 400 if isinstance(error, UsageError) else 422
         if as_json:
             return JSONResponse(said, status, headers=_NOT_KEPT)
-        return Response(f"{error}\n", status, media_type="text/plain", headers=_NOT_KEPT)
+        return message(status, str(error))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Any
 
 from manitwin.dataset.review.session import Progress
@@ -39,12 +40,14 @@ KEYS = (
 """What a key does at first: action, key, words. Digits lead to dimensions, Escape out of a field."""
 SHORT = tuple((action, key, words.split(",")[0]) for action, key, words in KEYS)
 PATH = "/review"
+MOST_UNREAD = 20
+"""Twins that cannot be read of which the reason is told."""
 
 
 def review_page(twin: Twin, links: Links, annotator: str, progress: Progress, draft: Any, *, blind: bool) -> str:
     """Return the page of an accepted twin; ``blind`` leaves out who says so, how sure they are, and why."""
     record = twin.record
-    fields = "".join(_dimension(record, place, dimension) for place, dimension in enumerate(DIMENSIONS, 1))
+    fields = "".join(_dimension(record, place, dimension, blind) for place, dimension in enumerate(DIMENSIONS, 1))
     body = (
         f"{_head(annotator, progress)}"
         f'<div class="twin">\n{viewer(record, links, hidden=("grasps",))}<main id="main">\n'
@@ -56,15 +59,23 @@ def review_page(twin: Twin, links: Links, annotator: str, progress: Progress, dr
         '<button type="button" data-act="undo">Take back <kbd data-key="undo"></kbd></button>'
         '<button type="button" data-act="later">Later <kbd data-key="later"></kbd></button></p>\n'
         f'<p class="said" id="saved" role="status" aria-live="polite"></p>\n</form>\n{_keys()}'
-        f"{'' if blind else fact_tables(record)}</main>\n</div>\n{pictures(twin, links)}"
+        f"{'' if blind else fact_tables(record)}</main>\n</div>\n"
+        f"{pictures(twin, links, with_card=not blind)}"
     )
     return page(f"Review {record.twin_id}", body, links, scripts=[*SCRIPTS, REVIEW])
 
 
-def done_page(links: Links, annotator: str, progress: Progress) -> str:
-    """Return the page of somebody whose queue is empty."""
+def done_page(links: Links, annotator: str, progress: Progress, unread: Mapping[str, str]) -> str:
+    """Return the page of somebody whose queue is empty, but for twins that cannot be read: ``unread``, the reasons by id."""
+    first = list(unread.values())[:MOST_UNREAD]
+    lacking = "".join(f'<li class="error">{text(reason)}</li>\n' for reason in first)
+    if lacking:
+        lacking = (
+            f"<p>{len(unread):,} {'twin' if len(unread) == 1 else 'twins'} cannot be read:</p>\n<ul>\n{lacking}</ul>\n"
+        )
+    what = "Nothing else" if lacking else "Nothing"
     body = (
-        f'{_head(annotator, progress)}<main id="main" class="message"><p>Nothing is left in your queue.</p>\n'
+        f'{_head(annotator, progress)}<main id="main" class="message"><p>{what} is left in your queue.</p>\n{lacking}'
         f'<form id="review" data-path="{PATH}"><p class="buttons">'
         '<button type="button" data-act="undo">Take back <kbd data-key="undo"></kbd></button></p>\n'
         f'<p class="said" id="saved" role="status" aria-live="polite"></p></form>\n{_keys()}</main>\n'
@@ -86,14 +97,14 @@ def _head(annotator: str, progress: Progress) -> str:
     )
 
 
-def _dimension(record: TwinRecord, place: int, dimension: Dimension) -> str:
+def _dimension(record: TwinRecord, place: int, dimension: Dimension, blind: bool) -> str:
     answers = "".join(
         f'<label><input type="radio" name="{dimension}" value="{answer}"> {answer}</label>' for answer in ANSWERS
     )
     return (
         f'<fieldset data-dimension="{dimension}"><legend><kbd>{place}</kbd> {dimension}'
         f' <span class="question">{text(QUESTIONS[dimension])}</span></legend>\n'
-        f'<p class="given">{text(said_of(record, dimension))}</p>\n'
+        f'<p class="given">{text(said_of(record, dimension, blind=blind))}</p>\n'
         f'<div class="answers" role="radiogroup" aria-label="{dimension}">{answers}</div>{_fix(record, dimension)}</fieldset>\n'
     )
 
@@ -109,8 +120,7 @@ def _fix(record: TwinRecord, dimension: Dimension) -> str:
             ("longest_side_m", "longest side", "m", max(physical.extents_m)),
         ):
             ends = "".join(
-                f'<input data-fix="{name}.{end}" type="number" step="any" min="0" placeholder="{shown}"'
-                f' aria-label="{words}, {end}">'
+                f'<input data-fix="{name}.{end}" inputmode="decimal" placeholder="{shown}" aria-label="{words}, {end}">'
                 for end, shown in (("value", number(value)), ("low", "at least"), ("high", "at most"))
             )
             rows.append(f"<span>{words} {ends} {unit}</span>")
@@ -119,10 +129,9 @@ def _fix(record: TwinRecord, dimension: Dimension) -> str:
         kind = dimension[0]
         named = [(p.id, p.label, p.candidate) for p in points.functional] if kind == "f" else []
         named += [(p.id, p.label or p.type, p.candidate) for p in points.grasp] if kind == "g" else []
-        most = len(points.candidates.positions_m) - 1
         fields = "".join(
-            f'<label>{text(name)} {text(label)} belongs to candidate <input data-point="{text(name)}" type="number" min="0"'
-            f' max="{most}" step="1" placeholder="{candidate}"></label>'
+            f'<label>{text(name)} {text(label)} belongs to candidate <input data-point="{text(name)}" inputmode="numeric"'
+            f' placeholder="{candidate}"></label>'
             for name, label, candidate in named
         )
         return _hidden(f'{fields}<span class="note">click a candidate in the 3D view to put it in</span>')

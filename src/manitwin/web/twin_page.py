@@ -127,10 +127,10 @@ def _downloads(record: TwinRecord, links: Links) -> str:
     return f'<p class="note">Files: {listed}</p>\n'
 
 
-def pictures(twin: Twin, links: Links) -> str:
-    """Return every picture that the model was shown, and the card."""
+def pictures(twin: Twin, links: Links, *, with_card: bool = True) -> str:
+    """Return every picture that the model was shown, and the card, which also has numbers with their intervals."""
     record = twin.record
-    shown = [("card", CARD, "card")] if CARD in record.files else []
+    shown = [("card", CARD, "card")] if with_card and CARD in record.files else []
     if links.live and record.source.file in INPUTS:
         shown.append(("source", record.source.file, "the input"))
     shown += [

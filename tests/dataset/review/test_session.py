@@ -12,7 +12,7 @@ from manitwin.dataset.index.query import Index
 from manitwin.dataset.review.queues import Plan
 from manitwin.dataset.review.session import ReviewSession
 from manitwin.dataset.review.store import ReviewStore
-from manitwin.dataset.review.twins_seen import read_twin
+from manitwin.dataset.review.twins_seen import read_twin, said_of
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
 from twin_folders import write_set
@@ -53,6 +53,19 @@ def test_a_queue_ends_when_all_is_judged_and_names_no_twin_that_is_gone(
     undone = session.undo("ada", "f" * 8)
     assert undone is not None and undone.review.twin_id == seen[-1] == session.next_twin("ada")
     assert undone.review.prompts["category"] == "builtin" and not undone.review.blind
+
+
+def test_what_is_left_for_later_is_behind_all_others(made: tuple[Path, list[str]], session: ReviewSession) -> None:
+    first, second, third = session.queue("ada")
+    assert session.queue("ada", after=first) == [second, third, first]
+    assert session.queue("ada", after=second) == [third, first, second] == session.queue("ada", after="gone")
+    assert session.queue("ada", after=first) == [third, second, first] and session.next_twin("ada") == third
+
+
+def test_a_blind_annotator_is_told_a_mass_without_its_interval(made: tuple[Path, list[str]]) -> None:
+    record = read_twin(DatasetRoot(made[0]), made[1][0])
+    seen, blind = said_of(record, "physical"), said_of(record, "physical", blind=True)
+    assert " to " in seen and " to " not in blind and blind.split(" kg")[0] == seen.split(" kg")[0]
 
 
 def test_what_is_wrong_is_refused_and_nothing_is_kept(made: tuple[Path, list[str]], session: ReviewSession) -> None:

@@ -52,17 +52,24 @@ class ReviewSession:
         self.store, self.plan, self.blind = store, plan, blind
         self.annotators = [require_annotator(name) for name in annotators]
         self._index, self._lock = index, threading.Lock()
+        self._later: dict[str, list[str]] = {}
         self._now: tuple[float, Mapping[str, str]] = (float("-inf"), {})
         for name in self.annotators:
             store.add_annotator(name)
 
-    def next_twin(self, annotator: str, after: str | None = None) -> str | None:
-        """Return the id of the next twin in an annotator's queue, with ``after`` behind that one; None: nothing is left."""
+    def queue(self, annotator: str, after: str | None = None) -> list[str]:
+        """Return the ids of an annotator's queue; ``after`` is left for later: behind all others, until the server ends."""
         queue = self._queue(annotator)
-        if after in queue:
-            place = queue.index(after) + 1
-            queue = queue[place:] + queue[:place]
-        return queue[0] if queue else None
+        with self._lock:
+            later = self._later.setdefault(annotator, [])
+            if after is not None and after in queue:
+                later[:] = [each for each in later if each != after and each in queue] + [after]
+            places = {twin_id: place for place, twin_id in enumerate(later)}
+        return sorted(queue, key=lambda twin_id: places.get(twin_id, -1))
+
+    def next_twin(self, annotator: str, after: str | None = None) -> str | None:
+        """Return the first id of ``queue``; None: nothing is left."""
+        return next(iter(self.queue(annotator, after)), None)
 
     def progress(self, annotator: str) -> Progress:
         """Return an annotator's progress."""

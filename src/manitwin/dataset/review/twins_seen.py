@@ -42,8 +42,8 @@ def prompts_of(record: TwinRecord) -> dict[Dimension, str]:
     return found
 
 
-def said_of(record: TwinRecord, dimension: Dimension) -> str:
-    """Return in one line what a twin says of itself in a dimension."""
+def said_of(record: TwinRecord, dimension: Dimension, *, blind: bool = False) -> str:
+    """Return in one line what a twin says of itself in a dimension; ``blind``: without the interval of its mass."""
     language, physical, points, grasps = record.language, record.physical, record.points, record.grasps
     if dimension == "category" and language is not None:
         return language.category
@@ -56,7 +56,8 @@ def said_of(record: TwinRecord, dimension: Dimension) -> str:
         return "; ".join(f"{point.id} {point.label or point.type}" for point in points.grasp)
     if dimension == "physical" and physical is not None:
         mass, sides = physical.mass_kg, " x ".join(f"{side:.3g}" for side in physical.extents_m)
-        return f"{mass.value:.3g} kg ({mass.low:.3g} to {mass.high:.3g}), {sides} m, {physical.material}"
+        interval = "" if blind else f" ({mass.low:.3g} to {mass.high:.3g})"
+        return f"{mass.value:.3g} kg{interval}, {sides} m, {physical.material}"
     if dimension == "simulation" and grasps is not None:
         return f"{grasps.verified} of {grasps.simulated} grasps held"
     if dimension == "mesh" and record.mesh is not None:

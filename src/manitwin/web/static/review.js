@@ -15,6 +15,7 @@
   let spent = 0;
   let request = id();
   let timer = null;
+  let sending = Promise.resolve(); // the draft that is under way: what is confirmed comes after it
   let busy = false;
 
   function id() {
@@ -97,7 +98,16 @@
     if (value !== "no") go(at + 1);
     else if (sets[at].querySelector("[data-point]")) showLayer("candidate");
   }
-  function content() {
+  // a draft keeps numbers as they are typed; what is confirmed has them read, and none is left out because it is none
+  function number(field) {
+    const typed = field.value.trim();
+    const read = Number(typed.replace(",", "."));
+    if (Number.isFinite(read) && (!field.dataset.point || (Number.isInteger(read) && read >= 0))) return read;
+    field.focus();
+    const what = field.getAttribute("aria-label") || field.parentElement.textContent.trim();
+    throw new Error(`${what}: "${typed}" is no ${field.dataset.point ? "candidate's number" : "number; give one such as 0.25"}`);
+  }
+  function content(read = (field) => field.value.trim()) {
     const answers = {};
     const corrections = {};
     for (const set of sets) {
@@ -105,13 +115,12 @@
       if (value) answers[set.dataset.dimension] = value;
       if (value !== "no") continue;
       for (const field of set.querySelectorAll("[data-fix], [data-point]")) {
-        const typed = field.value.trim();
-        if (!typed) continue;
-        if (field.dataset.point) (corrections.points ||= {})[field.dataset.point] = Number(typed);
-        else if (field.dataset.fix === "category") corrections.category = typed;
+        if (!field.value.trim()) continue;
+        if (field.dataset.point) (corrections.points ||= {})[field.dataset.point] = read(field);
+        else if (field.dataset.fix === "category") corrections.category = field.value.trim();
         else {
           const [name, end] = field.dataset.fix.split(".");
-          (corrections[name] ||= {})[end] = Number(typed);
+          (corrections[name] ||= {})[end] = read(field);
         }
       }
     }
@@ -161,9 +170,19 @@
   function keep() {
     request = id(); // another review than the one that may have been sent
     clearTimeout(timer);
-    timer = setTimeout(() => {
-      send(`${path}/${twin}/draft`, content()).then(() => say("draft kept"), (error) => say(error.message, true));
-    }, 400);
+    timer = setTimeout(keepNow, 400);
+  }
+  function keepNow() {
+    timer = null;
+    sending = send(`${path}/${twin}/draft`, content());
+    sending.then(() => say("draft kept"), (error) => say(error.message, true));
+    return sending;
+  }
+  // what was typed just now is no less kept where a key leads to another twin
+  async function keptBeforeLeaving() {
+    if (timer === null) return;
+    clearTimeout(timer);
+    await keepNow();
   }
   async function guarded(work) {
     if (busy) return;
@@ -182,17 +201,25 @@
       go(sets.findIndex((set) => !answer(set)));
       throw new Error(`not answered: ${missing.join(", ")}`);
     }
+    const body = { ...completed(content(number)), request };
     clearTimeout(timer);
-    const told = await send(`${path}/${twin}`, { ...completed(content()), request });
+    timer = null;
+    say("not saved yet …");
+    await sending.catch(() => {}); // a draft that arrived later would stay
+    say("not saved yet …");
+    const told = await send(`${path}/${twin}`, body);
     location.assign(told.next);
   });
   const undo = () => guarded(async () => {
-    clearTimeout(timer);
+    await keptBeforeLeaving();
     const told = await send(`${path}/undo`, { request: id() });
     if (told.next) location.assign(told.next);
     else say("there is nothing to take back");
   });
-  const later = () => guarded(async () => location.assign(`${path}?after=${encodeURIComponent(twin)}`));
+  const later = () => guarded(async () => {
+    await keptBeforeLeaving();
+    location.assign(`${path}?after=${encodeURIComponent(twin)}`);
+  });
   const ACTS = {
     yes: () => give("yes"), no: () => give("no"), unsure: () => give("unsure"),
     next: () => go(at + 1), previous: () => go(at - 1),
@@ -252,6 +279,7 @@
       return;
     }
     target.value = event.detail.slice(1);
+    if (document.activeElement.closest(".stage")) document.activeElement.blur(); // keys are those of the review again
     say(`${target.dataset.point} belongs to candidate ${target.value}`);
     keep();
   });
