@@ -196,6 +196,9 @@ def test_plain_files_open_from_the_disk(visitor: Visitor, viewed: Viewed, tmp_pa
     write_plain_files(str(viewed[0]), tmp_path / "out")
     page = visitor()
     page.goto((tmp_path / "out" / "index.html").as_uri())
+    for words, count in (("a kettle.", 1), ("hold", 0), ("cm", 0), ("no such words", 0)):  # captions, and no headings
+        page.fill("#find", words)
+        assert page.inner_text("#count") == f"{count} of 3 with these words", words
     page.fill("#find", "kettle")
     assert page.locator(".card:visible").count() == 1 and page.inner_text("#count") == "1 of 3 with these words"
     page.locator(".card a:visible").click()

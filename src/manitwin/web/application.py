@@ -104,13 +104,17 @@ async def answered(work: Callable[[], Response]) -> Response:
 
 
 def _gallery(gallery: Gallery, asked: dict[str, str], title: str) -> Response:
+    view = None
     try:
         view = View.of(asked)
         return HTMLResponse(gallery_page(gallery.find(view), title, LINKS), headers=NOT_KEPT)
-    except UsageError as error:  # a condition that cannot be used: all twins, and what is wrong
+    except (
+        UsageError
+    ) as error:  # a condition that cannot be used: all twins, what is wrong, and the fields as they were
         status = asked.get("status", "accepted")
         shown = gallery.find(View(status=status if status in ("accepted", "rejected") else "accepted"))
-        return HTMLResponse(gallery_page(shown, title, LINKS, error=str(error)), 400, headers=NOT_KEPT)
+        page = gallery_page(shown, title, LINKS, error=str(error), asked=view)
+        return HTMLResponse(page, 400, headers=NOT_KEPT)
 
 
 def _twin(twins: TwinFolders, twin_id: str, with_gallery: bool) -> Response:

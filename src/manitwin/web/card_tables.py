@@ -68,8 +68,12 @@ class CardTables:
         limit: int | None = None,
         offset: int = 0,
         among: pa.Table | None = None,
+        with_words: bool = False,
     ) -> list[dict[str, Any]]:
-        """Return the cards of rows, by a column (from the largest down with ``-``, those without a value last), then by twin."""
+        """Return the cards of rows, by a column (from the largest down with ``-``, those without a value last), then by twin.
+
+        ``with_words`` adds the column ``WORDS``.
+        """
         by = f'"{sort.removeprefix("-")}" {"DESC" if sort[0] == "-" else "ASC"} NULLS LAST, ' if sort else ""
         some = "" if limit is None else f" LIMIT {limit} OFFSET {offset}"
         # places first, their columns after: what is sorted is narrow
@@ -82,9 +86,10 @@ class CardTables:
         if not places:
             return []
         listed = ", ".join(map(str, places))
-        sql = f"SELECT rowid, {', '.join(SHOWN[status])} FROM {status} WHERE rowid IN ({listed})"
+        columns = (*SHOWN[status], *((WORDS,) if with_words else ()))
+        sql = f"SELECT rowid, {', '.join(columns)} FROM {status} WHERE rowid IN ({listed})"
         found = {place: values for place, *values in self._connection.execute(sql).fetchall()}
-        return [dict(zip(SHOWN[status], found[place], strict=True)) for place in places]
+        return [dict(zip(columns, found[place], strict=True)) for place in places]
 
     def _asked(self, sql: str, among: pa.Table | None) -> list[tuple[Any, ...]]:
         if among is not None:

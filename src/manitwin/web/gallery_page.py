@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from manitwin.web.gallery_query import SORTS, Found, View
+from manitwin.web.card_tables import WORDS
+from manitwin.web.gallery_query import SORTS, Found, View, decimal
 from manitwin.web.html import GALLERY, number, options, page, text
 from manitwin.web.links import THUMBNAIL, Links
 
@@ -22,12 +23,12 @@ MOST_FACETS = 1_000
 """Categories that can be chosen from a list; others are found by words."""
 
 
-def gallery_page(found: Found, title: str, links: Links, error: str = "") -> str:
-    """Return the page of a view."""
+def gallery_page(found: Found, title: str, links: Links, error: str = "", asked: View | None = None) -> str:
+    """Return the page of a view; the filters are those of the view that was ``asked`` for, where it had an ``error``."""
     view = found.view
     body = (
         f"{_header(found, title, links)}"
-        f'<div class="gallery">\n{_filters(found, links)}<main id="main">\n'
+        f'<div class="gallery">\n{_filters(found, view if asked is None else asked, links)}<main id="main">\n'
         + (f'<p class="error" role="alert">{text(error)}</p>\n' if error else "")
         + f'<p class="count" role="status">{_said(found)}</p>\n'
         + cards(found.rows, view.status, links)
@@ -63,8 +64,9 @@ def _card(row: dict[str, Any], status: str, links: Links) -> str:
         picture = f'<span class="none">{text(row["reason"].replace("_", " "))}</span>'
         facts, under = [("stage", row["stage"])], row["detail"]
     listed = "".join(f"<div><dt>{text(term)}</dt><dd>{text(said)}</dd></div>" for term, said in facts)
+    words = f' data-words="{text(row[WORDS])}"' if WORDS in row else ""
     return (
-        f'<li class="card {status}"><a href="{text(links.twin(row["twin_id"]))}">{picture}'
+        f'<li class="card {status}"{words}><a href="{text(links.twin(row["twin_id"]))}">{picture}'
         f'<span class="name">{text(name)}</span></a><p class="under">{text(under)}</p><dl>{listed}</dl></li>\n'
     )
 
@@ -87,8 +89,7 @@ def _header(found: Found, title: str, links: Links) -> str:
     return f'<header class="top"><h1>{text(title)}</h1><nav aria-label="Status">{tabs}</nav></header>\n'
 
 
-def _filters(found: Found, links: Links) -> str:
-    view = found.view
+def _filters(found: Found, view: View, links: Links) -> str:
     fields = [f'<label>Words <input type="search" name="q" value="{text(view.q)}"></label>']
     if view.status == "accepted":
         fields.append(_select("Category", "category", found.categories, view.category))
@@ -130,13 +131,13 @@ def _between(said: str, low: str, high: str, view: View) -> str:
 
 def _number(name: str, said: str, view: View) -> str:
     value = getattr(view, name)
-    shown = "" if value is None else f"{value:g}"
+    shown = "" if value is None else decimal(value)
     return f'<input type="number" step="any" min="0" name="{name}" aria-label="{said}" placeholder="{said}" value="{shown}">'
 
 
 def _least(said: str, name: str, view: View, step: str) -> str:
     value = getattr(view, name)
-    shown = "" if value is None else f"{value:g}"
+    shown = "" if value is None else decimal(value)
     return f'<label>{text(said)} <input type="number" step="{step}" min="0" name="{name}" value="{shown}"></label>'
 
 

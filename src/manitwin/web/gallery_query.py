@@ -97,7 +97,7 @@ class View:
         said = [
             (each.name, getattr(view, each.name)) for each in fields(view) if getattr(view, each.name) != each.default
         ]
-        return urlencode([(name, f"{value:g}" if isinstance(value, float) else value) for name, value in said])
+        return urlencode([(name, decimal(value) if isinstance(value, float) else value) for name, value in said])
 
     def conditions(self) -> list[str]:
         """Return the conditions on the view's cards (``CardTables``), in SQL; ``where`` is not among them."""
@@ -109,6 +109,11 @@ class View:
         return found + [
             f"{name} = {sql_text(getattr(self, name))}" for name in ("stage", "reason") if getattr(self, name)
         ]
+
+
+def decimal(value: float) -> str:
+    """Return a number of a view as an address and its field hold it: read again, it is the same to 15 digits."""
+    return f"{value:.15g}"
 
 
 def _number(name: str, value: str) -> float:
@@ -169,10 +174,10 @@ class Gallery:
             return Found(view, rows, cards.count(view.status, view.conditions(), among), **self._facets)
 
     def chosen(self, view: View) -> list[dict[str, Any]]:
-        """Return all rows of the view."""
+        """Return all rows of the view, with the words that are searched."""
         with self._lock:
             cards, among = self._opened(), self._among(view)
-            return cards.rows(view.status, view.conditions(), sort=view.sort, among=among)
+            return cards.rows(view.status, view.conditions(), sort=view.sort, among=among, with_words=True)
 
     def _among(self, view: View) -> pa.Table | None:
         """Return the twins of a condition in SQL, which the index answers: it may read all of its tables."""

@@ -14,6 +14,7 @@ from manitwin.errors import TwinError, UsageError
 from manitwin.formats.output_folder import new_folder
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import Twin
+from manitwin.web.card_tables import WORDS
 from manitwin.web.episode_folders import EpisodeFolders, is_episodes
 from manitwin.web.gallery_page import plain_gallery_page
 from manitwin.web.gallery_query import Gallery, View
@@ -160,8 +161,10 @@ def _row(twin: Twin) -> dict[str, Any]:
     record = twin.record
     if record.physical is None or record.language is None or record.grasps is None:
         raise UsageError(f"{twin.folder}: is no accepted twin; plain files show those that were accepted")
-    robustness = record.grasps.robustness
+    robustness, language = record.grasps.robustness, record.language
+    words = (record.twin_id, record.name, language.category, language.color, language.material, language.caption)
     return {
+        WORDS: " ".join(filter(None, words)).lower(),
         "twin_id": record.twin_id,
         "revision": record.revision,
         "name": record.name,

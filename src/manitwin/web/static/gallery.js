@@ -9,7 +9,7 @@
   const field = document.getElementById("find");
   const said = document.getElementById("count");
   const all = said.textContent;
-  const cards = [...document.querySelectorAll(".card")].map((card) => [card, card.textContent.toLowerCase()]);
+  const cards = [...document.querySelectorAll(".card")].map((card) => [card, card.dataset.words]);
   const find = () => {
     const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
     let shown = 0;
