@@ -14,6 +14,10 @@ _STYLE = """
 .samples { display: grid; grid-template-columns: repeat(auto-fill, minmax(14rem, 1fr)); gap: 1rem; }
 .samples > figure { margin: 0; }
 .samples img { width: 100%; height: auto; display: block; border-radius: 4px; }
+h1, h2 { overflow-wrap: anywhere; }
+th.text { min-width: 5.5rem; }
+td.text { min-width: 4.7rem; }
+tbody > tr > * { vertical-align: top; }
 """
 
 
@@ -71,10 +75,15 @@ def _figure(picture: Picture) -> str:
 
 
 def _table(table: Table) -> str:
-    heads = "".join(f'<th scope="col">{escape(name)}</th>' for name in table.headings)
+    """Return a table; columns of texts are read from the left, those of numbers stand at the right."""
+    texts = [any(isinstance(row[place], str) for row in table.rows) for place in range(len(table.headings))]
+    kinds = [' class="text"' if is_text or not place else "" for place, is_text in enumerate(texts)]
+    heads = "".join(
+        f'<th scope="col"{kind}>{escape(name)}</th>' for name, kind in zip(table.headings, kinds, strict=True)
+    )
     rows = "".join(
         f'<tr><th scope="row" class="text">{_cell(row[0])}</th>'
-        + "".join(f"<td>{_cell(value)}</td>" for value in row[1:])
+        + "".join(f"<td{kind}>{_cell(value)}</td>" for value, kind in zip(row[1:], kinds[1:], strict=True))
         + "</tr>\n"
         for row in table.rows
     )
