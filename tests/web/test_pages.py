@@ -288,6 +288,7 @@ def test_plain_files_are_whole_and_the_same_again(viewed: Viewed, tmp_path: Path
     index = (tmp_path / "out" / "index.html").read_text()
     assert mug in index and can in index and kettle not in index and rejected not in index
     for page in (tmp_path / "out").rglob("*.html"):
+        assert "Shift T" not in page.read_text(), "no trial can be played, and no key says so"
         said = re.findall(r'(?:src|href)="([^"]*)"', page.read_text())
         assert said and not [
             place for place in said if not place.startswith("data:") and not (page.parent / place).exists()
@@ -312,7 +313,8 @@ def test_trials_of_plain_files_are_those_of_the_first_grasps(viewed: Viewed, tmp
         write_plain_files(str(root / twin_name(kettle)), tmp_path / out, trials=2)
     folder = tmp_path / "out" / "twins" / kettle
     scripts = (folder / "trials.js").read_text().splitlines()
-    assert len(scripts) == 2 and "Play trial" in (folder / "index.html").read_text()
+    page = (folder / "index.html").read_text()
+    assert len(scripts) == 2 and "Play trial" in page and "Shift T" in page
     shown = json.loads((folder / "viewer.js").read_text().split("]=", 1)[1].rstrip(";\n"))["grasps"]["panda"]["id"]
     for script, grasp in zip(scripts, shown, strict=False):
         name, document = script.removeprefix("(globalThis.manitwinFiles??={})[").rstrip(";").split("]=", 1)

@@ -82,6 +82,15 @@ def test_keys_can_be_changed_and_never_clash(place: Path, visitor: Visitor) -> N
         assert page.locator("input[type=radio]:checked").count() == 0
         press(page, "a")
         assert page.is_checked("input[name=category][value=yes]")
+        press(page, "1", "N")
+        assert page.is_checked("input[name=category][value=no]"), "Caps Lock is on"
+        page.get_by_text("Change the keys").click()
+        page.focus("[data-map=confirm]")
+        press(page, "x", "Escape", "x")
+        page.wait_for_selector("#saved.error")
+        with page.expect_navigation():
+            press(page, "Shift+X")
+        assert [each.review.answers for each in stored(place)] == [{"category": "no"}]
 
 
 def test_a_server_killed_while_saving_loses_nothing_that_it_confirmed(place: Path, visitor: Visitor) -> None:

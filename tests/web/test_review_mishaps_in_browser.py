@@ -112,6 +112,24 @@ def test_all_that_is_judged_is_in_sight_without_a_mouse(place: Path, visitor: Vi
             return given.scrollHeight <= given.clientHeight + 1; })()""")
 
 
+def test_two_links_in_one_browser_mix_no_names(place: Path, visitor: Visitor) -> None:
+    with reviewing(place, "ada", "ben") as server:
+        page = visitor()
+        page.goto(server.links["ada"])
+        shown(page)
+        other = page.context.new_page()
+        other.goto(server.links["ben"])
+        shown(other)
+        for keys in (("y",), (*"yyyyyy", "Enter"), ("Backspace",)):
+            press(page, *keys)
+            page.wait_for_selector("#saved.error")
+            assert "this browser has been ben's" in page.inner_text("#saved")
+        assert stored(place) == []
+        press(other, *"yyyyyyy")
+        confirmed(other)
+        assert [each.review.annotator for each in stored(place)] == ["ben"]
+
+
 def test_a_twin_that_cannot_be_read_keeps_nobody_from_the_others(place: Path, visitor: Visitor) -> None:
     with reviewing(place, "ada") as server:
         page = visitor()

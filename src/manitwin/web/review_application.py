@@ -43,9 +43,7 @@ def review_application(pages: ASGIApp, twins: TwinFolders, session: ReviewSessio
         person, twin_id, body = _person(request), request.path_params["twin_id"], await _body(request)
 
         def work() -> Response:
-            session.confirm(
-                person, _accepted(twins.twin(twin_id)).record, parse_json_object(body, "review", UsageError)
-            )
+            session.confirm(person, _accepted(twins.twin(twin_id)).record, _said(body, "review", person))
             return JSONResponse({"next": PATH}, headers=_NOT_KEPT)
 
         return await _answered(work, as_json=True)
@@ -54,7 +52,7 @@ def review_application(pages: ASGIApp, twins: TwinFolders, session: ReviewSessio
         person, twin_id, body = _person(request), request.path_params["twin_id"], await _body(request)
 
         def work() -> Response:
-            said = parse_json_object(body, "draft", UsageError)
+            said = _said(body, "draft", person)
             session.store.put_draft(person, _accepted(twins.twin(twin_id)).record.twin_id, said)
             return JSONResponse({}, headers=_NOT_KEPT)
 
@@ -64,7 +62,7 @@ def review_application(pages: ASGIApp, twins: TwinFolders, session: ReviewSessio
         person, body = _person(request), await _body(request)
 
         def work() -> Response:
-            undone = session.undo(person, str(parse_json_object(body, "undo", UsageError).get("request", "")))
+            undone = session.undo(person, str(_said(body, "undo", person).get("request", "")))
             twin_id = None if undone is None else quote(undone.review.twin_id, safe="")
             return JSONResponse({"next": None if twin_id is None else f"{PATH}/{twin_id}"}, headers=_NOT_KEPT)
 
@@ -138,6 +136,16 @@ def _accepted(twin: Twin) -> Twin:
 def _require_known(session: ReviewSession, person: str) -> None:
     if person not in session.annotators:
         raise UsageError("this link is nobody's who reviews; open the one with your name")
+
+
+def _said(body: bytes, what: str, person: str) -> dict[str, Any]:
+    """Return what a page sends; raises UsageError where it was made for another annotator than the browser's cookie is of."""
+    said = parse_json_object(body, what, UsageError)
+    if said.pop("annotator", person) != person:
+        raise UsageError(
+            f"not saved: this browser has been {person}'s since their link was opened in it; open yours again"
+        )
+    return said
 
 
 async def _body(request: Request) -> bytes:

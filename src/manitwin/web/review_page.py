@@ -52,7 +52,9 @@ def review_page(twin: Twin, links: Links, annotator: str, progress: Progress, dr
         f"{_head(annotator, progress)}"
         f'<div class="twin">\n{viewer(record, links, hidden=("grasps",))}<main id="main">\n'
         f'<form id="review" data-twin="{text(record.twin_id)}" data-revision="{text(record.revision)}"'
-        f' data-path="{PATH}" data-draft="{text(json.dumps(draft)) if draft else ""}" autocomplete="off">\n{_strip()}{fields}'
+        f' data-annotator="{text(annotator)}" data-path="{PATH}"'
+        f' data-draft="{text(json.dumps(draft)) if draft else ""}" autocomplete="off">\n'
+        f"{_strip()}{fields}"
         f'<label class="note"><span>Note <kbd data-key="note"></kbd></span>'
         f'<textarea name="note" rows="2" maxlength="{MOST_NOTE_CHARACTERS}"></textarea></label>\n'
         '<p class="buttons"><button type="button" data-act="confirm">Confirm <kbd data-key="confirm"></kbd></button>'
@@ -76,7 +78,7 @@ def done_page(links: Links, annotator: str, progress: Progress, unread: Mapping[
     what = "Nothing else" if lacking else "Nothing"
     body = (
         f'{_head(annotator, progress)}<main id="main" class="message"><p>{what} is left in your queue.</p>\n{lacking}'
-        f'<form id="review" data-path="{PATH}"><p class="buttons">'
+        f'<form id="review" data-annotator="{text(annotator)}" data-path="{PATH}"><p class="buttons">'
         '<button type="button" data-act="undo">Take back <kbd data-key="undo"></kbd></button></p>\n'
         f'<p class="said" id="saved" role="status" aria-live="polite"></p></form>\n{_keys()}</main>\n'
     )

@@ -66,7 +66,8 @@ def viewer(record: TwinRecord, links: Links, *, with_trials: bool = True, hidden
         f" {words} <kbd>{key}</kbd></label>"
         for name, key, words, shown in LAYERS
     )
-    keys = "".join(f"<div><dt>{text(key)}</dt><dd>{text(does)}</dd></div>" for key, does in KEYS)
+    known = [(key, does) for key, does in KEYS if with_trials or not key.startswith("T")]
+    keys = "".join(f"<div><dt>{text(key)}</dt><dd>{text(does)}</dd></div>" for key, does in known)
     trials = links.file(record.twin_id, trial_document.DOCUMENT, record.revision).split("?")[0]
     places = (
         f' data-document="{text(links.file(record.twin_id, DOCUMENT, record.revision))}"'

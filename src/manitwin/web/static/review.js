@@ -4,7 +4,7 @@
   const form = document.getElementById("review");
   if (!form) return;
   const said = document.getElementById("saved");
-  const { twin, revision, path } = form.dataset;
+  const { twin, revision, path, annotator } = form.dataset;
   const sets = [...form.querySelectorAll("[data-dimension]")];
   const maps = [...document.querySelectorAll("[data-map]")];
   const KEPT = "manitwin.review.keys";
@@ -159,7 +159,7 @@
   async function send(place, body) {
     let reply;
     try {
-      reply = await fetch(place, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) });
+      reply = await fetch(place, { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify({ ...body, annotator }) });
     } catch {
       throw new Error("not saved: the server does not answer. Nothing is lost on this page; try again.");
     }
@@ -257,7 +257,8 @@
     }
     const digit = /^[1-9]$/.test(event.key) ? Number(event.key) : 0;
     if (digit && digit <= sets.length) go(digit - 1);
-    const found = maps.find((field) => field.value === event.key || (event.shiftKey && field.value === "Enter" && event.key === "Enter"));
+    const isOf = (key) => (field) => field.value === key; // also with Shift or Caps Lock, where no key of its own is that
+    const found = maps.find(isOf(event.key)) ?? maps.find(isOf(event.key.toLowerCase()));
     if (!found && !digit) return;
     event.preventDefault();
     if (found) act(found.dataset.map, event);
