@@ -49,16 +49,17 @@ def test_no_word_and_no_number_of_a_twin_is_broken(
 
 def test_a_report_fits_a_telephone_and_its_texts_are_read_from_the_left(visitor: Visitor, tmp_path: Path) -> None:
     rows = [
-        ("FIL001 unreadable", 5, "Ship the file beside the asset, under the name that is written."),
-        ("x" * 40, None, "y"),
+        ("FIL001 unreadable", 5, "-1.5 %", "Ship the file beside the asset, as written."),
+        ("x" * 40, 2372.4, "–", ""),
     ]
     path = "/a/very/long/path/of/an_asset_that_is_nowhere_broken_by_a_blank/0123456789.urdf"
-    table = Table("Findings", ("rule", "assets", "what to do"), rows)
+    table = Table("Findings", ("rule", "assets", "share", "what to do"), rows)
     (tmp_path / "report.html").write_bytes(report_page("Report", ["What it is."], [Section(path, [table])]))
     page = visitor(viewport={"width": 390, "height": 844})
     page.goto((tmp_path / "report.html").as_uri())
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    assert "2,372" in page.inner_text("table"), "no 2.37e+03"
     aligned = "[...document.querySelectorAll('thead th')].map((each) => getComputedStyle(each).textAlign)"
-    assert page.evaluate(aligned) == ["left", "right", "left"]
+    assert page.evaluate(aligned) == ["left", "right", "right", "left"]
     cells = "[...document.querySelectorAll('tbody td')].map((each) => getComputedStyle(each).textAlign)"
-    assert page.evaluate(cells) == ["right", "left"] * 2
+    assert page.evaluate(cells) == ["right", "right", "left"] * 2

@@ -16,6 +16,7 @@ _STYLE = """
 .samples img { width: 100%; height: auto; display: block; border-radius: 4px; }
 h1, h2 { overflow-wrap: anywhere; }
 th.text { min-width: 5.5rem; }
+thead th.text { overflow-wrap: break-word; }
 td.text { min-width: 4.7rem; }
 tbody > tr > * { vertical-align: top; }
 """
@@ -76,7 +77,7 @@ def _figure(picture: Picture) -> str:
 
 def _table(table: Table) -> str:
     """Return a table; columns of texts are read from the left, those of numbers stand at the right."""
-    texts = [any(isinstance(row[place], str) for row in table.rows) for place in range(len(table.headings))]
+    texts = [any(_is_text(row[place]) for row in table.rows) for place in range(len(table.headings))]
     kinds = [' class="text"' if is_text or not place else "" for place, is_text in enumerate(texts)]
     heads = "".join(
         f'<th scope="col"{kind}>{escape(name)}</th>' for name, kind in zip(table.headings, kinds, strict=True)
@@ -93,9 +94,16 @@ def _table(table: Table) -> str:
     )
 
 
+def _is_text(value: str | int | float | None) -> bool:
+    """Tell whether a value is words, and no number with its unit or interval."""
+    return isinstance(value, str) and value != "" and not (value[0].isdigit() or value[0] in "+-−–±")
+
+
 def _cell(value: str | int | float | None) -> str:
     if value is None:
         return "–"
     if isinstance(value, str):
         return escape(one_line(value))
-    return f"{value:,}" if isinstance(value, int) else f"{value:.3g}"
+    if isinstance(value, int):
+        return f"{value:,}"
+    return f"{value:,.0f}" if 1e3 <= abs(value) < 1e9 else f"{value:.3g}"
