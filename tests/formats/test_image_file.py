@@ -11,7 +11,7 @@ import pytest
 from PIL import Image, ImageCms
 
 from manitwin.errors import InputError
-from manitwin.formats.image_file import read_image
+from manitwin.formats.image_file import check_header, read_image
 
 
 def refusal(path: Path) -> InputError:
@@ -48,6 +48,9 @@ def test_heic_is_refused_with_the_remedy(tmp_path: Path, name: str, brands: byte
     (tmp_path / name).write_bytes(b"\0\0\0\x18ftyp" + brands + bytes(100))
     error = refusal(tmp_path / name)
     assert (error.reason, error.detail) == ("wrong_type", f"{name}: HEIC is not read; convert it to PNG or JPEG")
+    with pytest.raises(InputError) as caught:  # a build and a dry run look at the header first
+        check_header(tmp_path / name)
+    assert caught.value.detail == error.detail
 
 
 def test_avif_is_read_with_any_of_its_brands(tmp_path: Path) -> None:

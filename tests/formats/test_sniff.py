@@ -59,6 +59,34 @@ def test_prose_renamed_obj_is_wrong_type(tmp_path: Path) -> None:
     assert caught.value.reason == "wrong_type"
 
 
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        ("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n", "fetch it with git lfs pull"),
+        ("\ufeff\n<!DOCTYPE html>\n<html><body>404 <svg></svg></body></html>", "a web page (HTML)"),
+        ("<HTML><body>404</body></HTML>", "a web page (HTML)"),
+        ('<svg xmlns="http://www.w3.org/2000/svg"/>', "an SVG drawing"),
+        ('<?xml version="1.0"?>\n<!-- by hand -->\n<svg width="3">\n</svg>', "an SVG drawing"),
+        ("<!-- a note -->", "holds plain text"),
+    ],
+)
+@pytest.mark.parametrize("name", ["thing.png", "thing.obj"])
+def test_what_is_often_found_in_a_file_s_place_is_told_with_what_to_do(
+    tmp_path: Path, name: str, content: str, told: str
+) -> None:
+    (tmp_path / name).write_text(content, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        sniff(tmp_path / name)
+    assert caught.value.reason == "wrong_type" and told in caught.value.detail and name in caught.value.detail
+
+
+@pytest.mark.parametrize("name", ["scan.pdf", "photo.ppm", "photo.eps"])
+def test_pictures_of_other_kinds_are_told_by_their_suffix(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_bytes(b"P6\n8 8\n255\n" + bytes(192))
+    with pytest.raises(InputError, match="PNG or JPEG"):
+        sniff(tmp_path / name)
+
+
 def test_missing_file_is_unreadable(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         sniff(tmp_path / "gone.obj")

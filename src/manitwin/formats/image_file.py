@@ -53,6 +53,14 @@ def read_image(path: Path, *, frame: int | None = None, max_side_px: int | None 
     Raises InputError: ``unreadable``, ``too_large``, ``empty``, ``wrong_type``, ``too_small``, ``animated``; each names the
     file, the cause and the remedy.
     """
+    _require_image(path)
+    try:
+        return _read(path, frame, max_side_px)
+    except MemoryError as error:
+        raise _refused(path, error) from error
+
+
+def _require_image(path: Path) -> None:
     found = sniff(path)
     if found.kind != "image":
         raise InputError(
@@ -60,10 +68,6 @@ def read_image(path: Path, *, frame: int | None = None, max_side_px: int | None 
         )
     if found.format == "heif":
         raise InputError("wrong_type", f"{_name(path)}: {HEIC_NOT_READ}")
-    try:
-        return _read(path, frame, max_side_px)
-    except MemoryError as error:
-        raise _refused(path, error) from error
 
 
 def _read(path: Path, frame: int | None, max_side_px: int | None) -> Photo:
@@ -107,7 +111,8 @@ def png_of(pixels: np.ndarray) -> bytes:
 
 
 def check_header(path: Path, *, frame: int | None = None) -> None:
-    """Raise InputError for what an image's header tells already, as ``read_image`` would: its size, and an animation."""
+    """Raise InputError for what an image's header tells already, as ``read_image`` would: its kind, its size, an animation."""
+    _require_image(path)
     with _opened(path) as image:
         _check_size(path, image)
         _choose_frame(path, image, frame, [])

@@ -35,6 +35,18 @@ _EXPORT = "this mesh format is not read; export it as glTF 2.0 or OBJ"
 _VIDEO = "a video; give a photo"
 _IMAGE = "this image format is not read as a photo; convert it to PNG or JPEG"
 _ARCHIVE = "an archive; unpack it"
+_NO_FILE_ITSELF = (
+    (re.compile(rb"version https://git-lfs\."), "holds a pointer of Git LFS, not the file; fetch it with git lfs pull"),
+    (
+        re.compile(rb"(\xef\xbb\xbf)?\s*<(!doctype )?html[\s>]", re.IGNORECASE),
+        "holds a web page (HTML), not the file; download the file itself",
+    ),
+    (
+        re.compile(rb"(\xef\xbb\xbf)?\s*(<(\?xml|!--|!doctype).{0,4096}?)?<svg[\s>]", re.IGNORECASE | re.DOTALL),
+        f"holds an SVG drawing: {_IMAGE}",
+    ),
+)
+"""What is often found under the name of an image or a mesh, by how it begins, and what to do about it."""
 NOT_READ = {
     **dict.fromkeys((".heic", ".heif"), HEIC_NOT_READ),
     **dict.fromkeys((".urdf", ".sdf", ".xacro", ".usd", ".usda", ".usdc"), _IMPORT),
@@ -43,6 +55,8 @@ NOT_READ = {
     **dict.fromkeys((".abc", ".wrl", ".ma", ".mb", ".c4d", ".skp", ".drc", ".vrm", ".fcstd", ".sldprt"), _EXPORT),
     **dict.fromkeys((".mp4", ".mov", ".avi", ".mkv", ".webm", ".m4v"), _VIDEO),
     **dict.fromkeys((".tga", ".dds", ".exr", ".hdr", ".psd", ".svg", ".jxl", ".jp2", ".ktx", ".ktx2", ".ico"), _IMAGE),
+    **dict.fromkeys((".ppm", ".pgm", ".pbm", ".pnm", ".pcx", ".xcf", ".psb", ".jxr", ".icns", ".eps", ".ai"), _IMAGE),
+    ".pdf": "a document; save its picture as PNG or JPEG",
     **dict.fromkeys((".zip", ".tar", ".gz", ".tgz", ".7z", ".rar", ".bz2", ".xz", ".zst"), _ARCHIVE),
 }  # fmt: skip
 
@@ -76,6 +90,9 @@ def sniff(path: Path) -> Sniffed:
         return Sniffed("mesh", mesh)
     if not_read is not None:
         raise InputError("wrong_type", f"{called}: {not_read}")
+    for begin, told in _NO_FILE_ITSELF:
+        if begin.match(head):
+            raise InputError("wrong_type", f"{called}: {told}")
     raise InputError(
         "wrong_type",
         f"{called}: holds {_describe(head)}, neither an image ({', '.join(IMAGE_FORMATS)})"
