@@ -118,7 +118,7 @@ def test_a_view_that_is_a_mesh_by_its_bytes_is_refused_by_its_name(photos: Path)
 
 def _cut_out(photos: Path, work: Path, **item: object) -> Draft[Item]:
     files = [str(photos / f"{name}.png") for name in ("front", "side", "back")]
-    draft = Draft("t", Item(files[0], views=tuple(files[1:]), **item), seed=0)  # type: ignore[arg-type]
+    draft = Draft("t", Item(files[0], views=tuple(files[1:]), name="box", **item), seed=0)  # type: ignore[arg-type]
     run_stage(PhotosStage(MattingConfig()), draft, work)
     return draft
 

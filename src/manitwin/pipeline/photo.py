@@ -19,6 +19,7 @@ from manitwin.models.matting.matte import DoubtedCutOut, Matte, matte_photo
 from manitwin.models.matting.object_network import built_in_model
 from manitwin.models.matting.outline_network import outline_model
 from manitwin.pipeline.cutout import confirmed_or_rejected
+from manitwin.pipeline.given_alpha import as_given, doubted_rectangle
 from manitwin.pipeline.item import Item
 
 
@@ -26,7 +27,7 @@ class PhotoStage:
     """Write ``photo.png`` (RGBA, upright, alpha is the matte) and the field ``matte``."""
 
     name: ClassVar[str] = "photo"
-    version: ClassVar[str] = "16"
+    version: ClassVar[str] = "17"
     reads: ClassVar[tuple[str, ...]] = ()
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "matte")
     needs: ClassVar[Resource] = "cpu"
@@ -59,9 +60,10 @@ class PhotoStage:
         """
         settings = self.settings
         photo = read_image(path, frame=settings.frame, max_side_px=settings.photo_side_px)
+        given = as_given(photo.pixels, name)
         try:
             matte = matte_photo(
-                photo.pixels,
+                given.pixels,
                 path.name,
                 working_side_px=settings.working_side_px,
                 min_confidence=settings.min_confidence,
@@ -70,12 +72,14 @@ class PhotoStage:
                 network=self.network,
                 explains=template_outline_check(name, photo.focal_mm),
             )
+            if given.is_doubted:
+                raise doubted_rectangle(matte, path.name)
         except DoubtedCutOut as doubted:
             matte = confirmed(doubted)
         return np.ascontiguousarray(matte.rgba), {
             "method": matte.method,
             "confidence": matte.confidence,
-            "findings": [*photo.findings, *matte.findings],
+            "findings": [*photo.findings, *given.findings, *matte.findings],
             "scores": matte.scores,
             "agreement": matte.agreement,
             "focal_mm": photo.focal_mm,
@@ -94,7 +98,7 @@ class PhotosStage(PhotoStage):
     One that cannot be cut out is left out, with a finding; the field ``matte`` is that of the least sure of the others.
     """
 
-    version: ClassVar[str] = "8"
+    version: ClassVar[str] = "9"
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "photos/", "matte")
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:

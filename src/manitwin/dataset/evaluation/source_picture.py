@@ -15,6 +15,7 @@ from manitwin.formats.image_file import read_image
 from manitwin.models.classifiers.efficientnet_lite import features
 from manitwin.models.embedders.looks import MARGIN, NETWORK, centered
 from manitwin.models.matting import matte_photo
+from manitwin.pipeline.given_alpha import as_given
 from manitwin.twin.loaded_twin import Twin
 
 OUTLINE_PX, OUTLINE_RADIUS = 96, 20.0
@@ -69,7 +70,8 @@ def source_of(twin: Twin) -> Source | None:
     settings = MattingConfig()
     try:
         photo = read_image(twin.folder / source.file, max_side_px=settings.photo_side_px)
-        rgba = matte_photo(photo.pixels, source.file, working_side_px=settings.working_side_px).rgba
+        given = as_given(photo.pixels, None if twin.record.naming else twin.record.name)
+        rgba = matte_photo(given.pixels, source.file, working_side_px=settings.working_side_px).rgba
     except (Rejected, InputError) as error:
         return Source("image", source.sha256, left_out=f"its photo cannot be cut out by default settings: {error}")
     return Source("image", source.sha256, rgb=rgba[..., :3], mask=rgba[..., 3].astype(np.float32) / 255)

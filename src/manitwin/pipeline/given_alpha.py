@@ -1,0 +1,100 @@
+"""A picture's own alpha channel: whether it cuts a thing out, is merely faint, or frames a picture with transparent bars."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from manitwin.formats.image_file import MIN_SIDE_PX
+from manitwin.models.annotators.priors import lookup
+from manitwin.models.matting.matte import TRANSPARENT_SHARE, DoubtedCutOut, Matte
+
+OPAQUE = 250
+"""Alpha from which a pixel counts as opaque: what compresses with losses is off by a few."""
+LEAST_DRAWN = 26
+"""A tenth of opaque: a channel that reaches less is empty."""
+MOST_OF_CORNERS = 1 / 500
+"""Of an upright rectangle, what its round corners may leave transparent: those of a window on a screen do."""
+DOUBTFUL = 0.5
+"""How likely a rectangle is the thing that is meant, where nobody says what it is."""
+RECTANGULAR_SHAPES = frozenset({"flat and rectangular", "flat board", "box-shaped", "block-shaped"})
+FRAMED = "its alpha channel frames an upright rectangle, a picture with transparent bars: cropped to it"
+
+
+@dataclass(frozen=True)
+class Given:
+    """What of a picture is cut out: ``pixels (H, W, 3 or 4) uint8``, findings, and whether its alpha channel is doubted."""
+
+    pixels: np.ndarray
+    findings: tuple[str, ...] = ()
+    is_doubted: bool = False
+
+
+def as_given(pixels: np.ndarray, name: str | None) -> Given:
+    """Return what of a picture ``(H, W, 3 or 4) uint8`` is cut out, where a person calls the thing ``name``.
+
+    Where what is opaque is an upright rectangle with bars around, the name says whether that is the thing (a book, a box) or a
+    picture of it, which is then taken out of its bars; it is doubted where there is no name, or one that is not known.
+    """
+    pixels, findings = usable(pixels)
+    framed = framed_picture(pixels)
+    if framed is None:
+        return Given(pixels, findings)
+    rectangular = is_rectangular(name)
+    if rectangular is False:
+        return Given(framed, (*findings, FRAMED))
+    return Given(pixels, findings, is_doubted=rectangular is None)
+
+
+def usable(pixels: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Return a picture ``(H, W, 3 or 4) uint8`` with an alpha channel that may cut something out, or without one, and findings.
+
+    A channel that is the same everywhere cuts nothing out. One that is nowhere opaque is that of a faint cut-out (a glass that
+    is drawn translucent): it is stretched until its highest value is opaque.
+    """
+    if pixels.shape[2] != 4:
+        return pixels, ()
+    least, most = int(pixels[..., 3].min()), int(pixels[..., 3].max())
+    if most < LEAST_DRAWN or most == least == 255:
+        return pixels, ()
+    if least == most:
+        return np.ascontiguousarray(pixels[..., :3]), (f"its alpha channel is {most} of 255 everywhere: not used",)
+    if most >= OPAQUE:
+        return pixels, ()
+    stretched = pixels.copy()
+    stretched[..., 3] = np.rint(pixels[..., 3] * (255 / most))
+    return stretched, (f"its alpha channel reaches {most} of 255: what is most opaque was taken for the thing",)
+
+
+def framed_picture(pixels: np.ndarray) -> np.ndarray | None:
+    """Return the picture ``(H, W, 3) uint8`` inside where what is opaque of ``pixels`` is an upright rectangle with bars around.
+
+    Round corners as small as a window's are none; beside it may be what is not opaque, such as the shadow of a window.
+    """
+    if pixels.shape[2] != 4:
+        return None
+    opaque = pixels[..., 3] >= OPAQUE
+    if (~opaque).mean() <= TRANSPARENT_SHARE or not opaque.any():
+        return None
+    rows, columns = np.flatnonzero(opaque.any(axis=1)), np.flatnonzero(opaque.any(axis=0))
+    inside = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    if min(opaque[inside].shape) < MIN_SIDE_PX or (~opaque[inside]).mean() > MOST_OF_CORNERS:
+        return None
+    return np.ascontiguousarray(pixels[inside][..., :3])
+
+
+def is_rectangular(name: str | None) -> bool | None:
+    """Tell whether things of a name may have an upright rectangle for their outline; None where nothing is known of them."""
+    prior = lookup(name)
+    return None if prior is None else prior.shape in RECTANGULAR_SHAPES
+
+
+def doubted_rectangle(matte: Matte, name: str) -> DoubtedCutOut:
+    """Return the doubt of a cut-out that is an upright rectangle; ``name`` is the file's."""
+    return DoubtedCutOut(
+        "low_confidence_matte",
+        f"{name}: its alpha channel cuts an upright rectangle out, which may be the thing (a book, a box) or a picture with"
+        " transparent bars; say what it is with --name, or crop the bars off",
+        replace(matte, confidence=DOUBTFUL),
+    )
