@@ -91,6 +91,10 @@ def test_columns_that_nobody_knows_are_an_error_where_it_is_asked_for(folder: Pa
         ("name\ncup\n", "either 'file' or 'text'"),
         ("file\n", "no rows"),
         ("file,name\ncup.glb,a,b\n", "more values than columns"),
+        ("file;name\ncup.glb;cup\n", "list.csv:1: its columns are separated by semicolons"),
+        ("file\tname\ncup.glb\tcup\n", "list.csv:1: its columns are separated by tabs"),
+        ("cup.glb,cup\nphoto.jpg,cup\n", "the first line names the columns, unknown: 'cup'"),
+        ("file\nhttps://example.org/cup.glb\n", "https://example.org/cup.glb: a URL, and nothing is downloaded"),
     ],
 )
 def test_bad_manifest_is_one_clear_error(folder: Path, content: str, message: str) -> None:
@@ -98,6 +102,19 @@ def test_bad_manifest_is_one_clear_error(folder: Path, content: str, message: st
     manifest.write_text(content)
     with pytest.raises(UsageError, match=message):
         collect_items([manifest])
+
+
+@pytest.mark.parametrize(("value", "kind"), [(["cup"], "list"), ({"en": "cup"}, "dict"), (True, "bool")])
+def test_value_of_json_that_is_no_text_is_an_error_that_names_its_column(
+    folder: Path, value: object, kind: str
+) -> None:
+    manifest = folder / "list.jsonl"
+    manifest.write_text(json.dumps({"file": "photo.jpg", "name": value, "tags": ["a", "b"]}) + "\n")
+    with pytest.raises(UsageError, match=rf"list\.jsonl:1: name: is a {kind}; give one text or number"):
+        collect_items([manifest])
+    manifest.write_text(json.dumps({"file": "photo.jpg", "name": None, "tags": ["a", "b"]}) + "\n")
+    (item,), _ = collect_items([manifest])
+    assert item.name is None
 
 
 def test_manifest_that_is_no_text_is_told(folder: Path) -> None:
@@ -110,6 +127,8 @@ def test_manifest_that_is_no_text_is_told(folder: Path) -> None:
 def test_path_that_is_not_there_is_a_usage_error(folder: Path) -> None:
     with pytest.raises(UsageError, match="not there"):
         collect_items([folder / "nothing.png"])
+    with pytest.raises(UsageError, match="a URL, and nothing is downloaded"):
+        collect_items([Path("https://example.org/mug.png")])
 
 
 def test_folder_without_inputs_is_told_with_what_it_has(tmp_path: Path) -> None:

@@ -14,18 +14,24 @@ MAX_LINE_BYTES = 1 << 20
 MAX_COLUMNS = 512
 """Every row is as long as the header: one of 100,000 columns makes 20,000 short rows a matter of minutes."""
 
+_OTHER_MARKS = {";": "semicolons", "\t": "tabs"}
+
 
 def read_csv(path: Path, refuse: Refusal, *, name: str | None = None) -> Iterator[tuple[int, dict[str, Any]]]:
     """Yield the rows of a CSV file (RFC 4180) with a header, as the number of the line where each ends and its values.
 
     A row is read as it is asked for. Raises what ``refuse`` makes of one line that names file and line: not UTF-8, a quote
-    that is not closed, a value of more than csv's 128 KiB, a line of more than ``MAX_LINE_BYTES``, more than ``MAX_COLUMNS``
-    columns, more values than columns.
+    that is not closed, semicolons or tabs between columns, a value of more than csv's 128 KiB, a line of more than
+    ``MAX_LINE_BYTES``, more than ``MAX_COLUMNS`` columns, more values than columns.
     """
     called = name or str(path)
     reader = csv.DictReader(read_lines(path, refuse, name=called), strict=True)
     try:
-        columns = len(reader.fieldnames or ())
+        header = reader.fieldnames or ()
+        columns = len(header)
+        for mark, told in _OTHER_MARKS.items() if columns == 1 else ():
+            if mark in header[0]:
+                raise refuse(f"{called}:1: its columns are separated by {told}; save it with commas between them")
         if columns > MAX_COLUMNS:
             raise refuse(
                 f"{called}:{reader.line_num}: {columns:,} columns; at most {MAX_COLUMNS} are read: remove what is not needed"

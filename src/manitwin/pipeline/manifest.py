@@ -14,8 +14,6 @@ from typing import Any, Literal, cast, get_args
 from manitwin.engine.ledger.ledger import LEDGER
 from manitwin.engine.ledger.location import CONFIG
 from manitwin.errors import UsageError, choose_from
-from manitwin.formats.csv_file import read_csv, read_lines
-from manitwin.formats.json_file import parse_json
 from manitwin.formats.output_folder import require_writable_folder
 from manitwin.formats.printable import printable_line
 from manitwin.formats.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES
@@ -23,6 +21,7 @@ from manitwin.geometry.length_unit import StatedUnit
 from manitwin.pipeline.folder_listing import FolderListing, list_folder
 from manitwin.pipeline.inspection import imported
 from manitwin.pipeline.item import Item
+from manitwin.pipeline.manifest_rows import manifest_rows
 from manitwin.pipeline.photo_groups import PhotoGroups, one_of_photos
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH, is_imported
@@ -34,6 +33,7 @@ LONGEST = {"name": 200, "text": 4000, "license": 200, "attribution": 4000, "file
 _CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 """What changes a terminal or the order of what is read, and lone surrogates; a tab and an end of line do not."""
 _LINES = re.compile(r"[\r\n\t\u2028\u2029]")
+_URL = re.compile(r"[a-z][a-z0-9+.-]+:/", re.IGNORECASE)  # a path that was read as one has a single slash
 COLUMNS = ("file", "text", "name", "units", "up", "license", "attribution", "group", "turn_deg")
 _KNOWN = frozenset(COLUMNS)
 
@@ -131,7 +131,8 @@ def _given_items(
         path = Path(given)
         if not os.path.exists(path):
             raise UsageError(
-                f"{shortened(str(given))}: not there; give an image, a mesh, a folder, or a .csv or .jsonl manifest"
+                f"{shortened(str(given))}: {_not_there(str(given))}; give an image, a mesh, a folder, or a .csv or .jsonl"
+                " manifest"
             )
         if path.is_dir():
             yield from _allowed(_folder_items(path, str(given), defaults, notes), str(given), refusal)
@@ -171,7 +172,7 @@ def _manifest_items(
     groups = PhotoGroups(path)
     _real_folder.cache_clear()  # a link may lead elsewhere than at the last reading
     line = None
-    for line, row in _rows(path):
+    for line, row in manifest_rows(path, COLUMNS):
         for column in sorted(map(str, row.keys() - _KNOWN - unknown.keys())):
             shown = printable_line(column, max_characters=_SHOWN_CHARACTERS)
             near = get_close_matches(shown.lower().strip(), COLUMNS, n=1, cutoff=0.6)
@@ -189,22 +190,6 @@ def _manifest_items(
         )
     if unknown:
         notes.remarks.append(f"{path}: columns not used: {_listed(unknown)}")
-
-
-def _rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
-    yield from read_csv(path, UsageError) if path.suffix.lower() == ".csv" else _jsonl_rows(path)
-
-
-def _jsonl_rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
-    for number, line in enumerate(read_lines(path, UsageError), 1):
-        if not line.strip():
-            continue
-        row = parse_json(line, f"{path}:{number}", UsageError, file_names=True)
-        if not isinstance(row, dict):
-            raise UsageError(
-                f"{path}:{number}: a line is one JSON object with 'file' or 'text', not {type(row).__name__}"
-            )
-        yield number, row
 
 
 def _listed(unknown: dict[str, str]) -> str:
@@ -225,13 +210,15 @@ def _item(
             raise UsageError(f"{where}: {key}: {why}")
     file, text = values.get("file"), values.get("text")
     if (file is None) == (text is None):
-        columns = f"; its unknown columns: {_listed(unknown)}" if unknown else ""
+        columns = f"; the first line names the columns, unknown: {_listed(unknown)}" if unknown else ""
         raise UsageError(f"{where}: a row has either 'file' or 'text'{columns}")
     if file is not None:
         path = os.path.join(folder, file.rstrip("/") or file)
         if not os.path.isfile(path):
             if os.path.isdir(path) and is_imported(Path(path)):
                 return _imported_item(Path(path).resolve(), values)
+            if _URL.match(file):
+                raise UsageError(f"{where}: {shortened(file)}: {_not_there(file)}")
             what = "no file" if os.path.exists(path) else "not there"
             raise UsageError(f"{where}: {shortened(path)} is {what}; paths are absolute or relative to the manifest")
         file = _resolved(path)
@@ -247,6 +234,10 @@ def _item(
         license=values["license"],
         attribution=values["attribution"],
     )
+
+
+def _not_there(given: str) -> str:
+    return "a URL, and nothing is downloaded: download it, and give its path" if _URL.match(given) else "not there"
 
 
 def _resolved(path: str) -> str:
