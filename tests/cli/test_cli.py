@@ -32,6 +32,7 @@ def one_line(text: str) -> str:
         (("build", "FILE", "-o", "OUT", "--quick", "--require-agreement"), "quick leaves the second engine out"),
         (("build", "FILE", "-o", "OUT", "--gripper", "panda", "--gripper", "panda"), "each may be named once"),
         (("show", "OUT"), "not there; give a folder that manitwin build made"),
+        (("build", "https://example.org/mug.png", "-o", "OUT"), "a URL, and nothing is downloaded: download it"),
         (("layout", "OUT", "-o", "OUT"), "not there; give a data set"),
         (("layout", "FILE", "-o", "OUT", "--objects", "few"), "give LOW..HIGH"),
         (("trajectories", "FILE", "-o", "OUT", "-n", "0"), "-n is 0; give 1 or more"),

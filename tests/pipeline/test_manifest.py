@@ -94,7 +94,7 @@ def test_columns_that_nobody_knows_are_an_error_where_it_is_asked_for(folder: Pa
         ("file;name\ncup.glb;cup\n", "list.csv:1: its columns are separated by semicolons"),
         ("file\tname\ncup.glb\tcup\n", "list.csv:1: its columns are separated by tabs"),
         ("cup.glb,cup\nphoto.jpg,cup\n", "the first line names the columns, unknown: 'cup'"),
-        ("file\nhttps://example.org/cup.glb\n", "https://example.org/cup.glb: a URL, and nothing is downloaded"),
+        ("file\nhttps://example.org/cup.glb\n", "is a URL, and nothing is downloaded"),
     ],
 )
 def test_bad_manifest_is_one_clear_error(folder: Path, content: str, message: str) -> None:

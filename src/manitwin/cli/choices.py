@@ -15,6 +15,7 @@ from typing import Any
 import typer
 
 from manitwin.errors import UsageError, choose_from
+from manitwin.formats.missing_path import not_there
 
 
 @dataclass(frozen=True)
@@ -203,7 +204,7 @@ def must_exist(remedy: str) -> Callable[[Any], Any]:
     def check(value: Any) -> Any:
         for place in [] if value is None else value if isinstance(value, list | tuple) else [value]:
             if "://" not in str(place) and not os.path.exists(place):
-                raise UsageError(f"{place}: not there; give {remedy}")
+                raise UsageError(f"{place}: {not_there(str(place))}; give {remedy}")
         return value
 
     return check

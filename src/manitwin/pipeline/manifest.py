@@ -14,6 +14,7 @@ from typing import Any, Literal, cast, get_args
 from manitwin.engine.ledger.ledger import LEDGER
 from manitwin.engine.ledger.location import CONFIG
 from manitwin.errors import UsageError, choose_from
+from manitwin.formats.missing_path import not_there
 from manitwin.formats.output_folder import require_writable_folder
 from manitwin.formats.printable import printable_line
 from manitwin.formats.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES
@@ -33,7 +34,6 @@ LONGEST = {"name": 200, "text": 4000, "license": 200, "attribution": 4000, "file
 _CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 """What changes a terminal or the order of what is read, and lone surrogates; a tab and an end of line do not."""
 _LINES = re.compile(r"[\r\n\t\u2028\u2029]")
-_URL = re.compile(r"[a-z][a-z0-9+.-]+:/", re.IGNORECASE)  # a path that was read as one has a single slash
 COLUMNS = ("file", "text", "name", "units", "up", "license", "attribution", "group", "turn_deg")
 _KNOWN = frozenset(COLUMNS)
 
@@ -131,7 +131,7 @@ def _given_items(
         path = Path(given)
         if not os.path.exists(path):
             raise UsageError(
-                f"{shortened(str(given))}: {_not_there(str(given))}; give an image, a mesh, a folder, or a .csv or .jsonl"
+                f"{shortened(str(given))}: {not_there(str(given))}; give an image, a mesh, a folder, or a .csv or .jsonl"
                 " manifest"
             )
         if path.is_dir():
@@ -217,9 +217,7 @@ def _item(
         if not os.path.isfile(path):
             if os.path.isdir(path) and is_imported(Path(path)):
                 return _imported_item(Path(path).resolve(), values)
-            if _URL.match(file):
-                raise UsageError(f"{where}: {shortened(file)}: {_not_there(file)}")
-            what = "no file" if os.path.exists(path) else "not there"
+            what = "no file" if os.path.exists(path) else not_there(file)
             raise UsageError(f"{where}: {shortened(path)} is {what}; paths are absolute or relative to the manifest")
         file = _resolved(path)
     for key, kind in (("units", StatedUnit), ("up", Up)):
@@ -234,10 +232,6 @@ def _item(
         license=values["license"],
         attribution=values["attribution"],
     )
-
-
-def _not_there(given: str) -> str:
-    return "a URL, and nothing is downloaded: download it, and give its path" if _URL.match(given) else "not there"
 
 
 def _resolved(path: str) -> str:
