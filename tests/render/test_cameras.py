@@ -79,6 +79,15 @@ def test_hero_of_a_photo_is_on_its_side_though_more_is_seen_from_behind() -> Non
     assert hero_camera(points, **FRAMING, from_front=True).camera_to_object[1, 2] < -0.5
 
 
+@pytest.mark.parametrize("extents", [(0.09, 0.15, 0.015), (0.15, 0.09, 0.015), (0.1, 0.1, 0.004)])
+def test_hero_of_a_photo_of_a_flat_thing_has_its_upper_edge_above(extents: tuple[float, float, float]) -> None:
+    points = trimesh.creation.box(extents).vertices
+    points[points[:, 1] < 0, 0] *= 0.6  # narrower towards the viewer: from behind it is seen larger
+    camera = hero_camera(points, **FRAMING, from_front=True)
+    (_, upper), (_, lower) = project(np.array([[0, extents[1] / 2, 0], [0, -extents[1] / 2, 0]]), camera)[0]
+    assert upper < lower
+
+
 def test_pixel_rays_come_back_to_their_pixels() -> None:
     camera = Camera(look_at(np.array([1.0, 2.0, 0.5]), np.zeros(3)), 0.7, 31, 17)
     origins, directions = pixel_rays(camera)

@@ -178,14 +178,14 @@ def hero_camera(
     """Return the camera, of twelve three-quarter views, that shows the object best: much of it, and large.
 
     That is the largest silhouette in the object's unit. Flat things are seen from higher up, and turned towards the
-    picture's diagonal: there the area in the picture counts too. ``from_front``: what is not flat is seen from the side
-    of -Y, where a photo showed it.
+    picture's diagonal: there the area in the picture counts too. ``from_front``: seen from the side of
+    -Y, where a photo showed what stands, and from where what lies is the right way up.
     """
     extents = np.ptp(points, axis=0)
     flat = extents[2] < FLAT * extents[:2].max()
     elevation = HERO_FLAT_ELEVATION_DEG if flat else HERO_ELEVATION_DEG
     best: tuple[float, Camera] | None = None
-    for azimuth in HERO_FRONT_AZIMUTHS_DEG if from_front and not flat else HERO_AZIMUTHS_DEG:
+    for azimuth in HERO_FRONT_AZIMUTHS_DEG if from_front else HERO_AZIMUTHS_DEG:
         camera = framing_camera(
             points,
             azimuth_deg=float(azimuth),
