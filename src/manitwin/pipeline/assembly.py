@@ -18,6 +18,7 @@ from manitwin.formats.installation import installed_version
 from manitwin.formats.npy_file import labels_to_npy
 from manitwin.formats.packed_source import pack_photos, pack_source
 from manitwin.geometry.hulls.reduction import hull_to_obj
+from manitwin.models.annotators.priors import lookup
 from manitwin.pipeline.grasps import GRASP_POINTS
 from manitwin.pipeline.guesses import (
     OF_NO_NAME,
@@ -25,6 +26,7 @@ from manitwin.pipeline.guesses import (
     naming_checks,
     size_checks,
     template_checks,
+    unknown_name_words,
     unsaid_size_words,
 )
 from manitwin.pipeline.item import Item
@@ -229,17 +231,17 @@ def name_hint(record: TwinRecord) -> str | None:
     if not name_would_help(record):
         return None
     if record.naming is None:
-        return NAME_HINT
+        return NAME_HINT if record.name is None else unknown_name_words(record.name)
     return f"{NAME_HINT}; by its pictures it is {likeliest_words(record.naming.model_dump())}"
 
 
 def name_would_help(record: TwinRecord) -> bool:
-    """Tell whether the result rests on what is true of anything, or a classifier says, and a name would be better.
+    """Tell whether the result rests on what is true of anything, or a classifier says, and a name that is known would be better.
 
     Accepted: size, mass or friction rest on no name. Rejected: where a size or mass of that prior decided, where size
     and mass contradict each other, or where the posture of a lifted photo did, which the name has a say in.
     """
-    if record.name is not None and record.naming is None:
+    if record.naming is None and lookup(record.name) is not None:
         return False
     if record.physical is not None:
         physical = record.physical

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from typing import Any, cast
 
 from manitwin.engine.stage import Draft
 from manitwin.models.annotators.likely_names import OF_LIKELY_NAMES
+from manitwin.models.annotators.priors import load_priors, normalised
 from manitwin.twin.record_values import Check
 
 PRIOR = "prior:"
@@ -20,6 +22,8 @@ OF_ANYTHING = "usual of anything"
 """What it says besides where nobody has named the thing either."""
 LIKE_IT = " that looks like it"
 """And what it adds where a classifier has guesses."""
+SPELT_ALIKE = 0.8
+"""Of two names, from where one may be meant by the other (``difflib``'s ratio)."""
 
 
 def naming_checks(draft: Draft) -> list[Check]:
@@ -67,6 +71,14 @@ def unsaid_size_words(draft: Draft) -> str | None:
     if size is None or not size["source"].startswith(PRIOR):
         return None
     return f"{SIZE_UNSAID}: {unknown_size_words(size)}"
+
+
+def unknown_name_words(name: str) -> str:
+    """Say that a name is not among the priors', and the names that are spelt like it."""
+    known = sorted({word for prior in load_priors().values() for word in (prior.category, *prior.aliases)})
+    near = get_close_matches(normalised(name), known, n=2, cutoff=SPELT_ALIKE)
+    asked = f"; did you mean {' or '.join(map(repr, near))}?" if near else "; say what kind of thing it is with --name"
+    return f"the priors know no {name!r}, so that mass and friction are only those of anything{asked}"
 
 
 def likeliest_words(naming: dict[str, Any]) -> str:
