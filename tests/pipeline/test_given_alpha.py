@@ -95,11 +95,11 @@ def test_a_photo_with_transparent_bars_is_cut_out_where_its_name_is_no_rectangle
 
 
 def test_an_upright_rectangle_without_a_name_is_doubted_and_kept_to_be_looked_at(tmp_path: Path) -> None:
-    for name in (None, "thingamajig"):
+    for name, remedy in ((None, "say what it is with --name"), ("thingamajig", "the priors know no 'thingamajig'")):
         with pytest.raises(Rejected, match="an upright rectangle") as caught:
             cut_out(with_bars(photo_of_a_block(), 60), tmp_path, name)
         assert caught.value.reason == "low_confidence_matte" and CUTOUT in caught.value.files
-        assert "--name" in caught.value.detail and "given.png" in caught.value.detail
+        assert remedy in caught.value.detail and "given.png" in caught.value.detail
 
 
 def test_a_rectangle_that_is_named_a_book_is_one(tmp_path: Path) -> None:

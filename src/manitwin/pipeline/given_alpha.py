@@ -90,11 +90,14 @@ def is_rectangular(name: str | None) -> bool | None:
     return None if prior is None else prior.shape in RECTANGULAR_SHAPES
 
 
-def doubted_rectangle(matte: Matte, name: str) -> DoubtedCutOut:
-    """Return the doubt of a cut-out that is an upright rectangle; ``name`` is the file's."""
+def doubted_rectangle(matte: Matte, file: str, name: str | None) -> DoubtedCutOut:
+    """Return the doubt of a cut-out that is an upright rectangle, where nothing is known of what a person calls ``name``."""
+    remedy = (
+        "say what it is with --name" if name is None else f"the priors know no {name!r}: give it a name that they know"
+    )
     return DoubtedCutOut(
         "low_confidence_matte",
-        f"{name}: its alpha channel cuts an upright rectangle out, which may be the thing (a book, a box) or a picture with"
-        " transparent bars; say what it is with --name, or crop the bars off",
+        f"{file}: its alpha channel cuts an upright rectangle out, which may be the thing (a book, a box) or a picture with"
+        f" transparent bars; {remedy}, or crop the bars off",
         replace(matte, confidence=DOUBTFUL),
     )

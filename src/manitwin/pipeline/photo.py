@@ -73,7 +73,7 @@ class PhotoStage:
                 explains=template_outline_check(name, photo.focal_mm),
             )
             if given.is_doubted:
-                raise doubted_rectangle(matte, path.name)
+                raise doubted_rectangle(matte, path.name, name)
         except DoubtedCutOut as doubted:
             matte = confirmed(doubted)
         return np.ascontiguousarray(matte.rgba), {
