@@ -46,8 +46,9 @@ the right part; their source is `template:CATEGORY`. What is not here is refused
   high` and `with a 20 cm blade` change the measures until what is made has these lengths, within 0.2 %; what would no longer be
   such a thing is refused (a mug of 10 by 80 cm), but a box may be of any proportions. `500 ml`, `12 oz` and `1 pint` (of the
   United States) are what a vessel holds to its brim, a closed one within its walls; `2 kg` is what the thing weighs: either
-  sets the size. A volume or a mass beside a length is refused. Units may be spelt out, and inches, feet, yards and fractions
-  are read. A size that no such thing has is refused. `small` and `large` choose within the usual sizes.
+  sets the size. A volume may stand beside lengths (`a mug, 9 cm tall, 300 ml`), a mass may not. Units may be spelt out, and
+  inches, feet, yards and fractions are read. A size that no such thing has is refused. `small` and `large` choose within the
+  usual sizes.
 - **What it cannot be told** is refused and not left out: two lengths of one side, from which to which a length is, what a
   thing is not. So is the longer name of another thing (a magnifying glass is no glass).
 - **What it is made of** decides the mass: the volume of each part times its density; of a closed container, with its contents;

@@ -181,11 +181,14 @@ def test_another_thing_whose_name_ends_as_a_templates_is_refused(text: str) -> N
         ("a mug, 9 to 10 cm tall", "several lengths"),
         ("a small large mug", "two sizes of one thing, small and large"),
         ("a mug of 300 to 350 ml", "from which to which amount"),
-        ("a 300 ml mug, 9 cm tall", "states 300 ml and a length"),
+        ("a mug of 300 g, 9 cm tall", "states 300 g and a length"),
+        ("a 300 ml mug of 300 g", "states 300 ml and 300 g"),
+        ("a 5 l mug, 9 cm tall", "no mug can be given all of this"),
+        ("a fork of 200 ml, 20 cm long", "no vessel"),
         ("a fork of 200 ml", "no vessel"),
         ("a mug of 0 ml", "no size gives"),
-        ("a mug 10 cm tall and 80 cm wide", r"no mug can be given these lengths .*its width would be"),
-        ("a box 0 x 20 x 10 cm", "no box can be given these lengths"),
+        ("a mug 10 cm tall and 80 cm wide", r"no mug can be given all of this .*its width would be"),
+        ("a box 0 x 20 x 10 cm", "no box can be given all of this"),
         ("a box of 2 m x 2 m x 10 cm", "check the unit"),
         ("a mug with a 3 cm saucer", "no 'saucer' here"),
         ("a mug without a handle", "what a thing is not"),
@@ -519,6 +522,8 @@ def made_of(text: str) -> Made:
         ("a bottle 7 x 25 cm", (0.07, 0.07, 0.25)),
         ("a frying pan of 28 cm, 5 cm deep", (None, 0.28, 0.05)),
         ("a hammer 30 cm long and 12 cm wide", (0.30, 0.12, None)),
+        ("a mug, 9 cm tall, 300 ml", (None, None, 0.09)),
+        ("a 500 ml water bottle 22 cm high", (None, None, 0.22)),
     ],
 )
 def test_several_lengths_are_the_sides_of_what_is_made(text: str, extents_m: tuple[float | None, ...]) -> None:
@@ -551,6 +556,7 @@ def test_a_part_is_as_long_as_is_said(text: str, part: str, length_m: float) -> 
         ("a 16 fl oz mug", 473.2e-6),
         ("a 1 litre pitcher", 1e-3),
         ("a 2 litre saucepan", 2e-3),
+        ("a mug, 9 cm tall, 300 ml", 300e-6),
     ],
 )
 def test_an_open_vessel_holds_as_much_as_is_said(text: str, volume_m3: float) -> None:
@@ -577,7 +583,12 @@ def _hollow_m2(solid: trimesh.Trimesh, level_m: float) -> float:
 
 @pytest.mark.parametrize(
     ("text", "outside_m3"),
-    [("a 500 ml plastic water bottle", 500e-6), ("a 12 oz soda can", 354.9e-6), ("a 330 ml can", 330e-6)],
+    [
+        ("a 500 ml water bottle of plastic 22 cm high", 500e-6),
+        ("a 500 ml plastic water bottle", 500e-6),
+        ("a 12 oz soda can", 354.9e-6),
+        ("a 330 ml can", 330e-6),
+    ],
 )
 def test_a_closed_vessel_of_a_thin_wall_is_as_large_as_what_it_holds(text: str, outside_m3: float) -> None:
     made = made_of(text)

@@ -41,6 +41,14 @@ def capacity_m3(made: Made) -> float | None:
     return sum(hollows_m2) * step_m or None
 
 
+def held_m3(made: Made, amount: Amount) -> float:
+    """Return what a thing holds, of which an ``amount`` is said; raises UsageError for what is no vessel."""
+    held = capacity_m3(made)
+    if held is None:
+        raise UsageError(f"a {made.category} is no vessel that has a volume ({amount.said}); say a length or a mass")
+    return held
+
+
 def _hollow_m2(section: CrossSection) -> float:
     """Return the area of the largest hole in a level section: where the rim is interrupted, at a spout, there is none."""
     holes = [-area for loop in section.to_polygons() if (area := _area_m2(loop)) < 0]

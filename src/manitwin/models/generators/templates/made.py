@@ -18,10 +18,10 @@ from manitwin.geometry.seams import has_three_places
 from manitwin.geometry.solids.parts import PartedMesh
 from manitwin.models.annotators.priors import lookup
 from manitwin.models.annotators.walls import METALS
-from manitwin.models.generators.templates.capacity import scale_with
+from manitwin.models.generators.templates.capacity import held_m3, scale_with
 from manitwin.models.generators.templates.described import Wish
 from manitwin.models.generators.templates.looks import Look, look_of
-from manitwin.models.generators.templates.proportions import proportioned
+from manitwin.models.generators.templates.proportions import Holds, proportioned
 from manitwin.models.generators.templates.template import KnownPoint, Model, Template
 from manitwin.models.generators.templates.text import Wanted
 from manitwin.twin.import_record import GivenParts
@@ -58,10 +58,12 @@ def make(template: Template, wanted: Wanted, rng: np.random.Generator, said: Map
     if "wall_m" in measures:
         measures["wall_m"] = max(LEAST_WALL_M, measures["wall_m"] * _wall(template, next(iter(looks_by_slot.values()))))
     if wanted.solves_measures:
-        measures = proportioned(template, measures, wanted.lengths_m, wanted.part_lengths_m)
+        holds = _holds(template, wanted, looks_by_slot)
+        measures = proportioned(template, measures, wanted.lengths_m, wanted.part_lengths_m, holds)
     model = template.build(**measures)
     mesh = model.assembly.mesh()
     _check_parts(template, wanted, mesh)
+    by_amount = wanted.amount is not None and not wanted.solves_measures
 
     def made_at(scale: float) -> Made:
         walled, its_model, its_mesh = measures, model, mesh
@@ -69,14 +71,25 @@ def make(template: Template, wanted: Wanted, rng: np.random.Generator, said: Map
             walled = measures | {"wall_m": LEAST_WALL_M / scale}
             its_model = template.build(**walled)
             its_mesh = its_model.assembly.mesh()
-            scale = _scale(template, wanted, its_mesh) if wanted.amount is None else scale
+            scale = scale if by_amount else _scale(template, wanted, its_mesh)
         return dressed(template, its_model, its_mesh, walled, looks_by_slot, wanted.wishes, scale)
 
-    if wanted.amount is None:
+    if wanted.amount is None or not by_amount:
         return made_at(_scale(template, wanted, mesh))
     scale = scale_with(wanted.amount, made_at)
     _check_size(template, float(np.ptp(mesh.vertices, axis=0).max()) * scale)
     return made_at(scale)
+
+
+def _holds(template: Template, wanted: Wanted, looks: Mapping[str, Look]) -> Holds | None:
+    amount = wanted.amount
+    if amount is None or amount.volume_m3 is None:
+        return None
+
+    def held(model: Model, mesh: PartedMesh, measures: Mapping[str, float]) -> float:
+        return held_m3(dressed(template, model, mesh, measures, looks, wanted.wishes, 1.0), amount)
+
+    return Holds(amount.volume_m3, amount.said, held)
 
 
 def _wall(template: Template, look: Look) -> float:

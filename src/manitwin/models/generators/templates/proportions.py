@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
 from manitwin.errors import UsageError
+from manitwin.geometry.solids.parts import PartedMesh
 from manitwin.geometry.solids.shapes import SolidError
-from manitwin.models.generators.templates.template import Template
+from manitwin.models.generators.templates.template import Model, Template
 
 X, Y, Z = range(3)
 _AXES = {"height": (Z,), "width": (X, Y), "length": (X, Y, Z), "depth": (X, Y, Z), "": (X, Y, Z)}
@@ -18,8 +20,18 @@ _SPELT = {"": "longest side", "second": "second longest side"}
 WALL = "wall_m"
 MOST_STEPS, DIFFERENCE, CLOSE = 12, 0.01, 0.002
 MOST_M = 100.0
+LEAST_M3 = 1e-9
 MARGIN = 2.0
 """Beyond the interval of a measure by more than this factor a thing is no longer what the template makes."""
+
+
+@dataclass(frozen=True)
+class Holds:
+    """A volume that a vessel is to hold, in somebody's words, and what tells how much it does, by model, mesh and measures."""
+
+    volume_m3: float
+    said: str
+    capacity_m3: Callable[[Model, PartedMesh, Mapping[str, float]], float]
 
 
 def proportioned(
@@ -27,51 +39,53 @@ def proportioned(
     measures: Mapping[str, float],
     lengths_m: Mapping[str, float],
     part_lengths_m: Mapping[str, float],
+    holds: Holds | None = None,
 ) -> dict[str, float]:
     """Return measures near the given ones with which a template's thing has the stated lengths.
 
-    ``lengths_m`` by direction, ``part_lengths_m`` of the longest side of a part or a slot. All is scaled as one, then the
-    measures but the wall are changed as little as can be, by their logarithms (Gauss-Newton, minimum norm). Raises UsageError
-    where no such thing has these lengths at once, or such a part.
+    ``lengths_m`` by direction, ``part_lengths_m`` of the longest side of a part or a slot, ``holds`` what is held besides. All is
+    scaled as one, then the measures but the wall are changed as little as can be, by their logarithms (Gauss-Newton, minimum
+    norm). Raises UsageError where no such thing has all that at once, or such a part.
     """
     changed = dict(measures)
     free = [name for name in template.measures if name != WALL]
     if template.length_of and "" in lengths_m:
         part_lengths_m = {template.length_of: lengths_m[""], **part_lengths_m}
         lengths_m = {direction: length for direction, length in lengths_m.items() if direction}
-    named_m = {_SPELT.get(name, name): length for name, length in [*lengths_m.items(), *part_lengths_m.items()]}
-    targets = np.array([*lengths_m.values(), *part_lengths_m.values()])
+    said_m = [*lengths_m.items(), *part_lengths_m.items()]
+    stated = [f"{_SPELT.get(name, name)} {length:g} m" for name, length in said_m] + ([holds.said] if holds else [])
+    targets = np.array([length for _, length in said_m] + ([float(np.cbrt(holds.volume_m3))] if holds else []))
     if not ((targets > 0) & (targets < MOST_M)).all():
-        raise UsageError(_impossible(template, named_m))
-    sides = _sides_m(template, changed, part_lengths_m)
-    said = [*_axes(sides, lengths_m, targets), *range(3, 3 + len(part_lengths_m))]
+        raise UsageError(_impossible(template, stated))
+    sides = _sides_m(template, changed, part_lengths_m, holds)
+    said = [*_axes(sides, lengths_m, targets), *range(3, len(sides))]
     if len(said) < len(targets):
-        raise UsageError(_impossible(template, named_m))
+        raise UsageError(_impossible(template, stated))
     larger = float(np.exp(np.log(targets / sides[said]).mean()))
     for name in free:
         changed[name] *= larger if template.measures[name].unit == "m" else 1.0
     for _ in range(MOST_STEPS):
-        sides = _sides_m(template, changed, part_lengths_m)[said]
+        sides = _sides_m(template, changed, part_lengths_m, holds)[said]
         missing = np.log(targets / sides)
         if np.abs(missing).max() < CLOSE:
             if not template.any_proportions:
-                _check(template, changed, free, named_m)
+                _check(template, changed, free, stated)
             return changed
         slopes = np.empty((len(said), len(free)))
         for column, name in enumerate(free):
             longer = {**changed, name: changed[name] * (1 + DIFFERENCE)}
-            moved = _sides_m(template, longer, part_lengths_m)[said]
+            moved = _sides_m(template, longer, part_lengths_m, holds)[said]
             slopes[:, column] = np.log(moved / sides) / np.log1p(DIFFERENCE)
         steps = np.clip(np.linalg.pinv(slopes, rcond=1e-3) @ missing, -0.5, 0.5)
         for name, step in zip(free, steps, strict=True):
             changed[name] *= float(np.exp(step))
-    raise UsageError(_impossible(template, named_m))
+    raise UsageError(_impossible(template, stated))
 
 
 def _axes(sides_m: np.ndarray, lengths_m: Mapping[str, float], targets_m: np.ndarray) -> list[int]:
     """Return an axis for each length: of what the directions allow, those that change the shape least; none where they cannot be.
 
-    ``targets_m (K,)`` are the lengths and those of parts, whose sides now are behind the three extents in ``sides_m``.
+    ``targets_m (K,)`` are the lengths and what is said besides, which is now behind the three extents in ``sides_m``.
     """
     second = (int(np.argsort(-sides_m[:3], kind="stable")[1]),) if "" in lengths_m else (X, Y, Z)
     choices = [second if direction == "second" else _AXES[direction] for direction in lengths_m]
@@ -82,8 +96,10 @@ def _axes(sides_m: np.ndarray, lengths_m: Mapping[str, float], targets_m: np.nda
     return list(min(distinct, key=lambda axes: float(np.std(np.log(targets_m / sides_m[[*axes, *of_parts]])))))
 
 
-def _sides_m(template: Template, measures: Mapping[str, float], parts: Mapping[str, float]) -> np.ndarray:
-    """Return the extents along X, Y and Z of what the measures give, and the longest one of each of the parts."""
+def _sides_m(
+    template: Template, measures: Mapping[str, float], parts: Mapping[str, float], holds: Holds | None
+) -> np.ndarray:
+    """Return the extents along X, Y and Z of what the measures give, the longest of each part, and a cube's that it holds."""
     try:
         model = template.build(**measures)
         mesh = model.assembly.mesh()
@@ -98,20 +114,21 @@ def _sides_m(template: Template, measures: Mapping[str, float], parts: Mapping[s
             raise UsageError(f"a {template.category} has no {part!r} here. Its parts: {', '.join(known)}")
         faces = mesh.faces[np.isin(mesh.part, [mesh.names.index(name) for name in worn])]
         sides.append(float(np.ptp(mesh.vertices[faces.ravel()], axis=0).max()))
+    if holds is not None:
+        sides.append(float(np.cbrt(max(holds.capacity_m3(model, mesh, measures), LEAST_M3))))
     return np.array(sides)
 
 
-def _check(template: Template, measures: Mapping[str, float], names: list[str], named_m: Mapping[str, float]) -> None:
+def _check(template: Template, measures: Mapping[str, float], names: list[str], stated: list[str]) -> None:
     for name in names:
         usual, value = template.measures[name], measures[name]
         if not usual.low / MARGIN <= value <= usual.high * MARGIN:
             unit = usual.unit or "(a ratio)"
             raise UsageError(
-                f"{_impossible(template, named_m)}: its {name.removesuffix('_m').replace('_', ' ')} would be {value:.3g} {unit},"
+                f"{_impossible(template, stated)}: its {name.removesuffix('_m').replace('_', ' ')} would be {value:.3g} {unit},"
                 f" such are {usual.low:g} to {usual.high:g}; check the numbers and the unit"
             )
 
 
-def _impossible(template: Template, named_m: Mapping[str, float]) -> str:
-    said = ", ".join(f"{name} {length:g} m" for name, length in named_m.items())
-    return f"no {template.category} can be given {'these lengths' if len(named_m) > 1 else 'this length'} ({said})"
+def _impossible(template: Template, stated: list[str]) -> str:
+    return f"no {template.category} can be given {'all of this' if len(stated) > 1 else 'this'} ({', '.join(stated)})"

@@ -71,7 +71,8 @@ class Wanted:
     @property
     def solves_measures(self) -> bool:
         """Whether one scale for the whole cannot give the stated lengths."""
-        return len(self.lengths_m) > 1 or bool(self.part_lengths_m)
+        lengths = len(self.lengths_m) + (self.amount is not None)
+        return bool(self.part_lengths_m) or (bool(self.lengths_m) and lengths > 1)
 
 
 def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
@@ -111,9 +112,11 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
     except UsageError as error:
         raise UsageError(f"{text!r}: {error}") from None
     amounts = amounts_in(said_in, prior)
-    if len(amounts) + bool(lengths or of_parts) > 1:
+    if len(amounts) > 1 or (amounts and amounts[0].volume_m3 is None and (lengths or of_parts)):
         stated = " and ".join([*(each.said for each in amounts), *(["a length"] if lengths or of_parts else [])])
-        raise UsageError(f"{text!r} states {stated}: say one volume, or one mass, or lengths")
+        raise UsageError(
+            f"{text!r} states {stated}: say one volume or one mass, of the two a volume alone beside lengths"
+        )
     part_lengths = {_slot_called(word, template): length for word, length in of_parts.items()}
     return Wanted(
         found.category, wishes, lengths, words.relative, tuple(unused), part_lengths, next(iter(amounts), None)
