@@ -60,7 +60,7 @@ def proportioned(
     sides = _sides_m(template, changed, part_lengths_m, holds)
     said = [*_axes(sides, lengths_m, targets), *range(3, len(sides))]
     if len(said) < len(targets):
-        raise UsageError(_impossible(template, stated))
+        raise UsageError(f"{_impossible(template, stated)}; leave one of them out")
     larger = float(np.exp(np.log(targets / sides[said]).mean()))
     for name in free:
         changed[name] *= larger if template.measures[name].unit == "m" else 1.0
@@ -79,7 +79,8 @@ def proportioned(
         steps = np.clip(np.linalg.pinv(slopes, rcond=1e-3) @ missing, -0.5, 0.5)
         for name, step in zip(free, steps, strict=True):
             changed[name] *= float(np.exp(step))
-    raise UsageError(_impossible(template, stated))
+    remedy = "leave one of them out" if len(stated) > 1 else "say the length of the whole"
+    raise UsageError(f"{_impossible(template, stated)}; {remedy}")
 
 
 def _axes(sides_m: np.ndarray, lengths_m: Mapping[str, float], targets_m: np.ndarray) -> list[int]:
