@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image, ImageCms
+from PIL import Image, ImageCms, TiffImagePlugin
 
 from manitwin.errors import InputError
 from manitwin.formats.image_file import check_header, read_image
@@ -75,6 +75,25 @@ def test_chosen_frame_of_an_animation_is_read_and_said(shared_data: Path) -> Non
     assert orange[1] - apple[1] > 40  # an orange has far more green than a red apple
     with pytest.raises(InputError, match=r"no frame 3; set frame in the configuration to 0\.\.2"):
         read_image(shared_data / "bad" / "animated.gif", frame=3)
+
+
+def tiff_of(path: Path, *pictures: tuple[Image.Image, int]) -> Path:
+    """A TIFF of several pictures, each with its NewSubfileType."""
+    with TiffImagePlugin.AppendingTiffWriter(str(path), True) as stream:
+        for picture, kind in pictures:
+            tags = TiffImagePlugin.ImageFileDirectory_v2()
+            tags[254] = kind
+            picture.save(stream, format="TIFF", tiffinfo=tags)
+            stream.newFrame()
+    return path
+
+
+def test_a_preview_behind_a_tiff_s_picture_is_no_second_picture(tmp_path: Path) -> None:
+    blue, preview = Image.new("RGB", (128, 96), (30, 60, 160)), Image.new("RGB", (64, 48), (200, 0, 0))
+    read = read_image(tiff_of(tmp_path / "preview.tif", (blue, 0), (preview, 1)))
+    assert read.pixels.shape == (96, 128, 3) and (read.pixels == (30, 60, 160)).all()
+    assert refusal(tiff_of(tmp_path / "pages.tif", (blue, 0), (blue, 0))).reason == "animated"
+    assert refusal(tiff_of(tmp_path / "first.tif", (preview, 1), (blue, 0))).reason == "animated"
 
 
 @pytest.mark.shared_data

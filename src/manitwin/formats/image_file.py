@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, ImageCms, ImageOps
+from PIL import Image, ImageCms, ImageOps, TiffImagePlugin
 
 from manitwin.errors import InputError
 from manitwin.formats.bounded_file import open_regular
@@ -30,6 +30,8 @@ _CAUSE_CHARACTERS = 200
 _MEGAPIXELS = f"more than {MAX_PIXELS // 1_000_000} megapixels"
 _WIDE_GREY = ("I;16", "I;16B", "I;16L", "I;16N", "I")
 _MULTI_PICTURE = ("MPO",)  # a phone's JPEG with depth map or preview behind the photo: one photo, no animation
+_SUBFILE_TYPE, _REDUCED = 254, 1  # TIFF 6.0, NewSubfileType: a smaller version of another picture in the file
+_MOST_LEVELS = 16  # of a pyramid, each half as large
 
 
 @dataclass(frozen=True)
@@ -218,10 +220,21 @@ def _choose_frame(path: Path, image: Image.Image, frame: int | None, findings: l
 
 
 def _pictures(path: Path, image: Image.Image) -> int:
+    """Return how many pictures a file has; previews and levels of a pyramid behind a TIFF's picture are no further ones."""
     try:
-        return int(getattr(image, "n_frames", 1))
+        count = int(getattr(image, "n_frames", 1))
+        if isinstance(image, TiffImagePlugin.TiffImageFile) and 1 < count <= _MOST_LEVELS:
+            reduced = [_is_reduced(image, frame) for frame in range(count)]
+            image.seek(0)
+            return 1 if not reduced[0] and all(reduced[1:]) else count
+        return count
     except Exception as error:  # as in _opened
         raise _refused(path, error) from error
+
+
+def _is_reduced(image: TiffImagePlugin.TiffImageFile, frame: int) -> bool:
+    image.seek(frame)
+    return bool(int(image.tag_v2.get(_SUBFILE_TYPE, 0)) & _REDUCED)
 
 
 def _to_srgb(path: Path, image: Image.Image, profile: bytes | None, findings: list[str]) -> Image.Image:
