@@ -95,6 +95,11 @@ def test_what_cannot_be_asked_is_said_on_the_page(app: Starlette, query: str, sa
     assert status == 400 and said in unescape(page) and 'role="alert"' in page and "/etc/passwd:" not in page
 
 
+def test_of_a_twin_that_is_not_there_the_page_names_what_helps(app: Starlette) -> None:
+    status, page, _ = get(app, "/twin/0123456789abcdef")
+    assert status == 404 and "write the index again (manitwin index)" in page and "--twins" not in page
+
+
 def test_a_condition_that_cannot_be_used_is_still_in_its_field_and_so_are_the_others(app: Starlette) -> None:
     status, page, _ = get(app, "/?q=kettle&category=can&mass_min=0.1234567&where=mass_kg+%3E+and")
     assert status == 400 and len(names(page)) == 3, "all twins"
@@ -329,6 +334,10 @@ def test_plain_files_are_of_a_sample_and_leave_out_what_is_damaged(viewed: Viewe
     (root / twin_name(viewed[1][0]) / "collision" / "hull_00.obj").write_text("v nonsense\n")
     done = write_plain_files(str(root), tmp_path / "out")
     assert done.twins == 2 and list(done.left_out) == [viewed[1][0]]
+    model = root / twin_name(viewed[1][1]) / "visual.glb"
+    model.write_bytes(model.read_bytes()[:-9])
+    done = write_plain_files(str(root), tmp_path / "cut")
+    assert done.twins == 1 and "visual.glb: altered or cut off" in done.left_out[viewed[1][1]]
     drawn = [write_plain_files(str(viewed[0]), tmp_path / f"s{n}", sample=1, seed=n % 2) for n in range(4)]
     assert {each.twins for each in drawn} == {1}
     kept = [sorted(path.name for path in (tmp_path / f"s{n}" / "twins").iterdir()) for n in range(4)]

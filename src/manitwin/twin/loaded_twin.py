@@ -235,16 +235,20 @@ def _hull(path: Path, folder: Path) -> trimesh.Trimesh:
     return trimesh.Trimesh(vertices, faces, process=False)
 
 
+MOVED = "put it back, or name the data set where the twins are now (--twins)"
+"""What helps where scenes or episodes name a twin that is not there."""
+
+
 class TwinSource:
-    """Find twins by id below a data set's root.
+    """Find twins by id below a data set's root; ``remedy`` is what helps where one is not there.
 
     Those of a data set at a URL are copied to ``cache`` when they are asked for. Raises UsageError where there is no such
     place, or for a URL without ``cache``.
     """
 
-    def __init__(self, place: str | Path, cache: Path | None = None):
+    def __init__(self, place: str | Path, cache: Path | None = None, remedy: str = MOVED):
         self.root = DatasetRoot(place)
-        self.cache = cache
+        self.cache, self._remedy = cache, remedy
         if self.root.local is None and cache is None:
             raise UsageError(
                 f"{place}: a data set at a URL needs a local folder to copy its twins to; name one as cache"
@@ -290,7 +294,4 @@ class TwinSource:
         return Twin(self.folder(twin_id))
 
     def _missing(self, twin_id: str, count: str = "") -> str:
-        return (
-            f"{self.root.url}: no twin {twin_id} there{count}; put it back, or name the data set where the twins are now"
-            " (--twins)"
-        )
+        return f"{self.root.url}: no twin {twin_id} there{count}; {self._remedy}"

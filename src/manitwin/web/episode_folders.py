@@ -21,6 +21,7 @@ from manitwin.errors import ConfigError, EpisodesError, ManiTwinError, UsageErro
 from manitwin.formats.printable import printable_line
 from manitwin.robots.load import load_robot, shipped_robots, shipped_two_arms
 from manitwin.robots.robot import Robot
+from manitwin.twin.loaded_twin import MOVED
 from manitwin.web.attempt_rows import AttemptRows
 from manitwin.web.served_files import TwinFolders
 
@@ -146,7 +147,7 @@ class EpisodeFolders:
             self.without_twins = f"{self.root}: its twins are at {where}; name it to have them fetched (--twins)"
             return
         try:
-            self.twins = TwinFolders(where, cache if "://" in where else None)
+            self.twins = TwinFolders(where, cache if "://" in where else None, MOVED)
         except ManiTwinError as error:
             if dataset is not None:
                 raise

@@ -6,6 +6,7 @@ Each sets one name of ``manitwinFiles`` (stage.js): the file's path below the fo
 from __future__ import annotations
 
 import base64
+import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from urllib.parse import urlencode
 
 from manitwin.errors import TwinError, UsageError
 from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.store import REMEDY
 from manitwin.web import trial_document, twin_document
 from manitwin.web.links import FileLinks
 from manitwin.web.served_files import CARD, MODEL, VIEWS, open_file
@@ -52,11 +54,11 @@ def write_twin(
     content = {
         "index.html": page.encode(),
         DATA_SCRIPT: document_script(name, twin_document.document_bytes(document)),
-        MODEL_SCRIPT: binary_script(NAMES.file(twin_id, MODEL, revision), read_file(twin.folder, MODEL)),
+        MODEL_SCRIPT: binary_script(NAMES.file(twin_id, MODEL, revision), read_file(twin, MODEL)),
         **({TRIALS_SCRIPT: played} if played else {}),
     }
     named = [name for name in sorted(twin.record.files) if name == CARD or VIEWS.fullmatch(name)]
-    content |= {name: read_file(twin.folder, name) for name in named}
+    content |= {name: read_file(twin, name) for name in named}
     folder = out / "twins" / twin_id
     return sum(write(folder / name, data) for name, data in content.items())
 
@@ -74,9 +76,15 @@ def _trials(twin: Twin, document: dict[str, Any], player: TrialPlayer, count: in
     return b"".join(scripts)
 
 
-def read_file(folder: Path, name: str) -> bytes:
-    """Return the content of a file that a page may have; raises TwinError and UsageError as ``open_file`` does."""
-    return b"".join(open_file(folder, name).chunks())
+def read_file(twin: Twin, name: str) -> bytes:
+    """Return the content of a file that a page may have.
+
+    Raises TwinError and UsageError as ``open_file`` does, and TwinError for a file that is not the one of the record.
+    """
+    content = b"".join(open_file(twin.folder, name).chunks())
+    if hashlib.sha256(content).hexdigest() != twin.record.files.get(name):
+        raise TwinError(f"{name}: altered or cut off since it was written (its sha256 does not match); {REMEDY}")
+    return content
 
 
 def write(path: Path, content: bytes) -> int:

@@ -28,7 +28,7 @@ class SceneFolders:
         self._files = {file.parent.name: file for file in files}
         self.ids = sorted(self._files)
         dataset = dataset_of(files[0])
-        self.twins = TwinFolders(dataset, cache if "://" in dataset else None)
+        self.twins = TwinFolders(dataset, cache if "://" in dataset else None, "put it back, or make the scenes again")
 
     def scene(self, scene_id: str) -> SceneRecord:
         """Return a scene; raises UsageError where there is none of this id, or it cannot be read."""

@@ -47,16 +47,21 @@ class ServedFile:
                 yield part
 
 
+UNLIKE_INDEX = "put it back, or write the index again (manitwin index)"
+"""What helps where an index names a twin that is not there."""
+
+
 class TwinFolders:
     """The folders of the twins of a data set, or of one twin, by their ids.
 
-    ``cache`` takes those of a data set at a URL. Raises UsageError where there is no such place.
+    ``cache`` takes those of a data set at a URL, ``remedy`` is what helps where a twin is not there. Raises UsageError where
+    there is no such place.
     """
 
-    def __init__(self, place: str, cache: Path | None = None):
+    def __init__(self, place: str, cache: Path | None = None, remedy: str = UNLIKE_INDEX):
         one = Path(place)
         self.only: Twin | None = Twin(one) if "://" not in place and (one / RECORD).is_file() else None
-        self._source = None if self.only else TwinSource(place, cache)
+        self._source = None if self.only else TwinSource(place, cache, remedy)
 
     def folder(self, twin_id: str) -> Path:
         """Return a twin's folder; raises UsageError where there is none of this id."""
