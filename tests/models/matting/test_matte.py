@@ -176,6 +176,38 @@ def test_alpha_channel_is_believed_and_hidden_colours_are_not() -> None:
     assert not ((matte.rgba[..., 0] > 200) & (matte.rgba[..., 2] > 200)).any()
 
 
+def _cut_out(mask: np.ndarray, rgb: tuple[int, int, int], alpha: int = 255) -> np.ndarray:
+    image = np.zeros((*mask.shape, 4), np.uint8)
+    image[mask] = (*rgb, alpha)
+    return image
+
+
+def test_what_is_half_transparent_over_an_area_keeps_its_own_colour() -> None:
+    """A green glass with an opaque red label, and a background mixed in along its outline."""
+    image = _cut_out(_blob((200, 150), (80, 50)), (40, 160, 90), alpha=170)
+    image[130:170, 180:220] = (200, 30, 30, 255)
+    matte = matte_photo(image, "glass.png")
+    assert matte.rgba[150, 140, :3].tolist() == [40, 160, 90] and matte.rgba[150, 200, :3].tolist() == [200, 30, 30]
+    edge = _cut_out(_blob((200, 150), (80, 50)), (40, 160, 90))
+    edge[_blob((200, 150), (80, 50)) & ~_blob((200, 150), (78, 48))] = (255, 255, 255, 190)
+    assert not (matte_photo(edge, "mug.png").rgba[..., :3] == 255).all(2).any()
+
+
+def test_a_second_small_thing_of_a_cut_out_is_left_out_and_said() -> None:
+    large, small = _blob((250, 150), (90, 60)), _blob((60, 60), (20, 20))
+    matte = matte_photo(_cut_out(large, (40, 160, 90)) + _cut_out(small, (200, 30, 30)), "mug.png")
+    assert matte.findings == ("small separate pieces were left out",)
+    assert np.array_equal(matte.rgba[..., 3] > 127, large)
+
+
+def test_a_cut_out_that_is_trimmed_to_the_thing_is_not_cut_by_the_border() -> None:
+    trimmed = _cut_out(np.ones(SIZE, bool), (40, 160, 90))
+    trimmed[:60, :60, 3] = 0
+    assert matte_photo(trimmed, "box.png").findings == ()
+    cut = np.pad(trimmed, ((0, 0), (0, 80), (0, 0)))
+    assert matte_photo(cut, "box.png").findings == ("the image border cuts the object",)
+
+
 @pytest.mark.shared_data
 def test_blank_photo_has_no_object(shared_data: Path) -> None:
     with pytest.raises(Rejected) as caught:

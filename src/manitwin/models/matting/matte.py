@@ -19,6 +19,10 @@ from manitwin.models.matting.outline import dilated, without_small_holes
 from manitwin.models.matting.study import Judged, Study, largest_piece, study_photo
 
 TRANSPARENT_SHARE = 0.02
+MIXED_PX = 4
+"""From what is opaque, as far as an outline may be mixed with what was behind it."""
+LEFT_OUT_SHARE = 0.002
+"""Of what an alpha channel shows: less is dust."""
 MIN_CONFIDENCE = MattingConfig().min_confidence
 LIKELY = 0.5  # that pieces are things: the photo is rejected in any case, and that is the cause
 
@@ -135,12 +139,19 @@ def _given_matte(image: np.ndarray, name: str, min_area_share: float, second_obj
     # specular pixels that a cut-out tool took for background are holes
     closed = largest_piece(without_small_holes(mask))
     alpha = np.where(closed & ~mask, 255, np.where(dilated(closed, 2), image[..., 3], 0)).astype(np.uint8)
-    # what a file keeps under transparent pixels is anything: the nearest opaque colour takes its place
-    nearest = ndimage.distance_transform_edt(image[..., 3] < 250, return_distances=False, return_indices=True)
-    colours = image[nearest[0], nearest[1], :3]
-    frame = np.concatenate([mask[0], mask[-1], mask[:, 0], mask[:, -1]])
-    findings = ("the image border cuts the object",) if frame.mean() > 0.02 else ()
-    return Matte(np.dstack([colours, alpha]), "alpha", 1.0, findings, {})
+    # what a file keeps under transparent pixels is anything, and along an outline it is mixed with a background: the nearest
+    # opaque colour takes its place; what is half transparent over an area (a glass) has its own
+    opaque = image[..., 3] >= 250
+    away_px, nearest = ndimage.distance_transform_edt(~opaque if opaque.any() else ~mask, return_indices=True)
+    replaced = (away_px <= MIXED_PX) | ~mask
+    colours = np.where(replaced[..., None], image[nearest[0], nearest[1], :3], image[..., :3])
+    findings = []
+    sides = [mask[0], mask[-1], mask[:, 0], mask[:, -1]]
+    if np.concatenate(sides).mean() > 0.02 and not all(side.any() for side in sides):  # trimmed to it, it touches all
+        findings.append("the image border cuts the object")
+    if (mask & ~closed).sum() > LEFT_OUT_SHARE * mask.sum():
+        findings.append("small separate pieces were left out")
+    return Matte(np.dstack([colours, alpha]), "alpha", 1.0, tuple(findings), {})
 
 
 def _rounded_down(confidence: float) -> float:
