@@ -90,6 +90,37 @@ def test_pointing_at_a_point_tells_its_name(inside: Visitor, served: Served, vie
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     page.wait_for_selector(".tip:not([hidden])")
     assert page.inner_text(".tip") == "centre of mass"
+    page.keyboard.press("Escape")
+    page.locator("[data-layer=cube]").check()
+    page.mouse.move(box["x"] + box["width"] / 2 + 1, box["y"] + box["height"] / 2)
+    assert page.inner_text(".tip") == "centre of mass"
+    page.mouse.move(box["x"] + 20, box["y"] + 20)
+    assert page.locator(".tip").is_hidden(), "the cube is told where it is, and nowhere else"
+
+
+def test_a_small_point_is_met_from_nearby_and_the_end_of_a_drag_is_no_click(
+    inside: Visitor, served: Served, viewed: Viewed
+) -> None:
+    page = inside()
+    points = page.request.get(f"{served.address}/twin/{viewed[1][1]}/viewer.json").json()["points"]
+    point = next(each for each in points if each["kind"] == "functional")
+    at = point["position_m"]
+    for away, name in ((0.4, point["id"]), (-0.4, None)):  # from outside, and from behind the object
+        eye = [a + away * (0.8 * n + s) for a, n, s in zip(at, point["normal"], (0.6, 0, 0), strict=True)]
+        page.goto("about:blank")
+        page.goto(f"{served.address}/twin/{viewed[1][1]}#layers=mesh+functional&from={'+'.join(map(str, [*eye, *at]))}")
+        ready(page)
+        page.evaluate("document.addEventListener('twin:picked', ({ detail }) => (window.picked = detail))")
+        box = page.locator(".stage").bounding_box()
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        page.mouse.click(x + 5, y + 3)
+        assert page.evaluate("window.picked") == name
+    page.evaluate("delete window.picked")
+    page.mouse.move(x - 60, y)
+    page.mouse.down()
+    page.mouse.move(x, y, steps=4)
+    page.mouse.up()
+    assert page.evaluate("window.picked ?? null") is None
 
 
 def test_a_caption_with_a_script_stays_a_text(inside: Visitor, served: Served, viewed: Viewed) -> None:

@@ -51,6 +51,7 @@ globalThis.manitwinStage = (viewer, near = 0.01, far = 100) => {
   const quaternion = (q) => new THREE.Quaternion(q[1], q[2], q[3], q[0]);
   const vector = (v, at = 0) => new THREE.Vector3(v[at], v[at + 1], v[at + 2]);
   const ray = new THREE.Raycaster();
+  ray.params.Line.threshold = 0.003; // metres; of three.js one, so that every ray meets the edges of what stands nearby
   let asked = false;
   let home = [1, -1, 1, 0, 0, 0];
   let remember = () => {};
@@ -122,7 +123,29 @@ globalThis.manitwinStage = (viewer, near = 0.01, far = 100) => {
       const found = ofOne(hit.object, name);
       if (found !== undefined) return { told: typeof found === "function" ? found(hit.instanceId) : found, area, x, y };
     }
-    return { area, x, y };
+    return { told: nearby(name, targets(), area, x, y, event.pointerType === "touch" ? 16 : 8), area, x, y };
+  }
+  // points are a few pixels wide: the name of the nearest within so many pixels that faces the camera, as its normal says
+  function nearby(name, targets, area, x, y, reach) {
+    let told;
+    let least = reach;
+    const matrix = new THREE.Matrix4();
+    for (const each of targets) {
+      const found = each.userData.normals && ofOne(each, name);
+      if (!found) continue;
+      each.userData.normals.forEach((normal, place) => {
+        each.getMatrixAt(place, matrix);
+        const point = new THREE.Vector3().setFromMatrixPosition(matrix).applyMatrix4(each.matrixWorld);
+        const outwards = normal.clone().transformDirection(each.matrixWorld);
+        if (outwards.dot(camera.position.clone().sub(point)) <= 0) return;
+        point.project(camera);
+        const off = Math.hypot(((point.x + 1) / 2) * area.width - x, ((1 - point.y) / 2) * area.height - y);
+        if (off > least) return;
+        least = off;
+        told = found(place);
+      });
+    }
+    return told;
   }
   function ofOne(object, name) {
     let found;
@@ -147,7 +170,12 @@ globalThis.manitwinStage = (viewer, near = 0.01, far = 100) => {
     orbit.addEventListener("change", draw);
     orbit.addEventListener("end", () => remember());
     stage.addEventListener("pointerleave", () => (tip.hidden = true));
+    let pressed = null;
+    stage.addEventListener("pointerdown", (event) => (pressed = event));
     stage.addEventListener("click", (event) => {
+      const turned = pressed && Math.hypot(event.clientX - pressed.clientX, event.clientY - pressed.clientY) > 5;
+      pressed = null;
+      if (turned) return; // the end of a drag is no click
       const { told } = under(event, "pick", targets); // a page that moves points listens
       if (told !== undefined) stage.dispatchEvent(new CustomEvent("twin:picked", { bubbles: true, detail: told }));
     });

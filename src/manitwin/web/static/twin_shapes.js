@@ -35,6 +35,7 @@ globalThis.manitwinShapes = (view, layers, object) => {
       points.forEach((point, place) => mesh.setMatrixAt(place, new THREE.Matrix4().setPosition(vector(point.position_m))));
       mesh.userData.label = (place) => points[place].label;
       mesh.userData.pick = (place) => points[place].id;
+      mesh.userData.normals = points.map((point) => vector(point.normal)); // they are small: near is meant as well
       layers[kind].add(mesh);
       for (const { frame } of points.filter((point) => point.frame)) {
         const axes = new THREE.AxesHelper(0.12 * size);
