@@ -73,7 +73,7 @@ def said(
 def test_verdicts_of_files_are_added_up(place: Path, tmp_path: Path, suffix: str) -> None:
     ids = accepted(place)
     rows = [said(each) for each in ids[:4]]
-    rows += [said(ids[4], answer="no", category="cup", note="it is a cup", seconds=12.5)]
+    rows += [said(ids[4], answer="no", category="cup", note="it is a cup\nand no mug", seconds=12.5)]
     rows += [said(ids[0], "ben"), said(ids[1], "ben", answer="no"), said(ids[5], "ben", answer="unsure")]
     rows += [said(ids[4], dimension="physical", answer="no", mass_kg=0.2, mass_low_kg=0.1, mass_high_kg=0.3)]
     rows += [said(ids[4], dimension="functional", answer="no", points="f0=1")]
@@ -92,6 +92,9 @@ def test_verdicts_of_files_are_added_up(place: Path, tmp_path: Path, suffix: str
         (ids[4], "functional", {"f0": 1}),
         (ids[4], "physical", {"mass_kg": {"value": 0.2, "low": 0.1, "high": 0.3}}),
     ]
+    told = "\n".join(report.lines())
+    assert "physical, mass_kg is 0.2 (0.1 to 0.3)" in told and "{" not in told
+    assert r"(it is a cup\nand no mug)" in told, "a note takes one line"
     ada = next(each for each in report.speeds if each.annotator == "ada")
     assert (ada.reviews, ada.median_s) == (5, 12.5)
     worst = report.prompts[0]

@@ -167,6 +167,7 @@ def review_apply(
     """Write the corrections that nobody contradicts into the twins, and make again what follows from them."""
     from manitwin.cli.progress import WatchedRun
     from manitwin.dataset.review.apply import apply_reviews
+    from manitwin.dataset.review.report import shown_correction
 
     if dry_run:
         done = apply_reviews(dataset, dry_run=True)
@@ -174,9 +175,9 @@ def review_apply(
         with WatchedRun("twins", dataset) as watched:
             done = apply_reviews(dataset, jobs=jobs, **watched.callbacks)
     for each in done.corrections:
-        out_console.print(f"{each.twin_id} {each.name}: {_said(each.value)} ({each.source})")
+        out_console.print(f"{each.twin_id} {each.name}: {shown_correction(each.value)} ({each.source})")
     for conflict in done.conflicts:
-        said = ", ".join(f"{name} says {_said(value)}" for name, value in conflict.said.items())
+        said = ", ".join(f"{name} says {shown_correction(value)}" for name, value in conflict.said.items())
         out_console.print(f"not applied: {conflict.twin_id} {conflict.name}: {said}")
     for twin_id, reason in done.left.items():
         out_console.print(f"not applied: {twin_id}: {reason}")
@@ -186,12 +187,6 @@ def review_apply(
     if unfinished:
         print_error(f"twins are not all made again; `manitwin status {dataset}` says why")
     raise typer.Exit(4 if unfinished else 3 if done.conflicts or done.left else 0)
-
-
-def _said(value: object) -> str:
-    if isinstance(value, dict):
-        return f"{value['value']:g} ({value['low']:g} to {value['high']:g})"
-    return str(value)
 
 
 def review_report(

@@ -22,9 +22,17 @@ from manitwin.dataset.review.twins_seen import pictures_of, revisions
 from manitwin.dataset.review.verdict_table import table_of, write_verdicts
 from manitwin.dataset.review.verdicts import DIMENSIONS, Dimension
 from manitwin.errors import UsageError
+from manitwin.formats.printable import printable_line
 from manitwin.twin.dataset_root import DatasetRoot
 
 SHOWN = 20
+
+
+def shown_correction(value: object) -> str:
+    """Return what is true instead as a person reads it: a quantity with the interval that its annotator is sure of."""
+    if isinstance(value, dict):
+        return f"{value['value']:g} ({value['low']:g} to {value['high']:g})"
+    return str(value)
 
 
 @dataclass(frozen=True)
@@ -80,8 +88,8 @@ class ReviewReport:
                     f"{version.dimension} by {version.prompt}: {version.no} no, {version.yes} yes, {version.unsure} unsure"
                 )
         for each in self.disagreements[:SHOWN]:
-            said = "".join(f", {name} is {value}" for name, value in each.corrections.items())
-            note = f" ({'; '.join(each.notes)})" if each.notes else ""
+            said = "".join(f", {name} is {shown_correction(value)}" for name, value in each.corrections.items())
+            note = f" ({printable_line('; '.join(each.notes))})" if each.notes else ""
             picture = f" {each.pictures[-1]}" if each.pictures else ""
             lines.append(f"no: {each.twin_id} {each.dimension}{said}{note}{picture}")
         if len(self.disagreements) > SHOWN:
