@@ -68,7 +68,7 @@ class InterruptsWhenTakenDown:
 
 def look_at_inputs() -> None:
     """Read inputs of a build that have no end: folders in folders, rows of a manifest, a file that is never inspected."""
-    from manitwin.pipeline import folder_listing, inspection, manifest
+    from manitwin.pipeline import folder_listing, inspection, manifest, manifest_rows
 
     def endless(*arguments: object, **options: object) -> Iterator[tuple[int, dict[str, str]]]:
         (FOLDER / "started").touch()
@@ -76,7 +76,7 @@ def look_at_inputs() -> None:
             yield 1, {"text": "a mug"}
 
     if MODE == "manifest":
-        manifest.read_csv = endless
+        manifest_rows.read_csv = endless
         (FOLDER / "list.csv").touch()
         for _ in manifest.iterate_items([FOLDER / "list.csv"], {}, manifest.Notes()):
             pass

@@ -209,7 +209,7 @@ def _without_name(
     if lifted is None or (fitted is not None and _is_preferred(fitted, lifted)):
         assert fitted is not None
         return _of_likely_name(fitted, rgba)
-    if plain.nearest is not None and is_rather(plain.nearest.residual, lifted.notes["primitive"]):
+    if plain.nearest is not None and is_rather(plain.nearest, lifted.notes["primitive"]):
         return _plain(plain.nearest, rgba)
     return _lifted_job(lifted, lifted.notes)
 

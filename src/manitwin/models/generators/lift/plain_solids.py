@@ -126,15 +126,16 @@ def explains_closely(left: Residual) -> bool:
     return left.iou >= LEAST_IOU and left.outline <= MOST_OUTLINE and left.edges <= MOST_EDGES_MISSING
 
 
-def is_rather(left: Residual, lifted: str) -> bool:
+def is_rather(plain: Fitted, lifted: str) -> bool:
     """Tell whether a plain solid is to be preferred to what an outline was ``lifted`` to: a revolution, a box or an inflation.
 
     Where its inner edges are seen in the photo; and, as a cube from above has the outline of a body of revolution but for a few
-    pixels, where it has the outline to the pixel.
+    pixels, where a block has the outline to the pixel. (A glass from the side has that of a slab seen from near.)
     """
+    left = plain.residual
     edges_seen = left.edges <= EDGES_SEEN and left.iou >= NEAR_IOU and left.outline <= NEAR_OUTLINE
     exact = left.edges <= SILENT_EDGES and left.iou >= EXACT_IOU and left.outline <= EXACT_OUTLINE
-    return edges_seen or (exact and lifted == "revolution")
+    return edges_seen or (exact and PRIMITIVES[plain.category] == "box" and lifted == "revolution")
 
 
 def _is_possible(candidate: Candidate) -> bool:
