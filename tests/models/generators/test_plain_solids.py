@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 
 import cv2
 import numpy as np
 import pytest
+import trimesh
 
 from manitwin.errors import Rejected
 from manitwin.models.generators.lift import made_photo
@@ -21,12 +23,14 @@ SIDE_PX = 640
 TOP, SIDE = (200, 190, 170, 255), (120, 110, 95, 255)
 
 
-def _seen(outline_m: np.ndarray, height_m: float, elevation_deg: float, *, top: float = 1.0) -> np.ndarray:
+def _seen(
+    outline_m: np.ndarray, height_m: float, elevation_deg: float, *, top: float = 1.0, yaw_rad: float = 0.5
+) -> np.ndarray:
     """An RGBA picture of a convex outline (N, 2) raised to a height, its upper face scaled by ``top`` and lighter."""
     lower = np.column_stack([outline_m, np.zeros(len(outline_m))])
     upper = np.column_stack([top * outline_m, np.full(len(outline_m), height_m)])
     points, _, _ = normalised(np.concatenate([lower, upper]))
-    flat, _ = View(0.5, np.radians(elevation_deg), 0.0, 0.15).project(points)
+    flat, _ = View(yaw_rad, np.radians(elevation_deg), 0.0, 0.15).project(points)
     flat = (flat - (flat.min(0) + flat.max(0)) / 2) / np.ptp(flat, axis=0).max()
     pixels = np.rint(0.8 * SIDE_PX * flat + SIDE_PX / 2).astype(np.int32)
     rgba = np.zeros((SIDE_PX, SIDE_PX, 4), np.uint8)
@@ -57,6 +61,18 @@ def test_a_nameless_slab_on_a_table_lies_and_is_as_thick_as_it_looks() -> None:
     assert measures["width"] == pytest.approx(0.13 / 0.20, rel=0.08)
     assert measures["thick"] == pytest.approx(0.016 / 0.20, rel=0.25)
     assert job.notes["view"]["elevation_deg"] == pytest.approx(30, abs=5)
+
+
+def test_the_side_that_the_photo_shows_is_the_front() -> None:
+    """A slab whose narrow side is towards the camera, whatever side of a slab the solid has there."""
+    job = from_photo(_seen(_rounded(0.13, 0.20, 0.02), 0.016, 35, yaw_rad=0.1), None)
+    width, depth, height = np.ptp(trimesh.load(io.BytesIO(job.glb), "glb").to_mesh().vertices, axis=0)[[0, 2, 1]]
+    assert (
+        job.notes["primitive"] == "slab"
+        and depth / width == pytest.approx(0.20 / 0.13, rel=0.1)
+        and height < 0.3 * width
+    )
+    assert abs(job.notes["view"]["yaw_deg"]) < 45
 
 
 def test_a_cylinder_seen_from_above_is_as_high_as_it_is() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -252,13 +252,20 @@ def _lifted_job(lifted: Lifted, notes: dict[str, Any]) -> Job:
 
 
 def _shape_alone(fitted: Fitted, rgba: np.ndarray, *, primitive: str, source: str) -> Job:
-    """Return the solid alone, nothing known of it: a thing with a box's shape is not called a box."""
+    """Return the solid alone, nothing known of it: a thing with a box's shape is not called a box.
+
+    Its frame means nothing either: it is turned by quarter turns until the side that the photo shows is towards -Y.
+    """
     surface = texture_of([fitted], [rgba])
     usual = lookup(fitted.category)
     rests = "standing" if fitted.upright and (usual is None or usual.stands is not False) else "lying"
-    notes = notes_of(fitted) | {"primitive": primitive, "source": source, "rests": rests}
+    quarters = round(fitted.view.yaw_rad / (np.pi / 2))
+    view = replace(fitted.view, yaw_rad=fitted.view.yaw_rad - quarters * np.pi / 2)
+    notes = notes_of(replace(fitted, view=view)) | {"primitive": primitive, "source": source, "rests": rests}
     del notes["category"]
-    return Job(write_glb([visual_part(surface)]), notes, surface.unseen_share)
+    part = visual_part(surface)
+    part.apply_transform(trimesh.transformations.rotation_matrix(quarters * np.pi / 2, [0, 0, 1]))
+    return Job(write_glb([part]), notes, surface.unseen_share)
 
 
 def textured_part(lifted: Lifted) -> trimesh.Trimesh:
