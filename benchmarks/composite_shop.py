@@ -7,6 +7,8 @@ import numpy as np
 from composite_things import Thing, linear
 from composite_variants import labelled, matched
 
+from manitwin.formats.meshes.textures import linear_to_srgb
+
 WHITE = 255
 LIGHT_GROUNDS = (200, 254)
 SHADELESS = 0.99
@@ -55,7 +57,7 @@ def shop_picture(
     seen = seen * np.exp(0.02 * rng.standard_normal(seen.shape[:2], dtype=np.float32))[..., None]
     mixed = np.where(coverage[..., None] > 0, seen + (1 - coverage[..., None]) * (1 - brighter) * shown, shown)
     mixed = np.asarray(cv2.GaussianBlur(mixed.astype(np.float32), (0, 0), float(rng.uniform(0.3, 0.8))))
-    rgb = np.rint(255 * encoded(np.clip(mixed, 0, 1))).astype(np.uint8)
+    rgb = np.rint(255 * linear_to_srgb(np.clip(mixed, 0, 1))).astype(np.uint8)
     reached = cv2.dilate((coverage > 0).astype(np.uint8), np.ones((7, 7))) > 0
     rgb[~reached & (shade.min(2) == 1)] = ground
     scale = float(rng.uniform(*SIDES_PX)) / max(rgb.shape[:2])
@@ -66,8 +68,3 @@ def shop_picture(
         jpeg = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
         rgb = np.ascontiguousarray(cv2.imdecode(jpeg, cv2.IMREAD_COLOR)[..., ::-1])
     return rgb, share > 0.5
-
-
-def encoded(light: np.ndarray) -> np.ndarray:
-    """Return sRGB in [0, 1] of linear light (IEC 61966-2-1)."""
-    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * np.maximum(light, 1e-9) ** (1 / 2.4) - 0.055)

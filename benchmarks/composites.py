@@ -60,8 +60,8 @@ def composite(part: Part, number: int, variant: Variant = "plain") -> Composite:
     elif variant == "matched":
         under = cv2.warpAffine(main.coverage, placements[0], (WIDTH_PX, HEIGHT_PX)) > 0.5
         things[0] = matched(own_rng, main, ground[under].mean(0) if under.any() else ground.mean((0, 1)))
-    exact = draw_exact_ground(own_rng)
-    if variant == "shop":
+    elif variant == "shop":
+        exact = draw_exact_ground(own_rng)
         things[0] = shop_thing(own_rng, main, exact)
         ground = np.broadcast_to(linear(exact), ground.shape).astype(np.float32)
         setting = "shop"

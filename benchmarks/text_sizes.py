@@ -15,18 +15,10 @@ import numpy as np
 
 from manitwin.errors import UsageError
 from manitwin.models.annotators.priors import load_priors
+from manitwin.models.generators.lift.made_text import made_as_read
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.made import Made, make
-from manitwin.models.generators.templates.text import read_text
 
 OTHER_SEED, MOST_LARGER = 77, 0.12
-
-
-def made_of(text: str, seed: int) -> Made:
-    """Return what a text asks for."""
-    templates = load_templates()
-    wanted = read_text(text, templates)
-    return make(templates[wanted.category], wanted, np.random.default_rng(seed))
 
 
 def main() -> None:
@@ -39,7 +31,7 @@ def main() -> None:
     refused: dict[int, list[str]] = {2: [], 3: []}
     off, costs = [0.0], []
     for category in load_templates():
-        other = np.ptp(made_of(f"a {category}", OTHER_SEED).mesh.vertices, axis=0)
+        other = np.ptp(made_as_read(f"a {category}", OTHER_SEED)[0].mesh.vertices, axis=0)
         x, y, z = np.round(100 * other * np.exp(rng.uniform(-MOST_LARGER, MOST_LARGER)), 2)
         long, wide = max(x, y), min(x, y)
         for sides, text in (
@@ -48,7 +40,7 @@ def main() -> None:
         ):
             begun = time.process_time()
             try:
-                extents = 100 * np.ptp(made_of(text, given.seed).mesh.vertices, axis=0)
+                extents = 100 * np.ptp(made_as_read(text, given.seed)[0].mesh.vertices, axis=0)
             except UsageError:
                 refused[len(sides)].append(category)
                 continue
@@ -62,7 +54,7 @@ def main() -> None:
     held = 0
     for category in vessels:
         try:
-            made_of(f"a {category} of {given.volume}", given.seed)
+            made_as_read(f"a {category} of {given.volume}", given.seed)
         except UsageError as error:
             print(error)
         else:

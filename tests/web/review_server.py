@@ -63,3 +63,15 @@ def confirmed(page: Any) -> None:
     with page.expect_navigation():
         press(page, "Enter")
     page.wait_for_selector("#review")
+
+
+def correct_a_point(page: Any) -> None:
+    """Say that the points are wrong and correct them, once the 3D view is there."""
+    page.wait_for_selector("#viewer[data-ready]", timeout=30_000)
+    press(page, "3", "n", "c")
+
+
+def pick(page: Any, candidate: str) -> None:
+    """Pick a candidate in the 3D view, as a click on it does."""
+    picked = f"new CustomEvent('twin:picked', {{ bubbles: true, detail: '{candidate}' }})"
+    page.evaluate(f"document.querySelector('.stage').dispatchEvent({picked})")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from review_server import confirmed, press, reviewing, shown, stored
+from review_server import confirmed, correct_a_point, pick, press, reviewing, shown, stored
 from typer.testing import CliRunner
 
 from manitwin.cli.main import app
@@ -170,10 +170,8 @@ def test_a_point_moves_to_the_candidate_that_is_clicked(place: Path, visitor: Vi
         page = visitor()
         page.goto(server.links["ada"])
         shown(page)
-        page.wait_for_selector("#viewer[data-ready]", timeout=30_000)
-        press(page, "3", "n", "c")
-        page.evaluate("""document.querySelector('.stage').dispatchEvent(
-            new CustomEvent('twin:picked', { bubbles: true, detail: 'c1' }))""")
+        correct_a_point(page)
+        pick(page, "c1")
         assert page.input_value("[data-point=f0]") == "1"
         assert "f0 belongs to candidate 1" in page.inner_text("#saved")
 

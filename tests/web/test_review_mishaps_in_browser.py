@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from review_server import confirmed, press, reviewing, shown, stored
+from review_server import confirmed, correct_a_point, pick, press, reviewing, shown, stored
 
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.store import RECORD, seal
@@ -90,11 +90,9 @@ def test_after_a_candidate_is_clicked_the_keys_are_those_of_the_review(place: Pa
         page = visitor()
         page.goto(server.links["ada"])
         shown(page)
-        page.wait_for_selector("#viewer[data-ready]", timeout=30_000)
-        press(page, "3", "n", "c")
+        correct_a_point(page)
         page.locator(".stage").focus()
-        page.evaluate("""document.querySelector('.stage').dispatchEvent(
-            new CustomEvent('twin:picked', { bubbles: true, detail: 'c1' }))""")
+        pick(page, "c1")
         press(page, "4", "u")
         assert page.input_value("[data-point=f0]") == "1" and page.is_checked("input[name=physical][value=unsure]")
 

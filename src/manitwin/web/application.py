@@ -108,9 +108,8 @@ def _gallery(gallery: Gallery, asked: dict[str, str], title: str) -> Response:
     try:
         view = View.of(asked)
         return HTMLResponse(gallery_page(gallery.find(view), title, LINKS), headers=NOT_KEPT)
-    except (
-        UsageError
-    ) as error:  # a condition that cannot be used: all twins, what is wrong, and the fields as they were
+    except UsageError as error:
+        # a condition that cannot be used: all twins, what is wrong, and the fields as they were
         status = asked.get("status", "accepted")
         shown = gallery.find(View(status=status if status in ("accepted", "rejected") else "accepted"))
         page = gallery_page(shown, title, LINKS, error=str(error), asked=view)

@@ -8,6 +8,7 @@ import trimesh
 
 from manitwin.errors import UsageError
 from manitwin.models.annotators.priors import load_priors
+from manitwin.models.generators.lift.made_text import made_as_read
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.described import Wish
 from manitwin.models.generators.templates.looks import COLORS, MATERIALS
@@ -186,6 +187,7 @@ def test_another_thing_whose_name_ends_as_a_templates_is_refused(text: str) -> N
         ("a 5 l mug, 9 cm tall", "no mug can be given all of this"),
         ("a fork of 200 ml, 20 cm long", "no vessel"),
         ("a fork of 200 ml", "no vessel"),
+        ("a 500 ml leather bottle", "its wall is not"),
         ("a mug of 0 ml", "no size gives"),
         ("a mug 10 cm tall and 80 cm wide", r"no mug can be given all of this .*its width would be"),
         ("a box 0 x 20 x 10 cm", "no box can be given all of this"),
@@ -504,8 +506,7 @@ def test_a_colour_of_a_tool_is_its_handle_s() -> None:
 
 
 def made_of(text: str) -> Made:
-    wanted = read(text)
-    return make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
+    return made_as_read(text, 0)[0]
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import numpy as np
 from manifold3d import CrossSection, Manifold, OpType
 
 from manitwin.errors import UsageError
-from manitwin.models.annotators.priors import load_priors
+from manitwin.models.annotators.priors import load_materials, load_priors
 
 if TYPE_CHECKING:
     from manitwin.models.generators.templates.made import Made
@@ -30,8 +30,7 @@ def capacity_m3(made: Made) -> float | None:
     prior = load_priors()[made.category]
     if prior.vessel:
         solid, _ = made.solids[list(made.masses_kg).index("body")]
-        wall_m = TWO_WALLS_M if made.category == "thermos" else CLOSED_WALLS_M.get(made.looks["body"].surface, 0.001)
-        return max(float(solid.volume()) - wall_m * float(solid.surface_area()), 0.0)
+        return max(float(solid.volume()) - _closed_wall_m(made) * float(solid.surface_area()), 0.0)
     if not prior.container:
         return None
     solid = Manifold.batch_boolean([each for each, _ in made.solids], OpType.Add)
@@ -47,6 +46,19 @@ def held_m3(made: Made, amount: Amount) -> float:
     if held is None:
         raise UsageError(f"a {made.category} is no vessel that has a volume ({amount.said}); say a length or a mass")
     return held
+
+
+def _closed_wall_m(made: Made) -> float:
+    """Return how thick the wall of a closed vessel is; raises UsageError where nobody knows that of its material."""
+    if made.category == "thermos":
+        return TWO_WALLS_M
+    surface = made.looks["body"].surface
+    open_ware = load_materials()[surface].wall_m
+    if surface not in CLOSED_WALLS_M and open_ware is None:
+        raise UsageError(
+            f"how much a {made.category} of {made.looks['body'].material} holds is not known, as its wall is not; say a length"
+        )
+    return CLOSED_WALLS_M[surface] if open_ware is None else CLOSED_WALLS_M.get(surface, open_ware.typical)
 
 
 def _hollow_m2(section: CrossSection) -> float:
@@ -69,11 +81,7 @@ def scale_with(amount: Amount, made_at: Callable[[float], Made]) -> float:
     scale, wanted = 1.0, amount.mass_kg if amount.volume_m3 is None else amount.volume_m3
     for _ in range(MOST_ROUNDS):
         made = made_at(scale)
-        has = sum(made.masses_kg.values()) if amount.volume_m3 is None else capacity_m3(made)
-        if has is None:
-            raise UsageError(
-                f"a {made.category} is no vessel that has a volume ({amount.said}); say a length or a mass"
-            )
+        has = sum(made.masses_kg.values()) if amount.volume_m3 is None else held_m3(made, amount)
         if wanted is None or not LEAST < wanted < MOST:
             break
         if has > 0 and abs(has / wanted - 1) < CLOSE:

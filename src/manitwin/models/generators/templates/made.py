@@ -63,7 +63,6 @@ def make(template: Template, wanted: Wanted, rng: np.random.Generator, said: Map
     model = template.build(**measures)
     mesh = model.assembly.mesh()
     _check_parts(template, wanted, mesh)
-    by_amount = wanted.amount is not None and not wanted.solves_measures
 
     def made_at(scale: float) -> Made:
         walled, its_model, its_mesh = measures, model, mesh
@@ -71,17 +70,18 @@ def make(template: Template, wanted: Wanted, rng: np.random.Generator, said: Map
             walled = measures | {"wall_m": LEAST_WALL_M / scale}
             its_model = template.build(**walled)
             its_mesh = its_model.assembly.mesh()
-            scale = scale if by_amount else _scale(template, wanted, its_mesh)
+            scale = _scale(template, wanted, its_mesh) if wanted.scaling_amount is None else scale
         return dressed(template, its_model, its_mesh, walled, looks_by_slot, wanted.wishes, scale)
 
-    if wanted.amount is None or not by_amount:
+    if wanted.scaling_amount is None:
         return made_at(_scale(template, wanted, mesh))
-    scale = scale_with(wanted.amount, made_at)
+    scale = scale_with(wanted.scaling_amount, made_at)
     _check_size(template, float(np.ptp(mesh.vertices, axis=0).max()) * scale)
     return made_at(scale)
 
 
 def _holds(template: Template, wanted: Wanted, looks: Mapping[str, Look]) -> Holds | None:
+    """Return the volume that is said beside lengths, and how what a thing of some measures holds is found; None where none is."""
     amount = wanted.amount
     if amount is None or amount.volume_m3 is None:
         return None

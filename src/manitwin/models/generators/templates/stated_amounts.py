@@ -18,6 +18,7 @@ _MASSES_KG = {
     r"kilograms?|kilogrammes?|kilos?|kg": 1.0, r"grams?|grammes?|g": 1e-3, r"pounds?|lbs?": 0.45359237,
 }  # fmt: skip
 _OUNCE_M3, _OUNCE_KG = 29.5735e-6, 0.0283495
+"""Fluid and avoirdupois."""
 _UNITS = "|".join([*_VOLUMES_M3, *_MASSES_KG, "ounces?|oz"])
 _NUMERALS = {"half": 0.5, "quarter": 0.25, "one": 1.0, "two": 2.0, "three": 3.0, "four": 4.0, "five": 5.0, "ten": 10.0}
 _AMOUNT = re.compile(
@@ -47,18 +48,19 @@ def amounts_in(plain: str, prior: Prior) -> list[Amount]:
     found = []
     for match in _AMOUNT.finditer(plain):
         number = _NUMERALS[match[1]] if match[1] in _NUMERALS else float(match[1])
-        by_unit = [("volume_m3", _VOLUMES_M3), ("mass_kg", _MASSES_KG)]
         said = f"{match[1]} {match[2]}"
-        for name, units in by_unit:
-            size = next((size for spelt, size in units.items() if re.fullmatch(spelt, match[2])), None)
-            if size is not None:
-                found.append(Amount(said, **{name: number * size}))
-                break
-        else:
-            found.append(
-                Amount(said, volume_m3=number * _OUNCE_M3) if holds else Amount(said, mass_kg=number * _OUNCE_KG)
-            )
+        volume_m3, mass_kg = _size(match[2], _VOLUMES_M3), _size(match[2], _MASSES_KG)
+        if volume_m3 is None and mass_kg is None:  # ounces
+            volume_m3, mass_kg = (_OUNCE_M3, None) if holds else (None, _OUNCE_KG)
+        if volume_m3 is not None:
+            found.append(Amount(said, volume_m3=number * volume_m3))
+        elif mass_kg is not None:
+            found.append(Amount(said, mass_kg=number * mass_kg))
     return found
+
+
+def _size(unit: str, units: dict[str, float]) -> float | None:
+    return next((size for spelt, size in units.items() if re.fullmatch(spelt, unit)), None)
 
 
 def without_amounts(plain: str) -> str:

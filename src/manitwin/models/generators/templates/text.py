@@ -70,9 +70,14 @@ class Wanted:
 
     @property
     def solves_measures(self) -> bool:
-        """Whether one scale for the whole cannot give the stated lengths."""
-        lengths = len(self.lengths_m) + (self.amount is not None)
-        return bool(self.part_lengths_m) or (bool(self.lengths_m) and lengths > 1)
+        """Whether one scale for the whole cannot give what is stated: several lengths, that of a part, a volume beside them."""
+        beside = self.amount is not None or len(self.lengths_m) > 1
+        return bool(self.part_lengths_m) or (bool(self.lengths_m) and beside)
+
+    @property
+    def scaling_amount(self) -> Amount | None:
+        """The volume or mass that sets the scale; None where lengths do, or nothing."""
+        return None if self.solves_measures else self.amount
 
 
 def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:

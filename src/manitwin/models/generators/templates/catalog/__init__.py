@@ -39,10 +39,18 @@ def _template(category: str, row: dict[str, Any], build: Builder) -> Template:
     slots = {name: tuple(looks) for name, looks in row["slots"].items()}
     names, of_sheet = tuple(row.get("names", ())), tuple(row.get("of_sheet", ()))
     contents, of_plate = row.get("contents_kg_m3", {}), row.get("of_plate", False)
-    length_of, any_proportions = row.get("length_of", ""), row.get("any_proportions", False)
     return Template(
-        *(category, row["group"], measures, slots, build, names, contents, of_sheet, of_plate, length_of),
-        any_proportions=any_proportions,
+        category,
+        row["group"],
+        measures,
+        slots,
+        build,
+        names,
+        contents,
+        of_sheet,
+        of_plate,
+        length_of=row.get("length_of", ""),
+        any_proportions=row.get("any_proportions", False),
     )
 
 
