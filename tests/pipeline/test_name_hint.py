@@ -96,7 +96,10 @@ def test_the_result_line_says_it(tmp_path: Path) -> None:
 )
 def test_a_name_that_the_priors_do_not_know_is_said_in_the_result_line(tmp_path: Path, name: str, told: str) -> None:
     known_by_none = ending_of(accepted(tmp_path, name, UNKNOWN))
-    assert f"the priors know no '{name}'" in known_by_none.detail_and_hint and told in known_by_none.detail_and_hint
+    assert (
+        f"know no '{name}': mass and friction are those of any object" in known_by_none.detail_and_hint
+        and told in known_by_none.detail_and_hint
+    )
     assert told in ending_of(rejected(tmp_path, "too_wide", name=name)).detail_and_hint
     seen = ending_of(accepted(tmp_path, name, SEEN))
     assert seen.detail_and_hint == seen.detail, "a model has seen what it is"

@@ -78,7 +78,7 @@ def unknown_name_words(name: str) -> str:
     known = sorted({word for prior in load_priors().values() for word in (prior.category, *prior.aliases)})
     near = get_close_matches(normalised(name), known, n=2, cutoff=SPELT_ALIKE)
     asked = f"; did you mean {' or '.join(map(repr, near))}?" if near else "; say what kind of thing it is with --name"
-    return f"the priors know no {name!r}, so that mass and friction are only those of anything{asked}"
+    return f"the priors (docs/priors.md) know no {name!r}: mass and friction are those of any object{asked}"
 
 
 def likeliest_words(naming: dict[str, Any]) -> str:
