@@ -7,6 +7,7 @@ from typing import Literal
 
 import cv2
 import numpy as np
+from composite_categories import COMPOSITE_CATEGORIES
 
 from manitwin.errors import ManiTwinError
 from manitwin.models.generators.templates.catalog import load_templates
@@ -40,13 +41,13 @@ class Thing:
 
 def is_unseen(category: str) -> bool:
     """Return whether a category is kept out of the training part."""
-    return sorted(load_templates()).index(category) % UNSEEN == 0
+    return COMPOSITE_CATEGORIES.index(category) % UNSEEN == 0
 
 
 def draw_thing(rng: np.random.Generator, beside: Thing | None, part: Part) -> Thing:
     """Render a template with drawn colours, from where one of ``beside`` is seen, if that is given."""
     templates = load_templates()
-    names = [name for name in sorted(templates) if part != "training" or not is_unseen(name)]
+    names = [name for name in COMPOSITE_CATEGORIES if part != "training" or not is_unseen(name)]
     while True:
         category = names[int(rng.integers(len(names)))]
         wish = Wish(rgb=tuple(rng.uniform(0.03, 0.97, 3))) if rng.random() < 0.3 else Wish()  # type: ignore[arg-type]

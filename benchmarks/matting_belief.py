@@ -20,13 +20,13 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from composite_categories import COMPOSITE_CATEGORIES
 from composite_variants import Variant
 from composites import Composite, composite
 from matting import RIGHT_IOU
 from scipy.optimize import minimize
 from template_photos import TemplatePhoto, photograph
 
-from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.matting import belief
 from manitwin.models.matting.study import drawn, judged_candidates
 
@@ -175,7 +175,7 @@ def main() -> None:
     parser.add_argument("-o", "--out", type=Path)
     given = parser.parse_args()
     seeds = [int(seed) for seed in given.photo_seeds.split(",") if seed]
-    pairs = [(category, seed) for category in list(load_templates())[::PHOTO_CATEGORIES_EVERY] for seed in seeds]
+    pairs = [(category, seed) for category in COMPOSITE_CATEGORIES[::PHOTO_CATEGORIES_EVERY] for seed in seeds]
     things = [(number, *pair) for number, pair in enumerate(pairs)]
     with ProcessPoolExecutor(given.jobs, mp_context=get_context("spawn")) as pool:
         composites = pool.map(examples, range(given.first, given.first + given.count), chunksize=4)

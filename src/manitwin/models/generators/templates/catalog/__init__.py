@@ -1,4 +1,13 @@
-"""The templates: builders, a module a family, and ``templates.toml`` with their measures, looks and names."""
+"""The templates: a module of builders a family, and beside it a table of their measures, looks and names.
+
+A row of a table (``vessels.toml`` beside ``vessels.py``) has the names besides the category, which is one of the priors'; looks
+by slot to draw from ('colour material'; '' looks like the first slot); the mean density of closed containers with what is in
+them; the parts that are hollow behind a sheet where they are of metal (``of_sheet``); and the measures as [low, typical, high]:
+the interval that nearly all such things are in. A name that ends in ``_m`` is in metres, any other is a ratio. ``wall_m`` is that
+of ceramic; other materials have walls of their own (``looks``), but for metal where the thing is ``of_plate``. A length without a
+direction is that of the whole, or of the part ``length_of``. What has ``any_proportions`` is as long, wide and high as a text
+says, other things keep near their measures. Typical retail sizes; ``docs/templates.md`` says how they were checked.
+"""
 
 from __future__ import annotations
 
@@ -18,21 +27,23 @@ FAMILIES = (
 
 @cache
 def load_templates() -> dict[str, Template]:
-    """Return all templates by category, sorted; raises ManiTwinError where table and builders contradict each other."""
+    """Return all templates by category, sorted; raises ManiTwinError where a table and its builders contradict each other."""
+    templates = {}
     for family in FAMILIES:
-        import_module(f"{__name__}.{family}")
-    rows = parse_toml((resources.files(__name__) / "templates.toml").read_bytes(), "templates.toml", ManiTwinError)
-    if rows.keys() != BUILDERS.keys():
-        raise ManiTwinError(f"templates.toml: builder or row missing: {sorted(rows.keys() ^ BUILDERS.keys())}")
-    return {category: _template(category, rows[category], BUILDERS[category]) for category in sorted(rows)}
+        module, file = f"{__name__}.{family}", f"{family}.toml"
+        import_module(module)
+        builders = {category: build for category, build in BUILDERS.items() if build.__module__ == module}
+        rows = parse_toml((resources.files(__name__) / file).read_bytes(), file, ManiTwinError)
+        if rows.keys() != builders.keys():
+            raise ManiTwinError(f"{file}: builder or row missing: {sorted(rows.keys() ^ builders.keys())}")
+        templates |= {category: _template(category, rows[category], builders[category]) for category in rows}
+    return dict(sorted(templates.items()))
 
 
 def _template(category: str, row: dict[str, Any], build: Builder) -> Template:
     wanted, given = set(signature(build).parameters), set(row["measures"])
     if wanted != given:
-        raise ManiTwinError(
-            f"templates.toml [{category}]: measures that are not its builder's: {sorted(wanted ^ given)}"
-        )
+        raise ManiTwinError(f"template {category!r}: measures that are not its builder's: {sorted(wanted ^ given)}")
     measures = {
         name: Measure(low, typical, high, _unit(name)) for name, (low, typical, high) in row["measures"].items()
     }
