@@ -28,7 +28,7 @@ FAMILIES = (
 @cache
 def load_templates() -> dict[str, Template]:
     """Return all templates by category, sorted; raises ManiTwinError where a table and its builders contradict each other."""
-    templates = {}
+    templates: dict[str, Template] = {}
     for family in FAMILIES:
         module, file = f"{__name__}.{family}", f"{family}.toml"
         import_module(module)
