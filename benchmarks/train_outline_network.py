@@ -29,7 +29,7 @@ from manitwin.models.matting.outline_network import (
     AROUND_PX,
     NEAR_PX,
     VALUES,
-    outline_values,
+    BothSides,
     patch_windows,
     patches,
 )
@@ -80,14 +80,14 @@ def _near_outline(
     if mask.sum() < LEAST_PIXELS:
         return []
     rough = cv2.resize(mask.astype(np.float32), truth.shape[::-1], interpolation=cv2.INTER_LINEAR)
-    values, near = outline_values(rgb, rough, band_px(truth.shape, mask.shape))
-    rows, columns = np.nonzero(near)
+    sides = BothSides(rgb, rough, band_px(truth.shape, mask.shape))
+    rows, columns = np.nonzero(sides.near)
     some = rng.choice(len(rows), min(len(rows), PATCHES_OF_A_MASK), replace=False)
     rows, columns = rows[some], columns[some]
     turns, mirrored = int(rng.integers(4)), bool(rng.random() < 0.5)
     return [
         (
-            _turned(patches(patch_windows(values), rows, columns), turns, mirrored).astype(np.float16),
+            _turned(patches(patch_windows(sides, 0, len(rgb)), rows, columns), turns, mirrored).astype(np.float16),
             truth[rows, columns],
         )
     ]

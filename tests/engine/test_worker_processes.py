@@ -26,7 +26,7 @@ before = resident_mb()
 return_free_memory()
 print(before - resident_mb())
 """
-KEPT = FREED.replace("6_000", "600")
+KEPT = FREED.replace("6_000", "200")
 LARGE = """
 from manitwin.engine.worker_processes import map_large_blocks
 

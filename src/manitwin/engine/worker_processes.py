@@ -18,7 +18,7 @@ from manitwin.engine.process_bounds import one_thread_in_new_processes
 
 LARGE_BYTES = 2 << 20  # blocks from this size on are mapped each by itself
 M_MMAP_THRESHOLD = -3  # mallopt(3)
-KEPT_BYTES = 64 << 20  # free memory that stays mapped for the next stage
+KEPT_BYTES = 16 << 20  # free memory that stays mapped for the next stage
 
 
 @contextmanager

@@ -11,11 +11,12 @@ from manitwin.models.matting.outline_network import (
     AROUND_PX,
     NEAR_PX,
     VALUES,
+    BothSides,
     outline_model,
-    outline_values,
     patch_windows,
     patches,
     share_near_outline,
+    windows_of,
 )
 
 FINE = 4  # pixels of what is drawn for one of the photo
@@ -114,7 +115,7 @@ def test_patches_have_the_pixels_around_where_they_are() -> None:
     rng = np.random.default_rng(2)
     values = rng.normal(size=(40, 50, VALUES + 1)).astype(np.float32)
     rows, columns = np.array([20, 3]), np.array([25, 0])
-    made = patches(patch_windows(values), rows, columns)
+    made = patches(windows_of(values, 0, 40), rows, columns)
     assert made.shape == (2, VALUES * (NEAR_PX**2 + AROUND_PX**2) + 1)
     near = made[0, : VALUES * NEAR_PX**2].reshape(VALUES, NEAR_PX, NEAR_PX)
     around = made[0, VALUES * NEAR_PX**2 : -1].reshape(VALUES, AROUND_PX, AROUND_PX)
@@ -127,10 +128,20 @@ def test_patches_have_the_pixels_around_where_they_are() -> None:
 def test_values_name_the_way_from_ground_to_thing() -> None:
     coverage = ring(14.0)
     photo = photographed(coverage, (0.7, 0.1, 0.05), plain(0.5))
-    values, near = outline_values(photo, (coverage > 0.5).astype(np.float32), 2)
+    sides = BothSides(photo, (coverage > 0.5).astype(np.float32), 2)
+    values, near = sides.values(0, len(photo)), sides.near
     along = values[..., 1] + 0.5
     assert near.any() and np.median(along[coverage > 0.99]) == pytest.approx(1, abs=0.05)
     assert np.median(along[(coverage == 0) & near]) == pytest.approx(0, abs=0.1)
+
+
+def test_some_rows_at_a_time_are_those_of_the_whole() -> None:
+    coverage = ring(14.0)
+    photo = photographed(coverage, (0.7, 0.1, 0.05), plain(0.5))
+    sides = BothSides(photo, (coverage > 0.5).astype(np.float32), 3)
+    rows, columns = np.nonzero(sides.near[100:150])
+    whole = patches(patch_windows(sides, 0, len(photo)), rows + 100, columns)
+    assert np.array_equal(patches(patch_windows(sides, 100, 150), rows, columns), whole)
 
 
 def test_the_band_follows_the_photos_size() -> None:

@@ -27,6 +27,10 @@ NEAR_PX, AROUND_PX, STEP_PX = 11, 9, 3
 VALUES = 5
 """Of each pixel of a patch; one more, the contrast of both sides, is asked where the patch is."""
 AT_ONCE = 4096
+ROWS_AT_ONCE = 128
+"""Patches and rows that are worked on at a time: all of a photo of 2048 pixels would take 200 MB."""
+LEAST_SHARE = 1e-3
+"""Of a square, that pixels must fill for their mean to count."""
 LEAST_CONTRAST_LAB = 5.0
 COLOUR_LAB, LIGHT_LAB, CONTRAST_LAB = 20.0, 25.0, 40.0
 """That count as one to the network."""
@@ -48,52 +52,99 @@ def share_near_outline(rgb: np.ndarray, mask: np.ndarray, band_px: int) -> np.nd
         max(0, rows.min() - margin) : rows.max() + margin + 1,
         max(0, columns.min() - margin) : columns.max() + margin + 1,
     ]
-    values, near = outline_values(rgb[box], rough[box], band_px)
+    sides = BothSides(rgb[box], rough[box], band_px)
     told = (rough[box] > 0.5).astype(np.float32)
-    rows, columns = np.nonzero(near)
-    windows = patch_windows(values)
-    for first in range(0, len(rows), AT_ONCE):
-        some = np.s_[first : first + AT_ONCE]
-        told[rows[some], columns[some]] = _answers(patches(windows, rows[some], columns[some]))
+    for top in range(0, len(told), ROWS_AT_ONCE):
+        rows, columns = np.nonzero(sides.near[top : top + ROWS_AT_ONCE])
+        if len(rows):
+            windows = patch_windows(sides, top, min(top + ROWS_AT_ONCE, len(told)))
+            for first in range(0, len(rows), AT_ONCE):
+                some = np.s_[first : first + AT_ONCE]
+                told[top + rows[some], columns[some]] = _answers(patches(windows, rows[some], columns[some]))
     share[box] = told
     return share
 
 
-def outline_values(rgb: np.ndarray, rough: np.ndarray, band_px: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return what patches are made of, (H, W, VALUES + 1) float32, and which pixels (H, W) the outline may run through.
+@dataclass(frozen=True)
+class _Spread:
+    """Colours that hold at many pixels: ``colours (N, 3)``, and which of them does at each pixel, ``which (H, W)`` int32."""
 
-    ``rough`` (H, W) float32 is the mask at the size of ``rgb``. The values: the mask; where the colour lies on the way from the
-    ground's to the object's, and how far beside it; how much lighter it is than the ground, and how far from its hue and chroma;
-    the contrast of both. The object's colour is that of the nearest pixels well inside, the ground's the mean just outside. Each
-    is shifted to lie around zero, as perceptrons want it.
+    colours: np.ndarray
+    which: np.ndarray
+
+    @classmethod
+    def of(cls, colours: np.ndarray, nearest: np.ndarray, asked: np.ndarray) -> _Spread:
+        """Keep, of colours (H, W, 3), those at the ``nearest`` places (H, W) of the pixels that are ``asked`` for (H, W)."""
+        used = np.zeros(nearest.size, bool)
+        used[nearest[asked]] = True
+        number = np.cumsum(used, dtype=np.int32)
+        number -= 1
+        return cls(colours.reshape(-1, 3)[used], np.where(asked, number[nearest], 0))
+
+    def rows(self, top: int, end: int) -> np.ndarray:
+        """Return the colours (R, W, 3) of the rows from ``top`` to ``end``; any where none was asked for."""
+        return self.colours[self.which[top:end]]
+
+
+class BothSides:
+    """The colours on both sides of a rough outline, of which the values that patches show are made, some rows at a time.
+
+    ``near (H, W)`` are the pixels that the outline may run through. The object's colour is that of the nearest pixels well
+    inside, the ground's the mean just outside.
     """
-    solid = rough > 0.5
-    depth = cv2.distanceTransform(solid.astype(np.uint8), cv2.DIST_L2, 5)
-    away = cv2.distanceTransform((~solid).astype(np.uint8), cv2.DIST_L2, 5)
-    near = (depth <= band_px + 1) & (away <= band_px + 1)
-    values = np.zeros((*solid.shape, VALUES + 1), np.float32)
-    values[..., 0] = rough - 0.5
-    reach = 2 * band_px + 3
-    thickest = cv2.dilate(depth, np.ones((reach, reach), np.uint8))
-    inner = solid & (depth >= np.minimum(band_px + 1, 0.7 * thickest))
-    outer = ~solid & (away > band_px + 1) & (away < 4 * band_px + 6)
-    if not inner.any() or not outer.any():
-        return values, near
-    lab = cv2.cvtColor(rgb.astype(np.float32) / 255, cv2.COLOR_RGB2LAB)
-    own = cv2.blur(_spread(*_mean_of(lab, inner, 3), inner), (2 * band_px + 1, 2 * band_px + 1))
-    beyond, known = _mean_of(lab, outer, 4 * band_px + 5)
-    beyond = _spread(beyond, known, known)
-    step, offset = own - beyond, lab - beyond
-    contrast = length(step)
-    along = (offset * step).sum(2) / np.maximum(contrast**2, LEAST_CONTRAST_LAB**2)
-    beside = np.sqrt(np.maximum((offset**2).sum(2) - (along * contrast) ** 2, 0))
-    tint = np.hypot(offset[..., 1], offset[..., 2])
-    values[..., 1] = np.clip(along, -1, 2) - 0.5
-    values[..., 2] = np.clip(beside / COLOUR_LAB, 0, 2) - 0.3
-    values[..., 3] = np.clip(offset[..., 0] / LIGHT_LAB, -2, 2)
-    values[..., 4] = np.clip(tint / COLOUR_LAB, 0, 2) - 0.3
-    values[..., 5] = np.clip(contrast / CONTRAST_LAB, 0, 2) - 0.7
-    return values, near
+
+    def __init__(self, rgb: np.ndarray, rough: np.ndarray, band_px: int):
+        """Take a picture (H, W, 3) uint8, its mask (H, W) float32 at that size, and how far off its outline may be."""
+        self.rough, self._band_px = rough, band_px
+        solid = rough > 0.5
+        depth = cv2.distanceTransform(solid.astype(np.uint8), cv2.DIST_L2, 5)
+        away = cv2.distanceTransform((~solid).astype(np.uint8), cv2.DIST_L2, 5)
+        self.near = (depth <= band_px + 1) & (away <= band_px + 1)
+        reach = 2 * band_px + 3
+        thickest = cv2.dilate(depth, np.ones((reach, reach), np.uint8))
+        inner = solid & (depth >= np.minimum(band_px + 1, 0.7 * thickest))
+        outer = ~solid & (away > band_px + 1) & (away < 4 * band_px + 6)
+        del depth, away, thickest
+        self._told_apart = bool(inner.any() and outer.any())
+        if not self._told_apart:
+            return
+        beyond_px = 4 * band_px + 5
+        shown = 2 * (AROUND_PX // 2 * STEP_PX + STEP_PX + band_px) + 1
+        asked = cv2.dilate(self.near.astype(np.uint8), np.ones((shown, shown), np.uint8)) > 0
+        nearest_inside = _nearest(inner)
+        nearest_beyond = _nearest(_share_of(outer, beyond_px) > LEAST_SHARE)
+        scaled = rgb.astype(np.float32)
+        scaled /= 255
+        self._lab = cv2.cvtColor(scaled, cv2.COLOR_RGB2LAB)
+        del scaled
+        self._inside = _Spread.of(_mean_of(self._lab, inner, 3), nearest_inside, asked)
+        self._beyond = _Spread.of(_mean_of(self._lab, outer, beyond_px), nearest_beyond, asked)
+
+    def values(self, top: int, end: int) -> np.ndarray:
+        """Return the values (R, W, VALUES + 1) float32 of the rows from ``top`` to ``end``.
+
+        The mask; where the colour lies on the way from the ground's to the object's, and how far beside it; how much lighter it
+        is than the ground, and how far from its hue and chroma; the contrast of both. Each is shifted to lie around zero, as
+        perceptrons want it.
+        """
+        values = np.zeros((end - top, self.rough.shape[1], VALUES + 1), np.float32)
+        values[..., 0] = self.rough[top:end] - 0.5
+        if not self._told_apart:
+            return values
+        first = max(0, top - self._band_px)
+        own = self._inside.rows(first, end + self._band_px)
+        own = cv2.blur(own, (2 * self._band_px + 1, 2 * self._band_px + 1))[top - first :][: end - top]
+        beyond = self._beyond.rows(top, end)
+        step, offset = own - beyond, self._lab[top:end] - beyond
+        contrast = length(step)
+        along = _sum(offset * step) / np.maximum(contrast**2, LEAST_CONTRAST_LAB**2)
+        beside = np.sqrt(np.maximum(_sum(offset**2) - (along * contrast) ** 2, 0))
+        values[..., 1] = np.clip(along, -1, 2) - 0.5
+        values[..., 2] = np.clip(beside / COLOUR_LAB, 0, 2) - 0.3
+        values[..., 3] = np.clip(offset[..., 0] / LIGHT_LAB, -2, 2)
+        values[..., 4] = np.clip(np.hypot(offset[..., 1], offset[..., 2]) / COLOUR_LAB, 0, 2) - 0.3
+        values[..., 5] = np.clip(contrast / CONTRAST_LAB, 0, 2) - 0.7
+        return values
 
 
 @dataclass(frozen=True)
@@ -106,14 +157,25 @@ class PatchWindows:
     contrast: np.ndarray
 
 
-def patch_windows(values: np.ndarray) -> PatchWindows:
-    """Return the windows around each pixel of a picture, given its ``outline_values``."""
-    reach = AROUND_PX // 2 * STEP_PX
+def patch_windows(sides: BothSides, top: int, end: int) -> PatchWindows:
+    """Return the windows around each pixel of the rows from ``top`` to ``end`` of a picture."""
+    reach = AROUND_PX // 2 * STEP_PX + STEP_PX // 2
+    first = max(0, top - reach)
+    return windows_of(sides.values(first, min(end + reach, len(sides.near))), top - first, end - first)
+
+
+def windows_of(values: np.ndarray, top: int, end: int) -> PatchWindows:
+    """Return the windows around each pixel of the rows from ``top`` to ``end``, given ``values`` (H, W, VALUES + 1)."""
+    height, width = values.shape[:2]
+    inset = STEP_PX // 2
+    reach = AROUND_PX // 2 * STEP_PX + inset
+    rows = np.clip(np.arange(top - reach, end + reach), 0, height - 1)
+    columns = np.clip(np.arange(-reach, width + reach), 0, width - 1)
+    padded = values[rows[:, None], columns, :VALUES]
     off = reach - NEAR_PX // 2
-    padded = np.pad(values[..., :VALUES], ((reach, reach), (reach, reach), (0, 0)), mode="edge")
-    pixels = _windows(padded, NEAR_PX)[off : len(values) + off, off : values.shape[1] + off]
-    around = _windows(cv2.blur(padded, (STEP_PX, STEP_PX)), 2 * reach + 1)[..., ::STEP_PX, ::STEP_PX]
-    return PatchWindows(pixels, around, values[..., VALUES])
+    means = cv2.blur(padded, (STEP_PX, STEP_PX))[inset:-inset, inset:-inset]
+    around = _windows(means, (AROUND_PX - 1) * STEP_PX + 1)[..., ::STEP_PX, ::STEP_PX]
+    return PatchWindows(_windows(padded, NEAR_PX)[off:-off, off:-off], around, values[top:end, :, VALUES])
 
 
 def patches(windows: PatchWindows, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
@@ -167,14 +229,27 @@ def _weights_file() -> bytes:
     return (files("manitwin.models.matting") / WEIGHTS_FILE).read_bytes()
 
 
-def _mean_of(lab: np.ndarray, used: np.ndarray, side_px: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean colour (H, W, 3) of the ``used`` pixels in a square around each, and where there are any."""
-    weight = cv2.blur(used.astype(np.float32), (side_px, side_px))
-    total = cv2.blur(lab * used[..., None].astype(np.float32), (side_px, side_px))
-    return total / np.maximum(weight, 1e-6)[..., None], weight > 1e-3
+def _share_of(used: np.ndarray, side_px: int) -> np.ndarray:
+    """Return the share (H, W) float32 of ``used`` pixels in a square around each."""
+    return np.asarray(cv2.blur(used.astype(np.float32), (side_px, side_px)))
 
 
-def _spread(colours: np.ndarray, known: np.ndarray, used: np.ndarray) -> np.ndarray:
-    """Return at each pixel the colour (H, W, 3) of the nearest of the ``used`` that is ``known``."""
-    at = ndimage.distance_transform_edt(~(used & known), return_distances=False, return_indices=True)
-    return np.asarray(colours[at[0], at[1]])
+def _mean_of(lab: np.ndarray, used: np.ndarray, side_px: int) -> np.ndarray:
+    """Return the mean colour (H, W, 3) of the ``used`` pixels in a square around each, near black where there are none."""
+    total = lab * used[..., None]
+    total = cv2.blur(total, (side_px, side_px), dst=total)
+    total /= np.maximum(_share_of(used, side_px), 1e-6)[..., None]
+    return np.asarray(total)
+
+
+def _nearest(used: np.ndarray) -> np.ndarray:
+    """Return for each pixel which of the ``used`` (H, W) is nearest, by its place (H, W) int32 in the flattened picture."""
+    row, column = ndimage.distance_transform_edt(~used, return_distances=False, return_indices=True)
+    row *= used.shape[1]
+    row += column
+    return np.ascontiguousarray(row)
+
+
+def _sum(products: np.ndarray) -> np.ndarray:
+    """Return the sum (H, W) of three channels (H, W, 3), without numpy's slow reduction of a short axis."""
+    return np.asarray(products[..., 0] + products[..., 1] + products[..., 2])
