@@ -29,6 +29,7 @@ def read(text: str) -> Wanted:
         ("a mug", "mug"),
         ("MUGS!", "mug"),
         ("a cup of tea", "cup"),
+        ("a white cup and saucer", "cup and saucer"),
         ("the red coffee mug", "mug"),
         ("smartphone", "mobile phone"),
         ("chef's knife", "chef's knife"),

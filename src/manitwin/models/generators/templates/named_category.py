@@ -134,7 +134,7 @@ def _check_one_thing(text: str, before: list[str], name: list[str], prior: Prior
             f"{text!r} asks for several things ({several[0]}): one text makes one thing; describe that, and say how many with"
             " --count"
         )
-    if "and" in name:
+    if "and" in name and " ".join(name) not in names:
         raise UsageError(
             f"{text!r} asks for several things ({' '.join(name)}): one text makes one thing; name one of them"
         )

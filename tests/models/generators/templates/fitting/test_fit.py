@@ -161,6 +161,7 @@ def test_names_of_templates_and_of_priors_find_a_template() -> None:
         assert template is not None and template.category == category
     assert template_for(None) is None and template_for("unicorn") is None
     assert "drink can" in kinds_of("can") and "watering can" not in kinds_of("can")
+    assert {"mug", "cup and saucer"} <= set(kinds_of("cup")) and "cup" not in kinds_of("mug")
 
 
 def test_texture_has_neither_background_nor_mirrored_letters() -> None:

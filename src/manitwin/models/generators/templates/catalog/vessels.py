@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from manitwin.geometry.solids.shapes import box, cylinder, lathe, polygon, prism, rounded
 from manitwin.geometry.solids.sweep import arc, tube
-from manitwin.models.generators.templates.catalog.vessel import bulge, ear, hollowed, shell
+from manitwin.models.generators.templates.catalog.vessel import RIM_SHARE, bulge, ear, hollowed, shell
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -98,6 +100,41 @@ def plate(*, width_m: float, height: float, wall_m: float, well: float) -> Model
     radius, high = 0.5 * width_m, height * width_m
     profile = rounded([(well * radius, 0.0), ((well + 0.11) * radius, 0.25 * high), (radius, high)], 0.012)
     return hollowed(Model(), profile, wall_m, wall_m)
+
+
+@template("cup and saucer")
+def cup_and_saucer(
+    *, width_m: float, saucer: float, cup: float, rim: float, belly: float, taper: float, handle: float, wall_m: float
+) -> Model:
+    """Build a cup with an ear that stands on its saucer.
+
+    ``saucer`` is the saucer's height over its width, ``cup`` the cup's rim over the saucer's width, ``rim`` the cup's height over
+    its rim's width, ``belly`` and ``taper`` the radius of its lower half and its foot over the rim's, ``handle`` how far the ear
+    reaches out over the cup's height.
+    """
+    model, dish, radius = Model(), 0.5 * width_m, 0.5 * cup * width_m
+    foot, wide, height, up = taper * radius, belly * radius, rim * cup * width_m, saucer * width_m
+    floor = wall_m + 0.0005
+    well = 1.15 * foot
+    under, hollow = shell(
+        bulge([(well, 0.0), (0.6 * well + 0.4 * dish, 0.28 * up), (0.25 * well + 0.75 * dish, 0.64 * up), (dish, up)]),
+        wall_m,
+        floor + 0.0005,
+    )
+    side = [(wide, 0.35 * height), (0.5 * (wide + 0.96 * radius), 0.68 * height), (radius, height)]
+    profile = bulge([(foot, 0.0), (0.4 * foot + 0.6 * wide, 0.1 * height), *side])
+    outer, inner = shell(profile, wall_m, 1.5 * wall_m)
+    name, grip = ear(model, 0.5 * (wide + radius), 0.86 * height, 0.3 * height, handle * height, 0.008)
+    raised = [(x, y, z + floor) for x, y, z in (point.position_m for point in model.points)]
+    model.points = [replace(point, position_m=at) for point, at in zip(model.points, raised, strict=True)]
+    model.add("saucer", under).cut("saucer inside", hollow)
+    model.add("body", outer.translate((0, 0, floor))).add(name, grip.translate((0, 0, floor)), "handle")
+    model.cut("inside", inner.translate((0, 0, floor)))
+    for part in ("body", "inside"):
+        model.region("rim", part, lambda centers: centers[:, 2] > floor + (1 - RIM_SHARE) * height)
+    model.region("base", "saucer", lambda centers: centers[:, 2] < 0.02 * up)
+    model.point("opening", "opening", "rim", (0.0, 0.0, floor + height), (0.0, 0.0, 1.0))
+    return model.point("base", "face", "base", (0.5 * foot, 0.0, 0.0), (0.0, 0.0, -1.0))
 
 
 @template("pitcher")

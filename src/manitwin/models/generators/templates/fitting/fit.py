@@ -69,14 +69,21 @@ def template_for(name: str | None) -> Template | None:
 def kinds_of(category: str) -> list[str]:
     """Return the categories that people may mean by a category's name: a can may be a drink can, a water bottle a bottle.
 
-    They share its last word and are about as large: nobody calls a watering can a can.
+    They share its last word and are about as large: nobody calls a watering can a can. A plain name stands also for what has a
+    name with that last word, a mug that is called a coffee cup, and for that with something: a cup and saucer.
     """
     templates, last = load_templates(), category.split()[-1]
     said = lookup(category)
-    kinds = [other for other in templates if other != category and other.split()[-1] == last]
     if category != last:
-        kinds = [other for other in kinds if other == last]
+        kinds = [last] if last in templates else []
+    else:
+        kinds = [other for other in templates if other != category and last in _heads(templates[other])]
     return [other for other in kinds if said is not None and _about_as_large(lookup(other), said)][:_MOST_KINDS]
+
+
+def _heads(template: Template) -> set[str]:
+    """Return the words that say in each of a template's names what it is, before what it comes with."""
+    return {name.split(" and ")[0].split(" with ")[0].split()[-1] for name in (template.category, *template.names)}
 
 
 def _about_as_large(one: Prior | None, other: Prior) -> bool:
