@@ -41,6 +41,18 @@ def read(text: str) -> Wanted:
         ("a travel mug", "thermos"),
         ("a tooth brush", "toothbrush"),
         ("a No. 2 pencil", "pencil"),
+        ("an orange", "orange"),
+        ("a glass marble", "marble"),
+        ("a loaf of bread", "bread"),
+        ("a bar of chocolate", "chocolate bar"),
+        ("a nectarine", "peach"),
+        ("a picture of an apple", "apple"),
+        ("a cookie jar", "jar"),
+        ("an egg cup", "cup"),
+        ("a tomato can", "can"),
+        ("a ball pen", "pen"),
+        ("a bread knife", "chef's knife"),
+        ("a glass of orange juice", "glass"),
     ],
 )
 def test_category_is_the_thing_that_is_named(text: str, category: str) -> None:
@@ -144,6 +156,78 @@ def test_glass_behind_a_thing_and_a_comma_is_what_it_is_of(text: str, category: 
     assert category == "glass" or wanted.wishes[""].material == MATERIALS["glass"]
 
 
+@pytest.mark.parametrize(
+    ("text", "category", "color"),
+    [
+        ("an orange ball", "ball", "orange"),
+        ("an orange mug", "mug", "orange"),
+        ("a mug, orange", "mug", "orange"),
+        ("a mug painted orange", "mug", "orange"),
+        ("a mug that is orange", "mug", "orange"),
+        ("a large mug orange", "mug", "orange"),
+        ("a glass, orange", "glass", "orange"),
+        ("a peach colored cup", "cup", "peach"),
+        ("a vase, peach", "vase", "peach"),
+        ("a lemon yellow bowl", "bowl", "yellow"),
+        ("a mug, lemon yellow", "mug", "yellow"),
+        ("a chocolate brown mug", "mug", "brown"),
+        ("a mug, chocolate brown", "mug", "brown"),
+        ("an eggshell white vase", "vase", "white"),
+        ("a red apple", "apple", "red"),
+        ("a green apple", "apple", "green"),
+        ("a white egg", "egg", "white"),
+        ("an orange orange", "orange", "orange"),
+    ],
+)
+def test_fruit_that_is_a_colour_is_one_where_another_thing_is_named(text: str, category: str, color: str) -> None:
+    wanted = read(text)
+    rgb = tuple(int(COLORS[color][at : at + 2], 16) / 255 for at in (0, 2, 4))
+    assert wanted.category == category and wanted.wishes[""].rgb == pytest.approx(rgb)
+
+
+@pytest.mark.parametrize(
+    ("text", "category"),
+    [("a jam jar, strawberry", "jar"), ("a soap, lemon", "soap"), ("a mortar that is marble", "mortar")],
+)
+def test_what_a_thing_smells_or_is_of_is_not_the_thing(text: str, category: str) -> None:
+    assert read(text).category == category
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("a lemon squeezer", "apple juice", "an egg carton", "a chess board", "a cheese grater", "a carrot peeler"),
+        *("a banana split", "a basketball", "a chess knight", "a brake disc", "an ice cube", "a lime", "a toy truck"),
+        *("a cherry tomato", "a garlic bulb", "a potato masher", "an apple pie", "a ball of yarn", "a golf club"),
+    ],
+)
+def test_a_thing_is_no_food_or_ball_that_its_name_names(text: str) -> None:
+    with pytest.raises(UsageError, match="no template makes"):
+        read(text)
+
+
+def test_imitations_of_food_have_its_colours_and_weigh_what_they_are_of() -> None:
+    for seed in range(4):
+        plastic = make(TEMPLATES["banana"], read("a plastic banana"), np.random.default_rng(seed)).looks["body"]
+        red, green, blue = plastic.rgb
+        assert plastic.material == "plastic" and min(red, green) > 2 * blue
+        wooden = make(TEMPLATES["apple"], read("a wooden apple"), np.random.default_rng(seed)).looks["body"]
+        assert wooden.material == "wood" and wooden.density_kg_m3 == MATERIALS["wood"].density_kg_m3
+
+
+@pytest.mark.parametrize(
+    ("text", "mass_kg", "extent_m"),
+    [("a 60 g egg", 0.06, None), ("an orange, 8 cm", None, 0.08), ("a soccer ball", 0.43, 0.219)],
+)
+def test_food_and_balls_have_the_stated_size_and_the_usual_mass(
+    text: str, mass_kg: float | None, extent_m: float | None
+) -> None:
+    wanted = read(text)
+    thing = make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
+    assert mass_kg is None or sum(thing.masses_kg.values()) == pytest.approx(mass_kg, rel=0.05)
+    assert extent_m is None or np.ptp(thing.mesh.vertices, axis=0).max() == pytest.approx(extent_m, rel=0.02)
+
+
 def test_light_and_dark_move_a_colour() -> None:
     light, plain, dark = (read(f"{shade} blue mug").wishes[""].rgb for shade in ("light", "", "dark"))
     assert light is not None and plain is not None and dark is not None
@@ -166,7 +250,7 @@ def test_text_that_names_no_template_is_refused_in_one_line(text: str) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        *("a magnifying glass", "garlic bulb", "a muffin tin", "a VR headset", "a table tennis ball", "a glass marble"),
+        *("a magnifying glass", "garlic bulb", "a muffin tin", "a VR headset", "a cricket ball", "a steel ball"),
         *("a measuring tape", "a name plate", "a soap dish"),
     ],
 )
@@ -344,6 +428,7 @@ def test_two_colours_or_materials_of_one_part_are_refused(text: str) -> None:
     [
         *("two forks", "three red mugs", "a set of spoons", "12 forks", "a pair of mugs", "a pair of chopsticks"),
         *("two pairs of pliers", "a dozen bowls", "several small bottles", "a stack of plates", "a fork and knife"),
+        *("two apples", "a dozen eggs", "a pair of dice", "a bunch of bananas"),
         "a mortar and pestle",
     ],
 )

@@ -156,6 +156,32 @@ MATERIALS: dict[str, Look] = {
     )
 }
 """Looks by the word for the material, in its own usual colour."""
+FOODS: dict[str, Look] = {
+    look.material: look
+    for look in (
+        _look("apple flesh and skin", "food skin", "b3202a", 0.35, 850),
+        _look("citrus peel and flesh", "food skin", "ee8a1c", 0.5, 930),
+        _look("fruit flesh and skin", "food skin", "e8b04a", 0.5, 970),
+        _look("berry flesh", "food skin", "c41f2b", 0.4, 850),
+        _look("vegetable flesh", "food skin", "c8a878", 0.6, 1050),
+        _look("onion layers", "food skin", "b8752e", 0.4, 950),
+        _look("spongy flesh", "food skin", "e8e0d0", 0.6, 680),
+        _look("pumpkin with its hollow", "food skin", "d9721c", 0.55, 720),
+        _look("plant stalk", "food skin", "6b4a2c", 0.8, 700),
+        _look("plant leaf", "food skin", "4c8a34", 0.6, 700),
+        _look("egg in its shell", "ceramic", "e9c9a4", 0.55, 1070),
+        _look("bread", "food skin", "b5773a", 0.85, 270),
+        _look("fried dough", "food skin", "c98d4a", 0.7, 400),
+        _look("baked dough", "food skin", "c4914f", 0.85, 620),
+        _look("sugar glaze", "food skin", "ea8fae", 0.3, 1200),
+        _look("cheese", "food skin", "f0c452", 0.5, 1070),
+        _look("chocolate", "food skin", "4a2818", 0.35, 1250),
+    )
+}
+"""Looks of food, which tables name and texts do not: what a chocolate mug is of, its name does not say.
+
+Each is a piece with its air and skin; densities are the usual ones of ``prior_tables/food.toml`` or within their intervals.
+"""
 SAME_MATERIAL = {
     "wooden": "wood", "metal": "stainless steel", "metallic": "stainless steel", "stainless": "stainless steel",
     "inox": "stainless steel", "plastics": "plastic", "aluminum": "aluminium", "tin": "steel", "clay": "earthenware",
@@ -208,8 +234,15 @@ USUAL_COLORS: dict[str, tuple[str, ...]] = {
 """Colours that things of a material usually have, by the word for it; '' is its own. What is not here has its own alone."""
 
 
+_COLORED_IMITATIONS = frozenset(("plastic", "rubber", "foam", "ceramic", "wax", "textile", "paper", "cardboard"))
+"""Of what imitations of food have its colours: a plastic banana is yellow, a wooden one of wood that is seen."""
+
+
 def usual_looks(look: Look, usual: Iterable[Look]) -> list[Look]:
     """Return looks of a material in colours that a thing has: those of its ``usual`` ones of it, else those of any of it."""
+    food = [each for each in usual if each.material in FOODS]
+    if food and look.surface in _COLORED_IMITATIONS:
+        return [look.colored(each.rgb) for each in food]
     own = [each for each in usual if each.material == look.material]
     seen = look.surface == "wood" or (look.surface == "steel" and look.metallic > 0)
     if len(own) > 1 and not seen:  # a red wooden handle is painted: who says wood or steel wants to see it
@@ -237,10 +270,11 @@ def material_of(word: str) -> Look | None:
 
 
 def look_of(words: str) -> Look:
-    """Return the look that 'colour material' or 'material' describes; raises ValueError for any other words."""
+    """Return the look that 'colour material' or 'material' or a food describes; raises ValueError for any other words."""
     parts = words.split()
     for cut in range(len(parts)):
-        look = material_of(" ".join(parts[cut:]))
+        called = " ".join(parts[cut:])
+        look = FOODS.get(called) or material_of(called)
         if look is not None and cut == 0:
             return look
         rgb = color_of(parts[cut - 1]) if look is not None else None

@@ -9,9 +9,10 @@ from difflib import get_close_matches
 from itertools import pairwise
 
 from manitwin.errors import UsageError
-from manitwin.models.annotators.priors import Prior, load_priors, lookup, named
+from manitwin.models.annotators.priors import Prior, load_priors, lookup, named, singulars
 from manitwin.models.generators.templates.described import FILLER_WORDS, PURPOSE, is_described, own_materials
-from manitwin.models.generators.templates.looks import look_of, material_of
+from manitwin.models.generators.templates.looks import color_of, look_of, material_of
+from manitwin.models.generators.templates.matter import is_food
 from manitwin.models.generators.templates.template import Template
 
 _BEHIND = frozenset({"of", "in", "from", "made", "that", "which", "painted", "colored", "coloured", ","}) | PURPOSE
@@ -25,9 +26,49 @@ _SHOWN_AS = frozenset(
 """What is behind 'of' is meant: a photo of a mug, a roll of duct tape."""
 _OF_ANOTHER_SHAPE = frozenset(
     {"kettlebell", "stone", "washer", "pulley", "bearing", "mallet", "gavel", "toy hammer", "set square", "protractor"}
-    | {"doorbell", "potted plant", "awl", "file", "poker chip", "earring"}
+    | {"doorbell", "potted plant", "awl", "file", "poker chip", "earring", "plantain", "lime", "grapefruit", "apricot"}
+    | {
+        "parsnip",
+        "radish",
+        "garlic",
+        "shallot",
+        "sweet potato",
+        "squash",
+        "raspberry",
+        "blackberry",
+        "cracker",
+        "snack bar",
+    }
+    | {
+        "basketball",
+        "volleyball",
+        "rugby ball",
+        "handball",
+        "cricket ball",
+        "squash ball",
+        "bocce ball",
+        "steel ball",
+        "bead",
+    }
+    | {
+        "bowling pin",
+        "mahjong tile",
+        "rattle",
+        "teether",
+        "spinning top",
+        "fidget spinner",
+        "tractor",
+        "toy bus",
+        "toy truck",
+    }
+    | {"toy train"}
 )
-"""Kin in the priors of what a template makes, of another shape: a kettlebell is no dumbbell."""
+"""Kin in the priors of what a template makes, of another shape or look: a kettlebell is no dumbbell, a lime no lemon."""
+_NAMES_OF_OTHERS = frozenset(
+    {"cherry tomato", "baguette", "cube", "wooden cube", "jenga block", "alphabet block", "tile", "disc"}
+    | {"chess king", "chess queen", "chess knight", "rook", "game piece"}
+)
+"""Names of a category of the priors that its template does not look like: of chess pieces it makes the pawn."""
 _GROUPS = frozenset(
     {"set", "pair", "pack", "packet", "stack", "pile", "bunch", "bundle", "collection", "group", "row", "handful"}
     | {"couple", "number", "lot", "lots", "dozen", "dozens"}
@@ -42,7 +83,7 @@ _COUNTS = frozenset(
 
 @dataclass(frozen=True)
 class NamedCategory:
-    """A template's category, materials that its name says (``own``), and the words before and behind the name."""
+    """A template's category, materials or colours that its name says (``own``), and the words before and behind the name."""
 
     category: str
     own: list[str]
@@ -80,10 +121,12 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
         for start in range(end):
             if words[start] in FILLER_WORDS or "," in words[start:end] or (start > parted and not shown):
                 continue
-            if end - start == 1 and material_of(words[start]) is not None and _names_one(words[:start], names):
-                continue
             phrase = " ".join(words[start:end])
             prior = named(phrase) or named(phrase.replace(" ", ""))
+            if _says_how_it_looks(words, start, end, prior, names):
+                continue
+            if prior is not None and any(called in _NAMES_OF_OTHERS for called in singulars(phrase)):
+                raise UsageError(_no_category(text, phrase.split(), templates))
             meant = [names.get(phrase)]
             if prior is not None:
                 meant += [prior.category, None if prior.category in _OF_ANOTHER_SHAPE else prior.kin_of]
@@ -94,15 +137,30 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
             if other is not None and not _stands_for(other, category):
                 raise UsageError(_no_category(text, other.category.split(), templates))
             _check_one_thing(text, words[:start], words[start:end], load_priors()[category], set(names))
-            own = _own_materials(words[start:end], templates[category], load_priors()[category])
+            own = _own_words(words[start:end], templates[category], load_priors()[category])
             return NamedCategory(category, own, _without_counter(words[:start]), tail)
     raise UsageError(_no_category(text, words, templates))
 
 
-def _names_one(words: Sequence[str], names: Mapping[str, str]) -> bool:
-    """Tell whether a thing is named before a comma: the glass of 'a bottle, green glass' is what the bottle is of."""
-    commas = [at for at, word in enumerate(words) if word == ","]
-    return any(" ".join(words[start:at]) in names for at in commas for start in range(at))
+def _says_how_it_looks(
+    words: Sequence[str], start: int, end: int, prior: Prior | None, names: Mapping[str, str]
+) -> bool:
+    """Tell whether words that name a thing say how one before them looks or tastes: glass of 'a bottle, green glass'.
+
+    So do a material behind a comma or 'that is', a colour behind it or the thing's name ('a mug orange'), and food before a
+    colour ('a mug, lemon yellow') or behind a comma.
+    """
+    phrase, behind, before = " ".join(words[start:end]), words[end] if end < len(words) else "", words[:start]
+    is_look = end - start == 1 and material_of(phrase) is not None
+    food = prior is not None and prior.domain == "food" and prior.category in names
+    colored = color_of(phrase) is not None or (food and color_of(behind) is not None)
+    if not (is_look or colored or (food and "," in before)):
+        return False
+    ends = [at for at, word in enumerate(before) if word in _BEHIND - _PARTED]
+    if colored:
+        telling = [at for at, word in enumerate(before) if word not in FILLER_WORDS and not is_described(word)]
+        ends += [at + 1 for at in telling[-1:]]
+    return any(" ".join(before[first:last]) in names for last in ends for first in range(last))
 
 
 def _parts(words: Sequence[str], at: int) -> bool:
@@ -156,8 +214,13 @@ def _stands_for(meant: Prior, category: str) -> bool:
     return same and prior.longest_axis_m.low <= meant.longest_axis_m.typical <= prior.longest_axis_m.high
 
 
-def _own_materials(called: list[str], template: Template, prior: Prior) -> list[str]:
-    """Return the words of a name that say a material which the first slot of a template has, or another than is usual."""
+def _own_words(called: list[str], template: Template, prior: Prior) -> list[str]:
+    """Return the words of a name that say a material which the first slot of a template has, or another than is usual.
+
+    Of food, the colour too: a green apple is green, and a red wine glass is not red.
+    """
+    if is_food(prior) and (colors := [word for word in called[:-1] if color_of(word) is not None]):
+        return colors
     known = {look_of(choice).material for choice in next(iter(template.slots.values())) if choice}
     own = [word for word in called[:-1] if (look := material_of(word)) is not None and look.material in known]
     return own or own_materials(called, prior)

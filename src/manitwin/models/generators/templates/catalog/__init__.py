@@ -22,6 +22,7 @@ from manitwin.models.generators.templates.template import BUILDERS, Builder, Mea
 
 FAMILIES = (
     "vessels", "pots", "bottles", "cutlery", "hand_tools", "hardware", "devices", "desk", "toiletries", "household",
+    "food", "groceries", "balls", "toys",
 )  # fmt: skip
 
 

@@ -1,0 +1,51 @@
+"""Shapes of grown things, which several builders share: smooth bodies of revolution, ribs, stalks, green leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from manifold3d import Manifold
+
+from manitwin.geometry.solids.shapes import SIDES, Point, chords, lathe, union
+from manitwin.geometry.solids.sweep import arc, tube
+
+Radii = Callable[[np.ndarray], np.ndarray]
+
+
+def turned(
+    profile: Sequence[Point], width_m: float, height_m: float, *, samples: int = 36, sides: int = SIDES
+) -> Manifold:
+    """Return a smooth curve through points of (radius over half the width, z over the height) turned about Z."""
+    curve = arc([(r * width_m / 2, 0.0, z * height_m) for r, z in profile], samples=samples)
+    return lathe(curve[:, [0, 2]], sides=chords(sides))
+
+
+def lying(solid: Manifold) -> Manifold:
+    """Return a solid whose axis Z is laid along +X."""
+    return solid.rotate((0, 90, 0))
+
+
+def ribbed(solid: Manifold, scale: Radii) -> Manifold:
+    """Return a solid whose distance from the axis Z is scaled by a function of the angle about it (N,) in rad."""
+
+    def moved(vertices: np.ndarray) -> np.ndarray:
+        angle = np.arctan2(vertices[:, 1], vertices[:, 0])
+        return np.column_stack([vertices[:, :2] * scale(angle)[:, None], vertices[:, 2]])
+
+    return solid.warp_batch(moved)
+
+
+def stalk(points: Sequence[Sequence[float]], start_m: float, end_m: float, *, sides: int = 10) -> Manifold:
+    """Return a thin bent stalk through points, of radii that change from its start to its end."""
+    path = arc(points, samples=10)
+    return tube(path, np.linspace(start_m, end_m, len(path)), sides=sides)
+
+
+def leaves(count: int, outline: Sequence[Point], half_width_m: float, thick_m: float, *, turn: float = 0.0) -> Manifold:
+    """Return pointed leaves around the axis Z, each along a curve of (radius, z) from the axis outwards."""
+    curve = arc([(r, 0.0, z) for r, z in outline], samples=12)
+    along = np.linspace(0.0, 1.0, len(curve))
+    half = half_width_m * np.interp(along, [0, 0.35, 0.7, 1], [0.55, 1.0, 0.7, 0.12])
+    leaf = tube(curve, half, flatten=thick_m / (2 * half_width_m), sides=8)
+    return union([leaf.rotate((0, 0, 360 * (number + turn) / count)) for number in range(count)])
