@@ -42,6 +42,7 @@ PARTS_OF: dict[str, tuple[str, ...]] = {
     "tissue": ("tissue",), "flap": ("top",), "bow": ("bow", "hole"), "cup": ("cup", "inside"), "bulb": ("bulb",),
     "screw base": ("base",), "roller": ("roller",), "positive end": ("pole",), "body": _BODIES, "shaft": _BODIES,
     "bowl": ("bowl", "inside"), "finger holes": ("handle",), "blades": ("blade", "blades"),
+    "stem end": ("stem", "leaves", "dimple"), "front": ("bumper",), "roof": ("cabin",), "underside": ("wheels",),
 }  # fmt: skip
 """Which parts of templates a label speaks of."""
 
@@ -195,6 +196,9 @@ def _working_end(known: Known) -> np.ndarray:
 
 
 def _either_end(known: Known) -> np.ndarray:
+    across = np.ptp(known.positions_m[:, :2], axis=0)
+    if across.max() > np.ptp(known.positions_m[:, 2]) and across.max() < 1.01 * across.min():
+        return _outermost(known)  # what is round and lies has no ends but its edge
     along = known.positions_m[:, int(np.ptp(known.positions_m, axis=0).argmax())]
     return (along > along.max() - 0.1 * np.ptp(along)) | (along < along.min() + 0.1 * np.ptp(along))
 

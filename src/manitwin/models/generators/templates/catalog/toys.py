@@ -52,8 +52,9 @@ def frisbee(*, width_m: float, high: float, wall_m: float) -> Model:
     model.region("rim", "body", lambda c: np.hypot(c[:, 0], c[:, 1]) > 0.93 * r)
     model.region("inside", "body", lambda c: (c[:, 2] < h - 0.6 * wall_m) & (np.hypot(c[:, 0], c[:, 1]) < 0.93 * r))
     model.region("top", "body", lambda c: np.hypot(c[:, 0], c[:, 1]) < 0.74 * r)
-    model.point("surface", "face", "top", (0.0, 0.0, h), (0.0, 0.0, 1.0))
-    return model.point("rim", "surface", "rim", (0.0, -r, 0.4 * h), (0.0, -1.0, 0.0))
+    model.point("rim", "surface", "rim", (0.0, -r, 0.4 * h), (0.0, -1.0, 0.0))
+    model.point("inside", "surface", "inside", (0.0, 0.0, h - wall_m), (0.0, 0.0, -1.0))
+    return model.point("top", "face", "top", (0.0, 0.0, h), (0.0, 0.0, 1.0))
 
 
 @template("stacking ring")
