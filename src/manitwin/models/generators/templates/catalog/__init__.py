@@ -23,6 +23,7 @@ from manitwin.models.generators.templates.template import BUILDERS, Builder, Mea
 FAMILIES = (
     "vessels", "pots", "bottles", "cutlery", "hand_tools", "hardware", "devices", "desk", "toiletries", "household",
     "food", "groceries", "balls", "toys",
+    "cutting_tools", "workshop", "kitchen_tools", "cookware",
 )  # fmt: skip
 
 
