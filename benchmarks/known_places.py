@@ -35,7 +35,9 @@ PARTS_OF: dict[str, tuple[str, ...]] = {
     "blade": ("blade", "edge"), "wick": ("wick",), "tip": ("tip", "lead", "tines"), "bristles": ("bristles",),
     "jaw": ("jaw", "jaws", "mouth"), "jaws": ("jaw", "jaws", "mouth"), "joint": ("joint",), "spring joint": ("spring",),
     "striking face": ("face", "edge"), "tines": ("tines",), "grip": ("handle", "switch"), "housing": ("body",),
-    "head": ("head", "face", "claw", "blade", "bowl", "jaw", "pan", "edge", "wires", "tines", "neck", "glass", "frame"),
+    "head": (
+        "head", "face", "claw", "blade", "bowl", "jaw", "pan", "edge", "wires", "tines", "neck", "glass", "frame", "channel",
+    ),
     "working end": ("outlet",), "ear cup": ("cups",), "headband": ("band",), "core": ("core",), "outside": ("body",),
     "inner side": ("bore", "hole"), "barrel": ("barrel",), "lens": ("lens", "glass"), "switch": ("switch",),
     "cap end": ("eraser", "button", "ferrule", "cap", "clip"), "nozzle": ("nozzle", "spout", "head"),
@@ -43,6 +45,9 @@ PARTS_OF: dict[str, tuple[str, ...]] = {
     "screw base": ("base",), "roller": ("roller",), "positive end": ("pole",), "body": _BODIES, "shaft": _BODIES,
     "bowl": ("bowl", "inside"), "finger holes": ("handle",), "blades": ("blade", "blades"),
     "stem end": ("stem", "leaves", "dimple"), "front": ("bumper",), "roof": ("cabin",), "underside": ("wheels",),
+    "teeth": ("teeth",), "chuck": ("chuck", "bit"), "shank": ("shank",), "frame": ("frame",),
+    "hook": ("hook", "claw"), "chisel end": ("chisel",), "cutting head": ("head", "wheel", "key"), "slots": ("slots",),
+    "grating face": ("body", "holes", "slots"), "grinding end": ("tip",),
 }  # fmt: skip
 """Which parts of templates a label speaks of."""
 

@@ -50,7 +50,7 @@ the right part; their source is `template:CATEGORY`. What is not here is refused
   inches, feet, yards and fractions are read. A size that no such thing has is refused. `small` and `large` choose within the
   usual sizes.
 - **What it cannot be told** is refused and not left out: two lengths of one side, from which to which a length is, what a
-  thing is not. So is the longer name of another thing (a magnifying glass is no glass).
+  thing is not. So is the longer name of another thing (a garlic bulb is no light bulb).
 - **What it is made of** decides the mass: the volume of each part times its density; of a closed container, with its contents;
   hollow behind a sheet where a handle or a stand of sheet metal would be. It is no estimate, has no interval, and is not refused
   for being unlike that of most such things (a plastic fork); a finding says so.

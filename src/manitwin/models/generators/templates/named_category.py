@@ -15,6 +15,12 @@ from manitwin.models.generators.templates.looks import color_of, look_of, materi
 from manitwin.models.generators.templates.matter import is_food
 from manitwin.models.generators.templates.template import Template
 
+
+def _listed(names: str) -> frozenset[str]:
+    """Return names that are listed with commas between them."""
+    return frozenset(" ".join(names.split()).split(", "))
+
+
 _BEHIND = frozenset({"of", "in", "from", "made", "that", "which", "painted", "colored", "coloured", ","}) | PURPOSE
 """Words behind a name that begin what is said of the thing."""
 _PARTED = frozenset({"of", "in", "from"}) | PURPOSE
@@ -24,49 +30,22 @@ _SHOWN_AS = frozenset(
     | {"rendering", "render", "twin", "replica", "roll", "bar", "tube", "stick", "sheet", "block"}
 )
 """What is behind 'of' is meant: a photo of a mug, a roll of duct tape."""
-_OF_ANOTHER_SHAPE = frozenset(
-    {"kettlebell", "stone", "washer", "pulley", "bearing", "mallet", "gavel", "toy hammer", "set square", "protractor"}
-    | {"doorbell", "potted plant", "awl", "file", "poker chip", "earring", "plantain", "lime", "grapefruit", "apricot"}
-    | {
-        "parsnip",
-        "radish",
-        "garlic",
-        "shallot",
-        "sweet potato",
-        "squash",
-        "raspberry",
-        "blackberry",
-        "cracker",
-        "snack bar",
-    }
-    | {
-        "basketball",
-        "volleyball",
-        "rugby ball",
-        "handball",
-        "cricket ball",
-        "squash ball",
-        "bocce ball",
-        "steel ball",
-        "bead",
-    }
-    | {
-        "bowling pin",
-        "mahjong tile",
-        "rattle",
-        "teether",
-        "spinning top",
-        "fidget spinner",
-        "tractor",
-        "toy bus",
-        "toy truck",
-    }
-    | {"toy train"}
+_OF_ANOTHER_SHAPE = _listed(
+    """
+    kettlebell, stone, washer, pulley, bearing, mallet, gavel, toy hammer, set square, protractor, doorbell, potted
+    plant, awl, file, poker chip, earring, plantain, lime, grapefruit, apricot, parsnip, radish, garlic, shallot, sweet
+    potato, squash, raspberry, blackberry, cracker, snack bar, basketball, volleyball, rugby ball, handball, cricket
+    ball, squash ball, bocce ball, steel ball, bead, bowling pin, mahjong tile, rattle, teether, spinning top, fidget
+    spinner, tractor, toy bus, toy truck, toy train, impact driver, pocket knife, multitool, vise, lint roller, garden
+    fork, zester, corkscrew, scoop, bolt, nail, hacksaw, bar clamp, sieve
+    """
 )
 """Kin in the priors of what a template makes, of another shape or look: a kettlebell is no dumbbell, a lime no lemon."""
-_NAMES_OF_OTHERS = frozenset(
-    {"cherry tomato", "baguette", "cube", "wooden cube", "jenga block", "alphabet block", "tile", "disc"}
-    | {"chess king", "chess queen", "chess knight", "rook", "game piece"}
+_NAMES_OF_OTHERS = _listed(
+    """
+    cherry tomato, baguette, cube, wooden cube, jenga block, alphabet block, tile, disc, chess king, chess queen, chess
+    knight, rook, game piece
+    """
 )
 """Names of a category of the priors that its template does not look like: of chess pieces it makes the pawn."""
 _GROUPS = frozenset(

@@ -77,7 +77,7 @@ def saw(*, length_m: float, width: float, grip: float) -> Model:
         nut = cylinder(0.006, 0.0236).translate((start - 0.12 * reach, v * high, -0.0118))
         model.add("nuts", nut, "blade")
     model.point("teeth", "edge", "teeth", (0.5 * (start + end), -0.5 * wide, 0.0), (0.0, -1.0, 0.0))
-    model.point("toe", "tip", "blade", (end, -0.3 * wide, 0.0), (1.0, 0.0, 0.0))
+    model.point("blade tip", "tip", "blade", (end, -0.3 * wide, 0.0), (1.0, 0.0, 0.0))
     return model.point("handle", "surface", "handle", (start - 0.8 * reach, 0.0, 0.011), (0.0, 0.0, 1.0)).laid()
 
 
@@ -143,7 +143,7 @@ def utility_knife(*, length_m: float, blade: float, width_m: float) -> Model:
     end, back = 0.5 * length_m, -0.5 * length_m
     side = [(back, -0.5), (back, 0.4), (back + 0.03, 0.5), (start - 0.02, 0.42), (start, 0.38), (start - 0.014, -0.42)]
     shape = polygon([(x, w * y) for x, y in [*side, (0.3 * back, -0.42), (0.7 * back, -0.5)]], radius_m=0.002)
-    model = Model().add("body", prism(shape, thick, radius_m=0.0035).translate((0, 0, -0.5 * thick)), "body")
+    model = Model().add("handle", prism(shape, thick, radius_m=0.0035).translate((0, 0, -0.5 * thick)), "handle")
     flat = [(start - 0.03, -0.36), (end, -0.36), (end - 0.5 * w, 0.34), (start - 0.03, 0.34)]
     model.add("blade", prism(polygon([(x, w * y) for x, y in flat]), 0.0007).translate((0, 0, -0.00035)), "blade")
     model.region("edge", "blade", lambda centers: centers[:, 1] < -0.355 * w)
@@ -156,7 +156,7 @@ def utility_knife(*, length_m: float, blade: float, width_m: float) -> Model:
         model.add("slider", rib, "slider")
     model.point("blade", "edge", "edge", (0.5 * (start + end), -0.36 * w, 0.0), (0.0, -1.0, 0.0))
     model.point("slider", "button", "slider", (at, 0.0, 0.5 * thick + 0.003), (0.0, 0.0, 1.0))
-    return model.point("handle", "surface", "body", (0.5 * back, 0.0, 0.5 * thick), (0.0, 0.0, 1.0)).laid()
+    return model.point("handle", "surface", "handle", (0.5 * back, 0.0, 0.5 * thick), (0.0, 0.0, 1.0)).laid()
 
 
 @template("crowbar")
@@ -170,7 +170,8 @@ def crowbar(*, length_m: float, thick_m: float, hook: float) -> Model:
     bend = [(end - r + r * np.cos(a), r + r * np.sin(a), 0.0) for a in turn]
     path = np.array([(-0.38 * length_m, 0, 0), (0.0, 0, 0), *bend])
     ahead = np.array([np.cos(turn[-1] + 0.5 * np.pi), np.sin(turn[-1] + 0.5 * np.pi)])
-    model = Model().add("bar", tube(path, 1.08 * half, sides=6, across=(0, 0, 1)))
+    model = Model().add("shaft", tube(path, 1.08 * half, sides=6, across=(0, 0, 1)))
+    model.region("hook", "shaft", lambda centers: centers[:, 0] > end - 2 * r)
     reach = 2.4 * thick_m
     wedge = prism(
         polygon([(-1.2 * half, -half), (reach, -0.1 * half), (reach, 0.1 * half), (-1.2 * half, half)]), 2.6 * half
@@ -188,8 +189,8 @@ def crowbar(*, length_m: float, thick_m: float, hook: float) -> Model:
         "claw", "tip", "claw", (float(tip[0]), float(tip[1]), 0.9 * half), (float(ahead[0]), float(ahead[1]), 0.0)
     )
     low = (-0.38 * length_m - tail * np.cos(slope), tail * np.sin(slope), 0.0)
-    model.point("chisel", "tip", "chisel", (float(low[0]), float(low[1]), 0.0), (-1.0, 0.0, 0.0))
-    return model.point("shaft", "surface", "bar", (-0.1 * length_m, 0.0, 1.08 * half), (0.0, 0.0, 1.0)).laid()
+    model.point("chisel end", "tip", "chisel", (float(low[0]), float(low[1]), 0.0), (-1.0, 0.0, 0.0))
+    return model.point("shaft", "surface", "shaft", (-0.1 * length_m, 0.0, 1.08 * half), (0.0, 0.0, 1.0)).laid()
 
 
 @template("screw")

@@ -1,10 +1,8 @@
-"""Kitchen tools held in one hand: lying as they are put down, the working end towards +X; a box grater stands."""
+"""Kitchen tools held in one hand: lying as they are put down, the working end towards +X."""
 
 from __future__ import annotations
 
 import numpy as np
-from manifold3d import Manifold
-
 from manitwin.geometry.solids.shapes import box, cylinder, ellipsoid, lathe, polygon, prism, rectangle, union
 from manitwin.geometry.solids.sweep import arc, tube
 from manitwin.models.generators.templates.catalog.cutlery import scoop
@@ -81,52 +79,6 @@ def peeler(*, length_m: float, blade: float, width_m: float) -> Model:
     return model.point(
         "handle", "surface", "handle", (0.5 * (start - 0.008 - end), 0.0, 0.58 * width_m), (0.0, 0.0, 1.0)
     ).laid()
-
-
-@template("grater")
-def grater(*, height_m: float, width: float, depth: float, taper: float) -> Model:
-    """Build a box grater that stands, its coarse face towards -Y: four walls of sheet with holes, a handle on top.
-
-    ``width`` and ``depth`` of its foot are shares of the height, ``taper`` the width of its top over that of its foot.
-    """
-    high, wall, x, y = 0.86 * height_m, 0.0008, 0.5 * width * height_m, 0.5 * depth * height_m
-    model = Model().add("body", prism(rectangle(2 * x, 2 * y, radius_m=0.006), high, top=taper), "body")
-    hollow = prism(rectangle(2 * (x - wall), 2 * (y - wall), radius_m=0.0055), high, top=taper)
-    model.cut("inside", hollow.translate((0, 0, -2 * wall)), "body")
-    lean = np.degrees(np.arctan((1 - taper) * y / high))
-    rasps: list[Manifold] = []
-    for face, radius, pitch in ((-1.0, 0.0042, 0.0135), (1.0, 0.0016, 0.0072)):
-        columns = int(1.5 * x * (0.5 + 0.5 * taper) / pitch)
-        for row in range(int(0.72 * high / pitch)):
-            z = 0.1 * high + (row + 0.5) * pitch
-            out = y * (1 - (1 - taper) * z / high)
-            for column in range(columns - row % 2):
-                at = ((column - 0.5 * (columns - 1 - row % 2)) * pitch, face * out, z)
-                hole = cylinder(radius, 0.012, sides=12 if face < 0 else 6).translate((0, 0, -0.006))
-                rasps.append(hole.rotate((90 - face * lean, 0, 0)).translate(at))
-    model.cut("holes", union(rasps), "body")
-    for number in range(3):
-        slot = box(0.02, 0.95 * y, 0.0045, radius_m=0.0015).translate((x, 0, (0.28 + 0.2 * number) * high))
-        model.cut("slots", slot, "body")
-    reach = 0.92 * taper * x
-    path = arc(
-        [
-            (-reach, 0, high - 0.006),
-            (-0.9 * reach, 0, 0.97 * height_m),
-            (0.9 * reach, 0, 0.97 * height_m),
-            (reach, 0, high - 0.006),
-        ]
-    )
-    model.add("handle", tube(path, min(0.011, 0.7 * taper * y), flatten=0.55), "handle")
-    lip = prism(rectangle(2 * taper * x, 2 * taper * y, radius_m=0.005), 0.006, radius_m=0.001)
-    lip = lip - box(1.5 * taper * x, 1.3 * taper * y, 0.03).translate((0, 0, -0.01))
-    model.add("top", lip.translate((0, 0, high - 0.004)), "handle")
-    tilt = np.radians(lean)
-    out = y * (1 - (1 - taper) * 0.45)
-    model.point(
-        "grating face", "face", "body", (0.0, -out, 0.45 * high), (0.0, -float(np.cos(tilt)), float(np.sin(tilt)))
-    )
-    return model.point("handle", "surface", "handle", (0.0, 0.0, float(path[:, 2].max()) + 0.006), (0.0, 0.0, 1.0))
 
 
 @template("bottle opener")

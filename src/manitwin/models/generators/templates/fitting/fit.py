@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manitwin.geometry.solids.shapes import SolidError
-from manitwin.models.annotators.priors import Prior, lookup, named
+from manitwin.models.annotators.priors import Prior, load_priors, lookup, named
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.fitting.evidence import Evidence, evidence_of
 from manitwin.models.generators.templates.fitting.least_squares import Placed
@@ -70,7 +70,8 @@ def kinds_of(category: str) -> list[str]:
     """Return the categories that people may mean by a category's name: a can may be a drink can, a water bottle a bottle.
 
     They share its last word and are about as large: nobody calls a watering can a can. A plain name stands also for what has a
-    name with that last word, a mug that is called a coffee cup, and for that with something: a cup and saucer.
+    name with that last word, a mug that is called a coffee cup, and for that with something, a cup and saucer; but for what keeps
+    things in it or not as its own things do: no glass is a magnifying glass.
     """
     templates, last = load_templates(), category.split()[-1]
     said = lookup(category)
@@ -78,6 +79,7 @@ def kinds_of(category: str) -> list[str]:
         kinds = [last] if last in templates else []
     else:
         kinds = [other for other in templates if other != category and last in _heads(templates[other])]
+        kinds = [other for other in kinds if said is not None and load_priors()[other].container == said.container]
     return [other for other in kinds if said is not None and _about_as_large(lookup(other), said)][:_MOST_KINDS]
 
 
