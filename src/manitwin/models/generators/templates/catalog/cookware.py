@@ -1,4 +1,4 @@
-"""What cooks, drains, grates, bakes, toasts and weighs: standing, the front towards -Y; a spout towards -X, a handle towards +X."""
+"""What cooks, drains, grates, bakes, toasts and weighs: standing, the front towards -Y, a spout -X and a handle +X."""
 
 from __future__ import annotations
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from manitwin.geometry.solids.shapes import box, cylinder, ellipsoid, lathe, polygon, prism, rectangle, union
 from manitwin.geometry.solids.sweep import arc, tube
 from manitwin.models.generators.templates.catalog.cutlery import scoop
