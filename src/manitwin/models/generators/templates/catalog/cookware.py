@@ -27,7 +27,8 @@ def kettle(*, height_m: float, width: float, waist: float, spout: float, wall_m:
     model.add("body", outer).add("spout", tube(path, thick, flatten=0.8))
     name, handle = ear(model, 0.5 * (1 + waist) * r, 0.95 * h, 0.2 * h, 0.62 * r, 0.024)
     model.add(name, handle, "handle").cut("inside", inner)
-    model.cut("inside", tube(path, np.maximum(thick - wall_m, 0.002), flatten=0.8))
+    beyond = np.vstack([path, 2 * path[-1] - path[-2]])
+    model.cut("inside", tube(beyond, np.append(thick, thick[-1]) - wall_m, flatten=0.8))
     top = waist * r
     cover = [
         (0.0, 0.965 * h),
@@ -229,8 +230,8 @@ def tea_infuser(*, length_m: float, ball_m: float) -> Model:
     seam = cylinder(r + 0.0014, 0.0026).rotate((0, 90, 0)).translate((at - 0.0013, 0, 0))
     model.add("seam", seam, "ball")
     path = arc([(at - r + 0.002, 0, 0.0), (at - r - 0.02, 0, 0.0025), (-0.3 * end, 0, 0.004), (-end, 0, 0.004)])
-    half = 0.0042 * np.interp(np.linspace(0, 1, len(path)), [0, 0.1, 0.94, 1], [0.8, 0.9, 1.25, 0.7])
-    model.add("handle", tube(path, half, flatten=0.5), "ball")
+    half = 0.0042 * np.interp(np.linspace(0, 1, len(path)), [0, 0.1, 0.6, 0.96, 1], [0.8, 0.9, 1.1, 2.4, 1.8])
+    model.add("handle", tube(path, half, flatten=0.28), "ball")
     model.cut("inside", ellipsoid(2 * (r - wall), 2 * (r - wall), 2 * (r - wall)).translate((at, 0, 0)), "ball")
     count, holes = 90, []
     for number in range(count):

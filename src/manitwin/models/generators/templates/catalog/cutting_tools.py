@@ -5,24 +5,27 @@ from __future__ import annotations
 import numpy as np
 from manifold3d import CrossSection
 
-from manitwin.geometry.solids.shapes import box, cylinder, lathe, polygon, prism, rounded, union
+from manitwin.geometry.solids.shapes import box, chords, cylinder, lathe, polygon, prism, rounded, torus, union
 from manitwin.geometry.solids.sweep import arc, tube
 from manitwin.models.generators.templates.template import Model, template
 
 
 def oval(x_m: float, y_m: float) -> CrossSection:
     """Return an ellipse with these half axes about the origin."""
-    return CrossSection.circle(1.0, 40).scale((x_m, y_m))
+    return CrossSection.circle(1.0, chords(48)).scale((x_m, y_m))
 
 
 @template("scissors")
-def scissors(*, length_m: float, blade: float, ring: float, gape: float) -> Model:
+def scissors(
+    *, length_m: float, blade: float, broad: float, ring: float, fingers: float, thumb: float, gape: float
+) -> Model:
     """Build scissors whose blades are ``gape`` (rad) apart: ``blade`` of the length lies before the screw.
 
-    ``ring`` is the width of a finger ring over the length; the one towards +Y is longer, for the fingers, the other the thumb's.
+    ``broad`` is a blade's width and ``ring`` a finger ring's over the length. The ring towards +Y is for the fingers,
+    ``fingers`` of what is behind the screw long; the round one is the thumb's, which ends before it by the share ``thumb``.
     """
-    long, back, wide, thick = blade * length_m, (1 - blade) * length_m, 0.085 * length_m, 0.0125 * length_m
-    at, half, band, high = 0.5 * length_m - long, 0.5 * ring * length_m, 0.034 * length_m, 0.05 * length_m
+    long, back, wide, thick = blade * length_m, (1 - blade) * length_m, broad * length_m, 0.0125 * length_m
+    at, half, band, high = 0.5 * length_m - long, 0.5 * ring * length_m, 0.038 * length_m, 0.05 * length_m
     model = Model()
     edge = [(-0.3 * back, -0.3 * wide), (0.0, -0.6 * wide), (0.2 * long, -0.42 * wide), (long, -0.05 * wide)]
     spine = [(long, 0.02 * wide), (0.55 * long, 0.44 * wide), (0.08 * long, 0.5 * wide), (-0.3 * back, -0.05 * wide)]
@@ -32,10 +35,11 @@ def scissors(*, length_m: float, blade: float, ring: float, gape: float) -> Mode
         flat = prism(polygon(outline[:: round(side)]), thick + 1e-4).translate((0, 0, 0 if side > 0 else -thick))
         model.add("blades", flat.rotate((0, 0, turn)).translate((at, 0, 0)), "blade")
     for side in (1.0, -1.0):
-        turn, reach = 0.5 * side * np.degrees(gape), (0.2 if side > 0 else 0.33) * back
-        middle, away = reach - back, -side * (half + 0.3 * band)
-        outer, inner = oval(reach, half), oval(reach - band, half - band)
-        loop = prism(outer - inner, high, radius_m=0.3 * high).translate((middle, away, -0.5 * high))
+        turn = 0.5 * side * np.degrees(gape)
+        reach = 1.12 * half if side > 0 else max(0.5 * fingers * back, half)
+        middle, away = reach - (1 - thumb if side > 0 else 1.0) * back, -side * (half + 0.3 * band)
+        loop = torus(half - 0.5 * band, 0.5 * band).scale((reach / half, 1.0, high / band)).translate((middle, away, 0))
+        inner = oval(reach * (1 - band / half), half - band)
         path = [(-0.1 * back, 0, 0), (-0.28 * back, -side * 0.25 * half, 0), (middle + 0.9 * reach, 0.75 * away, 0)]
         arm = tube(arc(path), np.linspace(0.32 * wide, 0.85 * band, 24), flatten=0.45 * high / (0.32 * wide))
         solid = (arm + loop) - prism(inner, 2 * high).translate((middle, away, -high))
@@ -82,57 +86,50 @@ def saw(*, length_m: float, width: float, grip: float) -> Model:
 
 
 @template("drill")
-def drill(*, length_m: float, height: float, body: float, battery: float) -> Model:
+def drill(*, length_m: float, height: float, body: float, battery: float, pack: float, bit: float) -> Model:
     """Build a cordless drill that stands on its battery, its bit towards +X.
 
-    ``height``, the housing's diameter ``body`` and the battery's length are shares of the length.
+    ``bit`` is the share of the length that the bit sticks out; ``height``, the housing's diameter ``body`` and the battery's
+    length and height ``pack`` are shares of the rest.
     """
-    long, high, r = length_m, height * length_m, 0.5 * body * length_m
-    back, axis, pack = -0.5 * long, high - r, 0.26 * long
-    along = [(0, 0), (0.78 * r, 0), (r, 0.07 * long), (r, 0.4 * long), (0.86 * r, 0.5 * long), (0, 0.5 * long)]
-    collar = rounded([(0, 0), (0.84 * r, 0), (0.8 * r, 0.1 * long), (0, 0.1 * long)], 0.003)
-    jaws = rounded(
-        [
-            (0, 0),
-            (0.62 * r, 0),
-            (0.62 * r, 0.11 * long),
-            (0.5 * r, 0.14 * long),
-            (0.22 * r, 0.2 * long),
-            (0, 0.2 * long),
-        ],
-        0.004,
-    )
+    long = (1 - bit) * length_m
+    high, r, low = height * long, 0.5 * body * long, pack * long
+    back, axis = -0.5 * length_m, high - r
+    along = [(0, 0), (0.78 * r, 0), (r, 0.08 * long), (r, 0.46 * long), (0.88 * r, 0.56 * long), (0, 0.56 * long)]
+    collar = [(0, 0), (0.86 * r, 0), (0.8 * r, 0.13 * long), (0, 0.13 * long)]
+    jaws = [
+        (0, 0),
+        (0.66 * r, 0),
+        (0.66 * r, 0.19 * long),
+        (0.54 * r, 0.24 * long),
+        (0.24 * r, 0.33 * long),
+        (0, 0.33 * long),
+    ]
     model = Model()
-    for part, profile, x in (("body", rounded(along, 0.014), 0.0), ("collar", collar, 0.49), ("chuck", jaws, 0.58)):
-        model.add(part, lathe(profile).rotate((0, 90, 0)).translate((back + x * long, 0, axis)), part)
-    bit = cylinder(0.013 * long, 0.25 * long).rotate((0, 90, 0)).translate((back + 0.75 * long, 0, axis))
-    model.add("bit", bit, "bit")
-    foot, top = back + 0.24 * long, pack + 0.05 * long
-    path = arc(
-        [
-            (back + 0.27 * long, 0, axis - 0.5 * r),
-            (back + 0.22 * long, 0, 0.55 * axis + 0.4 * top),
-            (foot - 0.06 * long, 0, top - 0.03 * long),
-        ]
-    )
-    model.add("handle", tube(path, 0.095 * long, flatten=0.8, across=(1, 0, 0)), "handle")
-    deep, base = 0.36 * long, battery * long
+    for part, profile, x in (("body", rounded(along, 0.014), 0.0), ("collar", collar, 0.55), ("chuck", jaws, 0.67)):
+        model.add(part, lathe(rounded(profile, 0.003)).rotate((0, 90, 0)).translate((back + x * long, 0, axis)), part)
+    shank = cylinder(0.012 * long, bit * length_m + 0.06 * long).rotate((0, 90, 0))
+    model.add("bit", shank.translate((back + 0.94 * long, 0, axis)), "bit")
+    foot, top = back + 0.34 * long, low + 0.05 * long
+    bend = [
+        (back + 0.31 * long, axis - 0.5 * r),
+        (back + 0.27 * long, 0.55 * axis + 0.4 * top),
+        (foot - 0.08 * long, top - 0.03 * long),
+    ]
+    path = arc([(x, 0, z) for x, z in bend])
+    model.add("handle", tube(path, 0.1 * long, flatten=0.8, across=(1, 0, 0)), "handle")
+    deep, base = 0.38 * long, battery * long
     shoe = box(base, deep, 0.09 * long, radius_m=0.03 * long)
-    model.add("body", shoe.translate((foot, 0, pack - 0.04 * long)), "body")
-    model.add("battery", box(0.98 * base, 0.94 * deep, pack, radius_m=0.02 * long).translate((foot, 0, 0)), "battery")
-    model.add(
-        "trigger",
-        box(0.07 * long, 0.07 * long, 0.13 * long, radius_m=0.014 * long).translate(
-            (back + 0.345 * long, 0, axis - r - 0.12 * long)
-        ),
-        "trigger",
-    )
-    model.point("bit", "tip", "bit", (0.5 * long, 0.0, axis), (1.0, 0.0, 0.0))
-    model.point("chuck", "surface", "chuck", (back + 0.63 * long, 0.0, axis + 0.62 * r), (0.0, 0.0, 1.0))
-    model.point("trigger", "button", "trigger", (back + 0.38 * long, 0.0, axis - r - 0.055 * long), (1.0, 0.0, 0.0))
+    model.add("body", shoe.translate((foot, 0, low - 0.04 * long)), "body")
+    model.add("battery", box(0.98 * base, 0.94 * deep, low, radius_m=0.02 * long).translate((foot, 0, 0)), "battery")
+    trigger = box(0.08 * long, 0.075 * long, 0.13 * long, radius_m=0.016 * long)
+    model.add("trigger", trigger.translate((back + 0.4 * long, 0, axis - r - 0.12 * long)), "trigger")
+    model.point("bit", "tip", "bit", (0.5 * length_m, 0.0, axis), (1.0, 0.0, 0.0))
+    model.point("chuck", "surface", "chuck", (back + 0.76 * long, 0.0, axis + 0.66 * r), (0.0, 0.0, 1.0))
+    model.point("trigger", "button", "trigger", (back + 0.44 * long, 0.0, axis - r - 0.055 * long), (1.0, 0.0, 0.0))
     middle = path[13]
     return model.point(
-        "grip", "surface", "handle", (float(middle[0]), -0.076 * long, float(middle[2])), (0.0, -1.0, 0.0)
+        "grip", "surface", "handle", (float(middle[0]), -0.08 * long, float(middle[2])), (0.0, -1.0, 0.0)
     )
 
 

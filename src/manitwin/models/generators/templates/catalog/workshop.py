@@ -208,13 +208,13 @@ def paint_roller(*, length_m: float, width_m: float, roll_m: float, handle: floa
 def squeegee(*, length_m: float, width: float, handle_m: float) -> Model:
     """Build a window squeegee lying flat: a rubber blade in a channel across the end of its handle."""
     wide, end, r = width * length_m, 0.5 * length_m, 0.5 * handle_m
-    channel = box(0.016, wide, 0.011, radius_m=0.0025).translate((end - 0.019, 0, -0.0055))
+    channel = box(0.016, wide, 0.014, radius_m=0.0025).translate((end - 0.019, 0, -0.007))
     model = Model().add("channel", channel, "channel")
     rubber = polygon([(end - 0.02, -0.0022), (end, -0.0009), (end, 0.0009), (end - 0.02, 0.0022)])
     strip = prism(rubber, 1.02 * wide).rotate((90, 0, 0)).translate((0, 0.51 * wide, 0))
     model.add("rubber", strip, "rubber")
     model.region("edge", "rubber", lambda centers: centers[:, 0] > end - 0.0008)
-    clamp = box(0.03, 0.3 * wide, 0.02, radius_m=0.006).translate((end - 0.032, 0, -0.01))
+    clamp = box(0.03, 0.3 * wide, 0.013, radius_m=0.005).translate((end - 0.032, 0, -0.0065))
     model.add("neck", clamp, "handle")
     along = np.linspace(0, 1, 30)
     half = r * np.interp(along, [0, 0.05, 0.15, 0.5, 0.8, 1], [0.6, 0.95, 1.05, 1.0, 0.75, 0.9])
