@@ -45,7 +45,10 @@ def kettle(*, height_m: float, width: float, waist: float, spout: float, wall_m:
     )
     under = cylinder(0.9 * r, 0.6 * foot).translate((0, 0, -1.001 * foot))
     model.add("base", lathe(base) - (under - cylinder(0.3 * r, 2 * foot).translate((0, 0, -2 * foot))), "handle")
-    model.point("spout", "tip", "spout", (-reach, 0.0, 0.98 * h), (-0.7, 0.0, 0.714))
+    ahead = (path[-1] - path[-2]) / np.linalg.norm(path[-1] - path[-2])
+    lip = path[-1] + (0.8 * thick[-1] - 0.5 * wall_m) * np.array([-ahead[2], 0.0, ahead[0]])
+    out = (float(ahead[0]), 0.0, float(ahead[2]))
+    model.point("spout", "tip", "spout", (float(lip[0]), 0.0, float(lip[2])), out)
     model.point("lid", "surface", "lid", (0.0, 0.0, height_m), (0.0, 0.0, 1.0))
     return model.point("base", "face", "base", (0.0, 0.98 * r, -foot), (0.0, 0.0, -1.0)).laid()
 

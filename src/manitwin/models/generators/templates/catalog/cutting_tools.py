@@ -17,12 +17,21 @@ def oval(x_m: float, y_m: float) -> CrossSection:
 
 @template("scissors")
 def scissors(
-    *, length_m: float, blade: float, broad: float, ring: float, fingers: float, thumb: float, gape: float
+    *,
+    length_m: float,
+    blade: float,
+    broad: float,
+    ring: float,
+    fingers: float,
+    thumb: float,
+    offset: float,
+    gape: float,
 ) -> Model:
     """Build scissors whose blades are ``gape`` (rad) apart: ``blade`` of the length lies before the screw.
 
     ``broad`` is a blade's width and ``ring`` a finger ring's over the length. The ring towards +Y is for the fingers,
     ``fingers`` of what is behind the screw long; the round one is the thumb's, which ends before it by the share ``thumb``.
+    Both are moved to the thumb's side by the share ``offset`` of a ring.
     """
     long, back, wide, thick = blade * length_m, (1 - blade) * length_m, broad * length_m, 0.0125 * length_m
     at, half, band, high = 0.5 * length_m - long, 0.5 * ring * length_m, 0.038 * length_m, 0.05 * length_m
@@ -37,11 +46,12 @@ def scissors(
     for side in (1.0, -1.0):
         turn = 0.5 * side * np.degrees(gape)
         reach = 1.12 * half if side > 0 else max(0.5 * fingers * back, half)
-        middle, away = reach - (1 - thumb if side > 0 else 1.0) * back, -side * (half + 0.3 * band)
+        middle, away = reach - (1 - thumb if side > 0 else 1.0) * back, -side * (half + 0.3 * band) - 2 * offset * half
         loop = torus(half - 0.5 * band, 0.5 * band).scale((reach / half, 1.0, high / band)).translate((middle, away, 0))
         inner = oval(reach * (1 - band / half), half - band)
-        path = [(-0.1 * back, 0, 0), (-0.28 * back, -side * 0.25 * half, 0), (middle + 0.9 * reach, 0.75 * away, 0)]
-        arm = tube(arc(path), np.linspace(0.32 * wide, 0.85 * band, 24), flatten=0.45 * high / (0.32 * wide))
+        path = [(-0.12 * back, 0, 0), (-0.3 * back, -side * 0.3 * half, 0), (middle + 0.9 * reach, 0.75 * away, 0)]
+        thin = np.linspace(max(0.48 * wide, band), 0.85 * band, 24)
+        arm = tube(arc(path), thin, flatten=0.45 * high / float(thin[0]))
         solid = (arm + loop) - prism(inner, 2 * high).translate((middle, away, -high))
         model.add("handle", solid.rotate((0, 0, turn)).translate((at, 0, 0)), "handle")
         angle = np.radians(turn)
