@@ -26,6 +26,7 @@ _TURNED_AWAY = -0.3  # cosine: the other side of a thin wall is near, but anothe
 
 _BODIES = (
     "body", "tube", "bulb", "bowl", "cone", "roller", "barrel", "stem", "shaft", "cover", "legs", "neck", "blade",
+    "label", "dome", "posts",
 )  # fmt: skip
 PARTS_OF: dict[str, tuple[str, ...]] = {
     "opening": ("rim", "mouth"), "inside": ("inside",), "rim": ("rim",), "cooking surface": ("inside",),
@@ -39,9 +40,9 @@ PARTS_OF: dict[str, tuple[str, ...]] = {
         "head", "face", "claw", "blade", "bowl", "jaw", "pan", "edge", "wires", "tines", "neck", "glass", "frame", "channel",
     ),
     "working end": ("outlet",), "ear cup": ("cups",), "headband": ("band",), "core": ("core",), "outside": ("body",),
-    "inner side": ("bore", "hole"), "barrel": ("barrel",), "lens": ("lens", "glass"), "switch": ("switch",),
+    "inner side": ("bore", "hole"), "barrel": ("barrel", "sleeve"), "lens": ("lens", "glass"), "switch": ("switch",),
     "cap end": ("eraser", "button", "ferrule", "cap", "clip"), "nozzle": ("nozzle", "spout", "head"),
-    "tissue": ("tissue",), "flap": ("top",), "bow": ("bow", "hole"), "cup": ("cup", "inside"), "bulb": ("bulb",),
+    "tissue": ("tissue",), "flap": ("top", "flap", "fin"), "bow": ("bow", "hole"), "cup": ("cup", "inside"), "bulb": ("bulb",),
     "screw base": ("base",), "roller": ("roller",), "positive end": ("pole",), "body": _BODIES, "shaft": _BODIES,
     "bowl": ("bowl", "inside"), "finger holes": ("handle",), "blades": ("blade", "blades"),
     "stem end": ("stem", "leaves", "dimple"), "front": ("bumper",), "roof": ("cabin",), "underside": ("wheels",),
@@ -183,7 +184,7 @@ def _away_from_jaws(known: Known) -> np.ndarray:
 def _hole(known: Known) -> np.ndarray:
     """The inside of a band: surface that looks at the middle."""
     inward = known.positions_m.mean(0) - known.positions_m
-    return known.on("band", "body") & (
+    return known.on("band", "body", "strap") & (
         np.einsum("ij,ij->i", known.normals, inward) > 0.2 * np.linalg.norm(inward, axis=1)
     )
 
@@ -218,8 +219,8 @@ REGIONS: dict[str, Region] = {
     "opening": _known_opening, "lid": _upper_side, "cap": _upper_side, "nozzle": _upper_side, "surface": _front,
     "side": _sides, "outside": _sides, "edge": _narrow_edge, "front": _front, "back": _back,
     "far end": _far_end, "shaft end": _far_end, "body end": _far_end,
-    "handle end": _far_end, "seam": _far_end, "inner side": _hole, "outer side": _rim_of_the_band,
-    "jaws": _nearer_spring, "handles": _away_from_jaws, "end": _either_end, "tip": _working_end,
+    "handle end": _far_end, "seam": _far_end, "blunt end": _far_end, "inner side": _hole, "outer side": _rim_of_the_band,
+    "other end": _either_end, "jaws": _nearer_spring, "handles": _away_from_jaws, "end": _either_end, "tip": _working_end,
     "front edge": _working_end, "cup edge": _underside, "inside": _upper_side, "rim": _outermost, "wick": _upper_side,
     "bowl tip": _working_end, "blade tip": _working_end, "blade tips": _working_end, "wiping face": _front,
     "back face": _back,

@@ -49,8 +49,18 @@ def sweep(
     rings = path[:, None] + scales[:, None, None] * (
         section[None, :, :1] * first[:, None] + section[None, :, 1:] * second[:, None]
     )
-    count, around = len(path), len(section)
-    vertices = np.concatenate([rings.reshape(-1, 3), path[[0, -1]]])
+    return loft(rings, path[[0, -1]])
+
+
+def loft(rings_m: np.ndarray, ends_m: np.ndarray | None = None) -> Manifold:
+    """Return the solid between rings ``(K, S, 3)`` in metres, counted alike, closed at its two ends by fans.
+
+    The fans meet at ``ends_m (2, 3)``, without them at the middles of the first and the last ring. Seen from where the rings
+    go to, they run counter-clockwise.
+    """
+    count, around = rings_m.shape[:2]
+    middles = rings_m[[0, -1]].mean(axis=1) if ends_m is None else ends_m
+    vertices = np.concatenate([rings_m.reshape(-1, 3), middles])
     ring, side = np.meshgrid(np.arange(count - 1), np.arange(around), indexing="ij")
     a, b = ring * around + side, ring * around + (side + 1) % around
     walls = np.concatenate(
@@ -62,7 +72,7 @@ def sweep(
     end = np.stack([np.full(around, count * around + 1), last + edge, last + (edge + 1) % around], 1)
     faces = np.concatenate([walls, start, end])
     solid = Manifold(Mesh(vert_properties=vertices.astype(np.float32), tri_verts=faces.astype(np.uint32)))
-    return checked(solid, "sweep")
+    return checked(solid, "loft")
 
 
 def arc(points: Sequence[Sequence[float]], *, samples: int = 24) -> np.ndarray:

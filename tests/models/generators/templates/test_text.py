@@ -67,6 +67,29 @@ def read(text: str) -> Wanted:
         ("a vegetable peeler", "peeler"),
         ("a pair of tongs", "tongs"),
         ("a baking dish", "casserole dish"),
+        ("an open laptop", "laptop"),
+        ("a pair of glasses", "glasses"),
+        ("sunglasses", "glasses"),
+        ("reading glasses", "glasses"),
+        ("a glass", "glass"),
+        ("wine glasses", "wine glass"),
+        ("a watch", "watch"),
+        ("a running shoe", "shoe"),
+        ("a shoe box", "box"),
+        ("a hat", "hat"),
+        ("a cap", "cap"),
+        ("a phone charger", "charger"),
+        ("an iron", "iron"),
+        ("an iron pan", "frying pan"),
+        ("a cast iron skillet", "frying pan"),
+        ("a milk carton", "milk carton"),
+        ("a milk jug", "pitcher"),
+        ("a lamp", "desk lamp"),
+        ("a desk lamp with a green shade", "desk lamp"),
+        ("a post-it note", "sticky notes"),
+        ("a pack of playing cards", "playing cards"),
+        ("a lighter", "lighter"),
+        ("a lighter blue mug", "mug"),
     ],
 )
 def test_category_is_the_thing_that_is_named(text: str, category: str) -> None:
@@ -210,9 +233,9 @@ def test_what_a_thing_smells_or_is_of_is_not_the_thing(text: str, category: str)
 @pytest.mark.parametrize(
     "text",
     [
-        *("a lemon squeezer", "apple juice", "an egg carton", "a chess board", "a cheese grater", "a carrot peeler"),
+        *("a lemon squeezer", "apple sauce", "an egg carton", "a chess board", "an egg slicer"),
         *("a banana split", "a basketball", "a chess knight", "a brake disc", "an ice cube", "a lime", "a toy truck"),
-        *("a cherry tomato", "a garlic bulb", "a potato masher", "an apple pie", "a ball of yarn", "a golf club"),
+        *("a cherry tomato", "a garlic bulb", "an apple pie", "a ball of yarn", "a golf club"),
     ],
 )
 def test_a_thing_is_no_food_or_ball_that_its_name_names(text: str) -> None:
@@ -240,6 +263,12 @@ def test_food_and_balls_have_the_stated_size_and_the_usual_mass(
     thing = make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
     assert mass_kg is None or sum(thing.masses_kg.values()) == pytest.approx(mass_kg, rel=0.05)
     assert extent_m is None or np.ptp(thing.mesh.vertices, axis=0).max() == pytest.approx(extent_m, rel=0.02)
+
+
+def test_luggage_is_measured_by_its_sides_from_the_longest() -> None:
+    for text in ("a suitcase 55 x 40 x 20 cm", "a suitcase 40 cm wide, 55 cm tall and 20 cm deep"):
+        made = made_of(text)
+        assert np.ptp(made.mesh.vertices, axis=0) == pytest.approx([0.4, 0.2, 0.55], rel=0.003)
 
 
 def test_light_and_dark_move_a_colour() -> None:
@@ -274,6 +303,16 @@ def test_text_that_names_no_template_is_refused_in_one_line(text: str) -> None:
             "a saw blade",
             "a drill bit",
         ),
+        *(
+            "a laptop stand",
+            "a laptop charger",
+            "a shoe horn",
+            "a bottle cap",
+            "a playing card",
+            "a boot",
+            "a pocket watch",
+        ),
+        *("a ring binder", "a door handle", "a light", "a carton of eggs", "a lantern", "a stick of chalk"),
     ],
 )
 def test_another_thing_whose_name_ends_as_a_templates_is_refused(text: str) -> None:
@@ -450,7 +489,15 @@ def test_two_colours_or_materials_of_one_part_are_refused(text: str) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        *("two forks", "three red mugs", "a set of spoons", "12 forks", "a pair of mugs", "a pair of chopsticks"),
+        *(
+            "two forks",
+            "two glasses",
+            "three red mugs",
+            "a set of spoons",
+            "12 forks",
+            "a pair of mugs",
+            "a pair of chopsticks",
+        ),
         *("two pairs of pliers", "a dozen bowls", "several small bottles", "a stack of plates", "a fork and knife"),
         *("two apples", "a dozen eggs", "a pair of dice", "a bunch of bananas"),
         "a mortar and pestle",

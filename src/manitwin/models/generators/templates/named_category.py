@@ -9,17 +9,12 @@ from difflib import get_close_matches
 from itertools import pairwise
 
 from manitwin.errors import UsageError
-from manitwin.models.annotators.priors import Prior, load_priors, lookup, named, singulars
+from manitwin.models.annotators.priors import Prior, load_priors, lookup, named
 from manitwin.models.generators.templates.described import FILLER_WORDS, PURPOSE, is_described, own_materials
 from manitwin.models.generators.templates.looks import color_of, look_of, material_of
 from manitwin.models.generators.templates.matter import is_food
+from manitwin.models.generators.templates.other_shapes import KIN_OF_ANOTHER_SHAPE, is_of_another_shape
 from manitwin.models.generators.templates.template import Template
-
-
-def _listed(names: str) -> frozenset[str]:
-    """Return names that are listed with commas between them."""
-    return frozenset(" ".join(names.split()).split(", "))
-
 
 _BEHIND = frozenset({"of", "in", "from", "made", "that", "which", "painted", "colored", "coloured", ","}) | PURPOSE
 """Words behind a name that begin what is said of the thing."""
@@ -30,24 +25,6 @@ _SHOWN_AS = frozenset(
     | {"rendering", "render", "twin", "replica", "roll", "bar", "tube", "stick", "sheet", "block"}
 )
 """What is behind 'of' is meant: a photo of a mug, a roll of duct tape."""
-_OF_ANOTHER_SHAPE = _listed(
-    """
-    kettlebell, stone, washer, pulley, bearing, mallet, gavel, toy hammer, set square, protractor, doorbell, potted
-    plant, awl, file, poker chip, earring, plantain, lime, grapefruit, apricot, parsnip, radish, garlic, shallot, sweet
-    potato, squash, raspberry, blackberry, cracker, snack bar, basketball, volleyball, rugby ball, handball, cricket
-    ball, squash ball, bocce ball, steel ball, bead, bowling pin, mahjong tile, rattle, teether, spinning top, fidget
-    spinner, tractor, toy bus, toy truck, toy train, impact driver, pocket knife, multitool, vise, lint roller, garden
-    fork, zester, corkscrew, scoop, bolt, nail, hacksaw, bar clamp, sieve
-    """
-)
-"""Kin in the priors of what a template makes, of another shape or look: a kettlebell is no dumbbell, a lime no lemon."""
-_NAMES_OF_OTHERS = _listed(
-    """
-    cherry tomato, baguette, cube, wooden cube, jenga block, alphabet block, tile, disc, chess king, chess queen, chess
-    knight, rook, game piece
-    """
-)
-"""Names of a category of the priors that its template does not look like: of chess pieces it makes the pawn."""
 _GROUPS = frozenset(
     {"set", "pair", "pack", "packet", "stack", "pile", "bunch", "bundle", "collection", "group", "row", "handful"}
     | {"couple", "number", "lot", "lots", "dozen", "dozens"}
@@ -104,11 +81,11 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
             prior = named(phrase) or named(phrase.replace(" ", ""))
             if _says_how_it_looks(words, start, end, prior, names):
                 continue
-            if prior is not None and any(called in _NAMES_OF_OTHERS for called in singulars(phrase)):
-                raise UsageError(_no_category(text, phrase.split(), templates))
+            if is_of_another_shape(phrase, words[:start]):
+                raise UsageError(_no_category(text, words, templates))
             meant = [names.get(phrase)]
             if prior is not None:
-                meant += [prior.category, None if prior.category in _OF_ANOTHER_SHAPE else prior.kin_of]
+                meant += [prior.category, None if prior.category in KIN_OF_ANOTHER_SHAPE else prior.kin_of]
             category = next((name for name in meant if name in templates), None)
             if category is None:
                 other = other or prior
@@ -186,7 +163,7 @@ def _stands_for(meant: Prior, category: str) -> bool:
     """Tell whether things of a category look like those that are meant, and may be as large."""
     prior = load_priors()[category]
     same = (
-        meant.category not in _OF_ANOTHER_SHAPE
+        meant.category not in KIN_OF_ANOTHER_SHAPE
         and meant.shape == prior.shape
         and [p.label for p in meant.functional] == [p.label for p in prior.functional]
     )

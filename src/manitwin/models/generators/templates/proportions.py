@@ -41,6 +41,29 @@ def proportioned(
     part_lengths_m: Mapping[str, float],
     holds: Holds | None = None,
 ) -> dict[str, float]:
+    """Return measures near the given ones with which a template's thing has the stated lengths, as ``_with_lengths`` says.
+
+    Length, width and height of what is taller than long may be its sides by size, as luggage is measured: 55 x 40 x 20 cm.
+    """
+    try:
+        return _with_lengths(template, measures, lengths_m, part_lengths_m, holds)
+    except UsageError:
+        if lengths_m.keys() != {"length", "width", "height"} or template.any_proportions:
+            raise
+        sides = _sides_m(template, measures, {}, None)
+        if sides[Z] < sides[:Z].max():
+            raise
+        by_size = dict(zip(("height", "width", "depth"), sorted(lengths_m.values(), reverse=True), strict=True))
+        return _with_lengths(template, measures, by_size, part_lengths_m, holds)
+
+
+def _with_lengths(
+    template: Template,
+    measures: Mapping[str, float],
+    lengths_m: Mapping[str, float],
+    part_lengths_m: Mapping[str, float],
+    holds: Holds | None,
+) -> dict[str, float]:
     """Return measures near the given ones with which a template's thing has the stated lengths.
 
     ``lengths_m`` by direction, ``part_lengths_m`` of the longest side of a part or a slot, ``holds`` what is held besides. All is

@@ -24,6 +24,7 @@ FAMILIES = (
     "vessels", "pots", "bottles", "cutlery", "hand_tools", "hardware", "devices", "desk", "toiletries", "household",
     "food", "groceries", "balls", "toys",
     "cutting_tools", "workshop", "kitchen_tools", "cookware",
+    "computing", "instruments", "appliances", "packages", "accessories", "clothing", "stationery", "homeware",
 )  # fmt: skip
 
 

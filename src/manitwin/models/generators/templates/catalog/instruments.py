@@ -1,0 +1,165 @@
+"""Instruments to measure, speak, take and fill with: long ones lie with their working end towards +X."""
+
+from __future__ import annotations
+
+import numpy as np
+from manifold3d import Manifold
+
+from manitwin.geometry.solids.shapes import Point, box, cylinder, lathe, polygon, prism, rectangle, rounded, union
+from manitwin.geometry.solids.sweep import arc, sweep
+from manitwin.models.generators.templates.template import Model, template
+
+
+def _lying(profile: list[Point], sides: int = 36) -> Manifold:
+    """Return a turned solid whose axis lies along X."""
+    return lathe(profile, sides=sides).rotate((0, 90, 0))
+
+
+@template("microphone")
+def microphone(*, length_m: float, head_m: float, grip: float) -> Model:
+    """Build a hand-held microphone that lies, its grille towards +X."""
+    end, r = 0.5 * length_m, 0.5 * head_m
+    neck, handle = end - 1.75 * r, grip * r
+    turn = np.linspace(-0.95, 0.5 * np.pi, 16)
+    ball = [(float(r * np.cos(a)), float(end - r + r * np.sin(a))) for a in turn]
+    grille = [(0.0, neck), (ball[0][0], neck), *ball, (0.0, end)]
+    model = Model().add("grille", _lying(grille), "grille")
+    model.add(
+        "ring",
+        _lying([(0, end - 1.1 * r), (1.04 * r, end - 1.1 * r), (1.04 * r, end - 0.9 * r), (0, end - 0.9 * r)]),
+        "ring",
+    )
+    shaft = [
+        (0, -end),
+        (0.8 * handle, -end),
+        (0.84 * handle, -0.4 * end),
+        (1.15 * handle, neck - 0.004),
+        (0, neck + 0.004),
+    ]
+    model.add("body", _lying(rounded([*shaft[:-1], (0.8 * r, neck + 0.004), shaft[-1]], 0.004)))
+    at = neck - 0.28 * length_m
+    switch = box(0.014, 0.007, 0.004, radius_m=0.001).translate((at, 0, 0.95 * handle - 0.0015))
+    model.add("switch", switch, "ring")
+    model.cut("connector", cylinder(0.55 * handle, 0.014).rotate((0, 90, 0)).translate((-end - 0.001, 0, 0)), "ring")
+    model.point("grille", "tip", "grille", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
+    model.point("switch", "button", "switch", (at, 0.0, 0.95 * handle + 0.0025), (0.0, 0.0, 1.0))
+    return model.point("body", "surface", "body", (-0.4 * end, 0.0, 0.84 * handle), (0.0, 0.0, 1.0)).laid()
+
+
+@template("multimeter")
+def multimeter(*, length_m: float, width: float, thick_m: float, screen: float) -> Model:
+    """Build a multimeter that lies, its display towards +X, its sockets towards -X."""
+    across = width * length_m
+    frame = box(length_m, across, thick_m, radius_m=0.2 * thick_m)
+    model = Model().add("body", frame)
+    face = thick_m + 0.0012
+    panel = prism(rectangle(0.9 * length_m, 0.82 * across, radius_m=0.1 * across), face)
+    model.add("panel", panel, "panel")
+    high = screen * length_m
+    at = 0.42 * length_m - 0.5 * high
+    model.add("screen", box(high, 0.66 * across, face + 0.0006).translate((at, 0, 0)), "screen")
+    keys = [
+        box(0.035 * length_m, 0.13 * across, 0.004, radius_m=0.001).translate(
+            (at - 0.5 * high - 0.045 * length_m, y, face - 0.002)
+        )
+        for y in (-0.28 * across, -0.1 * across, 0.1 * across, 0.28 * across)
+    ]
+    model.add("buttons", union(keys), "buttons")
+    r, middle = 0.25 * across, -0.08 * length_m
+    knob = cylinder(r, 0.006, top_radius_m=0.94 * r).translate((middle, 0, face - 0.002))
+    ridge = box(1.7 * r, 0.32 * r, 0.009, radius_m=0.002).translate((middle, 0, face - 0.001))
+    model.add("dial", knob + ridge, "dial")
+    places = [(-0.38 * length_m, y) for y in (-0.25 * across, 0.0, 0.25 * across)]
+    model.add(
+        "socket rings", union([cylinder(0.0062, 0.003).translate((x, y, face - 0.0015)) for x, y in places]), "sockets"
+    )
+    model.cut("sockets", union([cylinder(0.0027, 0.03).translate((x, y, face - 0.012)) for x, y in places]), "sockets")
+    model.point("dial", "button", "dial", (middle, 0.0, face + 0.008), (0.0, 0.0, 1.0))
+    model.point("screen", "face", "screen", (at, 0.0, face + 0.0006), (0.0, 0.0, 1.0))
+    return model.point("socket", "hole", "sockets", (-0.38 * length_m, 0.0, face + 0.0015), (0.0, 0.0, 1.0))
+
+
+@template("thermometer")
+def thermometer(*, length_m: float, width: float, thick_m: float) -> Model:
+    """Build a fever thermometer that lies, its probe towards +X."""
+    end, half = 0.5 * length_m, 0.5 * width * length_m
+    outline = polygon(
+        [(-end, -0.8 * half), (-0.2 * end, -half), (0.3 * end, -0.6 * half), (0.86 * end, -0.0022), (0.86 * end, 0.0022),
+         (0.3 * end, 0.6 * half), (-0.2 * end, half), (-end, 0.8 * half)],
+        radius_m=0.0015,
+    )  # fmt: skip
+    model = Model().add("body", prism(outline, thick_m, radius_m=0.25 * thick_m))
+    probe = rounded([(0, 0.5 * end), (0.0019, 0.5 * end), (0.0019, end), (0, end)], 0.0018)
+    model.add("probe", _lying(probe, sides=20).translate((0, 0, 0.5 * thick_m)), "probe")
+    window = box(0.36 * end, 1.1 * half, 0.002).translate((-0.12 * end, 0, thick_m - 0.0014))
+    model.add("screen", window, "screen")
+    model.add("button", cylinder(0.5 * half, 0.003, sides=24).translate((-0.7 * end, 0, thick_m - 0.0016)), "button")
+    model.point("tip", "tip", "probe", (end, 0.0, 0.5 * thick_m), (1.0, 0.0, 0.0))
+    model.point("screen", "face", "screen", (-0.12 * end, 0.0, thick_m + 0.0006), (0.0, 0.0, 1.0))
+    return model.point("button", "button", "button", (-0.7 * end, 0.0, thick_m + 0.0014), (0.0, 0.0, 1.0))
+
+
+@template("syringe")
+def syringe(*, length_m: float, width: float, drawn: float, needle_m: float) -> Model:
+    """Build a syringe that lies, its needle towards +X; the plunger is drawn out by ``drawn`` of the barrel."""
+    end, r = 0.5 * length_m, 0.5 * width * length_m
+    barrel = (length_m - needle_m - 0.012) / (1 + drawn)
+    front = end - needle_m - 0.01
+    back = front - barrel
+    profile = [(0, back), (r, back), (r, front - 0.003), (0.0028, front), (0.002, front + 0.01), (0, front + 0.01)]
+    model = Model().add("barrel", _lying(rounded(profile, 0.001)))
+    model.add("flange", box(0.0022, 4.2 * r, 2.0 * r, radius_m=0.001).translate((back + 0.001, 0, -r)))
+    rod = _lying([(0, -end + 0.001), (0.5 * r, -end + 0.001), (0.5 * r, back + 0.004), (0, back + 0.004)])
+    model.add("plunger", rod, "plunger")
+    model.add("plunger", _lying([(0, -end), (1.15 * r, -end), (1.15 * r, -end + 0.002), (0, -end + 0.002)]), "plunger")
+    model.add(
+        "needle",
+        cylinder(0.0008, needle_m + 0.006, top_radius_m=0.0005, sides=12)
+        .rotate((0, 90, 0))
+        .translate((end - needle_m - 0.006, 0, 0)),
+        "needle",
+    )
+    model.point("tip", "tip", "needle", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
+    model.point("plunger", "button", "plunger", (-end, 0.0, 0.0), (-1.0, 0.0, 0.0))
+    return model.point("barrel", "surface", "barrel", (0.5 * (front + back), 0.0, r), (0.0, 0.0, 1.0)).laid()
+
+
+@template("tweezers")
+def tweezers(*, length_m: float, spread: float, width_m: float) -> Model:
+    """Build tweezers that lie on an edge of their arms, the tips towards +X."""
+    end, open_m = 0.5 * length_m, 0.5 * spread * length_m
+    section = np.array([(-1, -0.24), (1, -0.24), (1, 0.24), (-1, 0.24)])
+    model = Model()
+    for side in (-1.0, 1.0):
+        path = arc(
+            [
+                (-end, side * 0.0004, 0),
+                (-0.5 * end, 0.55 * side * open_m, 0),
+                (0.1 * end, side * open_m, 0),
+                (end, 0.3 * side * open_m, 0),
+            ]
+        )
+        half = np.interp(np.linspace(0, 1, len(path)), [0, 0.3, 0.6, 1], np.array([0.4, 0.5, 0.4, 0.1]) * width_m)
+        model.add("arms", sweep(path, section, half, across=(0, 0, 1)))
+    model.region("tips", "arms", lambda centers: centers[:, 0] > 0.8 * end)
+    model.region("joint", "arms", lambda centers: centers[:, 0] < -0.86 * end)
+    model.point("tips", "tip", "tips", (end, 0.3 * open_m, 0.0), (1.0, 0.0, 0.0))
+    return model.point("arms", "surface", "arms", (0.1 * end, open_m + 0.11 * width_m, 0.0), (0.0, 1.0, 0.0)).laid()
+
+
+@template("test tube")
+def test_tube(*, length_m: float, width: float, wall_m: float) -> Model:
+    """Build a test tube that lies, its open end towards +X."""
+    end, r = 0.5 * length_m, 0.5 * width * length_m
+
+    def capsule(radius: float, start: float, stop: float) -> list[Point]:
+        turn = np.linspace(-0.5 * np.pi, 0, 10)
+        bottom = [(float(radius * np.cos(a)), float(start + radius + radius * np.sin(a))) for a in turn]
+        return [*bottom, (radius, stop), (0.0, stop)]
+
+    model = Model().add("body", _lying(capsule(r, -end, end)))
+    lip = _lying(rounded([(0, end - 0.004), (1.14 * r, end - 0.004), (1.14 * r, end), (0, end)], 0.0015))
+    model.add("rim", lip).cut("inside", _lying(capsule(r - wall_m, -end + wall_m, end + 0.01)))
+    model.region("bottom", "body", lambda centers: centers[:, 0] < -end + r)
+    model.point("opening", "opening", "rim", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
+    return model.point("body", "surface", "body", (-0.1 * end, 0.0, r), (0.0, 0.0, 1.0)).laid()

@@ -1,0 +1,208 @@
+"""Packages of food, drink and small goods: cartons, cups, tubes, tins and flasks, closed and with what is in them."""
+
+from __future__ import annotations
+
+import numpy as np
+from manifold3d import Manifold
+
+from manitwin.geometry.solids.shapes import box, cylinder, ellipsoid, lathe, polygon, prism, rectangle, rounded, union
+from manitwin.models.generators.templates.template import Model, template
+
+
+@template("milk carton")
+def milk_carton(*, height_m: float, width: float, depth: float, gable: float) -> Model:
+    """Build a carton with a gabled top, its screw cap on the slope towards -Y."""
+    x, y = width * height_m, width * depth * height_m
+    fin = 0.42 * gable * height_m
+    shoulder, ridge = (1 - gable) * height_m, height_m - fin
+    model = Model().add("body", box(x, y, shoulder, radius_m=0.0015))
+    low = box(x - 0.0006, y - 0.0006, 0.001).translate((0, 0, shoulder - 0.002))
+    model.add("gable", (low + box(x - 0.0006, 0.0026, 0.001).translate((0, 0, ridge))).hull(), "gable")
+    for side in (-1.0, 1.0):  # the ends are folded in below the slopes
+        rise, end = ridge - shoulder, 0.5 * side * x
+        corners = [
+            (end * 1.01, 0.44 * y, shoulder),
+            (end * 1.01, -0.44 * y, shoulder),
+            (end * 1.01, 0, ridge - 0.16 * rise),
+        ]
+        model.cut("folds", Manifold.hull_points([*corners, (0.55 * end, 0, ridge - 0.2 * rise)]), "gable")
+    model.add("fin", box(x - 0.0006, 0.003, fin + 0.001).translate((0, 0, ridge - 0.0005)), "gable")
+    slope = np.array([ridge - shoulder, -0.5 * y])
+    slope = slope / np.linalg.norm(slope)  # (out towards -Y, up) is (slope[0], -slope[1])
+    r = min(0.016, 0.4 * float(np.hypot(ridge - shoulder, 0.5 * y)))
+    tilt = float(np.degrees(np.arctan2(slope[0], -slope[1])))
+    middle = (-0.27 * y, shoulder + 0.46 * (ridge - shoulder))
+    cap = cylinder(r, 0.016, top_radius_m=0.95 * r) + cylinder(1.2 * r, 0.004)
+    model.add(
+        "cap",
+        cap.rotate((tilt, 0, 0)).translate((0, middle[0] + 0.0015 * slope[0], middle[1] + 0.0015 * slope[1])),
+        "cap",
+    )
+    out, up = float(slope[0]), -float(slope[1])
+    model.region("base", "body", lambda centers: centers[:, 2] < 1e-5)
+    model.point("cap", "surface", "cap", (0.0, middle[0] - 0.0145 * out, middle[1] + 0.0145 * up), (0.0, -out, up))
+    model.point("base", "face", "base", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
+    return model.point("body", "surface", "body", (-0.5 * x, 0.0, 0.5 * shoulder), (-1.0, 0.0, 0.0))
+
+
+@template("yogurt cup")
+def yogurt_cup(*, height_m: float, width: float, taper: float) -> Model:
+    """Build a cup that widens upwards under a foil lid with a tab towards -Y."""
+    r, top = 0.5 * width * height_m, height_m - 0.0008
+    foot = taper * r
+    profile = [
+        (0, 0.003),
+        (0.85 * foot, 0.003),
+        (0.92 * foot, 0),
+        (foot, 0),
+        (0.93 * r, top - 0.006),
+        (0.93 * r, top - 0.003),
+        (r, top - 0.0026),
+        (r, top),
+        (0, top),
+    ]
+    model = Model().add("body", lathe(profile))
+    sheet = cylinder(1.01 * r, 0.0012) + prism(rectangle(0.5 * r, 0.5 * r, radius_m=0.2 * r), 0.0012).translate(
+        (0, -1.05 * r, 0)
+    )
+    model.add("lid", sheet.translate((0, 0, height_m - 0.0012)), "lid")
+    model.region("tab", "lid", lambda centers: centers[:, 1] < -1.04 * r)
+    model.region(
+        "base", "body", lambda centers: (centers[:, 2] < 0.0035) & (np.hypot(centers[:, 0], centers[:, 1]) < foot)
+    )
+    model.point("tab", "edge", "tab", (0.0, -1.3 * r, height_m - 0.0006), (0.0, -1.0, 0.0))
+    model.point("lid", "face", "lid", (0.0, 0.0, height_m), (0.0, 0.0, 1.0))
+    return model.point("base", "face", "base", (0.95 * foot, 0.0, 0.0), (0.0, 0.0, -1.0))
+
+
+@template("chips can")
+def chips_can(*, height_m: float, width: float, lid_m: float) -> Model:
+    """Build a tall tube of board with a metal bottom and a plastic lid."""
+    r, start = 0.5 * width * height_m, height_m - lid_m
+    model = Model().add("body", cylinder(0.975 * r, start - 0.002).translate((0, 0, 0.0035)))
+    model.add(
+        "base",
+        lathe(rounded([(0, 0.003), (0.88 * r, 0.003), (0.93 * r, 0), (r, 0), (r, 0.004), (0, 0.004)], 0.001)),
+        "metal",
+    )
+    model.add("seam", lathe([(0, start - 0.004), (r, start - 0.004), (r, start), (0, start)]), "metal")
+    lid = [
+        (0, start),
+        (1.02 * r, start),
+        (1.02 * r, height_m),
+        (0.9 * r, height_m),
+        (0.87 * r, height_m - 0.0025),
+        (0, height_m - 0.0025),
+    ]
+    model.add("lid", lathe(rounded(lid, 0.001)), "lid")
+    model.point("lid", "surface", "lid", (0.0, 0.0, height_m - 0.0025), (0.0, 0.0, 1.0))
+    return model.point("base", "face", "base", (0.96 * r, 0.0, 0.0), (0.0, 0.0, -1.0))
+
+
+@template("canister tin")
+def canister_tin(*, length_m: float, width: float, thick: float, corner: float) -> Model:
+    """Build a flat tin with a hinged lid, the hinge towards +Y."""
+    across, high = width * length_m, thick * length_m
+    radius = corner * across
+    split = 0.56 * high
+    model = Model().add("body", prism(rectangle(length_m, across, radius_m=radius), split + 0.002, radius_m=0.001))
+    cover = prism(rectangle(length_m + 0.0014, across + 0.0014, radius_m=radius + 0.0007), high - split, radius_m=0.001)
+    raised = prism(rectangle(0.9 * length_m, 0.84 * across, radius_m=0.8 * radius), 0.002)
+    model.add("lid", cover.translate((0, 0, split)) + raised.translate((0, 0, high - 0.0012)), "lid")
+    for side in (-1.0, 1.0):
+        pin = cylinder(0.0016, 0.16 * length_m, sides=16).rotate((0, 90, 0))
+        model.add("hinge", pin.translate((side * 0.24 * length_m - 0.08 * length_m, 0.5 * across + 0.0008, split)))
+    model.point("lid", "face", "lid", (0.0, 0.0, high + 0.0008), (0.0, 0.0, 1.0))
+    return model.point("front edge", "edge", "lid", (0.0, -0.5 * across - 0.0007, split + 0.001), (0.0, -1.0, 0.0))
+
+
+@template("dropper bottle")
+def dropper_bottle(*, height_m: float, width: float, bulb: float, neck: float) -> Model:
+    """Build a small bottle with a pipette: a collar to turn and a rubber bulb to squeeze."""
+    r, h = 0.5 * width * height_m, height_m
+    rubber, collar = bulb * h, 0.13 * h
+    shoulder, narrow = h - rubber - collar, neck * r
+    profile = [
+        (0, 0),
+        (0.96 * r, 0),
+        (r, 0.02 * h),
+        (r, 0.78 * shoulder),
+        (0.8 * r, 0.92 * shoulder),
+        (narrow, shoulder),
+        (narrow, shoulder + 0.02),
+        (0, shoulder + 0.004),
+    ]
+    profile[-2] = (narrow, shoulder + 0.004)
+    model = Model().add("body", lathe(rounded(profile, 0.25 * r)))
+    ring = 1.22 * narrow
+    ribs = [
+        cylinder(0.0012, 0.8 * collar, sides=8).translate((ring * np.cos(a), ring * np.sin(a), shoulder + 0.1 * collar))
+        for a in np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    ]
+    model.add(
+        "collar",
+        union(
+            [
+                lathe(
+                    rounded([(0, shoulder), (ring, shoulder), (ring, shoulder + collar), (0, shoulder + collar)], 0.001)
+                ),
+                *ribs,
+            ]
+        ),
+        "collar",
+    )
+    low = shoulder + collar
+    teat = [
+        (0, low - 0.001),
+        (0.86 * narrow, low - 0.001),
+        (0.9 * narrow, low + 0.55 * rubber),
+        (0.62 * narrow, low + 0.66 * rubber),
+        (0.6 * narrow, h - 0.2 * rubber),
+        (0.3 * narrow, h),
+        (0, h),
+    ]
+    model.add("bulb", lathe(rounded(teat, 0.004)), "bulb")
+    model.region("base", "body", lambda centers: centers[:, 2] < 1e-5)
+    model.point("bulb", "surface", "bulb", (0.0, -0.89 * narrow, low + 0.35 * rubber), (0.0, -1.0, 0.0))
+    model.point("cap", "surface", "collar", (0.0, -ring, low - 0.5 * collar), (0.0, -1.0, 0.0))
+    return model.point("base", "face", "base", (0.5 * r, 0.0, 0.0), (0.0, 0.0, -1.0))
+
+
+@template("playing cards")
+def playing_cards(*, length_m: float, width: float, thick: float) -> Model:
+    """Build a pack of cards in its box, lying on its back, the flap towards +X."""
+    across, high = width * length_m, thick * length_m
+    model = Model().add("body", box(length_m, across, high, radius_m=0.0008))
+    model.region("flap", "body", lambda centers: centers[:, 0] > 0.499 * length_m, "flap")
+    notch = cylinder(0.13 * across, 0.0006).scale((0.8, 1, 1)).translate((0.5 * length_m, 0, high - 0.0006))
+    model.cut("notch", notch, "cards")
+    for low in (0.0, 1.0):
+        border = prism(rectangle(0.9 * length_m, 0.86 * across, radius_m=0.004), 0.0005)
+        model.add(
+            "back" if low else "face",
+            border.translate((0, 0, low * (high + 0.0001) - (0.0003 if low else 0.0002))),
+            "back",
+        )
+    x, y = 0.16 * length_m, 0.14 * across
+    emblem = prism(polygon([(-x, 0), (0, -y), (x, 0), (0, y)]), 0.0004)
+    model.add("emblem", emblem.translate((0, 0, high + 0.0002)), "emblem")
+    model.point("flap", "surface", "flap", (0.5 * length_m, 0.0, 0.5 * high), (1.0, 0.0, 0.0))
+    return model.point("front", "face", "back", (-0.3 * length_m, 0.0, high + 0.0003), (0.0, 0.0, 1.0)).laid()
+
+
+@template("glasses case")
+def glasses_case(*, length_m: float, width: float, thick: float) -> Model:
+    """Build a hard case that lies closed, its lid up, the opening edge towards -Y."""
+    across, high = width * length_m, thick * length_m
+    reach = 0.5 * (length_m - across)
+    ends = [ellipsoid(across, across, 1.16 * high).translate((side * reach, 0, 0.42 * high)) for side in (-1.0, 1.0)]
+    shell = (ends[0] + ends[1]).hull() ^ box(2 * length_m, 2 * across, 2 * high)
+    model = Model().add("body", shell)
+    inner = prism(rectangle(length_m - 0.003, across - 0.003, radius_m=0.5 * across), 0.1).translate((0, 0, -0.05))
+    groove = box(2 * length_m, 2 * across, 0.0012) - inner
+    model.cut("seam", groove.translate((0, 0, 0.45 * high)), "seam")
+    model.region("lid", "body", lambda centers: centers[:, 2] > 0.46 * high)
+    clasp = ellipsoid(0.1 * length_m, 0.008, 0.16 * high).translate((0, -0.5 * across, 0.45 * high))
+    model.add("clasp", clasp, "clasp")
+    model.point("lid", "surface", "lid", (0.0, 0.0, high), (0.0, 0.0, 1.0))
+    return model.point("clasp", "surface", "clasp", (0.0, -0.5 * across - 0.004, 0.45 * high), (0.0, -1.0, 0.0))

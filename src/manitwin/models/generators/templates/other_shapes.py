@@ -1,0 +1,46 @@
+"""What the priors call by the name of a template's category, or keep with it, and the template does not look like."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from manitwin.models.annotators.priors import singulars
+from manitwin.models.generators.templates.described import FILLER_WORDS, is_described
+
+
+def _listed(names: str) -> frozenset[str]:
+    """Return names that are listed with commas between them."""
+    return frozenset(" ".join(names.split()).split(", "))
+
+
+KIN_OF_ANOTHER_SHAPE = _listed(
+    """
+    kettlebell, stone, washer, pulley, bearing, mallet, gavel, toy hammer, set square, protractor, doorbell, potted
+    plant, awl, file, poker chip, earring, plantain, lime, grapefruit, apricot, parsnip, radish, garlic, shallot, sweet
+    potato, squash, raspberry, blackberry, cracker, snack bar, basketball, volleyball, rugby ball, handball, cricket
+    ball, squash ball, bocce ball, steel ball, bead, bowling pin, mahjong tile, rattle, teether, spinning top, fidget
+    spinner, tractor, toy bus, toy truck, toy train, impact driver, pocket knife, multitool, vise, lint roller, garden
+    fork, zester, corkscrew, scoop, bolt, nail, hacksaw, bar clamp, sieve, pocket watch, lantern, night light, security
+    camera, action camera, infrared thermometer, insulin pen, trunk, briefcase, clipboard, postcard, door handle,
+    trophy, medal, safety pin, thumbtack, hairpin, book stand, chalk, perfume bottle, nail polish bottle, ink bottle
+    """
+)
+"""Kin in the priors of what a template makes, of another shape or look: a kettlebell is no dumbbell, a lime no lemon."""
+_NAMES_OF_OTHERS = _listed(
+    """
+    cherry tomato, baguette, cube, wooden cube, jenga block, alphabet block, tile, disc, chess king, chess queen, chess
+    knight, rook, game piece, boot, high heel, sandal, slipper, clog, flip flop, pump shoe, high top, beanie, binder,
+    ring binder, laptop charger, power supply, joystick, stand, fitness band, fitness tracker, card holder, tetra pak
+    """
+)
+"""Other names in the priors of a template's category, of what it does not make: a boot is no low shoe, of chess pieces it makes
+the pawn."""
+_PARTS_TOO = frozenset({"cap"})
+"""What names a thing alone, behind another noun names a part or a cover: a bottle cap is not for a head."""
+
+
+def is_of_another_shape(phrase: str, before: Sequence[str]) -> bool:
+    """Tell whether no template makes what is named, behind other words, though the priors have it as that of a category."""
+    said = {*singulars(phrase)}
+    part = before and before[-1] not in FILLER_WORDS and not is_described(before[-1])
+    return not said.isdisjoint(_NAMES_OF_OTHERS) or bool(part and not said.isdisjoint(_PARTS_TOO))
