@@ -26,11 +26,11 @@ _TURNED_AWAY = -0.3  # cosine: the other side of a thin wall is near, but anothe
 
 _BODIES = (
     "body", "tube", "bulb", "bowl", "cone", "roller", "barrel", "stem", "shaft", "cover", "legs", "neck", "blade",
-    "label", "dome", "posts",
+    "label", "dome", "posts", "bulbs",
 )  # fmt: skip
 PARTS_OF: dict[str, tuple[str, ...]] = {
     "opening": ("rim", "mouth"), "inside": ("inside",), "rim": ("rim",), "cooking surface": ("inside",),
-    "surface": ("top", "inside"), "handle": ("handle", "knob", "grips"), "handles": ("handle",),
+    "surface": ("top", "inside"), "handle": ("handle", "knob", "grips", "pull handle"), "handles": ("handle",),
     "handle end": ("handle",), "base": ("base", "foot"), "foot": ("foot",), "stem": ("stem",), "cap": ("cap",),
     "neck": ("neck", "collar", "stem"), "lid": ("cap", "lid", "top", "tab"), "spout": ("spout",),
     "blade": ("blade", "edge"), "wick": ("wick",), "tip": ("tip", "lead", "tines"), "bristles": ("bristles",),
@@ -49,6 +49,9 @@ PARTS_OF: dict[str, tuple[str, ...]] = {
     "teeth": ("teeth",), "chuck": ("chuck", "bit"), "shank": ("shank",), "frame": ("frame",),
     "hook": ("hook", "claw"), "chisel end": ("chisel",), "cutting head": ("head", "wheel", "key"), "slots": ("slots",),
     "grating face": ("body", "holes", "slots"), "grinding end": ("tip",),
+    "lenses": ("lenses",), "bridge": ("bridge",), "toe": ("toe",), "sole": ("sole",), "valve": ("valve", "lever", "bracket"),
+    "grille": ("grille",), "connector": ("connector",), "tips": ("tips",), "arms": ("arms",), "plunger": ("plunger",),
+    "crown": ("crown", "button"), "brim": ("brim", "visor"), "knob": ("knob",),
 }  # fmt: skip
 """Which parts of templates a label speaks of."""
 

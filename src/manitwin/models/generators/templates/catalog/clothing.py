@@ -17,13 +17,13 @@ _HEIGHTS = np.array([0.6, 0.86, 1.0, 1.0, 0.92, 0.74, 0.56, 0.44, 0.36, 0.26, 0.
 
 def _shoe(length_m: float, width_m: float, height_m: float, inset_m: float, low_m: float) -> Manifold:
     """Return the upper of a shoe, smaller by ``inset_m`` all around, standing on z = ``low_m``, the toe towards +X."""
-    shares = np.linspace(0, 1, 34)
+    shares = np.linspace(0, 1, 22)
     x = (-0.5 * length_m + inset_m) + (length_m - 2 * inset_m) * shares
     half = np.maximum(0.5 * width_m * np.interp(shares, _SHARES, _WIDTHS) - inset_m, 0.0015)
     high = np.maximum(height_m * np.interp(shares, _SHARES, _HEIGHTS) - inset_m, 0.003)
-    turn = np.linspace(0, np.pi, 22)
+    turn = np.linspace(0, np.pi, 14)
     y, z = np.sign(np.cos(turn)) * np.abs(np.cos(turn)) ** 0.7, np.sin(turn) ** 0.8
-    rings = np.stack([np.broadcast_to(x[:, None], (34, 22)), half[:, None] * y, low_m + high[:, None] * z], axis=2)
+    rings = np.stack([np.broadcast_to(x[:, None], (22, 14)), half[:, None] * y, low_m + high[:, None] * z], axis=2)
     return loft(rings)
 
 
@@ -31,7 +31,7 @@ def _shoe(length_m: float, width_m: float, height_m: float, inset_m: float, low_
 def shoe(*, length_m: float, width: float, height: float, sole_m: float) -> Model:
     """Build a low shoe with laces on its sole, the toe towards +X."""
     wide, high = width * length_m, height * length_m
-    shares = np.linspace(0, 1, 40)
+    shares = np.linspace(0, 1, 28)
     x = length_m * (shares - 0.5)
     half = 0.53 * wide * np.interp(shares, _SHARES, np.maximum(_WIDTHS, 0.16))
     outline = polygon([*zip(x, -half, strict=True), *zip(x[::-1], half[::-1], strict=True)], radius_m=0.006)
@@ -52,7 +52,7 @@ def shoe(*, length_m: float, width: float, height: float, sole_m: float) -> Mode
         lace = arc(
             [(0, -reach, -0.006), (0, -0.5 * reach, 0.0005), (0, 0.5 * reach, 0.0005), (0, reach, -0.006)], samples=10
         )
-        band = tube(lace, 0.0035, flatten=0.6, across=(1, 0, 0)).translate((length_m * (share - 0.5), 0, top))
+        band = tube(lace, 0.0035, flatten=0.6, across=(1, 0, 0), sides=8).translate((length_m * (share - 0.5), 0, top))
         model.add("laces", band, "laces")
     model.region("toe", "upper", lambda centers: centers[:, 0] > 0.38 * length_m)
     model.region("heel", "upper", lambda centers: centers[:, 0] < -0.44 * length_m)
@@ -80,14 +80,7 @@ def hat(*, length_m: float, crown: float, height: float, waist: float) -> Model:
         (brim, 0),
         (0, 0),
     ]
-    inner = [
-        (0, -0.01),
-        (r - t, -0.01),
-        (r - t, t + 0.004),
-        (top - t, high - 0.016),
-        (0.8 * top, high - t - 0.002),
-        (0, high - 0.012 - t),
-    ]
+    inner = [(0, -0.01), (r - t, -0.01), (r - t, t + 0.004), (0.97 * top - t, high - 0.026), (0, high - 0.018)]
     model = Model().add("crown", lathe(rounded(outer[:-2], 0.016) + outer[-2:]))
     model.add(
         "ribbon",

@@ -93,9 +93,9 @@ def hourglass(*, height_m: float, width: float, neck_m: float, sand: float) -> M
     waist = 0.5 * neck_m + (bulb - 0.5 * neck_m) * np.sin(0.5 * np.pi * np.minimum(1.25 * share, 1.0)) ** 1.3
     upper = [(float(w), float(middle + (high - middle) * s)) for w, s in zip(waist, share, strict=True)]
     lower = [(float(w), float(middle - (middle - low) * s)) for w, s in zip(waist, share, strict=True)]
-    model = Model().add("glass", lathe([(0, low), *lower[::-1], *upper[1:], (0, high)]), "glass")
+    model = Model().add("bulbs", lathe([(0, low), *lower[::-1], *upper[1:], (0, high)]), "glass")
     level = low + sand * (middle - low)
-    model.region("sand", "glass", lambda centers: centers[:, 2] < level, "sand")
+    model.region("sand", "bulbs", lambda centers: centers[:, 2] < level, "sand")
     plate = lathe(rounded([(0, 0), (r, 0), (r, disc), (0, disc)], 0.2 * disc))
     model.add("foot", plate).add("top", plate.translate((0, 0, h - disc)))
     for turn in np.radians([30.0, 150.0, 270.0]):
@@ -119,7 +119,7 @@ def hourglass(*, height_m: float, width: float, neck_m: float, sand: float) -> M
         model.add("posts", post.translate((x, y, 0)))
     model.point("top", "face", "top", (0.0, 0.0, h), (0.0, 0.0, 1.0))
     model.point("base", "face", "foot", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
-    return model.point("glass", "surface", "glass", (0.0, -bulb, high - 0.1 * (high - middle)), (0.0, -1.0, 0.0))
+    return model.point("glass", "surface", "bulbs", (0.0, -bulb, high - 0.1 * (high - middle)), (0.0, -1.0, 0.0))
 
 
 @template("paper towel")
