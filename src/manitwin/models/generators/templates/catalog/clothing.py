@@ -17,13 +17,13 @@ _HEIGHTS = np.array([0.6, 0.86, 1.0, 1.0, 0.92, 0.74, 0.56, 0.44, 0.36, 0.26, 0.
 
 def _shoe(length_m: float, width_m: float, height_m: float, inset_m: float, low_m: float) -> Manifold:
     """Return the upper of a shoe, smaller by ``inset_m`` all around, standing on z = ``low_m``, the toe towards +X."""
-    shares = np.linspace(0, 1, 22)
+    shares = np.linspace(0, 1, 28)
     x = (-0.5 * length_m + inset_m) + (length_m - 2 * inset_m) * shares
     half = np.maximum(0.5 * width_m * np.interp(shares, _SHARES, _WIDTHS) - inset_m, 0.0015)
     high = np.maximum(height_m * np.interp(shares, _SHARES, _HEIGHTS) - inset_m, 0.003)
-    turn = np.linspace(0, np.pi, 14)
+    turn = np.linspace(0, np.pi, 18)
     y, z = np.sign(np.cos(turn)) * np.abs(np.cos(turn)) ** 0.7, np.sin(turn) ** 0.8
-    rings = np.stack([np.broadcast_to(x[:, None], (22, 14)), half[:, None] * y, low_m + high[:, None] * z], axis=2)
+    rings = np.stack([np.broadcast_to(x[:, None], (28, 18)), half[:, None] * y, low_m + high[:, None] * z], axis=2)
     return loft(rings)
 
 

@@ -106,8 +106,8 @@ def envelope(*, length_m: float, width: float, thick_m: float, flap: float) -> M
 
 
 @template("folder")
-def folder(*, length_m: float, width: float, thick_m: float, tab: float) -> Model:
-    """Build a folder that lies closed, papers between its covers, the fold towards -X and a tab towards +X."""
+def folder(*, length_m: float, width: float, thick_m: float, tab: float, reach: float) -> Model:
+    """Build a folder that lies closed, papers between its covers: the fold towards -X, a tab or none towards +X."""
     across, cover = width * length_m, 0.0012
     model = Model().add(
         "papers",
@@ -119,11 +119,12 @@ def folder(*, length_m: float, width: float, thick_m: float, tab: float) -> Mode
         "cover",
         prism(rectangle(across - 0.004, length_m, radius_m=0.006), cover).translate((-0.002, 0, thick_m - cover)),
     )
-    leaf = prism(rectangle(0.09 * across, tab * length_m, radius_m=0.008), cover)
-    model.add("tab", leaf.translate((0.515 * across, 0.24 * length_m, 0)))
+    leaf = prism(rectangle((0.03 + reach) * across, tab * length_m, radius_m=0.008), cover)
+    model.add("tab", leaf.translate(((0.485 + 0.5 * reach) * across, 0.24 * length_m, 0)))
     model.add("fold", box(cover, length_m, thick_m).translate((-0.5 * across + 0.5 * cover, 0, 0)))
     model.point("front", "face", "cover", (0.0, 0.0, thick_m), (0.0, 0.0, 1.0))
-    model.point("tab", "edge", "tab", (0.56 * across, 0.24 * length_m, 0.5 * cover), (1.0, 0.0, 0.0))
+    if reach > 0.02:
+        model.point("tab", "edge", "tab", ((0.5 + reach) * across, 0.24 * length_m, 0.5 * cover), (1.0, 0.0, 0.0))
     return model.point("fold", "face", "fold", (-0.5 * across, 0.0, 0.5 * thick_m), (-1.0, 0.0, 0.0))
 
 
