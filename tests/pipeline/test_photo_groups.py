@@ -145,6 +145,17 @@ def test_a_photo_that_cannot_be_cut_out_is_left_out_and_told(photos: Path, tmp_p
         _cut_out(photos, tmp_path / "none")
 
 
+def test_a_copy_of_a_photo_is_left_out_and_told(photos: Path, tmp_path: Path) -> None:
+    (photos / "side.png").write_bytes((photos / "front.png").read_bytes())
+    folder = tmp_path / "out"
+    folder.mkdir()
+    files = [str(photos / f"{name}.png") for name in ("front", "side", "back")]
+    draft = Draft("t", Item(files[0], name="box", views=tuple(files[1:]), turns_deg=(0.0, 90.0, 180.0)), seed=0)
+    matte = PhotosStage(MattingConfig()).run(draft, folder)["matte"]
+    assert matte["findings"][0] == "left out: side.png: the same picture as front.png"
+    assert sorted(path.name for path in (folder / "photos").iterdir()) == ["00.png", "02.png"]
+
+
 def test_a_generator_of_one_photo_gets_the_first_and_the_twin_says_so(photos: Path, tmp_path: Path) -> None:
     program = tmp_path / "program.py"
     program.write_text(

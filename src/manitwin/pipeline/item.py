@@ -106,15 +106,15 @@ def twin_id(item: Item) -> str:
     if item.file is None:
         content: object = {"text": item.text}
     elif item.views:
-        photos = [{"suffix": Path(file).suffix.lower(), "sha256": _digest(Path(file))} for file in item.files]
+        photos = [{"suffix": Path(file).suffix.lower(), "sha256": file_sha256(Path(file))} for file in item.files]
         content = {"photos": photos, "turns_deg": list(item.turns_deg)}
     else:
         path = Path(item.file)
-        digest, root = _digest(path), path.parent.resolve()
-        sides = {p.relative_to(root).as_posix(): _digest(p) for p in side_files(path)}
+        digest, root = file_sha256(path), path.parent.resolve()
+        sides = {p.relative_to(root).as_posix(): file_sha256(p) for p in side_files(path)}
         content = {"suffix": path.suffix.lower(), "sha256": digest, "side_files": sides}
     if item.given is not None:
-        content = {"mesh": content, "given": _digest(Path(item.given))}
+        content = {"mesh": content, "given": file_sha256(Path(item.given))}
     if item.variation:
         content = {"content": content, "variation": item.variation}
     identity = {"content": content, "name": item.name, "units": item.units, "up": item.up}
@@ -129,7 +129,7 @@ def require_readable_size(path: Path) -> None:
         raise InputError("too_large", f"{printable_line(path.name)}: {said}; simplify it, or scale its pictures down")
 
 
-def _digest(path: Path) -> str:
+def file_sha256(path: Path) -> str:
     """Return the sha256 of a file; of one that no reader takes, that of its size, beginning and end."""
     try:
         with open_regular(path, partial(InputError, "unreadable")) as stream:

@@ -13,7 +13,7 @@ from manitwin.errors import UsageError
 from manitwin.formats.printable import printable_line
 from manitwin.formats.source_files import MESH_SUFFIXES
 from manitwin.models.generators.protocol import MOST_PHOTOS
-from manitwin.pipeline.item import Item
+from manitwin.pipeline.item import Item, file_sha256
 
 OF_THE_THING = ("name", "units", "up", "license", "attribution")
 """Columns that say something of the thing, not of a photo: rows of one group may not contradict each other."""
@@ -34,7 +34,7 @@ def one_of_photos(items: Sequence[Item], turns_deg: Sequence[float] | None, wher
         told = f"{meshes[0]} is a mesh" if meshes else "a text is no photo"
         raise UsageError(f"{where}: {told}; the views of one thing are all photos: give a mesh or a text by itself")
     files = [str(item.file) for item in items]
-    twice = next((file for number, file in enumerate(files) if file in files[:number]), None)
+    twice = given_twice(files)
     if twice is not None:
         raise UsageError(f"{where}: {Path(twice).name} is given twice; give each photo once")
     if len(items) > MOST_PHOTOS:
@@ -49,6 +49,22 @@ def one_of_photos(items: Sequence[Item], turns_deg: Sequence[float] | None, wher
         return items[0]
     relative = tuple(round((turn - turns[0]) % 360.0, 6) % 360.0 for turn in turns)
     return replace(items[0], views=tuple(files[1:]), turns_deg=relative)
+
+
+def given_twice(files: Sequence[str]) -> str | None:
+    """Return the first of some files that stands there a second time, None where each is there once."""
+    return next((file for number, file in enumerate(files) if file in files[:number]), None)
+
+
+def copies_of(files: Sequence[str]) -> dict[str, str]:
+    """Return the files whose bytes another one before them has, with that one; raises InputError of one that is not read."""
+    first: dict[str, str] = {}
+    copies = {}
+    for file in files:
+        earlier = first.setdefault(file_sha256(Path(file)), file)
+        if earlier != file:
+            copies[file] = earlier
+    return copies
 
 
 def _is_mesh(item: Item) -> bool:

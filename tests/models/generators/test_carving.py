@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 import trimesh
@@ -14,11 +15,11 @@ from manitwin.cli.main import app
 from manitwin.errors import Rejected, UsageError
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.ray_caster import RayCaster
-from manitwin.models.generators.lift.carved_photos import carve_photos
 from manitwin.models.generators.lift.carving import BOXY_POWER, ROUND_POWER, Carved, carve
 from manitwin.models.generators.lift.several import from_views
 from manitwin.models.generators.lift.surface import to_manifold
 from manitwin.models.generators.protocol import PhotoView
+from manitwin.pipeline.carved_photos import carve_photos
 from manitwin.render.cameras import framing_camera
 from manitwin.render.raycast import cast_camera
 
@@ -38,6 +39,14 @@ def _photo(mesh: trimesh.Trimesh, turn_deg: float, *, size_px: int = 300) -> np.
     _, normals, face = cast_camera(RayCaster(mesh), camera)
     axes = np.concatenate([normals, -normals], axis=2)
     return np.dstack([COLORS[axes.argmax(axis=2)], np.where(face >= 0, 255, 0).astype(np.uint8)])
+
+
+def _on_ground(rgba: np.ndarray) -> np.ndarray:
+    """A cut-out as a photo in focus on a pale, plain ground."""
+    share = rgba[..., 3:] / 255
+    return cv2.GaussianBlur(
+        (rgba[..., :3] * share + np.array([226, 224, 220]) * (1 - share)).astype(np.uint8), (3, 3), 0
+    )
 
 
 def _carved(mesh: trimesh.Trimesh, turns: list[float], power: float) -> Carved:
@@ -81,6 +90,46 @@ def test_turns_that_say_too_little_are_refused(tmp_path: Path) -> None:
         carve_photos([tmp_path / "a.png", tmp_path / "b.png"], [0, 180])
     with pytest.raises(UsageError, match="a turn of each"):
         carve_photos([tmp_path / "a.png", tmp_path / "b.png"], [0])
+
+
+def test_one_picture_does_not_count_for_two_directions(tmp_path: Path) -> None:
+    for name in ("a.png", "b.png"):
+        Image.fromarray(_photo(BOX, 0)).save(tmp_path / name)
+    with pytest.raises(UsageError, match=r"^a\.png is given twice"):
+        carve_photos([tmp_path / "a.png", tmp_path / "a.png"], [0, 90])
+    with pytest.raises(UsageError, match=r"^b\.png is the same picture as a\.png"):
+        carve_photos([tmp_path / "a.png", tmp_path / "b.png"], [0, 90])
+
+
+def test_alpha_channels_count_as_in_a_build(tmp_path: Path) -> None:
+    """A faint cut-out is the thing, a second thing beside it is none, and bars around a picture cut nothing out."""
+    plain = [_photo(BOX, turn) for turn in (0, 90)]
+    faint = [np.dstack([photo[..., :3], photo[..., 3] // 2]) for photo in plain]
+    grounds = [np.pad(_on_ground(photo), ((80, 80), (80, 80), (0, 0)), mode="edge") for photo in plain]
+    even = [np.dstack([photo, np.full(photo.shape[:2], 200, np.uint8)]) for photo in grounds]
+    barred = [np.pad(photo | np.uint8([0, 0, 0, 255]), ((40, 40), (0, 0), (0, 0))) for photo in even]
+    two = [photo.copy() for photo in plain]
+    two[1][5:85, 5:80, 3] = 255
+
+    def carved(pictures: list[np.ndarray], name: str | None) -> tuple[Carved, str]:
+        for number, picture in enumerate(pictures):
+            Image.fromarray(picture).save(tmp_path / f"{number}.png")
+        solid, findings = carve_photos([tmp_path / "0.png", tmp_path / "1.png"], [0, 90], name)
+        return solid, "; ".join(findings)
+
+    for pictures, name, said in (
+        (plain, "box", ""),
+        (faint, "box", "1.png: its alpha channel reaches 127 of 255"),
+        (barred, "mug", "1.png: its alpha channel frames an upright rectangle"),
+        (even, "box", "1.png: its alpha channel is 200 of 255 everywhere: not used"),
+    ):
+        solid, findings = carved(pictures, name)
+        assert said in findings
+        assert np.ptp(solid.surface.vertices, axis=0) == pytest.approx([10 / 12, 1.0, 5 / 12], abs=0.05)
+    with pytest.raises(Rejected, match=r"0\.png: its alpha channel cuts an upright rectangle out"):
+        carved(barred, None)
+    with pytest.raises(Rejected, match=r"1\.png: 2 separate objects"):
+        carved(two, "box")
 
 
 def test_the_command_writes_a_mesh_with_each_side_from_its_photo(tmp_path: Path) -> None:

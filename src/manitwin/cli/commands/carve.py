@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
 
 from manitwin.cli import options
 from manitwin.cli.arguments import degrees_of
-from manitwin.cli.console import out_console
+from manitwin.cli.console import err_console, out_console
 
 
 def carve(
@@ -30,16 +31,23 @@ def carve(
     """Carve a textured mesh out of several photos of one object, for `manitwin build`."""
     from manitwin.errors import UsageError
     from manitwin.formats.glb import write_glb
-    from manitwin.models.generators.lift.carved_photos import carve_photos, carved_part
+    from manitwin.models.generators.lift.carved_part import carved_part
+    from manitwin.pipeline.carved_photos import carve_photos
+    from manitwin.pipeline.manifest import unusable
     from manitwin.twin.store import write_bytes_atomically
 
     if out.suffix.lower() != ".glb":
         raise UsageError(f"{out}: the mesh is a GLB file; give a name that ends in .glb")
     if not out.parent.is_dir():
         raise UsageError(f"{out.parent}: no folder there; make it, or give another place with -o")
-    carved = carve_photos(paths, degrees_of(turns), name)
+    why = None if name is None else unusable("name", name)
+    if why is not None:
+        raise UsageError(f"--name: {why}")
+    carved, findings = carve_photos(paths, degrees_of(turns), name)
+    for finding in findings:
+        err_console.print(finding)
     write_bytes_atomically(out, write_glb([carved_part(carved)]))
     filled = ", ".join(f"{o.name} {share:.0%}" for o, share in zip(carved.outlines, carved.covered, strict=True))
-    said = f' --name "{name}"' if name else ""
+    said = f" --name {quote(name)}" if name else ""
     out_console.print(f"{out}: {len(carved.surface.faces)} faces; of each outline it fills {filled}")
-    out_console.print(f"manitwin build {out} --up y{said} -o TWINS makes a twin of it")
+    out_console.print(f"manitwin build {quote(str(out))} --up y{said} -o TWINS makes a twin of it")

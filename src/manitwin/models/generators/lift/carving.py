@@ -16,6 +16,7 @@ from manifold3d import Manifold
 from scipy import ndimage
 
 from manitwin.errors import Rejected
+from manitwin.models.generators.lift.hint import ShapeHint
 from manitwin.models.generators.lift.surface import LiftedSurface, from_manifold, normalised, stood, to_manifold
 from manitwin.models.generators.lift.texture import Crop, crop_object
 
@@ -27,6 +28,8 @@ WIDTH_SPREAD = 0.06  # of round things' outlines, seen by different lenses
 OFFSETS = 21  # places of the axis tried in each photo
 OFFSET_SHARE = 0.25  # of the outline's width, to each side
 ROUND_POWER, USUAL_POWER, BOXY_POWER = 2.0, 4.0, 8.0  # of the superellipse at each level (Barr 1981)
+LEAST_CROSSING = 0.3
+"""The sine of the widest angle between two photos' directions, below which they say the same."""
 SIMPLER_CELLS = 0.15  # how far the surface may move to have fewer faces
 _BASE_CUTS = (0.0, 0.01, 0.02, 0.04, 0.06, 0.1)
 LEAST_TIP_DEG = 5.0
@@ -59,6 +62,16 @@ class Carved:
     outlines: tuple[Outline, ...]
     covered: tuple[float, ...]
     to_pixels: np.ndarray
+
+
+def power_of(hint: ShapeHint) -> float:
+    """Return the power of the superellipse that a thing's cross-sections are where only two directions are seen."""
+    return ROUND_POWER if hint.round else BOXY_POWER if hint.boxy else USUAL_POWER
+
+
+def are_crossing(turns_deg: Sequence[float]) -> bool:
+    """Tell whether two of the directions differ by enough to say something of the depth; the opposite one says nothing."""
+    return bool(np.abs(np.sin(np.deg2rad(np.subtract.outer(turns_deg, turns_deg)))).max() >= LEAST_CROSSING)
 
 
 def carve(
@@ -117,7 +130,7 @@ def _placed(outlines: list[Outline]) -> list[Outline]:
     fixed = [outlines[0]]
     rest = sorted(outlines[1:], key=lambda o: -abs(np.sin(np.deg2rad(o.turn_deg - outlines[0].turn_deg))))
     for number, outline in enumerate(rest):
-        crossing = abs(np.sin(np.deg2rad(outline.turn_deg - outlines[0].turn_deg))) > 0.3
+        crossing = abs(np.sin(np.deg2rad(outline.turn_deg - outlines[0].turn_deg))) > LEAST_CROSSING
         if number == 0 and crossing:
             fixed.append(outline)
             continue

@@ -6,18 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import trimesh
 
 from manitwin.errors import Rejected
-from manitwin.models.generators.lift.carved_photos import carved_part, seen_area_share
-from manitwin.models.generators.lift.carving import (
-    BOXY_POWER,
-    ROUND_POWER,
-    USUAL_POWER,
-    carve,
-    same_from_every_side,
-)
+from manitwin.models.generators.lift.carved_part import carved_part, seen_area_share
+from manitwin.models.generators.lift.carving import are_crossing, carve, power_of, same_from_every_side
 from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name
 from manitwin.models.generators.lift.lifting import lift
 from manitwin.models.generators.lift.made_photo import textured_part
@@ -28,8 +21,6 @@ from manitwin.models.generators.templates.fitting.generated import known_of_fitt
 from manitwin.models.generators.templates.fitting.several import SeveralFitted, fit_several
 from manitwin.twin.import_record import ImportRecord
 
-LEAST_CROSSING = 0.3
-"""The sine of the widest angle between two photos' directions, below which they say the same."""
 MOST_TURN_ERROR_DEG = 30.0
 """A template that stands is seen from within so much of what was stated, or the statement is wrong."""
 
@@ -142,8 +133,7 @@ def _carved(views: Sequence[PhotoView], hint: ShapeHint) -> MadeOfViews:
     turns = _stated(views)
     if turns is None:
         return _round(views, hint)
-    power = ROUND_POWER if hint.round else BOXY_POWER if hint.boxy else USUAL_POWER
-    if np.abs(np.sin(np.deg2rad(np.subtract.outer(turns, turns)))).max() < LEAST_CROSSING:
+    if not are_crossing(turns):
         names = ", ".join(view.name for view in views)
         raise Rejected(
             "generator_failed",
@@ -151,7 +141,7 @@ def _carved(views: Sequence[PhotoView], hint: ShapeHint) -> MadeOfViews:
             " from the side",
             "generate",
         )
-    carved = carve(photos, turns, power=power)
+    carved = carve(photos, turns, power=power_of(hint))
     notes = {
         "primitive": "visual hull",
         "source": f"carved out of {len(views)} photos",

@@ -1,61 +1,21 @@
-"""From several photo files of one object to a textured mesh: matted, carved, coloured by what shows a place best."""
+"""A carved solid as a textured mesh, coloured by the photo that shows a place best."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import trimesh
 from trimesh.visual import TextureVisuals
 
-from manitwin.config import MattingConfig
-from manitwin.errors import UsageError
-from manitwin.formats.image_file import read_image
 from manitwin.geometry.poses import GLTF_TO_OBJECT, transform_points
 from manitwin.geometry.ray_caster import RayCaster
-from manitwin.models.generators.lift.carving import (
-    BOXY_POWER,
-    HEIGHT_PX,
-    ROUND_POWER,
-    USUAL_POWER,
-    Carved,
-    Outline,
-    carve,
-)
-from manitwin.models.generators.lift.hint import hint_from_name
+from manitwin.models.generators.lift.carving import HEIGHT_PX, Carved, Outline
 from manitwin.models.generators.lift.surface import bare_mesh
 from manitwin.models.generators.lift.texture import paint_unseen
 from manitwin.models.generators.photo_material import photo_material
-from manitwin.models.generators.protocol import MOST_PHOTOS
-from manitwin.models.matting import matte_photo
 
 SEEN_COSINE = 0.2  # a face seen at less than 12 degrees takes painted colours
-
-
-def carve_photos(paths: Sequence[Path], turns_deg: Sequence[float], name: str | None = None) -> Carved:
-    """Carve what photos show from stated turns (degrees about the vertical, counter-clockwise seen from above, the first 0).
-
-    Raises UsageError for turns that are not one a photo or all in one direction, InputError for a file that cannot be read,
-    Rejected naming the photo that cannot be matted or does not go with the others.
-    """
-    if not 2 <= len(paths) <= MOST_PHOTOS or len(turns_deg) != len(paths):
-        raise UsageError(
-            f"{len(paths)} photos and {len(turns_deg)} turns: give 2 to {MOST_PHOTOS} photos and a turn of each, such as 0 90 180"
-        )
-    if not np.isfinite(turns_deg).all():
-        raise UsageError("a turn is no number; give degrees, such as 0 90 180")
-    if np.abs(np.sin(np.deg2rad(np.subtract.outer(turns_deg, turns_deg)))).max() < 0.3:
-        raise UsageError(
-            "all photos are from one direction or its opposite: give one from the side, such as 90 degrees"
-        )
-    hint, settings = hint_from_name(name), MattingConfig()
-    photos = []
-    for path in paths:
-        pixels = read_image(path, max_side_px=settings.photo_side_px).pixels
-        photos.append((path.name, matte_photo(pixels, path.name).rgba))
-    power = ROUND_POWER if hint.round else BOXY_POWER if hint.boxy else USUAL_POWER
-    return carve(photos, turns_deg, power=power)
 
 
 def carved_part(carved: Carved) -> trimesh.Trimesh:
