@@ -42,6 +42,7 @@ def build(
     name: str | None = None,
     units: str = "auto",
     up: str = "auto",
+    longest_side_m: float | None = None,
     license: str | None = None,
     attribution: str | None = None,
     count: int = 1,
@@ -64,11 +65,11 @@ def build(
     under another one, the inputs that are given are (where none is given, all that are there), from the first stage that
     it changes.
 
-    ``name``, ``units`` m|cm|mm|none|auto, ``up`` y|z|auto, ``license`` and ``attribution`` hold for all inputs whose manifest row
-    does not say otherwise; of each text ``count`` variations are made, which differ in what it leaves open. With ``views`` the
-    inputs are photos of one thing, which becomes one twin; ``turns_deg`` is the camera's turn about the vertical in each,
-    counter-clockwise seen from above. With ``strict`` a manifest's column that nobody knows is an error. ``config`` None: what
-    the data set was built with, else the defaults.
+    ``name``, ``units`` m|cm|mm|none|auto, ``up`` y|z|auto, ``longest_side_m`` (of length, width and height as it stands),
+    ``license`` and ``attribution`` hold for all inputs whose manifest row does not say otherwise; of each text ``count``
+    variations are made, which differ in what it leaves open. With ``views`` the inputs are photos of one thing, which becomes
+    one twin; ``turns_deg`` is the camera's turn about the vertical in each, counter-clockwise seen from above. With ``strict``
+    a manifest's column that nobody knows is an error. ``config`` None: what the data set was built with, else the defaults.
     ``flags`` are said on top of it: ``seed``; ``grippers``, names or .toml files, the first one's grasps are the twin's own;
     ``vlm``, ``generator`` and ``grasper`` choose backends (docs/backends.md); once services
     have charged ``max_cost_usd``, items that would cost more are left unfinished; ``record`` is a file that a VLM's answers are
@@ -82,7 +83,14 @@ def build(
     """
     from manitwin.pipeline.settings import request_build
 
-    defaults = {"name": name, "units": units, "up": up, "license": license, "attribution": attribution}
+    defaults = {
+        "name": name,
+        "units": units,
+        "up": up,
+        "longest_side_m": longest_side_m,
+        "license": license,
+        "attribution": attribution,
+    }
     request = request_build(
         inputs, out, texts=texts, count=count, views=views, turns_deg=turns_deg, strict=strict, jobs=jobs, config=config,
         defaults=defaults, flags=flags,

@@ -125,6 +125,8 @@ class Folders:
             # of a bottle that is 21 cm high: 59 mm wide; of a box: 66 mm of 20 cm
             left, right = (117, 183) if "--name box" in said else (122, 178)
             photo[60:260, left:right] = 200, 60, 50, 255
+            if right < 183:  # with a neck: an upright rectangle is a picture with bars, of what is called a bottle
+                photo[60:100, left:140] = photo[60:100, 160:right] = 0
             Image.fromarray(photo).save(page / name)
         (page / "scans").mkdir()
         trimesh.load(ROOT / "samples" / "mug.glb", force="mesh").export(page / "scans" / "mug.obj")

@@ -8,7 +8,7 @@ from manitwin.errors import InputError
 from manitwin.pipeline.item import Item, twin_id
 
 
-def test_identity_depends_on_bytes_name_units_and_up_only(tmp_path: Path) -> None:
+def test_identity_depends_on_bytes_name_size_units_and_up_only(tmp_path: Path) -> None:
     file, copy, other = tmp_path / "a.stl", tmp_path / "b.stl", tmp_path / "c.stl"
     file.write_bytes(b"same")
     copy.write_bytes(b"same")
@@ -17,9 +17,12 @@ def test_identity_depends_on_bytes_name_units_and_up_only(tmp_path: Path) -> Non
     assert twin_id(item) == twin_id(Item(file=str(copy), license="CC0-1.0", attribution="somebody"))
     changed = [
         Item(file=str(other)),
-        *(dataclasses.replace(item, **c) for c in ({"name": "mug"}, {"units": "mm"}, {"up": "y"})),
+        *(
+            dataclasses.replace(item, **c)
+            for c in ({"name": "mug"}, {"units": "mm"}, {"up": "y"}, {"longest_side_m": 0.1})
+        ),
     ]
-    assert len({twin_id(item), *map(twin_id, changed)}) == 5
+    assert len({twin_id(item), *map(twin_id, changed)}) == 6
 
 
 def test_changed_texture_is_another_twin(tmp_path: Path) -> None:

@@ -45,6 +45,31 @@ def test_csv_rows_override_what_holds_for_all(folder: Path) -> None:
     assert items[0].file == str(folder / "cup.glb")
 
 
+def test_a_row_says_its_size_by_its_longest_side_or_by_its_unit(folder: Path) -> None:
+    """What a row says of either counts before what holds for all; a row that says both, or neither rightly, is told."""
+    manifest = folder / "list.csv"
+    manifest.write_text("file,units,longest_side_m\ncup.glb,,0.12\ncup.glb,mm,\nphoto.jpg,none,.3\nphoto.jpg,,\n")
+    items, _ = collect_items([manifest], units="cm")
+    said = [("auto", 0.12), ("mm", None), ("none", 0.3), ("cm", None)]
+    assert [(item.units, item.longest_side_m) for item in items] == said
+    items, _ = collect_items([manifest], longest_side_m=0.5)
+    assert [item.longest_side_m for item in items] == [0.12, None, 0.3, 0.5]
+    for row, told in (
+        ("cup.glb,mm,0.1", r"list\.csv:2: longest_side_m: the unit mm says the size of a mesh already"),
+        ("photo.jpg,,12 cm", r"list\.csv:2: longest_side_m is 12 cm; give metres, more than 0"),
+        ("photo.jpg,,0", "longest_side_m is 0; give metres"),
+        ("photo.jpg,,inf", "longest_side_m is inf; give metres"),
+    ):
+        manifest.write_text(f"file,units,longest_side_m\n{row}\n")
+        with pytest.raises(UsageError, match=told):
+            collect_items([manifest])
+    manifest.write_text("text,longest_side_m\na mug,0.1\n")
+    with pytest.raises(UsageError, match="a text says its size in its words"):
+        collect_items([manifest])
+    manifest.write_text("file,height_m\nphoto.jpg,0.1\n")
+    assert "'height_m' (did you mean 'longest_side_m'?)" in collect_items([manifest])[1].remarks[0]
+
+
 def test_jsonl_holds_texts_and_absolute_paths(folder: Path) -> None:
     manifest = folder / "list.jsonl"
     manifest.write_text(

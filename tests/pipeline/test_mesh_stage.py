@@ -14,8 +14,13 @@ from manitwin.engine.stage import Draft
 from manitwin.errors import InputError, Rejected
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.cavity import find_opening
+from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.known import known_of
+from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.text import Wanted
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.mesh import MeshStage
+from manitwin.twin.import_record import FITTED, GivenPoint
 
 
 def _run(path: Path, folder: Path, **item: Any) -> tuple[dict[str, Any], trimesh.Trimesh, list[trimesh.Trimesh]]:
@@ -59,6 +64,27 @@ def test_a_game_asset_whose_numbers_are_no_lengths_has_no_scale(tmp_path: Path) 
     assert (declared["metric"], declared["units"]) == (True, "declared")
     assert (none["metric"], none["units"], none["unit_factor"]) == (False, "user", 1.0)
     assert not any("units" in finding for finding in none["findings"])
+
+
+def test_a_stated_longest_side_is_the_size_of_what_has_none(tmp_path: Path) -> None:
+    """A generator's mesh in a unit of its own, and with it what the generator knows of it."""
+    trimesh.creation.box((2.0, 1.2, 0.8)).export(tmp_path / "generated.glb")
+    made = make(load_templates()["book"], Wanted("book", {}), np.random.default_rng(0))
+    known = known_of(made, "book").model_copy(
+        update={"functional_points": [GivenPoint(position_m=(1.0, 0.0, 0.8))], "format": FITTED}
+    )
+    fields = {"generation": {"rests": True, "metric": False, "known": known.model_dump(mode="json")}}
+    draft = Draft(
+        "id", Item("photo.jpg", longest_side_m=0.24), 0, fields, {"generated.glb": tmp_path / "generated.glb"}
+    )
+    geometry = MeshStage(MeshConfig()).run(draft, tmp_path)["geometry"]
+    assert (geometry["metric"], geometry["units"]) == (True, "user")
+    with np.load(tmp_path / "canonical.npz") as arrays:
+        assert np.ptp(arrays["vertices"], axis=0).max() == pytest.approx(0.24)
+    (part,) = read_glb(tmp_path / "canonical.glb")
+    assert part.extents.max() == pytest.approx(0.24, rel=1e-5)
+    (point,) = geometry["known"]["functional_points"]
+    assert point["position_m"][0] == pytest.approx(0.12)
 
 
 def test_an_stl_without_a_word_is_in_millimetres(tmp_path: Path) -> None:

@@ -29,11 +29,12 @@ REMEDIES = {
     "generator_failed": "another photo, another generator (--generator, see docs/generators.md), or a mesh",
     "not_watertight": "close the holes of the mesh in a modeller",
     "degenerate": "give a mesh that encloses a volume, with walls and no holes",
-    "absurd_size": "say the unit: --units m, cm or mm, or a column units",
+    "absurd_size": "say the unit of a mesh (--units m, cm or mm, or a column units), or how long it is (--longest-side 0.12,"
+    " metres, or a column longest_side_m)",
     "poor_quality": "another photo, or another generator (--generator, see docs/generators.md)",
-    "implausible_mass": "check --units and --name, or the columns units and name",
-    "implausible_size": "check --units and --name, or the columns units and name; --units none where no unit is right, as of"
-    " game assets: it is then made as large as is usual of what it is called",
+    "implausible_mass": "check --units, --longest-side and --name, or the columns units, longest_side_m and name",
+    "implausible_size": "check --units, --longest-side and --name, or the columns of these; --units none where no unit is right,"
+    " as of game assets: it is then made as large as is usual of what it is called",
     "too_wide": "a gripper that opens wider (--gripper, see docs/grippers.md)",
     "too_thin": "a gripper for thin things, such as a suction cup (--gripper, see docs/grippers.md)",
     "no_proposal": "another gripper (--gripper, see docs/grippers.md); hands may not reach such a thing at all",
@@ -48,12 +49,14 @@ REMEDIES = {
 """What a person can do about a reason: those of twins (``REJECTION_REASONS``), of layouts, and of what failed."""
 
 NAME_IT = (
-    "say what it is (--name mug, or a column name), for a mesh also its unit (--units m, cm or mm, or a column units)"
+    "say what it is (--name mug, or a column name), and how long (--longest-side 0.12, metres, or a column longest_side_m);"
+    " of a mesh its unit does too (--units m, cm or mm, or a column units)"
 )
 """The remedy where only the usual size of anything made it too wide or too thin."""
 SCALE_IT = "say the unit (--units m, cm or mm, or a column units), or scale the file"
 MEASURE_IT = (
-    "give a mesh of its true size (--units m, cm or mm, or a column units), or say more closely what it is (--name)"
+    "measure it (--longest-side 0.12, metres, or a column longest_side_m), or give a mesh of its true size (--units m, cm or mm,"
+    " or a column units), or say more closely what it is (--name)"
 )
 """The remedy where the usual size of what it is called did: another gripper comes after that."""
 

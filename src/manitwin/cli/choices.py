@@ -159,6 +159,7 @@ REHEARSALS = Choices(
 
 LARGEST_COUNT = 10**9
 LARGEST_COST_USD = 1e9
+LARGEST_SIDE_M = 1e3
 
 
 def count_of(what: str, most: int = LARGEST_COUNT) -> Callable[[Any], Any]:

@@ -176,7 +176,8 @@ def plan_document(plan: Plan, place: str) -> Document:
             {
                 "file": planned.item.file, "views": list(planned.item.views), "text": planned.item.text,
                 "name": planned.item.name, "kind": planned.kind,
-                "units": planned.item.units, "up": planned.item.up, "twin_id": planned.twin_id, "state": planned.state,
+                "units": planned.item.units, "up": planned.item.up,
+                "longest_side_m": planned.item.longest_side_m, "twin_id": planned.twin_id, "state": planned.state,
                 "detail": planned.detail,
             }
             for planned in plan.items

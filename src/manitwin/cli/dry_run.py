@@ -222,4 +222,5 @@ def _line_of(planned: PlannedItem) -> str:
 
 def _given(item: Item, kind: str | None) -> str:
     units = f"units {item.units}" if kind == "mesh" else ""
-    return ", ".join(filter(None, (item.name or "no name", units)))
+    size = "" if item.longest_side_m is None else f"{item.longest_side_m:g} m"
+    return ", ".join(filter(None, (item.name or "no name", size, units)))

@@ -24,6 +24,15 @@ Text = Annotated[
 ]
 Units = Annotated[str, choices.UNITS.option(help="Units of meshes: m, cm, mm, none (no lengths) or auto.")]
 Up = Annotated[str, choices.UP.option(help="Up axis of meshes: y, z or auto.")]
+LongestSide = Annotated[
+    float | None,
+    typer.Option(
+        "--longest-side",
+        help="The longest of length, width and height as it stands: metres. A photo's size is else what is usual.",
+        metavar="METRES",
+        callback=choices.amount_of("--longest-side", choices.LARGEST_SIDE_M),
+    ),
+]
 License = Annotated[str | None, typer.Option(help="Licence of the inputs (SPDX).")]
 Attribution = Annotated[str | None, typer.Option(help="Whom to credit for the inputs.")]
 Strict = Annotated[bool, typer.Option("--strict", help="A manifest column that nobody knows is an error.")]
@@ -122,8 +131,8 @@ DryRun = Annotated[
 ]
 
 OF_INPUTS: dict[str, tuple[Any, Any]] = {
-    "name": (Name, None), "units": (Units, "auto"), "up": (Up, "auto"), "license": (License, None),
-    "attribution": (Attribution, None),
+    "name": (Name, None), "units": (Units, "auto"), "up": (Up, "auto"), "longest_side_m": (LongestSide, None),
+    "license": (License, None), "attribution": (Attribution, None),
 }  # fmt: skip
 """What holds for all inputs of a build, by the names of ``manitwin.build``: annotation and default."""
 

@@ -13,7 +13,7 @@ from manitwin.models.generators.lift.carving import Carved, are_crossing, carve,
 from manitwin.models.generators.lift.hint import hint_from_name
 from manitwin.models.generators.protocol import MOST_PHOTOS
 from manitwin.pipeline.photo import PhotoStage, refused
-from manitwin.pipeline.photo_groups import copies_of, given_twice
+from manitwin.pipeline.photo_groups import copies_told, given_twice
 
 EXAMPLE = "such as --turns 0,90,180"
 
@@ -40,10 +40,8 @@ def carve_photos(
         raise UsageError(
             "all photos are from one direction or its opposite: give one from the side, such as 90 degrees"
         )
-    for copy, first in copies_of([str(path) for path in paths]).items():
-        raise UsageError(f"{Path(copy).name} is the same picture as {Path(first).name}; give each photo once")
     stage = PhotoStage(MattingConfig())
-    photos, findings = [], []
+    photos, findings = [], copies_told([str(path) for path in paths])
     for path in paths:
         rgba, field = stage.cut_out(path, name, refused)
         photos.append((path.name, rgba))

@@ -108,7 +108,7 @@ def check_plausible_size(solid: trimesh.Trimesh, metric: bool, smallest_m: float
     if not smallest_m <= side_m <= largest_m:
         detail = (
             f"the longest side is {side_m:.4g} m, valid is {smallest_m:g} to {largest_m:g} m;"
-            " give the right units (m, cm, mm)"
+            " give the right units (m, cm, mm), or the longest side in metres"
         )
         raise Rejected("absurd_size", detail, "gate")
     limit_m = smallest_m if side_m < np.sqrt(smallest_m * largest_m) else largest_m

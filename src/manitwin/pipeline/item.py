@@ -33,6 +33,7 @@ class Item(Payload):
     """One input as the user gave it.
 
     ``file`` is an absolute path, or None where ``text`` is given. ``units`` and ``up`` are what the user said ('auto': unsaid).
+    ``longest_side_m`` is the longest of its length, width and height as it stands, None where the user does not say it.
     ``given`` is the import.json beside an imported mesh: what another tool says of it. ``variation`` counts the things that are
     made of one text: each is drawn from a seed of its own. ``views`` are the absolute paths of further photos of the thing that
     the photo ``file`` shows; ``turns_deg`` is the camera's turn about the vertical in each photo, counter-clockwise seen from
@@ -50,6 +51,7 @@ class Item(Payload):
     variation: int = 0
     views: tuple[str, ...] = ()
     turns_deg: tuple[float, ...] = ()
+    longest_side_m: float | None = None
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -84,6 +86,7 @@ class Item(Payload):
         fields = super().to_json()
         later = {"given": self.given is None, "variation": not self.variation}
         later |= {"views": not self.views, "turns_deg": not self.turns_deg}
+        later["longest_side_m"] = self.longest_side_m is None
         kept = {name: value for name, value in fields.items() if not later.get(name, False)}
         return {name: list(value) if isinstance(value, tuple) else value for name, value in kept.items()}
 
@@ -97,7 +100,7 @@ class Item(Payload):
 
 
 def twin_id(item: Item) -> str:
-    """Return the id of the twin that an item makes: a hash of the input's bytes, name, units and up axis, and of nothing else.
+    """Return the id of the twin that an item makes: a hash of the input's bytes, name, size, units and up axis, of nothing else.
 
     Of several photos of one thing it covers all, in their order, and the stated turns. What another tool says of an imported mesh
     is part of the input. Another configuration is another revision of the same twin.
@@ -118,6 +121,8 @@ def twin_id(item: Item) -> str:
     if item.variation:
         content = {"content": content, "variation": item.variation}
     identity = {"content": content, "name": item.name, "units": item.units, "up": item.up}
+    if item.longest_side_m is not None:
+        identity["longest_side_m"] = item.longest_side_m
     return sha256_of_json(identity)[:ID_DIGITS]
 
 

@@ -24,6 +24,8 @@ from manitwin.pipeline.inspection import imported
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.manifest_rows import manifest_rows
 from manitwin.pipeline.photo_groups import PhotoGroups, one_of_photos
+from manitwin.pipeline.stated_size import COLUMN as COLUMN_OF_SIZE
+from manitwin.pipeline.stated_size import MEANT, stated_size_m, with_defaults
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH, is_imported
 
@@ -34,7 +36,7 @@ LONGEST = {"name": 200, "text": 4000, "license": 200, "attribution": 4000, "file
 _CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 """What changes a terminal or the order of what is read, and lone surrogates; a tab and an end of line do not."""
 _LINES = re.compile(r"[\r\n\t\u2028\u2029]")
-COLUMNS = ("file", "text", "name", "units", "up", "license", "attribution", "group", "turn_deg")
+COLUMNS = ("file", "text", "name", "units", "up", "longest_side_m", "license", "attribution", "group", "turn_deg")
 _KNOWN = frozenset(COLUMNS)
 
 Up = Literal["y", "z", "auto"]
@@ -66,7 +68,7 @@ def require_inputs(root: DatasetRoot, inputs: Sequence[str | Path], texts: Seque
 
 def iterate_items(
     inputs: Iterable[str | Path],
-    defaults: dict[str, str | None],
+    defaults: dict[str, Any],
     notes: Notes,
     texts: Iterable[str] = (),
     *,
@@ -94,7 +96,7 @@ def iterate_items(
 
 def _one_of_views(
     inputs: Sequence[str | Path],
-    defaults: dict[str, str | None],
+    defaults: dict[str, Any],
     notes: Notes,
     texts: Sequence[str],
     turns_deg: Sequence[float] | None,
@@ -112,7 +114,7 @@ def _one_of_views(
 
 def _given_items(
     inputs: Iterable[str | Path],
-    defaults: dict[str, str | None],
+    defaults: dict[str, Any],
     notes: Notes,
     texts: Iterable[str],
     strict: bool,
@@ -126,7 +128,8 @@ def _given_items(
     Raises UsageError for a path that is not there, a folder without inputs, a manifest that cannot be read, an unknown
     value, or an item that is refused.
     """
-    defaults = {"units": "auto", "up": "auto", "name": None, "license": None, "attribution": None, **defaults}
+    unsaid = dict.fromkeys(("name", "longest_side_m", "license", "attribution"))
+    defaults = {"units": "auto", "up": "auto", **unsaid, **defaults}
     for given in inputs:
         path = Path(given)
         if not os.path.exists(path):
@@ -176,6 +179,7 @@ def _manifest_items(
         for column in sorted(map(str, row.keys() - _KNOWN - unknown.keys())):
             shown = printable_line(column, max_characters=_SHOWN_CHARACTERS)
             near = get_close_matches(shown.lower().strip(), COLUMNS, n=1, cutoff=0.6)
+            near = [COLUMN_OF_SIZE] if shown.lower().strip() in MEANT else near
             unknown[column] = f"{shown!r} (did you mean {near[0]!r}?)" if near else repr(shown)
             if strict:
                 raise UsageError(f"{path}: unknown column {unknown[column]}; valid: {', '.join(COLUMNS)}")
@@ -201,10 +205,8 @@ def _listed(unknown: dict[str, str]) -> str:
 def _item(
     row: dict[str, Any], folder: Path, defaults: dict[str, Any], where: str, unknown: dict[str, str] | None = None
 ) -> Item:
-    values = {
-        **defaults,
-        **{key: str(value).strip() for key, value in row.items() if key in COLUMNS and value not in (None, "")},
-    }
+    said = {key: str(value).strip() for key, value in row.items() if key in COLUMNS and value not in (None, "")}
+    values = with_defaults(said, defaults)
     for key, value in values.items():
         if isinstance(value, str) and (why := unusable(key, value)):
             raise UsageError(f"{where}: {key}: {why}")
@@ -216,7 +218,7 @@ def _item(
         path = os.path.join(folder, file.rstrip("/") or file)
         if not os.path.isfile(path):
             if os.path.isdir(path) and is_imported(Path(path)):
-                return _imported_item(Path(path).resolve(), values)
+                return _imported_item(Path(path).resolve(), values, where)
             what = "no file" if os.path.exists(path) else not_there(file)
             raise UsageError(f"{where}: {shortened(path)} is {what}; paths are absolute or relative to the manifest")
         file = _resolved(path)
@@ -231,6 +233,7 @@ def _item(
         up=cast(Up, values["up"]),
         license=values["license"],
         attribution=values["attribution"],
+        longest_side_m=stated_size_m(values, where),
     )
 
 
@@ -269,8 +272,10 @@ def shortened(path: str) -> str:
     return printable_line(path, max_characters=200)
 
 
-def _imported_item(folder: Path, values: dict[str, Any]) -> Item:
+def _imported_item(folder: Path, values: dict[str, Any], where: str) -> Item:
     """Return the item of an imported asset; unit and axes are those that the import wrote, whatever the user says."""
+    if values["longest_side_m"]:
+        raise UsageError(f"{where}: longest_side_m: an imported asset has a size of its own; leave it out")
     name, license_, attribution = imported(folder / IMPORT_RECORD)
     return Item(
         file=str(folder / IMPORTED_MESH),

@@ -19,6 +19,7 @@ from manitwin.formats.meshes.repaired import repaired_parts
 from manitwin.formats.meshes.source import MeshLimits
 from manitwin.formats.meshes.textures import bake_transform
 from manitwin.formats.printable import printable_line
+from manitwin.geometry.boxes import extents_along_sides
 from manitwin.geometry.canonical_frame import UpChoice, choose_up, object_frame
 from manitwin.geometry.length_unit import LengthUnit, decide_unit
 from manitwin.geometry.poses import OBJECT_TO_GLTF
@@ -72,17 +73,21 @@ class MeshStage:
         except (QhullError, np.linalg.LinAlgError) as error:
             cause = f"its surface has no depth or precision to make a solid of ({type(error).__name__})"
             raise _degenerate(path, cause) from error
-        solid = trimesh.Trimesh(
-            trimesh.transform_points(result.mesh.vertices, to_object), result.mesh.faces, process=False
-        )
-        shown = [bake_transform(part, to_object) for part in repaired_parts(parts, result)]
+        vertices = trimesh.transform_points(result.mesh.vertices, to_object)
+        larger = _to_stated_size(vertices, draft.payload.longest_side_m)
+        solid = trimesh.Trimesh(larger * vertices, result.mesh.faces, process=False)
+        sized = np.diag([larger, larger, larger, 1.0]) @ to_object
+        shown = [bake_transform(part, sized) for part in repaired_parts(parts, result)]
         (folder / "canonical.glb").write_bytes(write_glb(shown, max_texture_size=self.settings.max_texture_size))
         np.savez(folder / "canonical.npz", vertices=np.asarray(solid.vertices), faces=np.asarray(solid.faces, np.int64))
-        geometry = _geometry(file, unit, chosen, result, solid)
+        if draft.payload.longest_side_m is not None:
+            unit = LengthUnit(larger * unit.factor, True, "user", None)
+        geometry = _geometry(file, unit, chosen, result, solid, larger)
         known = draft.field("generation").get("known") if generated else None
         if known is not None:
-            to_mesh = to_object @ np.diag([unit.factor] * 3 + [1.0]) @ OBJECT_TO_GLTF
-            geometry["known"] = ImportRecord.model_validate(known).moved(to_mesh).model_dump(mode="json")
+            to_mesh = to_object @ np.diag([unit.factor / larger] * 3 + [1.0]) @ OBJECT_TO_GLTF
+            moved = ImportRecord.model_validate(known).moved(to_mesh)
+            geometry["known"] = (moved if larger == 1.0 else moved.scaled(larger)).model_dump(mode="json")
         if draft.payload.given is not None:  # what else is given of the mesh has to follow it
             geometry["input_to_object"] = (to_object @ np.diag([unit.factor] * 3 + [1.0])).tolist()
         return {"geometry": geometry}
@@ -145,6 +150,11 @@ def _input_path(draft: Draft[Item], generated: bool) -> Path:
     return Path(draft.payload.file)
 
 
+def _to_stated_size(vertices: np.ndarray, longest_side_m: float | None) -> float:
+    """Return the factor that makes the longest side of a standing thing as long as was stated; 1 where nothing was."""
+    return 1.0 if longest_side_m is None else longest_side_m / float(extents_along_sides(vertices).max())
+
+
 def _said_up(draft: Draft[Item], generated: bool) -> Literal["y", "z", "auto"]:
     """Return the up axis as the user said it, or as a generator did that sets its meshes down by itself."""
     if not generated:
@@ -183,7 +193,12 @@ def _soup(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
 
 
 def _geometry(
-    file: MeshFile, unit: LengthUnit, chosen: UpChoice, result: RepairResult, solid: trimesh.Trimesh
+    file: MeshFile,
+    unit: LengthUnit,
+    chosen: UpChoice,
+    result: RepairResult,
+    solid: trimesh.Trimesh,
+    larger: float,
 ) -> dict[str, Any]:
     findings = list(file.findings)
     if unit.finding is not None:
@@ -205,6 +220,6 @@ def _geometry(
         "euler_number": int(solid.euler_number),
         "vertices": len(solid.vertices),
         "faces": len(solid.faces),
-        "thickness_m": result.thickness_m,
+        "thickness_m": None if result.thickness_m is None else larger * result.thickness_m,
         "findings": findings,
     }

@@ -21,7 +21,7 @@ from manitwin.models.matting.outline_network import outline_model
 from manitwin.pipeline.cutout import confirmed_or_rejected
 from manitwin.pipeline.given_alpha import as_given, doubted_rectangle
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.photo_groups import copies_of
+from manitwin.pipeline.photo_groups import copies_told
 
 
 class PhotoStage:
@@ -96,8 +96,7 @@ class PhotoStage:
 class PhotosStage(PhotoStage):
     """Cut several photos of one thing out: ``photos/`` has each by its number, ``photo.png`` is the first of them.
 
-    One that cannot be cut out is left out, and so is a copy of another, with a finding; the field ``matte`` is that of the least
-    sure of the others.
+    One that cannot be cut out is left out, with a finding; the field ``matte`` is that of the least sure of the others.
     """
 
     version: ClassVar[str] = "10"
@@ -108,11 +107,8 @@ class PhotosStage(PhotoStage):
         (folder / "photos").mkdir()
         kept: list[tuple[str, dict[str, Any]]] = []
         doubts: list[Rejected] = []
-        copies = copies_of(draft.payload.files)
         for number, file in enumerate(draft.payload.files):
             path = Path(file)
-            if file in copies:
-                continue
             try:
                 rgba, field = self.cut_out(path, draft.payload.name, refused)
             except InputError:  # no photo: what was given is not what was meant
@@ -124,16 +120,17 @@ class PhotosStage(PhotoStage):
             if not kept:
                 _save(rgba, folder / "photo.png")
             kept.append((path.name, field))
-        same = [f"{Path(copy).name}: the same picture as {Path(first).name}" for copy, first in copies.items()]
-        reasons = [*(answer.detail for answer in doubts), *same]
-        left_out = [f"left out: {why}" for why in reasons]
+        left_out = [f"left out: {answer.detail}" for answer in doubts]
         if not kept:
-            raise Rejected(doubts[0].reason, "; ".join(reasons), doubts[0].stage)
+            raise Rejected(doubts[0].reason, "; ".join(answer.detail for answer in doubts), doubts[0].stage)
         if len(kept) == 1:
-            left_out.append(f"{kept[0][0]} is the only photo that is left: the rest is a guess")
+            left_out.append(f"{kept[0][0]} is the only photo that could be cut out: the rest is a guess")
         findings = [f"{name}: {finding}" for name, field in kept for finding in field["findings"]]
         worst = min((field for _, field in kept), key=lambda field: field["confidence"])
-        matte = worst | {"findings": [*left_out, *findings], "photos": [field["confidence"] for _, field in kept]}
+        matte = worst | {
+            "findings": [*copies_told(draft.payload.files), *left_out, *findings],
+            "photos": [field["confidence"] for _, field in kept],
+        }
         matte["focals_mm"] = [field["focal_mm"] for _, field in kept]
         return {"matte": matte | self._network_field()}
 

@@ -15,7 +15,7 @@ from manitwin.formats.source_files import MESH_SUFFIXES
 from manitwin.models.generators.protocol import MOST_PHOTOS
 from manitwin.pipeline.item import Item, file_sha256
 
-OF_THE_THING = ("name", "units", "up", "license", "attribution")
+OF_THE_THING = ("name", "units", "up", "longest_side_m", "license", "attribution")
 """Columns that say something of the thing, not of a photo: rows of one group may not contradict each other."""
 
 Row = Mapping[str, Any]
@@ -56,15 +56,14 @@ def given_twice(files: Sequence[str]) -> str | None:
     return next((file for number, file in enumerate(files) if file in files[:number]), None)
 
 
-def copies_of(files: Sequence[str]) -> dict[str, str]:
-    """Return the files whose bytes another one before them has, with that one; raises InputError of one that is not read."""
+def copies_told(files: Sequence[str]) -> list[str]:
+    """Say which files have the bytes of another one before them: renders of a round thing may, two photos of a thing do not.
+
+    Raises InputError of a file that is not read.
+    """
     first: dict[str, str] = {}
-    copies = {}
-    for file in files:
-        earlier = first.setdefault(file_sha256(Path(file)), file)
-        if earlier != file:
-            copies[file] = earlier
-    return copies
+    earlier = [(file, first.setdefault(file_sha256(Path(file)), file)) for file in files]
+    return [f"{Path(file).name}: the same picture as {Path(other).name}" for file, other in earlier if other != file]
 
 
 def _is_mesh(item: Item) -> bool:

@@ -75,9 +75,9 @@ class PhysicalStage:
         obb_extents, obb_to_object[:3, 3] = obb_extents * scale, obb_to_object[:3, 3] * scale
         solid = trimesh.Trimesh(subject.solid.vertices * scale, subject.solid.faces, process=False)
         mass = mass_estimate(estimates, float(solid.volume))
-        unit = _guessed_unit(draft) if scale == 1.0 else ""
-        self._check_size(object_name(draft), scale * longest, estimates.longest_axis_m, unit)
-        self._check_mass(None if _known_mass(subject) else object_name(draft), mass, float(solid.volume), unit)
+        to_check = _to_check(draft, rescaled=scale != 1.0)
+        self._check_size(object_name(draft), scale * longest, estimates.longest_axis_m, to_check)
+        self._check_mass(None if _known_mass(subject) else object_name(draft), mass, float(solid.volume), to_check)
         parts = [bake_transform(part, np.diag([scale, scale, scale, 1.0])) for part in subject.parts]
         _write_meshes(draft, folder, solid, parts, scale, self.settings.max_texture_size)
         properties, uncertainty = spread_mass(solid, mass.value, estimates.wall_thickness_m)
@@ -138,18 +138,17 @@ class PhysicalStage:
             return None
         return mass_by_parts(solid, mass_kg, estimates.part_materials, prior, draft.seed)
 
-    def _check_size(self, name: str | None, longest_m: float, said: Estimate | None, unit: str) -> None:
+    def _check_size(self, name: str | None, longest_m: float, said: Estimate | None, to_check: str) -> None:
         prior = lookup(name)
         if prior is None or (said is not None and _is_confirmed(said)):
             return
         if not _within(longest_m, prior.longest_axis_m, self.settings.size_margin):
             raise Rejected(
                 "implausible_size",
-                f"{longest_m:.4g} m long, but a {prior.category} has {_span(prior.longest_axis_m)} m; "
-                f"check units and name{unit}",
+                f"{longest_m:.4g} m long, but a {prior.category} has {_span(prior.longest_axis_m)} m; {to_check}",
             )
 
-    def _check_mass(self, name: str | None, mass: Estimate, volume_m3: float, unit: str) -> None:
+    def _check_mass(self, name: str | None, mass: Estimate, volume_m3: float, to_check: str) -> None:
         """Raise Rejected for the mass of no such thing; ``name`` is None of a template, whose mass is that of its parts."""
         if _is_confirmed(mass):
             return
@@ -165,15 +164,20 @@ class PhysicalStage:
         if not self.settings.min_density_kg_m3 <= density <= self.settings.max_density_kg_m3:
             raise Rejected(
                 "implausible_mass",
-                f"{mass.value:.4g} kg in {volume_m3 * 1e6:.4g} ml is {density:.4g} kg/m3, as no object has; "
-                f"check units and name{unit}",
+                f"{mass.value:.4g} kg in {volume_m3 * 1e6:.4g} ml is {density:.4g} kg/m3, as no object has; {to_check}",
             )
 
 
-def _guessed_unit(draft: Draft[Item]) -> str:
-    """Say how a mesh's numbers were read where that was a guess: a rejection for size or mass is then likely its fault."""
+def _to_check(draft: Draft[Item], *, rescaled: bool) -> str:
+    """Say what may be wrong where a size or mass is that of no such thing: who gave the size, and the name.
+
+    A mesh's numbers that were read by a guess are then likely at fault.
+    """
+    if draft.payload.longest_side_m is not None:
+        return "check the stated longest side (in metres) and the name"
     geometry = draft.field("geometry")
-    return f": {geometry['unit_finding']}" if geometry.get("units") == "guessed" else ""
+    guessed = not rescaled and geometry.get("units") == "guessed"
+    return "check units and name" + (f": {geometry['unit_finding']}" if guessed else "")
 
 
 def _declared(mass: Estimate) -> str:

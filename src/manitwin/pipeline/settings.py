@@ -139,7 +139,7 @@ def request_build(
     strict: bool,
     jobs: int | None,
     config: BuildConfig | str | Path | None,
-    defaults: dict[str, str | None],
+    defaults: dict[str, Any],
     flags: Flags,
     count: int = 1,
     views: bool = False,
