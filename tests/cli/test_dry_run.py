@@ -14,15 +14,16 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from json_documents import check_keys
-from manitwin.cli.dry_run import (
+from manitwin.cli.dry_run import own_rate
+from manitwin.cli.main import app
+from manitwin.cli.measured_rates import (
     CHAIN_CPU_S,
+    FURTHER_PHOTO_CPU_S,
     ROBUSTNESS_CPU_S,
     SECOND_ENGINE_CPU_S,
     TRIALS_CPU_S,
     measured_rate,
-    own_rate,
 )
-from manitwin.cli.main import app
 from manitwin.config import BuildConfig
 from manitwin.engine.ledger.ledger import LEDGER, Ledger
 from manitwin.engine.ledger.location import ledger_path
@@ -83,10 +84,11 @@ def test_it_names_every_input_and_writes_nothing(inputs: Path, tmp_path: Path) -
     reasons = [item["detail"].partition(":")[0] for item in document["items"][2:]]
     assert reasons == ["too_small", "animated", "empty"]
     assert (
-        document["estimate"]["cpu_seconds"] == pytest.approx(2 * CHAIN_CPU_S) and document["estimate"]["cost_usd"] == 0
+        document["estimate"]["cpu_seconds"] == pytest.approx(CHAIN_CPU_S["mesh"] + CHAIN_CPU_S["image"])
+        and document["estimate"]["cost_usd"] == 0
     )
     assert "measured.md" in document["estimate"]["each"]["mesh"]["source"]
-    assert "2 to build, 3 would be rejected" in text and "about 0:00:28 of CPU time" in text and "0.00 USD" in text
+    assert "2 to build, 3 would be rejected" in text and "about 0:00:14 of CPU time" in text and "0.00 USD" in text
     assert "box.stl (box, units m)" in text
 
 
@@ -187,11 +189,27 @@ def test_wrong_use_is_wrong_use(tmp_path: Path) -> None:
 
 def test_measured_seconds_count_engines_and_grippers() -> None:
     quick = BuildConfig(second_opinion={"enabled": False}, robustness={"enabled": False})
-    assert measured_rate(quick).cpu_s == CHAIN_CPU_S
-    whole = measured_rate(BuildConfig()).cpu_s
-    assert whole == pytest.approx(CHAIN_CPU_S + SECOND_ENGINE_CPU_S + ROBUSTNESS_CPU_S)
-    two = measured_rate(quick.model_copy(update={"grippers": ("panda", "wsg50_110")})).cpu_s
-    assert two == pytest.approx(CHAIN_CPU_S + TRIALS_CPU_S)
+    for kind, chain in CHAIN_CPU_S.items():
+        assert measured_rate(quick, kind).cpu_s == chain
+        whole = measured_rate(BuildConfig(), kind).cpu_s
+        assert whole == pytest.approx(chain + SECOND_ENGINE_CPU_S + ROBUSTNESS_CPU_S)
+        two = measured_rate(quick.model_copy(update={"grippers": ("panda", "wsg50_110")}), kind).cpu_s
+        assert two == pytest.approx(chain + TRIALS_CPU_S)
+    assert measured_rate(quick, "photos", 3).cpu_s == CHAIN_CPU_S["image"] + 2 * FURTHER_PHOTO_CPU_S
+
+
+def test_each_kind_of_input_has_its_own_cost_and_each_photo_of_a_thing_adds_to_it(tmp_path: Path) -> None:
+    for number in range(5):
+        pixels = np.full((64, 64, 3), 40 + 30 * number, np.uint8)
+        Image.fromarray(pixels).save(tmp_path / f"{number}.png")
+    rows = ["0.png,,a", "1.png,,a", "2.png,,b", "3.png,,b", "4.png,,b", ",a red mug,"]
+    (tmp_path / "list.csv").write_text("file,text,group\n" + "\n".join(rows) + "\n")
+    told = json.loads(
+        manitwin("build", tmp_path / "list.csv", "-o", tmp_path / "out", "--dry-run", "--quick", "--json")
+    )
+    each = {kind: rate["cpu_seconds"] for kind, rate in told["estimate"]["each"].items()}
+    assert each["photos"] == pytest.approx(CHAIN_CPU_S["image"] + 1.5 * FURTHER_PHOTO_CPU_S)
+    assert told["estimate"]["cpu_seconds"] == pytest.approx(2 * each["photos"] + CHAIN_CPU_S["text"])
 
 
 def test_a_data_set_that_has_built_enough_tells_its_own_rate(tmp_path: Path) -> None:

@@ -8,10 +8,12 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from datetime import timedelta
 from pathlib import Path
+from statistics import fmean
 from typing import Literal, get_args
 
 from manitwin.cli.console import err_console, out_console
 from manitwin.cli.documents import plan_document, print_document
+from manitwin.cli.measured_rates import Rate, measured_rate
 from manitwin.config import BuildConfig
 from manitwin.engine.amendments import amendments_sha256, read_amendments
 from manitwin.engine.ledger.ledger import LEDGER, Ledger
@@ -23,15 +25,8 @@ from manitwin.pipeline.recipe import TwinRecipe, estimate_usd
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import RECORD
 
-CHAIN_CPU_S = 13.8
-SECOND_ENGINE_CPU_S = 11.1
-ROBUSTNESS_CPU_S = 26.7
-TRIALS_CPU_S = 6.1
-"""Medians of 25 real meshes (docs/measured.md, "Twins of 25 meshes"): the whole chain with ``--quick``, what the second engine
-and robustness add for each gripper, and the trials that each further gripper adds. A generator's own work is not in them."""
 ENOUGH_ITEMS = 3
 """So many accepted items must there be before a data set's own rate is believed."""
-MEASURED = "docs/measured.md, the median of 25 meshes"
 
 MOST_LINES = 50
 WORDS = {
@@ -61,14 +56,6 @@ class PlannedItem:
     kind: str | None
     state: PlannedState
     detail: str = ""
-
-
-@dataclass(frozen=True)
-class Rate:
-    """CPU seconds that an item of a kind takes, and whose figure that is."""
-
-    cpu_s: float
-    source: str
 
 
 @dataclass(frozen=True)
@@ -117,9 +104,11 @@ def plan_build(items: Iterable[Item], root: DatasetRoot, config: BuildConfig, re
         ledger = Ledger(copy)
         try:
             given, _ = ledger.add_items(items)
-            rates = {kind: own_rate(ledger, kind, recipe.sha256) or measured_rate(config) for kind in usd}
+            own = {kind: own_rate(ledger, kind, recipe.sha256) for kind in usd}
             ledger.begin_run(recipe.sha256, given)  # opens again what a run would open again
-            return Plan(_planned_by(ledger, _Planner(recipe, config, record_of, root)), rates, usd, remarks)
+            planned = _planned_by(ledger, _Planner(recipe, config, record_of, root))
+            rates = {kind: own[kind] or measured_rate(config, kind, _photos_each(planned, kind)) for kind in usd}
+            return Plan(planned, rates, usd, remarks)
         finally:
             ledger.close()
 
@@ -141,11 +130,10 @@ def _planned_by(ledger: Ledger, planner: _Planner) -> list[PlannedItem]:
     return planned
 
 
-def measured_rate(config: BuildConfig) -> Rate:
-    """Return what an item takes by the published measurements, for these grippers and engines."""
-    grippers = len(config.grippers)
-    each = SECOND_ENGINE_CPU_S * config.second_opinion.enabled + ROBUSTNESS_CPU_S * config.robustness.enabled
-    return Rate(CHAIN_CPU_S + TRIALS_CPU_S * (grippers - 1) + each * grippers, MEASURED)
+def _photos_each(items: Iterable[PlannedItem], kind: str) -> float:
+    """Return how many photos the items of a kind that would be built have in the mean: 1 where they have none."""
+    counts = [len(each.item.files) for each in items if each.kind == kind and each.state == "to_build"]
+    return max(1.0, fmean(counts)) if counts else 1.0
 
 
 def own_rate(ledger: Ledger, kind: str, recipe_sha256: str) -> Rate | None:
