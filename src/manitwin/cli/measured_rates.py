@@ -13,7 +13,7 @@ SECOND_ENGINE_CPU_S = 3.4
 ROBUSTNESS_CPU_S = 7.9
 TRIALS_CPU_S = 2.7
 """Medians (docs/measured.md, "What an input takes"): the whole chain with ``--quick`` by the kind of input, what the second
-engine and robustness add for each gripper, and what each further gripper adds. Of generators the built-in one's work is in them."""
+engine and robustness add for each gripper, and what each further gripper adds. Of generators the built-in one."""
 MEASURED = "docs/measured.md, medians"
 
 

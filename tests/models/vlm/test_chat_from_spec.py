@@ -107,3 +107,16 @@ def test_key_with_a_line_break_is_refused_without_being_shown(monkeypatch: pytes
         with pytest.raises(ConfigError, match="spaces") as caught:
             make("m", config(usd_per_million_tokens=[1, 2]))
         assert "sk-secret" not in str(caught.value)
+
+
+def test_an_address_may_be_that_of_the_endpoint_itself() -> None:
+    for name, url in (("openai", "http://localhost:8000/v1"), ("anthropic", "http://localhost:8000")):
+        whole = f"{url}/chat/completions/" if name == "openai" else f"{url}/v1/messages"
+        made = {"openai": openai_from_spec, "anthropic": anthropic_from_spec}[name](f"m@{whole}", BuildConfig())
+        assert made.decides["server"] == url
+
+
+@pytest.mark.parametrize("place", ["localhost:8000/v1", "localhost", "127.0.0.1:11434/v1", "gpu-box:8000/v1"])
+def test_an_address_without_its_scheme_is_no_part_of_a_model(place: str) -> None:
+    with pytest.raises(ConfigError, match=f"give its scheme too, such as http://{place}"):
+        openai_from_spec(f"qwen3-vl@{place}", BuildConfig())

@@ -8,10 +8,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from email.utils import format_datetime
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 from mug_question import KEY, MUG, PRICE, Mug, Waits, answer_mug, question, services
+from pydantic import BaseModel
 
 from manitwin.config import VlmConfig
 from manitwin.engine.charges import counted
@@ -226,8 +227,80 @@ def test_invalid_schema_is_no_lack_of_structured_output() -> None:
 
 
 def test_unknown_model_is_named() -> None:
-    with fake(models=["another"]) as server, pytest.raises(BadReply, match="'tiny-vl' does not exist"):
+    with (
+        fake(models=["another"]) as server,
+        pytest.raises(BadReply, match=r"'tiny-vl' does not exist.*check the model's name"),
+    ):
         chat(server).ask(question())
+
+
+@pytest.mark.parametrize(
+    ("status", "body", "told"),
+    [
+        (
+            404,
+            b"<html>Not Found</html>",
+            r": HTTP 404; check the model's name, and the address: that of most servers ends in /v1$",
+        ),
+        (
+            400,
+            {"error": {"message": "image_url is only supported by certain models"}},
+            r"choose a model that sees pictures$",
+        ),
+        (
+            400,
+            {"error": {"message": "Model is not a multimodal model"}},
+            r"\(HTTP 400\); choose a model that sees pictures$",
+        ),
+        (
+            400,
+            {"error": {"message": "This model's maximum context length is 8192 tokens"}},
+            r"serve it with a longer context",
+        ),
+    ],
+)
+def test_what_a_server_cannot_do_is_told_with_its_remedy(status: int, body: Any, told: str) -> None:
+    with FakeServer(Script(Response(status, body))) as server, pytest.raises(BadReply, match=told):
+        chat(server).ask(question())
+
+
+def _answer(**message: Any) -> Script:
+    return Script(Response(200, {"choices": [{"message": message, "finish_reason": "stop"}]}))
+
+
+def test_an_answer_in_parts_is_read_and_thinking_alone_is_none() -> None:
+    parts = [{"type": "thinking", "thinking": []}, {"type": "text", "text": json.dumps(MUG)}]
+    with FakeServer(_answer(content=parts)) as server:
+        assert json.loads(chat(server).ask(question()).text) == MUG
+    for name in ("reasoning_content", "reasoning"):
+        thought = {"content": None, name: "It is a mug."}
+        with (
+            FakeServer(_answer(**thought)) as server,
+            pytest.raises(BadReply, match="thought and gave no answer; serve it"),
+        ):
+            chat(server).ask(question())
+
+
+def test_a_person_is_not_shown_all_that_could_have_been_said() -> None:
+    class Word(BaseModel):
+        word: Literal[tuple(f"thing number {number}" for number in range(100))]  # type: ignore[valid-type]
+
+    said = {"choices": [{"message": {"content": '{"word": "Tasse"}'}, "finish_reason": "stop"}]}
+    with FakeServer(Script(Response(200, said), Response(200, said))) as server, pytest.raises(BadReply) as failed:
+        ask(chat(server), question(), Word)
+    told = str(failed.value)
+    assert len(told) < 400 and "word: Input should be 'thing number 0'" in told and told.endswith("not 'Tasse'")
+    assert "thing number 57" in server.requests[1].json()["messages"][-1]["content"]
+
+
+def test_words_instead_of_json_are_shown() -> None:
+    words = "I'm sorry, but I can't help with identifying this image."
+    answers = Response(200, {"choices": [{"message": {"content": words}, "finish_reason": "stop"}]})
+    with (
+        FakeServer(Script(answers, answers)) as server,
+        pytest.raises(BadReply, match=r"begins \"I'm sorry, but I can't help"),
+    ):
+        ask(chat(server), question(), Mug)
 
 
 @pytest.mark.parametrize(

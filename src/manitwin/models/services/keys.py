@@ -14,6 +14,8 @@ from manitwin.errors import ConfigError, choose_from
 from manitwin.formats.printable import printable_line
 
 ADDRESS = re.compile(r"(?:^|@)([A-Za-z][A-Za-z0-9+.-]*://.*)$")
+_BARE_HOST = re.compile(r"@((?:localhost|\d{1,3}(?:\.\d{1,3}){3}|[\w-]+(?:\.[\w-]+)*:\d+)(?:[:/].*)?)$")
+"""A server's address that lacks its scheme: without it, it would count as part of a model's name."""
 SCHEMES = ("http", "https", "tcp")
 _EXAMPLE = "one such as http://localhost:8000/v1, or tcp://localhost:5556 of a grasp server"
 HOST = re.compile(r"[\w.:%-]+")  # names, also of other alphabets, and IPv4 and IPv6 addresses
@@ -32,6 +34,8 @@ def is_local(url: str) -> bool:
 def split_url(argument: str) -> tuple[str, str | None]:
     """Return what stands before ``@scheme://`` and the URL, each possibly missing; raises ConfigError for a bad URL."""
     found = ADDRESS.search(argument)
+    if found is None and (bare := _BARE_HOST.search(argument)) is not None:
+        raise ConfigError(f"{bare[1]!r} is no URL of a server; give its scheme too, such as http://{bare[1]}")
     return (argument, None) if found is None else (argument[: found.start()], _checked(found.group(1)))
 
 

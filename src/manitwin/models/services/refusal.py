@@ -121,7 +121,8 @@ def words_of(body: Any, deepest: int = _DEEPEST_WORDS) -> str:
 
 def error_for(name: str, refusal: Refusal, status: int | None, remedy: str, after_s: float | None) -> ManiTwinError:
     """Return the error that a refusal is; ``remedy`` is for a refused key."""
-    what = f"{name}: {refusal.message}" + (f" (HTTP {status})" if status is not None else "")
+    said = f" (HTTP {status})" if status is not None and refusal.message != f"HTTP {status}" else ""
+    what = f"{name}: {refusal.message}{said}"
     if refusal.kind == "denied":
         return AccessDenied(f"{what}; {remedy}")
     if refusal.kind == "busy":

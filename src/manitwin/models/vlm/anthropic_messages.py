@@ -47,6 +47,7 @@ class AnthropicMessages(ServedChat):
     """
 
     name = "anthropic"
+    endpoint = "/v1/messages"
 
     def __init__(
         self,
@@ -78,7 +79,7 @@ class AnthropicMessages(ServedChat):
         """Answer a question, given the turns that followed it."""
         while True:
             try:
-                answer = self._service.post_json("v1/messages", self._body(question, turns))
+                answer = self._service.post_json(self.endpoint, self._body(question, turns))
             except NotTaken as error:
                 if not self._does_without(error.words):
                     raise

@@ -67,7 +67,7 @@ def _served(
         raise ConfigError(
             f"{kind.name} needs a model: {kind.name}:MODEL, or {kind.name}:MODEL@URL for another server than {default_url}"
         )
-    url = url or default_url
+    url = (url or default_url).removesuffix(kind.endpoint)
     key_name = KEY_OF_HOST.get(urlsplit(url).hostname or "", KEY_OF_OTHERS)
     own_server = key_name == KEY_OF_OTHERS
     key = key_from_environment((key_name,), url, f"{kind.name}:{argument}", own_server=own_server)

@@ -11,8 +11,9 @@ from manitwin.config import ServicesConfig, VlmConfig
 from manitwin.errors import ConfigError
 from manitwin.models.services.http import HttpService
 from manitwin.models.services.keys import bearer
-from manitwin.models.services.refusal import NotTaken, Refusal, refusal_by_status
+from manitwin.models.services.refusal import Gone, NotTaken, Refusal, refusal_by_status
 from manitwin.models.vlm.client import Completion, ServedChat, counted_tokens
+from manitwin.models.vlm.openai_answer import NOT_THERE, only_thought, remedy_of, text_of
 from manitwin.models.vlm.openai_dialect import Dialect, request_body
 from manitwin.models.vlm.prices import estimated_usage
 from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage
@@ -36,6 +37,7 @@ class OpenAiChat(ServedChat):
     """
 
     name = "openai"
+    endpoint = "/chat/completions"
 
     def __init__(
         self,
@@ -68,12 +70,15 @@ class OpenAiChat(ServedChat):
 
         while True:
             try:
-                answer = self._service.post_json("chat/completions", self._body(question, turns))
+                answer = self._service.post_json(self.endpoint, self._body(question, turns))
             except NotTaken as error:
                 narrower = self.dialect.without(error.words)
                 if narrower is None:
-                    raise
+                    remedy = remedy_of(error.words)
+                    raise error if remedy is None else NotTaken(f"{error}; {remedy}", error.words) from None
                 self.dialect = narrower
+            except Gone as error:
+                raise Gone(f"{error}; {NOT_THERE}") from None
             else:
                 return self._completion(answer, question).paid(self.price, self._who)
 
@@ -97,16 +102,19 @@ class OpenAiChat(ServedChat):
         message = choice.get("message") if isinstance(choice, dict) else None
         if not isinstance(choice, dict) or not isinstance(message, dict):
             raise self._service.unreadable("choices[0].message: it is no chat completion")
-        text, refused = message.get("content"), message.get("refusal")
-        if text is not None and not isinstance(text, str):
+        text, refused = text_of(message.get("content")), message.get("refusal")
+        if text is None:
             raise self._service.unreadable("text in choices[0].message.content: it is no chat completion")
-        usage = _usage(answer.get("usage")) or estimated_usage(question, text or "")
+        usage = _usage(answer.get("usage")) or estimated_usage(question, text)
         model = self._service.said(str(answer.get("model") or ""))
-        return Completion(text or "", usage, model, self._fault(choice.get("finish_reason"), refused))
+        fault = self._fault(choice.get("finish_reason"), refused)
+        if fault is None and only_thought(message, text):
+            fault = "it thought and gave no answer; serve it without thinking, or raise vlm.max_tokens"
+        return Completion(text, usage, model, fault)
 
     def _fault(self, finish: Any, refused: Any) -> str | None:
         if refused:
-            return f"it refuses to answer: {self._service.said(str(refused))}"
+            return f"it refuses to answer: {self._service.said(str(refused))}; choose another model"
         if finish == "length":
             return f"its answer was cut at {self._settings.max_tokens} tokens; raise vlm.max_tokens (a model's thinking counts)"
         if finish == "content_filter":

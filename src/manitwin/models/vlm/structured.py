@@ -30,6 +30,9 @@ _CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-
 _FENCE = "```"
 _AFTER_FENCE = re.compile(r"[a-zA-Z]*[^\S\n]*\n")
 PROBE_PX = 256
+SHOWN_CHARACTERS = 80
+LONGEST_COMPLAINT = 240
+"""Characters that a person is shown of one; the model is told all of it."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,8 @@ def ask(
             if repaired:
                 _forget(chat, question, turns)
                 raise BadReply(
-                    f"{chat.model} gave no usable answer to {question.name!r} when asked again: {'; '.join(wrong)}"
+                    f"{chat.model} gave no usable answer to {question.name!r} when asked again:"
+                    f" {'; '.join(map(_without_the_middle, wrong))}"
                 ) from None
             repaired = True
             said = _listed(
@@ -93,6 +97,12 @@ def complaints(error: ValueError) -> list[str]:
         place = ".".join(map(str, detail["loc"])) or "the answer"
         found.append(f"{place}: {detail['msg']}, not {str(detail['input'])[:80]!r}")
     return found[:MAX_COMPLAINTS]
+
+
+def _without_the_middle(line: str) -> str:
+    """Return a complaint for a person: of a long one, which lists all that could be said, its place and what was said."""
+    half = LONGEST_COMPLAINT // 2
+    return line if len(line) <= LONGEST_COMPLAINT else f"{line[:half]} ... {line[-half:]}"
 
 
 def _listed(opening: str, lines: Sequence[str], closing: str) -> str:
@@ -164,7 +174,8 @@ def _object_in(text: str) -> dict[str, Any]:
     except RecursionError:
         raise ValueError("it is no JSON that can be read: it is nested too deep") from None
     except ValueError as error:
-        raise ValueError(f"it is no JSON: {str(error).split(';')[0]}") from None
+        begin = _CONTROL.sub(" ", text[:SHOWN_CHARACTERS])
+        raise ValueError(f"it is no JSON ({str(error).split(';')[0]}), and begins {begin!r}") from None
     raise ValueError(f"it is a JSON {type(value).__name__}, not an object")
 
 

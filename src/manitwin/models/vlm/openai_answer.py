@@ -1,0 +1,34 @@
+"""What a chat completions server sends back: the text of an answer, why it is none, and what a person does about a refusal."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+_PICTURES = re.compile(r"image|vision|multi-?modal|picture", re.IGNORECASE)
+_CONTEXT = re.compile(r"context (?:length|window|size)|maximum context|too many tokens|n_ctx", re.IGNORECASE)
+NOT_THERE = "check the model's name, and the address: that of most servers ends in /v1"
+
+
+def text_of(content: Any) -> str | None:
+    """Return the text of a message's content, which is one or a list of parts (Mistral's); None for what is neither."""
+    if content is None or isinstance(content, str):
+        return content or ""
+    if not isinstance(content, list) or not all(isinstance(part, dict) for part in content):
+        return None
+    said = [part.get("text") for part in content if part.get("type") == "text"]
+    return "".join(said) if said and all(isinstance(each, str) for each in said) else None
+
+
+def only_thought(message: Mapping[str, Any], text: str) -> bool:
+    """Tell whether a model thought and said nothing: vLLM and others send its thinking beside an answer that is empty."""
+    thoughts = [message.get(name) for name in ("reasoning_content", "reasoning")]
+    return not text.strip() and any(isinstance(each, str) and each.strip() for each in thoughts)
+
+
+def remedy_of(words: str) -> str | None:
+    """Return what a person does about a request that a server does not take, by its words; None where they say nothing known."""
+    if _CONTEXT.search(words):
+        return "serve it with a longer context, or ask with smaller pictures (vlm.picture_px)"
+    return "choose a model that sees pictures" if _PICTURES.search(words) else None
