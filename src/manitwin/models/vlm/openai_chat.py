@@ -114,7 +114,7 @@ class OpenAiChat(ServedChat):
 
     def _fault(self, finish: Any, refused: Any) -> str | None:
         if refused:
-            return f"it refuses to answer: {self._service.said(str(refused))}; choose another model"
+            return f"it refuses to answer: {self._service.said(str(refused)).rstrip('.')}; choose another model"
         if finish == "length":
             return f"its answer was cut at {self._settings.max_tokens} tokens; raise vlm.max_tokens (a model's thinking counts)"
         if finish == "content_filter":
