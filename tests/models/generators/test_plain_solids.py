@@ -158,3 +158,10 @@ def test_what_is_nearly_explained_is_the_plain_solid_where_its_edges_are_seen(
     near = dataclasses.replace(seen, residual=Residual(0.97, 0.0035, edges, 0.3, 0.0, 200))
     monkeypatch.setattr(made_photo, "plain_solids", lambda *arguments: PlainSolids(None, near))
     assert from_photo(_seen(_circle(0.08), 0.10, 35), None).notes["primitive"] == primitive
+
+
+def test_what_is_no_such_thing_as_its_template_makes_is_the_plain_solid_that_explains_it() -> None:
+    thick = _seen(_rounded(0.20, 0.10, 0.03), 0.05, 30)
+    assert from_photo(thick, "envelope").notes["primitive"] == "slab"
+    with pytest.raises(Rejected, match="seen at an angle"):
+        from_photo(thick, "frisbee")

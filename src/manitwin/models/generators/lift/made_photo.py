@@ -42,6 +42,7 @@ from manitwin.models.generators.templates.fitting.generated import (
     notes_of,
     texture_of,
     visual_part,
+    with_its_front_seen,
 )
 from manitwin.twin.import_record import ImportRecord
 
@@ -78,9 +79,9 @@ def from_photo(
     """Return the template that the name means where its fit explains the photo, else the photo lifted; raises Rejected.
 
     What has no template, and no name or that of a box, is a box where its outline is that of one seen from a corner; so is what
-    lies otherwise than its template does where a box explains it much better (a long speaker). What has no template is a plain
-    solid where one explains the photo closely. What has no name has the shape of a template of the ``likely`` names, each with
-    its probability, where one explains the photo better.
+    lies otherwise than its template does where a box explains it much better (a long speaker). What has no template, or one whose
+    fit is not believed, is a plain solid where one explains the photo closely. What has no name has the shape of a template of
+    the ``likely`` names, each with its probability, where one explains the photo better.
     ``focal_mm`` is the lens as 35 mm equivalent, where it is known.
     """
     template = template_for(name)
@@ -101,6 +102,10 @@ def from_photo(
     box = box_from_corner(rgba, focal_mm) if lies else None
     if box is not None and fitted is not None and _explains_more(box, fitted.residual.iou):
         return _shape_alone(box, rgba, primitive="box", source="the outline's six corners")
+    if fitted is not None and fitted.confidence < LEAST_CONFIDENCE:
+        solid = plain_solids(rgba, hint, focal_mm).close
+        if solid is not None and why_not_round(name, np.ptp(solid.made.mesh.vertices, axis=0)) is None:
+            return _plain(solid, rgba)
     return fitted_or_lifted(fitted, rgba, name)
 
 
@@ -182,6 +187,7 @@ def _is_round(fitted: Fitted) -> bool:
 
 def from_fit(fitted: Fitted, rgba: np.ndarray, name: str | None) -> Job:
     """Return a fitted template with the photo on it."""
+    fitted = with_its_front_seen(fitted)
     surface = texture_of([fitted], [rgba])
     known = known_of_fitted(fitted, name or fitted.category, surface)
     return Job(write_glb([visual_part(surface)]), notes_of(fitted), surface.unseen_share, known)

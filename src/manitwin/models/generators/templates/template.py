@@ -104,7 +104,8 @@ class Template:
     closed containers, with what is in them. ``of_sheet`` are parts that are hollow behind a sheet where they are of metal;
     ``of_plate``: what is of metal has the wall that is stated, and none of sheet. ``length_of`` is the part that a length
     without a direction is of: a pan of 24 cm has that diameter, without its handle; '' for the whole. What has
-    ``any_proportions``, a box, is as long, wide and high as is said; other things keep near their intervals.
+    ``any_proportions``, a box, is as long, wide and high as is said; other things keep near their intervals. What has
+    ``any_front``, an apple, has no side that is its front: of a photo it is the side that is seen.
     """
 
     category: str
@@ -118,6 +119,7 @@ class Template:
     of_plate: bool = False
     length_of: str = ""
     any_proportions: bool = False
+    any_front: bool = False
 
     def drawn(self, rng: np.random.Generator) -> dict[str, float]:
         """Draw all measures."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,32 @@ from trimesh.visual import TextureVisuals
 
 from manitwin.formats.meshes.triangles import with_creased_normals
 from manitwin.models.generators.photo_material import photo_material
+from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.fitting.fit import Fitted
 from manitwin.models.generators.templates.fitting.texturing import Shot, Textured, textured
+from manitwin.models.generators.templates.fitting.view import of_turned
 from manitwin.models.generators.templates.known import known_of
 from manitwin.models.generators.templates.made import given_parts
+from manitwin.models.generators.templates.template import Vector
 from manitwin.twin.import_record import FITTED, ImportRecord
+
+
+def with_its_front_seen(fitted: Fitted) -> Fitted:
+    """Return a fit of a thing that has no front of its own, where it stands, turned until what the photo shows is towards -Y."""
+    if not load_templates()[fitted.category].any_front or not fitted.upright:
+        return fitted
+    made, yaw_rad = fitted.made, fitted.view.yaw_rad
+    turn = trimesh.transformations.rotation_matrix(yaw_rad, [0, 0, 1])[:3, :3]
+
+    def turned(vector: Vector) -> Vector:
+        x, y, z = (turn @ vector).tolist()
+        return (x, y, z)
+
+    view, vertices = of_turned(fitted.view, made.mesh.vertices)
+    points = [replace(p, position_m=turned(p.position_m), direction=turned(p.direction)) for p in made.points]
+    solids = [(solid.rotate((0, 0, float(np.degrees(yaw_rad)))), density) for solid, density in made.solids]
+    mesh = replace(made.mesh, vertices=vertices)
+    return replace(fitted, made=replace(made, mesh=mesh, points=tuple(points), solids=solids), view=view)
 
 
 def texture_of(fitted: Sequence[Fitted], photos: Sequence[np.ndarray]) -> Textured:

@@ -6,7 +6,7 @@ front towards -Y; for projection the object's box is centred and its half diagon
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -69,3 +69,18 @@ def boxed(flat: np.ndarray) -> tuple[float, float, float]:
     scale = 1.0 / float((high - low).max())
     x, y = -scale * (low + high) / 2
     return scale, float(x), float(y)
+
+
+def of_turned(view: View, vertices: np.ndarray) -> tuple[View, np.ndarray]:
+    """Return vertices ``(V, 3)`` turned about Z by a view's yaw, and the view without it that sees them where they were.
+
+    Their box is another one, by whose centre and half diagonal a view is told: what this moves along the line of sight is left.
+    """
+    cos, sin = np.cos(view.yaw_rad), np.sin(view.yaw_rad)
+    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    turned = vertices @ turn.T
+    (_, center, half), (_, its_center, its_half) = normalised(vertices), normalised(turned)
+    larger = its_half / half
+    ahead = replace(view, yaw_rad=0.0, perspective=float(view.perspective * larger), scale=float(view.scale * larger))
+    x, y, _ = ahead.in_camera((its_center - turn @ center)[None] / its_half)[0]
+    return replace(ahead, x=float(view.x + ahead.scale * x), y=float(view.y - ahead.scale * y)), turned
