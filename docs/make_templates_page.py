@@ -25,6 +25,8 @@ INTRODUCTION = """# Things from a sentence: the templates
 manitwin build --text "a red ceramic mug, 9 cm" --text "a hammer with a yellow handle" --quick -o twins
 ```
 
+![One thing of each template, as seed 0 makes it](templates.webp)
+
 The built-in generator `lift` makes the categories below from words alone: no GPU, no key, nothing downloaded. Each is a
 template: measures within the interval that such things have, parts with a name, a material and a density each, and places
 whose use is known by construction. So size, mass, centre of mass and inertia follow from the parts, and functional points are on
@@ -137,7 +139,7 @@ bristles may stand ahead or aside, there is no frame and its reason says so; a b
 pitcher's spout and a nozzle are not to be relied on. The held-out half was looked at while buttons, spouts and bristles
 were mended, so it is not quite blind.
 
-This page is written by `python docs/make_templates_page.py`.
+This page is written by `python docs/make_templates_page.py`, its picture by `python docs/make_templates_picture.py`.
 """
 
 

@@ -14,6 +14,7 @@ from PIL import Image
 
 import manitwin
 from manitwin.episodes.skills.registry import skill_names
+from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.render.false_colors import NOTHING_RGB, depth_in_colors, id_color
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -101,6 +102,25 @@ def test_layouts_show_depth_and_ids_in_the_colours_of_previews(make_data_picture
         for top in range(0, len(shown), size + 4):
             tile = shown[top : top + size, left : left + size].reshape(-1, 3)
             assert {*map(tuple, np.unique(tile, axis=0).tolist())} <= allowed
+
+
+@pytest.mark.slow
+def test_templates_are_those_of_the_code() -> None:
+    from make_templates_picture import templates_picture
+
+    assert_same(templates_picture(), "templates.webp")
+
+
+def test_every_template_is_in_the_picture_of_them() -> None:
+    from make_templates_picture import COLUMNS, LABEL_PX, TILE_PX
+
+    with Image.open(DOCS / "templates.webp") as picture:
+        width, height = picture.size
+    shown = np.asarray(Image.open(DOCS / "templates.webp").convert("L"))[-LABEL_PX:]
+    last = len(load_templates()) - height // (TILE_PX + LABEL_PX) * COLUMNS + COLUMNS
+    assert width == COLUMNS * TILE_PX and 0 < last <= COLUMNS
+    named = [shown[:, at : at + TILE_PX].min() < 200 for at in range(0, width, TILE_PX)]
+    assert named == [at < last for at in range(COLUMNS)]
 
 
 @pytest.mark.slow
