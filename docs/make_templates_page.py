@@ -130,7 +130,8 @@ judged). Most of what was wrong were labels of parts that such things lack (a mi
 with its thin end); since these were mended, and more of the labels are judged, it is 872 of 891 (97.9 %; `--later --seeds 3`),
 and 569 of 588 (96.8 %) of seeds not seen before (`--later --first 500 --seeds 2`). Of 87 rendered photos of 29 of them
 (`photo_generation.py OUT --held-out`, named, from 10, 30 and 55 degrees) 76 are accepted, the others rejected for their cut-out;
-their volumes overlap the true ones by 0.94 in the median, least those of spirit levels, envelopes and sticky notes (0.61 to 0.93).
+their volumes overlap the true ones by 0.94 in the median, least those of spirit levels, envelopes and sticky
+notes (0.61 to 0.93).
 
 `python benchmarks/frames.py --held-out`: frames from geometry, asked for at the candidate nearest to a known point, are
 right (opening 5 mm and 3 degrees, face 3 mm and 3, hole 2 mm and 5, edge 10 degrees, tip 5 mm and 10, button 3 mm and 10)
