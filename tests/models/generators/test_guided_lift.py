@@ -136,7 +136,7 @@ def test_correction_of_a_photo_is_fitted_and_the_better_fit_stays(boxed: np.ndar
 
 def test_none_of_the_templates_falls_back_to_the_name_and_says_so(boxed: np.ndarray, tmp_path: Path) -> None:
     eyes = Eyes("none of these", {})
-    result = made(guided(eyes), tmp_path, rgba=boxed, name="milk carton")
+    result = made(guided(eyes), tmp_path, rgba=boxed, name="first aid kit")
     assert eyes.names == ["template"] and "none of the templates" in result.notes["filled"]["findings"][0]
     assert result.notes["filled"]["category"] is None
 
