@@ -775,6 +775,7 @@ def _hollow_m2(solid: trimesh.Trimesh, level_m: float) -> float:
         ("a 500 ml plastic water bottle", 500e-6),
         ("a 12 oz soda can", 354.9e-6),
         ("a 330 ml can", 330e-6),
+        ("a 1 litre milk carton", 1000e-6),
     ],
 )
 def test_a_closed_vessel_of_a_thin_wall_is_as_large_as_what_it_holds(text: str, outside_m3: float) -> None:

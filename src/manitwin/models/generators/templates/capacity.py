@@ -15,8 +15,9 @@ if TYPE_CHECKING:
     from manitwin.models.generators.templates.made import Made
     from manitwin.models.generators.templates.stated_amounts import Amount
 
-CLOSED_WALLS_M = {"glass": 0.003, "plastic": 0.0005, "aluminium": 0.0001, "steel": 0.0003}
-"""Of blown and drawn containers by what they look like: bottles and jars of glass 2 to 4 mm, PET 0.3 to 0.7, cans 0.1 to 0.3."""
+CLOSED_WALLS_M = {"glass": 0.003, "plastic": 0.0005, "aluminium": 0.0001, "steel": 0.0003, "cardboard": 0.0005}
+"""Of containers by what they look like: bottles and jars of glass 2 to 4 mm, PET 0.3 to 0.7, cans 0.1 to 0.3, drink cartons and
+composite cans 0.4 to 0.9."""
 TWO_WALLS_M = 0.005
 """Of a thermos: two sheets of steel and what is between them."""
 LEVELS = 200
