@@ -73,10 +73,10 @@ stands for its kinds: a can may be a drink can where that explains the photo bet
   of a text; their source is `template:CATEGORY, fitted to the photo`.
 - **Without a name**, from a person or a classifier, it is a box where its outline has the six corners of one seen from a corner,
   which tell its sides; else a block, a slab with round corners, a cylinder or a disc where that explains the outline almost to
-  the pixel and its edges are seen (so too under a name without a template); else it has the shape of a template of its likeliest
-  names (from a tenth on) where that explains the photo closely, and much better than a body of revolution: a cup that may be a
-  mug or a bucket is hollow in either case, and is called neither. What none explains is lifted, and is rejected where the
-  outline is an ellipse: a disc seen at an angle has it as well as an egg.
+  the pixel and its edges are seen (so too under a name without a template, or with one that is not believed); else it has the
+  shape of a template of its likeliest names (from a tenth on) where that explains the photo closely, and much better than a body
+  of revolution: a cup that may be a mug or a bucket is hollow in either case, and is called neither. What none explains is
+  lifted, and is rejected where the outline is an ellipse: a disc seen at an angle has it as well as an egg.
 - **Texture**: the photo on what it shows. Unseen places get quiet colours of their own part: those of the same ring where it
   is turned, else of the nearest seen places, as a median that keeps no letters.
 - **What it cannot do**: walls thinner than a pixel keep the usual thickness; a box seen at one face alone has the usual

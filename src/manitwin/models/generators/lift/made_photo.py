@@ -90,11 +90,8 @@ def from_photo(
         box = box_from_corner(rgba, focal_mm)
         if box is not None:
             return _shape_alone(box, rgba, primitive="box", source="the outline's six corners")
-    plain = plain_solids(rgba, hint, focal_mm) if template is None else PlainSolids()
     if name is None:
-        return _without_name(rgba, likely, focal_mm, plain)
-    if plain.close is not None:
-        return _plain(plain.close, rgba)
+        return _without_name(rgba, likely, focal_mm, plain_solids(rgba, hint, focal_mm))
     fitted = (
         None if template is None else fit(template.category, rgba, or_of=kinds_of(template.category), focal_mm=focal_mm)
     )
@@ -102,7 +99,7 @@ def from_photo(
     box = box_from_corner(rgba, focal_mm) if lies else None
     if box is not None and fitted is not None and _explains_more(box, fitted.residual.iou):
         return _shape_alone(box, rgba, primitive="box", source="the outline's six corners")
-    if fitted is not None and fitted.confidence < LEAST_CONFIDENCE:
+    if fitted is None or fitted.confidence < LEAST_CONFIDENCE:
         solid = plain_solids(rgba, hint, focal_mm).close
         if solid is not None and why_not_round(name, np.ptp(solid.made.mesh.vertices, axis=0)) is None:
             return _plain(solid, rgba)

@@ -191,8 +191,10 @@ def _no_category(text: str, words: list[str], templates: Mapping[str, Template])
     else:
         names = sorted({name for template in templates.values() for name in (template.category, *template.names)})
         said = words if meant is None else meant.category.split()
-        last_first = said[::-1]  # the noun
-        spelt = dict.fromkeys(match for word in last_first for match in get_close_matches(word, names, n=2, cutoff=0.6))
+        # from the noun, which is the last word
+        spelt = dict.fromkeys(
+            near for word in reversed(said) for near in get_close_matches(word, names, n=2, cutoff=0.6)
+        )
         hint = f"; did you mean {', '.join(list(spelt)[:4])}?" if spelt else "."
     return f"no template makes {text!r}{hint} There are {len(templates)} (docs/templates.md)"
 

@@ -19,6 +19,7 @@ from manitwin.geometry.solids.shapes import (
 )
 from manitwin.geometry.solids.sweep import arc, tube
 from manitwin.models.generators.templates.catalog.organic import lying, ribbed
+from manitwin.models.generators.templates.catalog.rings import ring_radii, with_both_sides
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -102,8 +103,8 @@ def mushroom(*, width_m: float, tall: float, dome: float, stem: float) -> Model:
 @template("donut")
 def donut(*, width_m: float, thick: float, hole: float, glaze: float) -> Model:
     """Build a donut lying flat with glaze and sprinkles; ``glaze`` is how far down its side that reaches."""
-    r, inner, h = 0.5 * width_m, 0.5 * hole * width_m, thick * width_m
-    ring, half = 0.5 * (r + inner), 0.5 * (r - inner)
+    r, h = 0.5 * width_m, thick * width_m
+    ring, half = ring_radii(width_m, hole)
     flat = h / (2 * half)
     body = torus(ring, half, sides=chords(60)).scale((1, 1, flat))
     cover = torus(ring, half + 0.0011, sides=chords(60)).scale((1, 1, (0.5 * h + 0.0011) / (half + 0.0011)))
@@ -120,9 +121,7 @@ def donut(*, width_m: float, thick: float, hole: float, glaze: float) -> Model:
         crumb = box(0.0046, 0.0014, 0.0014, radius_m=0.0004).rotate((0, 0, 97.0 * number)).rotate((0, tilt, 0))
         crumbs[int(1.618 * number) % 2].append(crumb.translate((ring + off, 0, z)).rotate((0, 0, float(np.degrees(a)))))
     model.add("sprinkles", union(crumbs[0]), "sprinkles").add("more sprinkles", union(crumbs[1]), "more sprinkles")
-    model.region("hole", "body", lambda c: np.hypot(c[:, 0], c[:, 1]) < ring - 0.6 * half)
-    model.point("inner side", "hole", "hole", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    return model.point("outer side", "surface", "body", (0.0, -r, 0.0), (0.0, -1.0, 0.0)).laid()
+    return with_both_sides(model, width_m, hole, hole_share=0.4)
 
 
 @template("cookie")

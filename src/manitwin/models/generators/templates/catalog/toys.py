@@ -20,6 +20,7 @@ from manitwin.geometry.solids.shapes import (
     torus,
     union,
 )
+from manitwin.models.generators.templates.catalog.rings import ring_radii, with_both_sides
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -60,12 +61,9 @@ def frisbee(*, width_m: float, high: float, wall_m: float) -> Model:
 @template("stacking ring")
 def stacking_ring(*, width_m: float, hole: float) -> Model:
     """Build a ring lying flat; ``hole`` is the hole's width over the ring's."""
-    r, inner = 0.5 * width_m, 0.5 * hole * width_m
-    ring, half = 0.5 * (r + inner), 0.5 * (r - inner)
+    ring, half = ring_radii(width_m, hole)
     model = Model().add("body", torus(ring, half, sides=chords(64)))
-    model.region("hole", "body", lambda c: np.hypot(c[:, 0], c[:, 1]) < ring - 0.3 * half)
-    model.point("inner side", "hole", "hole", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-    return model.point("outer side", "surface", "body", (0.0, -r, 0.0), (0.0, -1.0, 0.0)).laid()
+    return with_both_sides(model, width_m, hole, hole_share=0.7)
 
 
 @template("yo yo")
