@@ -23,6 +23,7 @@ from manitwin.formats.meshes.read import read_mesh
 from manitwin.formats.packed_source import pack_source
 from manitwin.pipeline.folder_listing import list_folder
 from manitwin.pipeline.item import Item, twin_id
+from three_mf_archive import archive, mesh_object, model
 
 USDA = """#usda 1.0
 (
@@ -233,6 +234,41 @@ def off(folder: Path) -> None:
     (folder / "ball.off").write_text("\n".join(lines) + "\n")
 
 
+def three_mf(folder: Path) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=1, radius=30)
+    resources = (
+        '<basematerials id="5"><base name="red" displaycolor="#FF0000"/></basematerials><m:texture2d id="6" path="/a.png"/>'
+        '<m:texture2dgroup id="7" texid="6"><m:tex2coord u="0.5" v="0.5"/></m:texture2dgroup>'
+        + mesh_object(1, ball, properties=['pid="5" p1="0"'] * 40 + ['pid="7" p1="0"'] * 40)
+        + '<object id="2"><components><component objectid="1" transform="1 0 0 0 1 0 0 0 1 9 0 0"/></components></object>'
+    )
+    (folder / "ball.model").write_text(model(resources, '<item objectid="1"/><item objectid="2"/>'))
+    notes = '<config><object id="1"><metadata key="extruder" value="2"/><volume firstid="0" lastid="20">'
+    notes += (
+        '<metadata key="volume_type" value="NegativeVolume"/></volume><part id="1" subtype="normal_part"/></object>'
+    )
+    (folder / "notes.config").write_text(notes + "</config>")
+    (folder / "colors.config").write_text('{"filament_colour": ["#FF0000", "#00FF0080"]}')
+    (folder / "whole.3mf").write_bytes(_packed(folder))
+
+
+def _packed(folder: Path) -> bytes:
+    """Return the archive of what lies in a folder, so that what was changed there is not only a wrong checksum."""
+    beside: dict[str, str | bytes] = {
+        "a.png": picture(),
+        "Metadata/Slic3r_PE_model.config": (folder / "notes.config").read_bytes(),
+        "Metadata/project_settings.config": (folder / "colors.config").read_bytes(),
+    }
+    return archive((folder / "ball.model").read_bytes(), beside)
+
+
+def read_three_mf(case: Case) -> None:
+    inside = [case.folder / name for name in ("ball.model", "notes.config", "colors.config")]
+    if case.file.suffix != ".3mf" and all(file.is_file() and file.stat().st_size < 1 << 20 for file in inside):
+        (case.folder / "whole.3mf").write_bytes(_packed(case.folder))
+    read(Case(case.folder, case.folder / "whole.3mf"))
+
+
 def draco(folder: Path) -> None:
     data = compressed_ball()
     write_glb_of(folder / "ball.glb", document_of_ball(data), data)
@@ -240,6 +276,7 @@ def draco(folder: Path) -> None:
 
 target("msh", msh, read)
 target("off", off, read)
+target("3mf", three_mf, read_three_mf)
 target("draco", draco, read, weight=0.1)
 target("dae", dae, read, files=("*.dae",), weight=0.5)
 target("usdz", usdz, read, weight=0.3)

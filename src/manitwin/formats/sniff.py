@@ -16,7 +16,7 @@ from manitwin.formats.json_file import MAX_JSON_BYTES, parse_json
 from manitwin.formats.printable import printable_line
 
 IMAGE_FORMATS = ("png", "jpeg", "gif", "webp", "tiff", "bmp", "avif")
-MESH_FORMATS = ("glb", "gltf", "obj", "ply", "stl", "dae", "usdz", "msh", "off")
+MESH_FORMATS = ("glb", "gltf", "obj", "ply", "stl", "dae", "usdz", "3mf", "msh", "off")
 
 _HEAD_BYTES = 65536
 MSH_HEADER_BYTES = 16
@@ -51,7 +51,7 @@ NOT_READ = {
     **dict.fromkeys((".heic", ".heif"), HEIC_NOT_READ),
     **dict.fromkeys((".urdf", ".sdf", ".xacro", ".usd", ".usda", ".usdc"), _IMPORT),
     **dict.fromkeys((".dng", ".nef", ".cr2", ".cr3", ".arw", ".orf", ".rw2", ".raf", ".pef"), _CAMERA_RAW),
-    **dict.fromkeys((".fbx", ".blend", ".3ds", ".max", ".step", ".stp", ".iges", ".igs", ".3mf", ".x3d"), _EXPORT),
+    **dict.fromkeys((".fbx", ".blend", ".3ds", ".max", ".step", ".stp", ".iges", ".igs", ".x3d"), _EXPORT),
     **dict.fromkeys((".abc", ".wrl", ".ma", ".mb", ".c4d", ".skp", ".drc", ".vrm", ".fcstd", ".sldprt"), _EXPORT),
     **dict.fromkeys((".mp4", ".mov", ".avi", ".mkv", ".webm", ".m4v"), _VIDEO),
     **dict.fromkeys((".tga", ".dds", ".exr", ".hdr", ".psd", ".svg", ".jxl", ".jp2", ".ktx", ".ktx2", ".ico"), _IMAGE),
@@ -132,6 +132,8 @@ def _mesh_format(head: bytes, size: int, suffix: str, stream: BinaryIO) -> str |
         return "ply"
     if head.startswith(b"PK\x03\x04") and _is_usdz(head):
         return "usdz"
+    if head.startswith(b"PK\x03\x04") and (suffix == ".3mf" or _holds_model(size, stream)):
+        return "3mf"
     # a binary STL has no magic: 80 free bytes, a count, 50 bytes a triangle; its free bytes may even begin with "solid"
     if size >= 84 and size == 84 + 50 * int.from_bytes(head[80:84], "little"):
         return "stl"
@@ -172,6 +174,13 @@ def _is_usdz(head: bytes) -> bool:
     length = int.from_bytes(head[26:28], "little")
     name = head[30 : 30 + length].decode("latin-1").lower()
     return name.endswith((".usd", ".usda", ".usdc"))
+
+
+def _holds_model(size: int, stream: BinaryIO) -> bool:
+    # an archive ends in the directory of its members (APPNOTE 4.3.6); Open Packaging Conventions ask for the first of these
+    stream.seek(max(0, size - _HEAD_BYTES))
+    tail = stream.read(_HEAD_BYTES)
+    return b"[Content_Types].xml" in tail and b".model" in tail
 
 
 def _is_gltf(start: str, size: int, stream: BinaryIO) -> bool:

@@ -1,7 +1,7 @@
 """XML in and out: what others wrote is read without document type, entities, includes or network; what is written is the same
 bytes for the same content.
 
-All XML of the package is parsed here.
+All XML of the package is parsed here, but for what is too large for a tree (``xml_walk``).
 """
 
 from __future__ import annotations

@@ -17,6 +17,7 @@ from manitwin.formats.meshes.off import read_off
 from manitwin.formats.meshes.ply import read_ply
 from manitwin.formats.meshes.source import MeshLimits, MeshSource
 from manitwin.formats.meshes.stl import read_stl
+from manitwin.formats.meshes.three_mf import read_three_mf
 from manitwin.formats.meshes.triangles import has_one_false_normal, shaded, without_normals
 from manitwin.formats.sniff import sniff
 
@@ -28,6 +29,7 @@ _SUFFIXES = {
     "stl": (".stl",),
     "dae": (".dae",),
     "usdz": (".usdz",),
+    "3mf": (".3mf",),
     "msh": (".msh",),
     "off": (".off",),
 }
@@ -97,6 +99,8 @@ def _read(format: str, source: MeshSource) -> tuple[list[trimesh.Trimesh], float
         return read_dae(source)
     if format == "usdz":
         return _read_usdz(source)
+    if format == "3mf":
+        return *read_three_mf(source), None
     readers = {"obj": read_obj, "ply": read_ply, "stl": read_stl, "msh": read_msh, "off": read_off}
     return readers[format](source), None, None
 

@@ -1,0 +1,96 @@
+"""The archive side of 3MF (Open Packaging Conventions): its parts by name, and which of them is the model."""
+
+from __future__ import annotations
+
+import io
+import posixpath
+import zipfile
+import zlib
+from collections.abc import Iterator
+from functools import partial
+
+from manitwin.errors import InputError
+from manitwin.formats.meshes.source import MeshSource
+from manitwin.formats.xml_file import parse_xml
+
+_RELATIONSHIPS = "_rels/.rels"
+_MODEL_RELATIONSHIP = "/3dmodel"
+"""How the type of the relationship ends that leads to the model (3MF Core Specification, section 2.1)."""
+_CENTRAL_HEADER = b"PK\x01\x02"
+"""How a member's entry in an archive's directory begins (APPNOTE 4.3.12)."""
+_MAX_MEMBERS = 10_000
+_MAX_TEXT_BYTES = 16 << 20
+_BLOCK_BYTES = 1 << 20
+_BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError)
+
+
+class ThreeMfPackage:
+    """The parts of a 3MF archive by name, of at most the limit's bytes unpacked together; nothing is written to disk."""
+
+    def __init__(self, source: MeshSource):
+        self._source = source
+        content = source.data()
+        if content.count(_CENTRAL_HEADER) > _MAX_MEMBERS:  # before a list of them is made
+            raise source.too_large(f"it has more than {_MAX_MEMBERS} files in its archive", "pack fewer files")
+        try:
+            self._zip = zipfile.ZipFile(io.BytesIO(content))
+            self._members = {_part_name(member.filename): member for member in self._zip.infolist()}
+        except (*_BROKEN, ValueError) as error:
+            cause = f"truncated or broken: its archive cannot be read ({str(error)[:60]})"
+            raise source.unreadable(cause, "download it again") from error
+
+    def model(self) -> str:
+        """Return the name of the part that holds the model; raises InputError ``unreadable`` where none is there."""
+        text = self.text(f"/{_RELATIONSHIPS}")
+        if text is not None:
+            refusal = partial(InputError, "unreadable")
+            root = parse_xml(text, "Relationships", self._source.name, refusal=refusal)
+            for each in root.iter("{*}Relationship"):
+                if (each.get("Type") or "").endswith(_MODEL_RELATIONSHIP):
+                    return _part_name(each.get("Target") or "")
+        found = sorted(name for name in self._members if name.endswith(".model"))
+        if not found:
+            raise self._source.unreadable("no 3D model is in its archive", "export it again as 3MF")
+        return found[0]
+
+    def blocks(self, name: str) -> Iterator[bytes]:
+        """Yield the content of a part that must be there, in blocks.
+
+        Raises InputError: ``unreadable`` where it is missing or broken, ``too_large`` beyond the limit.
+        """
+        member = self._members.get(_part_name(name))
+        if member is None:
+            raise self._source.unreadable(f"its part {name[:80]!r} is not in the archive", "export it again as 3MF")
+        try:
+            with self._zip.open(member) as stream:
+                while block := stream.read(_BLOCK_BYTES):
+                    self._count(len(block))
+                    yield block
+        except _BROKEN as error:
+            cause = f"its part {name[:80]!r} is broken ({str(error)[:60]})"
+            raise self._source.unreadable(cause, "download it again") from error
+
+    def text(self, name: str) -> bytes | None:
+        """Return the content of a part of no more than 16 MiB, or None where it is not there or larger."""
+        member = self._members.get(_part_name(name))
+        if member is None or member.file_size > _MAX_TEXT_BYTES:
+            return None
+        return b"".join(self.blocks(name))
+
+    def texture(self, name: str) -> bytes | None:
+        """Return the content of a picture, or None with a finding where it is not there."""
+        if _part_name(name) not in self._members:
+            self._source.find(f"texture {name[:80]!r} is not in the archive; carried on without it")
+            return None
+        return b"".join(self.blocks(name))
+
+    def _count(self, size_bytes: int) -> None:
+        self._source.bytes_read += size_bytes
+        limit = self._source.limits.max_bytes
+        if self._source.bytes_read > limit:
+            raise self._source.too_large(f"unpacked it has more than {limit} bytes")
+
+
+def _part_name(name: str) -> str:
+    """Return a part's name as it is compared: from the root, without case (OPC, section 6.2.2.3)."""
+    return posixpath.normpath("/" + name.replace("\\", "/").lstrip("/")).lower()

@@ -1,0 +1,156 @@
+"""What slicers note beside a 3MF model: which pieces only help to print, and the colours of their filaments.
+
+PrusaSlicer keeps all pieces of an object in one mesh and notes their ranges of triangles (``Slic3r_PE_model.config``); Bambu
+Studio and OrcaSlicer make a component of each (``model_settings.config``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+from lxml import etree  # type: ignore[import-untyped]
+
+from manitwin.errors import InputError
+from manitwin.formats.json_file import parse_json
+from manitwin.formats.meshes.source import MeshSource
+from manitwin.formats.meshes.three_mf_model import color_of
+from manitwin.formats.meshes.three_mf_package import ThreeMfPackage
+from manitwin.formats.xml_file import parse_xml
+
+Color = tuple[int, int, int, int]
+_PRUSA_PARTS, _PRUSA_SETTINGS = "/Metadata/Slic3r_PE_model.config", "/Metadata/Slic3r_PE.config"
+_BAMBU_PARTS, _BAMBU_SETTINGS = "/Metadata/model_settings.config", "/Metadata/project_settings.config"
+_MATTER = frozenset({"ModelPart", "normal_part"})
+_CUT_OUT = frozenset({"NegativeVolume", "negative_part"})
+_COLORS_BY = ("filament_colour", "extruder_colour")
+"""Settings that hold the colours of what is printed, by preference."""
+_MOST_FILAMENTS = 256
+
+
+@dataclass(frozen=True)
+class Range:
+    """Triangles ``first`` to ``last`` of an object's mesh: a piece of some ``kind``, printed by an ``extruder`` (from 1)."""
+
+    first: int
+    last: int
+    kind: str
+    extruder: int | None
+
+
+@dataclass
+class SlicerNotes:
+    """The notes of one archive; ids are those of objects and their components. Empty where no slicer made it."""
+
+    ranges: dict[int, list[Range]] = field(default_factory=dict)
+    kinds: dict[tuple[int, int], str] = field(default_factory=dict)
+    extruders: dict[tuple[int, int], int] = field(default_factory=dict)
+    objects: dict[int, int] = field(default_factory=dict)
+    filaments: list[Color] = field(default_factory=list)
+
+    def helps(self, object_id: int, part_id: int, source: MeshSource) -> bool:
+        """Tell whether a component of an object only helps to print it, with a finding."""
+        kind = self.kinds.get((object_id, part_id), "normal_part")
+        _find_left_out(kind, source)
+        return kind not in _MATTER
+
+    def matter(self, part_id: int, count: int, source: MeshSource) -> np.ndarray:
+        """Return which (F,) of an object's ``count`` triangles are the thing itself, with a finding of what is not."""
+        is_matter = np.ones(count, bool)
+        for each in self.ranges.get(part_id, []):
+            if each.kind not in _MATTER:
+                _find_left_out(each.kind, source)
+                is_matter[each.first : each.last + 1] = False
+        return is_matter
+
+    def colors(self, object_id: int, part_id: int, count: int, default: np.ndarray) -> np.ndarray:
+        """Return the colour (F, 4) uint8 sRGB of each of ``count`` triangles without one of its own: that of its filament."""
+        whole = self.extruders.get((object_id, part_id), self.objects.get(object_id))
+        colors = np.broadcast_to(self._filament(whole, default), (count, 4)).copy()
+        for each in self.ranges.get(part_id, []):
+            if each.extruder is not None:
+                colors[each.first : each.last + 1] = self._filament(each.extruder, default)
+        return colors
+
+    def _filament(self, extruder: int | None, default: np.ndarray) -> np.ndarray:
+        known = extruder is not None and 1 <= extruder <= len(self.filaments)
+        return np.array(self.filaments[extruder - 1], np.uint8) if known and extruder is not None else default
+
+
+def read_notes(package: ThreeMfPackage, source: MeshSource) -> SlicerNotes:
+    """Return what a slicer noted in a package; raises InputError ``unreadable`` where the notes are broken."""
+    notes = SlicerNotes()
+    for name in (_PRUSA_PARTS, _BAMBU_PARTS):
+        text = package.text(name)
+        if text is None:
+            continue
+        root = parse_xml(text, "config", source.name, refusal=partial(InputError, "unreadable"))
+        for each in root.iter("object"):
+            _read_object(each, notes)
+    settings = package.text(_PRUSA_SETTINGS), package.text(_BAMBU_SETTINGS)
+    notes.filaments = _prusa_colors(settings[0]) or _bambu_colors(settings[1], source)
+    return notes
+
+
+def _read_object(element: etree._Element, notes: SlicerNotes) -> None:
+    number = int(element.get("id", "0"))
+    extruder = _metadata(element, "extruder")
+    if extruder is not None:
+        notes.objects[number] = int(extruder)
+    for volume in element.iter("volume"):
+        extruder = _metadata(volume, "extruder")
+        is_modifier = _metadata(volume, "modifier") == "1"  # before PrusaSlicer 1.42
+        kind = _metadata(volume, "volume_type") or ("ParameterModifier" if is_modifier else "ModelPart")
+        piece = Range(
+            max(int(volume.get("firstid", "0")), 0),
+            max(int(volume.get("lastid", "-1")), -1),
+            kind,
+            None if extruder is None else int(extruder),
+        )
+        notes.ranges.setdefault(number, []).append(piece)
+    for part in element.iter("part"):
+        key = number, int(part.get("id", "0"))
+        notes.kinds[key] = part.get("subtype", "normal_part")
+        extruder = _metadata(part, "extruder")
+        if extruder is not None:
+            notes.extruders[key] = int(extruder)
+
+
+def _metadata(element: etree._Element, key: str) -> str | None:
+    """Return a value of an element's own metadata, not of what is within it."""
+    return next((each.get("value") for each in element.iterchildren("metadata") if each.get("key") == key), None)
+
+
+def _prusa_colors(text: bytes | None) -> list[Color]:
+    lines = [] if text is None else text.decode("utf-8", "replace").splitlines()
+    settings = {key.strip("; "): value.strip() for key, _, value in (line.partition("=") for line in lines)}
+    for name in _COLORS_BY:
+        if colors := _colors(settings.get(name, "").split(";")):
+            return colors
+    return []
+
+
+def _bambu_colors(text: bytes | None, source: MeshSource) -> list[Color]:
+    if text is None:
+        return []
+    tree = parse_json(text.decode("utf-8", "replace"), source.name, partial(InputError, "unreadable"))
+    named = tree.get(_COLORS_BY[0]) if isinstance(tree, dict) else None
+    return _colors([str(each) for each in named]) if isinstance(named, list) else []
+
+
+def _colors(texts: list[str]) -> list[Color]:
+    """Return the colours that texts say; none where any says none, for they are counted."""
+    try:
+        return [color_of(text) for text in texts[:_MOST_FILAMENTS] if text.strip()]
+    except ValueError:
+        return []
+
+
+def _find_left_out(kind: str, source: MeshSource) -> None:
+    if kind in _CUT_OUT:
+        source.find(
+            "pieces in it that a slicer cuts out of the thing were left out, and so were the holes that they make"
+        )
+    elif kind not in _MATTER:
+        source.find("pieces in it that only tell a slicer how to print were left out")
