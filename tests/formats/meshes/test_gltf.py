@@ -217,15 +217,6 @@ def test_hostile_documents_are_unreadable_in_one_line(tmp_path: Path, how: str) 
     assert caught.value.detail.startswith("a.gltf: ") and "\n" not in caught.value.detail
 
 
-def test_skinned_mesh_is_refused_as_animated(tmp_path: Path) -> None:
-    maker = Maker()
-    tree = maker.scene(_triangle(maker))
-    tree["skins"] = [{"joints": [0]}]
-    with pytest.raises(InputError) as caught:
-        read_mesh(_save(tmp_path, tree))
-    assert caught.value.reason == "animated"
-
-
 def test_glb_with_a_chunk_longer_than_the_file_is_truncated(tmp_path: Path) -> None:
     (tmp_path / "a.glb").write_bytes(struct.pack("<4sIIII", b"glTF", 2, 10**6, 10**6, 0x4E4F534A) + b"{}")
     with pytest.raises(InputError, match="truncated"):

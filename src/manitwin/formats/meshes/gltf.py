@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
@@ -15,6 +14,7 @@ from manitwin.formats.bounded_file import decode_text
 from manitwin.formats.json_file import parse_json
 from manitwin.formats.meshes.gltf_document import Accessors, GltfMaterials, split_glb, transformed_uv
 from manitwin.formats.meshes.gltf_draco import DRACO, decompress
+from manitwin.formats.meshes.gltf_skin import influences, joint_matrices, posed
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import (
     bake_transform,
@@ -40,7 +40,7 @@ _NAME_CHARACTERS = 200
 def read_gltf(source: MeshSource, binary: bool) -> list[trimesh.Trimesh]:
     """Read the default scene of a glTF 2.0 document into parts in its own frame (metres, Y-up), node transforms baked.
 
-    Raises InputError: ``unreadable``, ``too_large``, ``animated`` (skinned meshes).
+    A mesh that is bound to a skeleton is taken in the pose that the file holds. Raises InputError: ``unreadable``, ``too_large``.
     """
     with source.reading("glTF"):
         return _scene_parts(source, binary)
@@ -56,8 +56,18 @@ def _scene_parts(source: MeshSource, binary: bool) -> list[trimesh.Trimesh]:
     reader = _Primitives(tree, accessors, materials, source)
     parts: list[trimesh.Trimesh] = []
     faces = vertices = 0
-    for mesh_index, matrix in _instances(tree, source):
-        for part in reader.parts(mesh_index):
+    placed = _placed_nodes(tree, source)
+    for number, matrix in placed.items():
+        node = tree["nodes"][number]
+        if "mesh" not in node:
+            continue
+        if "skin" in node:
+            source.find("it is bound to a skeleton; it was taken in the pose that the file holds")
+            joints = joint_matrices(tree, node["skin"], placed, accessors, source)
+            found, matrix = reader.posed_parts(node["mesh"], joints), np.eye(4)  # its own node does not move it
+        else:
+            found = reader.parts(node["mesh"])
+        for part in found:
             faces += len(part.faces)
             source.check_faces(faces)
             if vertices + len(part.vertices) > source.limits.max_vertices:
@@ -100,14 +110,12 @@ def _check_document(tree: dict[str, Any], source: MeshSource) -> None:
         raise source.unreadable(
             f"it requires {', '.join(unknown)[:120]}", "export it without compression or extensions"
         )
-    if tree.get("skins"):
-        raise source.refused("animated", "the mesh is bound to a skeleton", "apply the pose and export a still mesh")
     if tree.get("animations"):
         source.find("the file is animated; its rest pose was taken")
 
 
-def _instances(tree: dict[str, Any], source: MeshSource) -> Iterator[tuple[Any, np.ndarray]]:
-    """Yield every mesh of the default scene with its node's transform to the scene ``(4, 4)``."""
+def _placed_nodes(tree: dict[str, Any], source: MeshSource) -> dict[int, np.ndarray]:
+    """Return the transform ``(4, 4)`` to the scene of every node of the default scene, each after those that hold it."""
     nodes = tree.get("nodes", [])
     scenes = tree.get("scenes", [])
     default = tree.get("scene", 0)
@@ -117,19 +125,18 @@ def _instances(tree: dict[str, Any], source: MeshSource) -> Iterator[tuple[Any, 
         children = {child for node in nodes for child in node.get("children", [])}
         roots = [index for index in range(len(nodes)) if index not in children]
     stack = [(root, np.eye(4)) for root in reversed(roots)]
-    seen: set[Any] = set()
+    placed: dict[int, np.ndarray] = {}
     while stack:
         index, parent = stack.pop()
-        if not isinstance(index, int) or not 0 <= index < len(nodes) or index in seen:
+        if not isinstance(index, int) or not 0 <= index < len(nodes) or index in placed:
             # section 3.5.2: nodes form strict trees; anything else would never end
             raise source.unreadable("its nodes form no tree", "export it again")
-        seen.add(index)
         node = nodes[index]
         with np.errstate(all="ignore"):  # what overflows is found where vertices are checked
             matrix = parent @ _local_matrix(node, source)
-        if "mesh" in node:
-            yield node["mesh"], matrix
+        placed[index] = matrix
         stack.extend((child, matrix) for child in reversed(node.get("children", [])))
+    return placed
 
 
 def _local_matrix(node: dict[str, Any], source: MeshSource) -> np.ndarray:
@@ -154,16 +161,21 @@ class _Primitives:
         self._primitives = self._face_count = self._vertex_count = 0
 
     def parts(self, index: Any) -> list[trimesh.Trimesh]:
+        """Return the parts of a mesh in its own frame."""
+        if index not in self._parts:
+            self._parts[index] = self.posed_parts(index, None)
+        return self._parts[index]
+
+    def posed_parts(self, index: Any, joints: np.ndarray | None) -> list[trimesh.Trimesh]:
+        """Return the parts of a mesh in the scene as ``joints`` (J, 4, 4) move it, or in its own frame without."""
         meshes = self._tree.get("meshes", [])
         if not isinstance(index, int) or not 0 <= index < len(meshes):
             raise self._source.unreadable(f"a node names mesh {str(index)[:20]}, which is not there", "export it again")
-        if index not in self._parts:
-            name = str(meshes[index].get("name") or f"mesh_{index}")[:_NAME_CHARACTERS]
-            built = [self._part(primitive, name) for primitive in meshes[index].get("primitives", [])]
-            self._parts[index] = [part for part in built if part is not None]
-        return self._parts[index]
+        name = str(meshes[index].get("name") or f"mesh_{index}")[:_NAME_CHARACTERS]
+        built = [self._part(primitive, name, joints) for primitive in meshes[index].get("primitives", [])]
+        return [part for part in built if part is not None]
 
-    def _part(self, primitive: dict[str, Any], name: str) -> trimesh.Trimesh | None:
+    def _part(self, primitive: dict[str, Any], name: str, joints: np.ndarray | None) -> trimesh.Trimesh | None:
         mode = primitive.get("mode", 4)
         if mode not in (4, 5, 6):
             self._source.find("points or lines in it were left out")
@@ -197,6 +209,9 @@ class _Primitives:
             uv = np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])  # to the origin at the lower left
         normals = self._rows(attributes, "NORMAL", 3, count)
         normals = None if normals is None else normals[used]
+        if joints is not None:
+            bound, shares = influences(attributes, self._accessors, count, self._source)
+            vertices, normals = posed(vertices, normals, (bound[used], shares[used]), joints, self._source)
         part = make_part(vertices, faces, material=material, name=name, uv=uv, normals=normals)
         colors = self._rows(attributes, "COLOR_0", 3, count)
         if colors is None or material.baseColorTexture is not None:
