@@ -130,6 +130,30 @@ def test_layers_of_properties_show_the_top_one(tmp_path: Path) -> None:
     assert _colors(_read(tmp_path, archive(model(resources)))) == [(0, 0, 255)]
 
 
+def test_mixtures_of_materials_have_the_mean_of_their_colours(tmp_path: Path) -> None:
+    resources = (
+        '<basematerials id="7"><base name="a" displaycolor="#FF0000"/><base name="b" displaycolor="#0000FF"/></basematerials>'
+        '<m:compositematerials id="9" matid="7" matindices="0 1"><m:composite values="1 0"/><m:composite values="2 2"/>'
+        "</m:compositematerials>" + mesh_object(1, BOX, properties=['pid="9" p1="1"'] * 12)
+    )
+    assert _colors(_read(tmp_path, archive(model(resources)))) == [(55, 0, 55)]
+
+
+def test_colours_and_places_that_are_not_there_are_told_and_grey(tmp_path: Path) -> None:
+    resources = (
+        '<m:colorgroup id="7"><m:color color="#FF0000"/></m:colorgroup><m:texture2dgroup id="8" texid="6">'
+        '<m:tex2coord u="0" v="0"/></m:texture2dgroup>'
+        + mesh_object(1, BOX, properties=['pid="7" p1="0"'] * 4 + ['pid="7" p1="4"'] * 4 + ['pid="8" p1="1"'] * 4)
+    )
+    read = _read(tmp_path, archive(model(resources)))
+    by_color = {color: len(part.faces) for color, part in zip(_colors(read), read.parts, strict=True)}
+    assert by_color == {(255, 0, 0): 4, (204, 204, 204): 8}
+    assert sorted(read.findings) == [
+        "colours that triangles in it name are not there; what has them is grey",
+        "texture coordinates that triangles in it name are not there; what has them is grey",
+    ]
+
+
 PRUSA = (
     '<config><object id="1" instances_count="1"><metadata type="object" key="extruder" value="1"/>'
     '<volume firstid="0" lastid="11"><metadata type="volume" key="volume_type" value="ModelPart"/></volume>'

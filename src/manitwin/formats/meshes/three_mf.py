@@ -113,7 +113,7 @@ class _Reader:
         """Yield the parts of an object's own triangles: one for each texture and each colour."""
         count = len(found.triangles)
         is_matter = self._notes.matter(number, count, self._source)
-        textured = is_matter & np.isin(found.groups, list(model.texture_coordinates))
+        textured = is_matter & _has_texture(found, model, self._source)
         for group in np.unique(found.groups[textured]):
             some = np.flatnonzero(textured & (found.groups == group))
             yield _textured(found, some, int(group), model, self._package, self._source)
@@ -154,15 +154,17 @@ def _colors(
         some = found.groups[triangles] == group
         table = model.colors.get(int(group))
         if table is None:
-            if group != NONE:
+            if group != NONE and int(group) not in model.texture_coordinates:
                 source.find("properties in it are of no kind that is read; what has them is grey")
             continue
         corners = found.corners[triangles[some]]
-        if corners.min() < 0 or corners.max() >= len(table):
-            raise source.unreadable("a triangle names a colour that is not there", "export it again")
-        colors[some] = table[corners]
+        is_there = ((corners >= 0) & (corners < len(table))).all(axis=1)
+        if not is_there.all():
+            source.find("colours that triangles in it name are not there; what has them is grey")
+        some = np.flatnonzero(some)[is_there]
+        colors[some] = table[corners[is_there]]
         if model.names[int(group)]:
-            names[some] = corners[:, 0]
+            names[some] = corners[is_there, 0]
     return colors, names
 
 
@@ -172,13 +174,23 @@ def _plain(color: np.ndarray, name: str | None) -> PBRMaterial:
     return pbr_material(name, base_color=(*linear, alpha), alpha_mode="BLEND" if alpha < 1 else None)
 
 
+def _has_texture(found: ModelObject, model: Model, source: MeshSource) -> np.ndarray:
+    """Return which (F,) of an object's triangles have texture coordinates."""
+    textured = np.zeros(len(found.groups), bool)
+    for group, (_, places) in model.texture_coordinates.items():
+        some = found.groups == group
+        is_there = ((found.corners >= 0) & (found.corners < len(places))).all(axis=1)
+        if (some & ~is_there).any():
+            source.find("texture coordinates that triangles in it name are not there; what has them is grey")
+        textured |= some & is_there
+    return textured
+
+
 def _textured(
     found: ModelObject, triangles: np.ndarray, group: int, model: Model, package: ThreeMfPackage, source: MeshSource
 ) -> trimesh.Trimesh:
     texture, places = model.texture_coordinates[group]
     corners = found.corners[triangles].reshape(-1)
-    if corners.min() < 0 or corners.max() >= len(places):
-        raise source.unreadable("a triangle names a texture coordinate that is not there", "export it again")
     name = model.textures.get(texture)
     data = None if name is None else package.texture(name)
     image = None if data is None or name is None else decode_texture(data, name, source)

@@ -102,7 +102,8 @@ class _Walker:
             "object": self._object, "vertex": self._vertex, "triangle": self._triangle, "component": self._component,
             "item": self._item, "basematerials": self._colors, "base": self._base, "colorgroup": self._colors,
             "color": self._color, "texture2d": self._texture, "texture2dgroup": self._coordinates,
-            "tex2coord": self._coordinate, "multiproperties": self._several, "multi": self._one_of_several,
+            "tex2coord": self._coordinate, "compositematerials": self._mixtures, "composite": self._mixture,
+            "multiproperties": self._several, "multi": self._one_of_several,
         }  # fmt: skip
         self._group = NONE
         self._rows: list[tuple[int, ...]] = []
@@ -116,15 +117,13 @@ class _Walker:
             self.model.unit = attributes.get("unit", "millimeter")
         elif tag == "beamlattice":
             self._source.find("its lattice of beams is no mesh, and was left out")
-        elif tag == "compositematerials":
-            self._source.find("mixtures of materials in it are not read; what has them is grey")
         elif (element := self._elements.get(tag)) is not None:
             element(attributes)
 
     def end(self, tag: str) -> None:
         if tag == "object":
             self._close_object()
-        elif tag in ("basematerials", "colorgroup"):
+        elif tag in ("basematerials", "colorgroup", "compositematerials"):
             self.model.colors[self._group] = np.array(self._rows or [_WHITE], np.uint8)
         elif tag == "texture2dgroup":
             texture, _ = self.model.texture_coordinates[self._group]
@@ -199,6 +198,21 @@ class _Walker:
 
     def _color(self, attributes: Mapping[str, str]) -> None:
         self._rows.append(color_of(attributes["color"]))
+
+    def _mixtures(self, attributes: Mapping[str, str]) -> None:
+        self._colors(attributes)
+        of = self.model.colors.get(int(attributes["matid"]), np.array([_WHITE], np.uint8))
+        places = np.array(attributes["matindices"].split(), np.int64)
+        self._mixed = of[np.clip(places, 0, len(of) - 1)]
+
+    def _mixture(self, attributes: Mapping[str, str]) -> None:
+        """The colour of a mixture is the mean of its materials' by their shares."""
+        shares = np.zeros(len(self._mixed))
+        given = np.array(attributes["values"].split(), np.float64)[: len(shares)]
+        shares[: len(given)] = given
+        if not (np.isfinite(shares).all() and shares.sum() > 0):
+            raise ValueError("a mixture of nothing")
+        self._rows.append(tuple(np.round(shares @ self._mixed / shares.sum()).clip(0, 255).astype(int).tolist()))
 
     def _texture(self, attributes: Mapping[str, str]) -> None:
         self.model.textures[int(attributes["id"])] = attributes["path"]
