@@ -109,8 +109,8 @@ def test_bad_shared_inputs_are_refused(shared_data: Path, name: str, reason: str
     assert caught.value.detail.startswith(name) and "\n" not in caught.value.detail
 
 
-@pytest.mark.parametrize("content", [b"", b"ISO-10303-21;\nHEADER;", b"PK\3\4" + bytes(60)])
-@pytest.mark.parametrize("name", ["thing.step", "a.zip", "robot.URDF", "clip.mp4"])
+@pytest.mark.parametrize("content", [b"", b"(: exchange of the product model", b"PK\3\4" + bytes(60)])
+@pytest.mark.parametrize("name", ["thing.iges", "a.zip", "robot.URDF", "clip.mp4"])
 def test_single_file_is_refused_with_the_reason_of_a_folder(tmp_path: Path, name: str, content: bytes) -> None:
     path = tmp_path / name
     path.write_bytes(content)

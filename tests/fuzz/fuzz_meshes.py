@@ -24,6 +24,7 @@ from manitwin.formats.packed_source import pack_source
 from manitwin.pipeline.folder_listing import list_folder
 from manitwin.pipeline.item import Item, twin_id
 from skinned_document import bound_bar
+from step_document import step_box
 from three_mf_archive import archive, mesh_object, model
 
 USDA = """#usda 1.0
@@ -271,6 +272,10 @@ def read_three_mf(case: Case) -> None:
     read(Case(case.folder, case.folder / "whole.3mf"))
 
 
+def step(folder: Path) -> None:
+    (folder / "box.step").write_text(step_box((10, 20, 30), "inch"))
+
+
 def draco(folder: Path) -> None:
     data = compressed_ball()
     write_glb_of(folder / "ball.glb", document_of_ball(data), data)
@@ -279,6 +284,7 @@ def draco(folder: Path) -> None:
 target("msh", msh, read)
 target("off", off, read)
 target("3mf", three_mf, read_three_mf)
+target("step", step, read, weight=0.3)
 target("draco", draco, read, weight=0.1)
 target("dae", dae, read, files=("*.dae",), weight=0.5)
 target("usdz", usdz, read, weight=0.3)

@@ -16,12 +16,13 @@ from manitwin.formats.json_file import MAX_JSON_BYTES, parse_json
 from manitwin.formats.printable import printable_line
 
 IMAGE_FORMATS = ("png", "jpeg", "gif", "webp", "tiff", "bmp", "avif")
-MESH_FORMATS = ("glb", "gltf", "obj", "ply", "stl", "dae", "usdz", "3mf", "msh", "off")
+MESH_FORMATS = ("glb", "gltf", "obj", "ply", "stl", "dae", "usdz", "3mf", "step", "msh", "off")
 
 _HEAD_BYTES = 65536
 MSH_HEADER_BYTES = 16
 OFF_KEYWORD = re.compile(r"(ST)?(C)?(N)?(4)?(n)?OFF(?=[\d\s])")
 """How OFF begins; its vertices have texture coordinates, colours, normals, a fourth coordinate, any number of coordinates."""
+_STEP_BEGINS = "ISO-10303-21"
 _NAME_CHARACTERS = 200
 _OBJ_KEYWORDS = frozenset(
     {"v", "vt", "vn", "vp", "f", "l", "p", "o", "g", "s", "mg", "usemtl", "mtllib", "usemap", "maplib", "cstype", "deg"}
@@ -51,7 +52,7 @@ NOT_READ = {
     **dict.fromkeys((".heic", ".heif"), HEIC_NOT_READ),
     **dict.fromkeys((".urdf", ".sdf", ".xacro", ".usd", ".usda", ".usdc"), _IMPORT),
     **dict.fromkeys((".dng", ".nef", ".cr2", ".cr3", ".arw", ".orf", ".rw2", ".raf", ".pef"), _CAMERA_RAW),
-    **dict.fromkeys((".fbx", ".blend", ".3ds", ".max", ".step", ".stp", ".iges", ".igs", ".x3d"), _EXPORT),
+    **dict.fromkeys((".fbx", ".blend", ".3ds", ".max", ".iges", ".igs", ".x3d"), _EXPORT),
     **dict.fromkeys((".abc", ".wrl", ".ma", ".mb", ".c4d", ".skp", ".drc", ".vrm", ".fcstd", ".sldprt"), _EXPORT),
     **dict.fromkeys((".mp4", ".mov", ".avi", ".mkv", ".webm", ".m4v"), _VIDEO),
     **dict.fromkeys((".tga", ".dds", ".exr", ".hdr", ".psd", ".svg", ".jxl", ".jp2", ".ktx", ".ktx2", ".ico"), _IMAGE),
@@ -148,6 +149,8 @@ def _mesh_format(head: bytes, size: int, suffix: str, stream: BinaryIO) -> str |
         return "stl"
     if start.startswith("<") and re.search(r"<(\w+:)?COLLADA[\s>]", start):
         return "dae"
+    if start.startswith(_STEP_BEGINS):
+        return "step"
     if OFF_KEYWORD.match(start):
         return "off"
     if start.startswith("{") and _is_gltf(start, size, stream):

@@ -37,17 +37,17 @@ _KNOWN_REQUIRED = (
 _NAME_CHARACTERS = 200
 
 
-def read_gltf(source: MeshSource, binary: bool) -> list[trimesh.Trimesh]:
+def read_gltf(source: MeshSource, binary: bool, *, data: bytes | None = None) -> list[trimesh.Trimesh]:
     """Read the default scene of a glTF 2.0 document into parts in its own frame (metres, Y-up), node transforms baked.
 
-    A mesh that is bound to a skeleton is taken in the pose that the file holds. Raises InputError: ``unreadable``, ``too_large``.
+    ``data`` is the document itself where it is not the file's. A mesh that is bound to a skeleton is taken in the pose that the
+    file holds. Raises InputError: ``unreadable``, ``too_large``.
     """
     with source.reading("glTF"):
-        return _scene_parts(source, binary)
+        return _scene_parts(source, binary, source.data() if data is None else data)
 
 
-def _scene_parts(source: MeshSource, binary: bool) -> list[trimesh.Trimesh]:
-    data = source.data()
+def _scene_parts(source: MeshSource, binary: bool, data: bytes) -> list[trimesh.Trimesh]:
     text, chunk = split_glb(data, source) if binary else (data, None)
     tree = _parse(text, source)
     _check_document(tree, source)

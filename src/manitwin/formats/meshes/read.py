@@ -16,6 +16,7 @@ from manitwin.formats.meshes.obj import read_obj
 from manitwin.formats.meshes.off import read_off
 from manitwin.formats.meshes.ply import read_ply
 from manitwin.formats.meshes.source import MeshLimits, MeshSource
+from manitwin.formats.meshes.step import read_step
 from manitwin.formats.meshes.stl import read_stl
 from manitwin.formats.meshes.three_mf import read_three_mf
 from manitwin.formats.meshes.triangles import has_one_false_normal, shaded, without_normals
@@ -30,6 +31,7 @@ _SUFFIXES = {
     "dae": (".dae",),
     "usdz": (".usdz",),
     "3mf": (".3mf",),
+    "step": (".step", ".stp", ".p21"),
     "msh": (".msh",),
     "off": (".off",),
 }
@@ -101,6 +103,8 @@ def _read(format: str, source: MeshSource) -> tuple[list[trimesh.Trimesh], float
         return _read_usdz(source)
     if format == "3mf":
         return *read_three_mf(source), None
+    if format == "step":
+        return read_step(source), 1.0, None
     readers = {"obj": read_obj, "ply": read_ply, "stl": read_stl, "msh": read_msh, "off": read_off}
     return readers[format](source), None, None
 

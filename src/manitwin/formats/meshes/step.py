@@ -1,0 +1,47 @@
+"""Solids of CAD programs in STEP (ISO 10303-21), whose exact surfaces OpenCASCADE turns into triangles."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+import trimesh
+
+from manitwin.formats.isolated import Limits, ProcessCrashed, run_isolated
+from manitwin.formats.meshes.gltf import read_gltf
+from manitwin.formats.meshes.source import MeshSource
+
+INSTALL = "pip install 'manitwin[cad]'"
+DEFLECTION_MM, ANGLE_RAD = 0.05, 0.2
+"""How far a triangle may lie off its surface, and how far two along it may turn: 32 sides to a round hole."""
+_LIMITS = Limits(seconds=600.0)
+
+
+def read_step(source: MeshSource) -> list[trimesh.Trimesh]:
+    """Read the solids of a STEP file into parts in its own axes, in metres whatever its unit is, with its colours.
+
+    Raises InputError ``wrong_type`` where what ``manitwin[cad]`` installs is missing, ``unreadable``, ``too_large``.
+    """
+    if find_spec("cascadio") is None:
+        raise source.refused("wrong_type", "what reads STEP is not installed", f"{INSTALL}, or export it as glTF 2.0")
+    try:
+        glb = run_isolated(f"{__name__}:triangulated", source.data(), limits=_LIMITS)
+    except ProcessCrashed as error:
+        cause = f"OpenCASCADE crashes on it, or takes more than {_LIMITS.seconds:g} s"
+        raise source.unreadable(cause, "export it as glTF 2.0") from error
+    if not glb:
+        raise source.unreadable("its STEP is broken, or holds no solid or surface", "export it again")
+    return read_gltf(source, binary=True, data=glb)
+
+
+def triangulated(data: bytes) -> bytes:
+    """Return the GLB of a STEP file's content, in metres and in its own axes; empty where nothing in it can be read.
+
+    To be run in a process of its own: OpenCASCADE prints to its output, and crashes on some broken files.
+    """
+    import cascadio
+
+    try:
+        glb: bytes = cascadio.load(data, tol_linear=DEFLECTION_MM, tol_angular=ANGLE_RAD, use_parallel=False)
+    except (RuntimeError, ValueError):
+        return b""
+    return glb
