@@ -23,6 +23,7 @@ from manitwin.formats.meshes.read import read_mesh
 from manitwin.formats.packed_source import pack_source
 from manitwin.pipeline.folder_listing import list_folder
 from manitwin.pipeline.item import Item, twin_id
+from meshopt_document import compressed_document
 from skinned_document import bound_bar
 from step_document import step_box
 from three_mf_archive import archive, mesh_object, model
@@ -127,6 +128,7 @@ def gltf(folder: Path) -> None:
     document["nodes"][-1] |= {"rotation": [0.0, 0.0, 0.0, 1.0], "scale": [1.0, 2.0, 1.0], "children": []}
     (folder / "more.gltf").write_text(json.dumps(document))
     (folder / "bound.gltf").write_text(json.dumps(bound_bar()[0]))
+    (folder / "compressed.gltf").write_text(json.dumps(compressed_document("exponential")))
 
 
 def obj(folder: Path) -> None:

@@ -12,8 +12,10 @@ from scipy.spatial.transform import Rotation
 from manitwin.errors import InputError
 from manitwin.formats.bounded_file import decode_text
 from manitwin.formats.json_file import parse_json
-from manitwin.formats.meshes.gltf_document import Accessors, GltfMaterials, split_glb, transformed_uv
+from manitwin.formats.meshes.gltf_document import Accessors, split_glb
 from manitwin.formats.meshes.gltf_draco import DRACO, decompress
+from manitwin.formats.meshes.gltf_materials import GltfMaterials, transformed_uv
+from manitwin.formats.meshes.gltf_meshopt import MESHOPT
 from manitwin.formats.meshes.gltf_skin import influences, joint_matrices, posed
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import (
@@ -30,6 +32,7 @@ _KNOWN_REQUIRED = (
     "KHR_materials_",
     "KHR_mesh_quantization",
     DRACO,
+    MESHOPT,
     "KHR_lights_punctual",
     "EXT_texture_webp",
     "KHR_xmp",

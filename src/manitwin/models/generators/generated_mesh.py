@@ -27,10 +27,10 @@ MAX_TEXTURE_PX = 8192  # the largest that generators make; the mesh stage brings
 def flaw(path: Path) -> str | None:
     """Return why a mesh file cannot be used, None where it can.
 
-    It is read as the mesh stage reads it, and repaired with its default settings: unreadable, truncated or compressed
-    files, meshes without faces, with coordinates that are not finite, without extent or volume, and those that no repair
-    closes to a watertight solid, or only by leaving most of the surface out. An open sheet that repair can give a wall to
-    (a bowl without thickness) is not refused.
+    It is read as the mesh stage reads it, and repaired with its default settings: unreadable or truncated files, meshes without
+    faces, with coordinates that are not finite, without extent or volume, and those that no repair closes to a watertight
+    solid, or only by leaving most of the surface out. An open sheet that repair can give a wall to (a bowl without thickness)
+    is not refused.
     """
     try:
         parts = read_mesh(path).parts

@@ -27,7 +27,7 @@ URL = "https://api.tripo3d.ai/v2/openapi"
 KEYS = ("TRIPO_API_KEY",)
 DEFAULT_MODEL = "v2.5-20250123"
 SEEDS = 1 << 31
-# Tripo makes FBX of the first, compressed meshes (meshopt) of the second, and no textures with the third
+# Tripo makes FBX of the first, quantised meshes of the second, and no textures with the third
 UNREADABLE = ("quad", "compress", "generate_parts")
 # docs.tripo3d.ai/get-started/pricing.html, as stored in November 2026: an image to a textured model (a text costs 10
 # credits less); "H2 / H3" there are the versions v2 and v3. $1 is 100 credits.
