@@ -16,6 +16,7 @@ from trimesh.visual import TextureVisuals
 
 from collada_document import DOCUMENT
 from draco_document import compressed_ball, document_of_ball, write_glb_of
+from fbx_document import fbx_box
 from handmade import visual
 from manitwin.errors import InputError
 from manitwin.formats.glb import write_glb
@@ -278,6 +279,11 @@ def step(folder: Path) -> None:
     (folder / "box.step").write_text(step_box((10, 20, 30), "inch"))
 
 
+def fbx(folder: Path) -> None:
+    (folder / "picture.png").write_bytes(picture())
+    (folder / "box.fbx").write_text(fbx_box(texture="picture.png"))
+
+
 def draco(folder: Path) -> None:
     data = compressed_ball()
     write_glb_of(folder / "ball.glb", document_of_ball(data), data)
@@ -287,6 +293,7 @@ target("msh", msh, read)
 target("off", off, read)
 target("3mf", three_mf, read_three_mf)
 target("step", step, read, weight=0.3)
+target("fbx", fbx, read, files=("*.fbx",), weight=0.3)
 target("draco", draco, read, weight=0.1)
 target("dae", dae, read, files=("*.dae",), weight=0.5)
 target("usdz", usdz, read, weight=0.3)

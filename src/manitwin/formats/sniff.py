@@ -16,13 +16,15 @@ from manitwin.formats.json_file import MAX_JSON_BYTES, parse_json
 from manitwin.formats.printable import printable_line
 
 IMAGE_FORMATS = ("png", "jpeg", "gif", "webp", "tiff", "bmp", "avif")
-MESH_FORMATS = ("glb", "gltf", "obj", "ply", "stl", "dae", "usdz", "3mf", "step", "msh", "off")
+MESH_FORMATS = ("glb", "gltf", "obj", "ply", "stl", "dae", "usdz", "3mf", "step", "fbx", "msh", "off")
 
 _HEAD_BYTES = 65536
 MSH_HEADER_BYTES = 16
 OFF_KEYWORD = re.compile(r"(ST)?(C)?(N)?(4)?(n)?OFF(?=[\d\s])")
 """How OFF begins; its vertices have texture coordinates, colours, normals, a fourth coordinate, any number of coordinates."""
 _STEP_BEGINS = "ISO-10303-21"
+FBX_BINARY, FBX_TEXT = b"Kaydara FBX Binary  ", re.compile(r"; *FBX (\d{1,2})\.(\d)\.\d+ project file")
+"""How an FBX file begins, as bytes and as text with its version."""
 _NAME_CHARACTERS = 200
 _OBJ_KEYWORDS = frozenset(
     {"v", "vt", "vn", "vp", "f", "l", "p", "o", "g", "s", "mg", "usemtl", "mtllib", "usemap", "maplib", "cstype", "deg"}
@@ -52,7 +54,7 @@ NOT_READ = {
     **dict.fromkeys((".heic", ".heif"), HEIC_NOT_READ),
     **dict.fromkeys((".urdf", ".sdf", ".xacro", ".usd", ".usda", ".usdc"), _IMPORT),
     **dict.fromkeys((".dng", ".nef", ".cr2", ".cr3", ".arw", ".orf", ".rw2", ".raf", ".pef"), _CAMERA_RAW),
-    **dict.fromkeys((".fbx", ".blend", ".3ds", ".max", ".iges", ".igs", ".x3d"), _EXPORT),
+    **dict.fromkeys((".blend", ".3ds", ".max", ".iges", ".igs", ".x3d"), _EXPORT),
     **dict.fromkeys((".abc", ".wrl", ".ma", ".mb", ".c4d", ".skp", ".drc", ".vrm", ".fcstd", ".sldprt"), _EXPORT),
     **dict.fromkeys((".mp4", ".mov", ".avi", ".mkv", ".webm", ".m4v"), _VIDEO),
     **dict.fromkeys((".tga", ".dds", ".exr", ".hdr", ".psd", ".svg", ".jxl", ".jp2", ".ktx", ".ktx2", ".ico"), _IMAGE),
@@ -135,6 +137,8 @@ def _mesh_format(head: bytes, size: int, suffix: str, stream: BinaryIO) -> str |
         return "usdz"
     if head.startswith(b"PK\x03\x04") and (suffix == ".3mf" or _holds_model(size, stream)):
         return "3mf"
+    if head.startswith(FBX_BINARY):
+        return "fbx"
     # a binary STL has no magic: 80 free bytes, a count, 50 bytes a triangle; its free bytes may even begin with "solid"
     if size >= 84 and size == 84 + 50 * int.from_bytes(head[80:84], "little"):
         return "stl"
@@ -149,6 +153,8 @@ def _mesh_format(head: bytes, size: int, suffix: str, stream: BinaryIO) -> str |
         return "stl"
     if start.startswith("<") and re.search(r"<(\w+:)?COLLADA[\s>]", start):
         return "dae"
+    if FBX_TEXT.match(start):
+        return "fbx"
     if start.startswith(_STEP_BEGINS):
         return "step"
     if OFF_KEYWORD.match(start):

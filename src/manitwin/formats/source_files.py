@@ -19,7 +19,7 @@ from manitwin.formats.bounded_file import open_regular, read_bytes
 from manitwin.formats.json_file import parse_json
 
 MESH_SUFFIXES = frozenset(
-    {".glb", ".gltf", ".obj", ".ply", ".stl", ".dae", ".usdz", ".3mf", ".step", ".stp", ".msh", ".off"}
+    {".glb", ".gltf", ".obj", ".ply", ".stl", ".dae", ".usdz", ".3mf", ".step", ".stp", ".fbx", ".msh", ".off"}
 )
 IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".webp", ".gif", ".bmp", ".tif", ".tiff", ".avif"})
 MAX_TEXT_BYTES = 512 * 1024 * 1024

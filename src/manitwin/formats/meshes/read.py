@@ -10,6 +10,7 @@ import trimesh
 
 from manitwin.formats.isolated import ProcessCrashed, run_isolated
 from manitwin.formats.meshes.dae import read_dae
+from manitwin.formats.meshes.fbx import read_fbx
 from manitwin.formats.meshes.gltf import read_gltf
 from manitwin.formats.meshes.msh import read_msh
 from manitwin.formats.meshes.obj import read_obj
@@ -31,6 +32,7 @@ _SUFFIXES = {
     "dae": (".dae",),
     "usdz": (".usdz",),
     "3mf": (".3mf",),
+    "fbx": (".fbx",),
     "step": (".step", ".stp", ".p21"),
     "msh": (".msh",),
     "off": (".off",),
@@ -103,6 +105,8 @@ def _read(format: str, source: MeshSource) -> tuple[list[trimesh.Trimesh], float
         return _read_usdz(source)
     if format == "3mf":
         return *read_three_mf(source), None
+    if format == "fbx":
+        return read_fbx(source), 1.0, "y"
     if format == "step":
         return read_step(source), 1.0, None
     readers = {"obj": read_obj, "ply": read_ply, "stl": read_stl, "msh": read_msh, "off": read_off}
