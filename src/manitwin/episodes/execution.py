@@ -16,6 +16,7 @@ from manitwin.episodes.joint_targets import JointTargets, hand_share
 from manitwin.episodes.planning.problem import Grasp, Motion, Phase
 from manitwin.episodes.recorder import Recorder
 from manitwin.episodes.recording import RATE_HZ, Recording
+from manitwin.episodes.step_speeds import StepSpeeds
 from manitwin.geometry.poses import inverse
 from manitwin.physics.sapien.contacts import NONE_MEANT, ROBOT_NAME, MeantContacts, Touches
 from manitwin.physics.sapien.controls.control import control_of
@@ -75,6 +76,7 @@ class Execution:
         self._last_poses = deque([self._poses()], maxlen=REST_ROWS)
         self._last_pressing = deque[frozenset[frozenset[str]]](maxlen=STILL_ROWS)
         touches = self._take_touches(world.contacts.read())
+        self._speeds = StepSpeeds(world, closing.timestep_s)
         self._recorder = Recorder(world, touches, self._hands_state)
 
     def use(self, arm: int) -> None:
@@ -264,14 +266,15 @@ class Execution:
 
     def _advance(self, phase: Phase) -> None:
         ends_row = (self.steps + 1) % self._steps_per_row == 0
-        before = self._joint_positions() if ends_row else None
+        if ends_row:
+            self._speeds.begin()
         self._world.step()
         self.steps += 1
-        if before is not None or self.steps % self._steps_per_look == 0:
+        if ends_row or self.steps % self._steps_per_look == 0:
             contacts = self._world.contacts.read()
             self._watch(phase, contacts)
-            if before is not None:
-                self._record(phase, before, contacts)
+            if ends_row:
+                self._record(phase, contacts)
 
     def _watch(self, phase: Phase, contacts: Sequence[physx.PhysxContact]) -> None:
         for arm in self._arms:
@@ -283,17 +286,14 @@ class Execution:
         self.unplanned.update(unplanned)
         self._unplanned_since_row = self._unplanned_since_row or bool(unplanned)
 
-    def _record(
-        self, phase: Phase, joint_positions_before_rad: np.ndarray, contacts: Sequence[physx.PhysxContact]
-    ) -> None:
-        """Add a row. Speeds are those of the last step: PhysX's are those at its end, where stiff drives have slowed down."""
-        velocities = (self._joint_positions() - joint_positions_before_rad) / self._closing.timestep_s
+    def _record(self, phase: Phase, contacts: Sequence[physx.PhysxContact]) -> None:
+        """Add a row; speeds are those of the last step."""
         self._recorder.add(
             np.concatenate([arm.commanded_rad for arm in self._arms]),
             np.concatenate([arm.told for arm in self._arms]),
             self._hands_state,
             phase,
-            velocities,
+            self._speeds.end(),
             self._take_touches(contacts),
             unplanned=self._unplanned_since_row,
             literal=self.literal,
@@ -309,9 +309,6 @@ class Execution:
     @property
     def _hands_state(self) -> np.ndarray:
         return np.concatenate([arm.hand.state for arm in self._arms])
-
-    def _joint_positions(self) -> np.ndarray:
-        return np.concatenate([robot.joint_positions() for robot in self._world.robots])
 
     def _take_touches(self, contacts: Sequence[physx.PhysxContact]) -> Touches:
         """Take down what the fingers of the arm that is used touch; return what those of all do."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from manitwin.episodes.planning.problem import Phase
 from manitwin.episodes.recording import Recording
+from manitwin.episodes.step_speeds import Speeds
 from manitwin.geometry.poses import quaternion_wxyz, without_sign_changes
 from manitwin.physics.sapien.contacts import Touches
 from manitwin.physics.sapien.world import RobotWorld
@@ -21,8 +22,8 @@ class _State(NamedTuple):
     tips_to_world: np.ndarray
     object_positions_m: list[np.ndarray]
     object_quaternions_wxyz: list[np.ndarray]
-    object_linear_velocities_m_s: list[np.ndarray]
-    object_angular_velocities_rad_s: list[np.ndarray]
+    object_linear_velocities_m_s: np.ndarray
+    object_angular_velocities_rad_s: np.ndarray
     granule_positions_m: np.ndarray | None
 
 
@@ -40,7 +41,12 @@ class Recorder:
         """Take the first state; ``hand (h,)`` is that of the hand."""
         self._world = world
         joints = sum(len(each.robot.arm_joints) for each in world.robots)
-        self._states: list[_State] = [self._state(np.zeros(joints), hand)]
+        at_rest = Speeds(  # nothing is held yet
+            np.zeros(joints),
+            np.array([body.linear_velocity for body in world.bodies]),
+            np.array([body.angular_velocity for body in world.bodies]),
+        )
+        self._states: list[_State] = [self._state(at_rest, hand)]
         self._touches, self._unplanned, self._actions = [touches], [False], list[_Action]()
 
     def add(
@@ -49,15 +55,15 @@ class Recorder:
         hand_told: np.ndarray,
         hand: np.ndarray,
         phase: Phase,
-        joint_velocities_rad_s: np.ndarray,
+        speeds: Speeds,
         touches: Touches,
         *,
         unplanned: bool,
         literal: int | None = None,
     ) -> None:
-        """Add what the controllers were told, and the state that it led to: the world's as it is, and the arm's speeds."""
+        """Add what the controllers were told, and the state that it led to: the world's as it is, and its speeds."""
         self._actions.append(_Action(joint_positions_rad, hand_told, phase, literal))
-        self._states.append(self._state(joint_velocities_rad_s, hand))
+        self._states.append(self._state(speeds, hand))
         self._touches.append(touches)
         self._unplanned.append(unplanned)
 
@@ -94,18 +100,18 @@ class Recorder:
             active_literal=None if None in told["active_literal"] else np.array(told["active_literal"], np.uint8),
         )
 
-    def _state(self, joint_velocities_rad_s: np.ndarray, hand: np.ndarray) -> _State:
+    def _state(self, speeds: Speeds, hand: np.ndarray) -> _State:
         robots, bodies = self._world.robots, self._world.bodies
         poses = [body.entity_pose for body in bodies]
         return _State(
             joint_positions_rad=np.concatenate([robot.joint_positions() for robot in robots]),
-            joint_velocities_rad_s=joint_velocities_rad_s,
+            joint_velocities_rad_s=speeds.joints_rad_s,
             hand=hand,
             tips_to_world=np.array([robot.gripper_pose() for robot in robots]),
             object_positions_m=[pose.p for pose in poses],
             object_quaternions_wxyz=[pose.q for pose in poses],
-            object_linear_velocities_m_s=[body.linear_velocity for body in bodies],
-            object_angular_velocities_rad_s=[body.angular_velocity for body in bodies],
+            object_linear_velocities_m_s=speeds.centers_m_s,
+            object_angular_velocities_rad_s=speeds.objects_rad_s,
             granule_positions_m=None if (granules := self._world.granules) is None else granules.positions_m(),
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -12,9 +13,10 @@ from manitwin.episodes.courses.regulated import Admittance, with_heights
 from manitwin.episodes.planning.arm_kinematics import ArmKinematics
 from manitwin.episodes.planning.path_timing import joint_spline
 from manitwin.episodes.planning.problem import Grasp
+from manitwin.episodes.recording import RATE_HZ, Recording
 from manitwin.episodes.skills.registry import SKILLS
 from manitwin.geometry.frames.words import wipes
-from manitwin.geometry.poses import transform
+from manitwin.geometry.poses import rotation_angle_rad, rotation_from_quaternion_wxyz, transform, transform_points
 from manitwin.robots.load import load_robot
 from manitwin.scenes.layouts.twin_frames import TwinFrame
 from rigid_boxes import above, block, box
@@ -36,12 +38,30 @@ SPOT = around(BODY, (FACE,), 0.5, 0.05)
 
 
 def test_the_patch_is_wiped_with_a_force_that_is_kept() -> None:
-    facts, _ = attempt(SPOT, goal_of("wipe", SPOT), GRASPS)
+    facts, recording = attempt(SPOT, goal_of("wipe", SPOT), GRASPS)
     assert facts.outcome == "kept", (facts.evaluation, facts.unplanned, facts.plan_failures)
     (event,) = facts.events
     assert event.values["share"] > 0.9
     assert event.values["force_n"] == pytest.approx(3.0, abs=0.3)
     assert event.values["in_band"] > 0.9
+    assert recording is not None
+    assert_speeds_are_those_of_the_motion(recording)
+
+
+def assert_speeds_are_those_of_the_motion(recording: Recording) -> None:
+    """Compare the recorded speeds with what poses two rows apart say: the engine's were 0.3 m/s and 7 rad/s beside."""
+    poses = [
+        transform(rotation_from_quaternion_wxyz(turn.astype(float)), at_m.astype(float))
+        for at_m, turn in zip(recording.object_positions_m[:, 0], recording.object_quaternions_wxyz[:, 0], strict=True)
+    ]
+    centers_m = np.array([transform_points(pose, BODY.center_of_mass_m[None])[0] for pose in poses])
+    turned_rad = np.array([rotation_angle_rad(b[:3, :3] @ a[:3, :3].T) for a, b in itertools.pairwise(poses)])
+    moved_m_s = (centers_m[2:] - centers_m[:-2]) * RATE_HZ / 2
+    assert np.linalg.norm(recording.object_linear_velocities_m_s[1:-1, 0] - moved_m_s, axis=1).max() < 0.1
+    spins_rad_s = np.linalg.norm(recording.object_angular_velocities_rad_s[1:-1, 0], axis=1)
+    still = np.maximum(turned_rad[1:], turned_rad[:-1]) < 1e-3
+    assert still.sum() > 50
+    assert spins_rad_s[still].max() < 0.3
 
 
 def test_15_cm_beside_the_board_nothing_is_wiped() -> None:
