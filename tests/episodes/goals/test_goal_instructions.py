@@ -43,3 +43,8 @@ def test_a_stir_is_not_said_to_go_around_once() -> None:
 def test_an_end_that_may_be_no_tip_is_not_called_one() -> None:
     """Of a capped marker the closed end of its body goes into the holder."""
     assert not [each for each in said("inserted", "marker") if "tip" in each]
+
+
+def test_what_may_lie_on_something_is_not_said_to_stand_there() -> None:
+    """A hammer goes onto a brick, and a bottle onto a loaf, as they lie there best."""
+    assert not [each for each in said("on", "hammer") if "stand" in each]

@@ -14,8 +14,8 @@ from manitwin.twin.record import Language
 
 TEMPLATES: Mapping[str, tuple[str, ...]] = {
     "on": (
-        "put {a} on {b}", "place {a} on top of {b}", "set {a} down on {b}", "{a} should stand on {b}: put {it} there",
-        "pick up {a} and put {it} on {b}", "take {a} and stand {it} on {b}", "please stack {a} on {b}",
+        "put {a} on {b}", "place {a} on top of {b}", "set {a} down on {b}", "{a} should be on {b}: put {it} there",
+        "pick up {a} and put {it} on {b}", "take {a} and set {it} on {b}", "please stack {a} on {b}",
     ),
     "in": (
         "put {a} in {b}", "place {a} into {b}", "drop {a} into {b}", "pick up {a} and put {it} into {b}",
