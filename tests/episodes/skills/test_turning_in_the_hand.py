@@ -42,6 +42,7 @@ def test_what_turns_as_it_is_lifted_is_taken_by_another_grasp() -> None:
     assert facts.grasp is not None and facts.grasp.grasp_id != "knobs"
     assert facts.outcome == "kept", (facts.evaluation, facts.unplanned, facts.replans)
     assert recording is not None and closings(recording) == 2
+    assert facts.grasps_tried == 2 + sum(facts.plan_failures.values())  # the two that were executed failed of nothing
 
 
 def test_where_no_other_grasp_serves_it_is_lifted_as_it_turns() -> None:

@@ -84,7 +84,7 @@ class HandoverCourse(Course):
         """Plan both halves with the first pair of grasps and the first meeting that serve."""
         self.tell_no_grasp()
         plan, report = self._arms.plan_handover(self.problem, self._meetings, self._put_down, longest_s=LONGEST_S)
-        self.facts.grasps_tried = report.tried
+        self.facts.grasps_tried += report.tried
         self.facts.plan_failures += report.failures
         if plan is None:
             return False

@@ -102,7 +102,7 @@ class HeldCourse(Course):
         blocking = sum(map(len, tiers)) - len(grasps)
         self.problem = replace(self.problem, grasps=grasps)
         plan, report = self._planner.plan(self.problem, task.paths, as_hulls=task.as_hulls, longest_s=task.longest_s)
-        self.facts.grasps_tried = report.tried + blocking
+        self.facts.grasps_tried += report.tried + blocking
         self.facts.plan_failures += report.failures
         if blocking:
             self.facts.plan_failures["blocks_function"] += blocking
