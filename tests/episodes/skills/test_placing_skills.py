@@ -115,6 +115,32 @@ def test_only_what_fits_goes_into_a_vessel() -> None:
     assert not SKILLS["place_on"].suits(POOL, dice, bowl)  # a vessel has only a rim
 
 
+def standing_box(extents_m: list[float], *poses: StandingPose) -> tuple[PlacedObject, Pool]:
+    """A box that stands on the table, its frame's origin below it, and the things with it."""
+    half_m = extents_m[2] / 2
+    body = box(extents_m, 0.1, center_m=(0, 0, half_m))
+    body = replace(body, hulls=tuple(hull + np.array([0, 0, half_m]) for hull in body.hulls))
+    twin = PoolTwin(twin_id(91), "0", "carton", poses, False, ())
+    bodies = {each.twin_id: POOL.body(each.twin_id).body for each in POOL.twins} | {twin.twin_id: body}
+    standing = PlacedObject("object_00", twin.twin_id, body, transform(None, np.array([0.45, -0.2, 0])))
+    return standing, Pool([*POOL.twins, twin], bodies.__getitem__)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_stands_is_put_on_another_thing_standing_though_it_would_rather_lie(seed: int) -> None:
+    lying = StandingPose(1, transform(LYING, np.array([0, 0.05, 0.025])), 0.9, 0.06)
+    carton, pool = standing_box([0.04, 0.05, 0.1], StandingPose(0, np.eye(4), 0.1, 0.04, True), lying)
+    goal = goal_of("place_on", around(carton, placed(1, "box", 0.5, 0.1), pool=pool), seed)
+    assert goal is not None
+    assert goal.poses[0][2, 2] > 0.99
+    assert any(abs(pose[2, 2]) < 0.01 for pose in goal.poses)
+
+
+def test_what_stands_on_another_thing_only_where_it_is_put_exactly_is_not_put_there() -> None:
+    rod, pool = standing_box([0.012, 0.012, 0.2], StandingPose(0, np.eye(4), 1.0, 0.01, True))
+    assert goal_of("place_on", around(rod, placed(1, "box", 0.5, 0.1), pool=pool)) is None
+
+
 def test_into_a_deep_vessel_things_are_also_let_go_at_its_rim() -> None:
     body, _ = deep_pot(0.16, 0.06)
     pot = PoolTwin(twin_id(90), "0", "pot", (StandingPose(0, np.eye(4), 1.0, 0.07, True),), True, ())

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from manitwin.episodes.goals.evaluation import evaluate
 from manitwin.episodes.goals.goal import Goal
@@ -14,6 +16,7 @@ from manitwin.geometry.poses import transform
 from manitwin.geometry.rigid_body import StaticBox
 from manitwin.physics.sapien.settle import settle_scene
 
+PERTURBED, OFF_M, OFF_RAD = 3, 0.005, np.radians(3)
 SETTLES_S = 2.0
 GIVE_UP_M = 0.3  # what has moved so far from where it was let go has fallen beside
 FLOOR = StaticBox("floor", np.array([1.0, 1.0, 0.25]), transform(translation=np.array([0.0, 0, -0.25])))
@@ -43,3 +46,15 @@ def rest_after_drop(
     touching = frozenset(frozenset(pair) for pair in settled.touching)
     state = WorldState(states, touching, frozenset({FLOOR.name}))
     return up @ settled.object_to_world[0] if evaluate(state, goal).reached else None
+
+
+def all_rest(around: Surroundings, target: int, partner: int, goal: Goal, let_go_at: Iterable[np.ndarray]) -> bool:
+    """Tell whether the goal is true of where the target comes to rest from each of some poses ``(4, 4)``."""
+    return all(rest_after_drop(around, target, partner, goal, pose) is not None for pose in let_go_at)
+
+
+def nearby(pose: np.ndarray, rng: np.random.Generator, scale: int = 1) -> Iterator[np.ndarray]:
+    """Yield poses that differ from one as a placement does from its plan, or ``scale`` times as far and as many."""
+    for _ in range(scale * PERTURBED):
+        turn = Rotation.from_rotvec(rng.normal(0, scale * OFF_RAD, 3)).as_matrix() @ pose[:3, :3]
+        yield transform(turn, pose[:3, 3] + np.array([*rng.normal(0, scale * OFF_M, 2), 0.0]))

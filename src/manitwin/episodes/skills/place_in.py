@@ -6,9 +6,8 @@ from collections.abc import Iterator, Sequence
 from itertools import chain, zip_longest
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from manitwin.episodes.skills.dropping import rest_after_drop
+from manitwin.episodes.skills.dropping import all_rest, nearby, rest_after_drop
 from manitwin.episodes.skills.skill import Skill, Surroundings, tries
 from manitwin.episodes.skills.within_rim import FREE_FALL_M, as_it_is, leaning, on_end, radius_on_end
 from manitwin.geometry.hull_distance import PlacedParts
@@ -21,7 +20,6 @@ LEANING_FALL_M = 0.004  # above where a drop ended
 AS_IT_IS_TRIED, LYING_TRIED, ON_END_TRIED, LEANING_TRIED = 3, 4, 12, 12
 ROUNDS = 5  # of tries; the next is only made where no pose of those before can be planned for
 RESTS_FIRST = 8  # of where drops ended, before the poses that they began in
-PERTURBED, OFF_M, OFF_RAD = 3, 0.005, np.radians(3)
 FAR_FALL_M = (
     0.03  # what moves farther as it falls meets the opening hand on its way: twice as many drops, twice as far beside
 )
@@ -94,13 +92,10 @@ class PlaceIn(Skill):
         scale: int = 1,
     ) -> Iterator[np.ndarray]:
         """Yield those of some poses from which the goal is reached also a little beside."""
-        for pose in poses:
-            if self._is_steady(around, target, partner, _nearby(pose, rng, scale)):
-                yield pose
-
-    def _is_steady(self, around: Surroundings, target: int, partner: int, poses: Iterator[np.ndarray]) -> bool:
         goal = self.goal(around.objects[target], around.objects[partner])
-        return all(rest_after_drop(around, target, partner, goal, pose) is not None for pose in poses)
+        for pose in poses:
+            if all_rest(around, target, partner, goal, nearby(pose, rng, scale)):
+                yield pose
 
 
 def _lying(
@@ -122,10 +117,3 @@ def _raised(rest: np.ndarray) -> np.ndarray:
 def _farthest_m(points: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
     """Return how far the point moves that moves the farthest between two poses ``(4, 4)``."""
     return float(np.linalg.norm(transform_points(after, points) - transform_points(before, points), axis=1).max())
-
-
-def _nearby(pose: np.ndarray, rng: np.random.Generator, scale: int = 1) -> Iterator[np.ndarray]:
-    """Yield poses that differ from one as a placement does from its plan, or ``scale`` times as far and as many."""
-    for _ in range(scale * PERTURBED):
-        turn = Rotation.from_rotvec(rng.normal(0, scale * OFF_RAD, 3)).as_matrix() @ pose[:3, :3]
-        yield transform(turn, pose[:3, 3] + np.array([*rng.normal(0, scale * OFF_M, 2), 0.0]))

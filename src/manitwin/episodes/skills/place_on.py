@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from manitwin.episodes.skills.dropping import rest_after_drop
+from manitwin.episodes.skills.dropping import all_rest, nearby, rest_after_drop
 from manitwin.episodes.skills.skill import Skill, Surroundings
 from manitwin.geometry.hull_distance import PlacedParts
 from manitwin.geometry.poses import rotation_angle_rad, transform, transform_points
@@ -15,8 +16,8 @@ from manitwin.scenes.layouts.placing import draw_pose, on_plane
 from manitwin.scenes.layouts.pool import Pool, PoolBody, PoolTwin
 from manitwin.scenes.layouts.stacking import Level, level_end, lower
 
-TRIED = 8
-ABOVE_M = 0.001
+AS_IT_IS_TRIED, DRAWN_TRIED = 2, 8
+ABOVE_M, RAISED_M = 0.001, 0.02
 MOST_MOVED_M, MOST_TURNED_RAD = 0.008, np.radians(6)
 LEVEL_M = 0.006  # corners within this of the highest are the top: no scan of a box is level to a millimetre
 BROAD_M = 0.012  # how far the middle of a top is from its edges
@@ -31,7 +32,7 @@ class PlaceOn(Skill):
     same_category: bool = False
     predicate: str = "on"
     has_partner: bool = True
-    most_poses: int = 4
+    most_poses: int = 4 + AS_IT_IS_TRIED
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
         """Accept a partner with a level top, which a vessel does not have; whether the target stays there a drop shows."""
@@ -43,29 +44,54 @@ class PlaceOn(Skill):
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> Iterator[np.ndarray]:
-        """Yield the poses in which the target came to rest on its partner after a fall of a millimetre."""
+        """Yield poses in which the target came to rest on its partner after a fall of a millimetre, also from a little beside.
+
+        Those in which it is as it stands or lies now come first: who has a cup put on a box does not ask for it on its side.
+        """
         assert partner is not None
-        twin = around.twin(target)
         body, goal = around.body(target), self.goal(around.objects[target], around.objects[partner])
-        (low, high), top = around.parts(partner).bounds, _top(around.parts(partner))
+        high, top = around.parts(partner).bounds[1], _top(around.parts(partner))
         if top is None:
             return
         spread_m = SPREAD_SHARE * top.depth_inside(top.middle_m)
-        for number in range(TRIED):
-            pose = on_plane(draw_pose(twin.poses, rng), np.zeros(2), 0.0, rng.uniform(-np.pi, np.pi))
+        for number in range(AS_IT_IS_TRIED + DRAWN_TRIED):
+            if number < AS_IT_IS_TRIED:
+                pose = _as_it_is(body, around.objects[target].object_to_world, rng)
+            else:
+                pose = on_plane(draw_pose(around.twin(target).poses, rng), np.zeros(2), 0.0, rng.uniform(-np.pi, np.pi))
             center = transform_points(pose, body.body.center_of_mass_m[None])[0, :2]
             shift = top.middle_m - center + (0.0 if number == 0 else rng.uniform(-spread_m, spread_m, 2))
-            raised = transform(translation=np.array([*shift, high[2] + 0.02])) @ pose
-            lowered = lower(body, raised, [around.parts(partner)], float(low[2]))
-            if lowered is None or lowered.bounds[0][2] < low[2] + ABOVE_M:
+            raised = transform(translation=np.array([*shift, high[2] + RAISED_M])) @ pose
+            start = self._let_go(around, target, partner, raised)
+            rested = None if start is None else rest_after_drop(around, target, partner, goal, start)
+            if start is None or rested is None or not _stayed(body, start, rested):
                 continue
-            start = transform(translation=np.array([0.0, 0, ABOVE_M])) @ lowered.pose
-            rested = rest_after_drop(around, target, partner, goal, start)
-            if rested is not None and _stayed(body, start, rested):
+            again = (_raised(each) for each in nearby(rested, rng))
+            beside = (self._let_go(around, target, partner, each) for each in again)
+            if all(each is not None and all_rest(around, target, partner, goal, [each]) for each in beside):
                 yield rested
+
+    def _let_go(self, around: Surroundings, target: int, partner: int, raised: np.ndarray) -> np.ndarray | None:
+        """Return the pose a millimetre above the partner that is straight below another one; None where that is beside it."""
+        low_m = float(around.parts(partner).bounds[0][2])
+        lowered = lower(around.body(target), raised, [around.parts(partner)], low_m)
+        if lowered is None or lowered.bounds[0][2] < low_m + ABOVE_M:
+            return None
+        return transform(translation=np.array([0.0, 0, ABOVE_M])) @ lowered.pose
 
 
 PLACE_ON, STACK = PlaceOn("place_on"), PlaceOn("stack", same_category=True)
+
+
+def _raised(pose: np.ndarray) -> np.ndarray:
+    return transform(translation=np.array([0.0, 0, RAISED_M])) @ pose
+
+
+def _as_it_is(body: PoolBody, object_to_world: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return a pose that differs from one by its heading and place alone, with the lowest point at z = 0."""
+    turned = transform(Rotation.from_rotvec([0, 0, rng.uniform(-np.pi, np.pi)]).as_matrix() @ object_to_world[:3, :3])
+    turned[2, 3] = -body.parts.at(turned).bounds[0][2]
+    return turned
 
 
 def _top(base: PlacedParts) -> Level | None:
