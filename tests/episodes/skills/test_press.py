@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -44,6 +45,16 @@ def test_a_button_on_the_underside_is_not_pressed() -> None:
     )
     assert SKILLS["press"].suits(SPOT.pool, SPOT.twin(0), None)
     assert not SKILLS["press"].suits(under.pool, under.twin(0), None)
+
+
+def test_the_middle_of_a_top_that_is_a_hole_is_not_pressed() -> None:
+    block = replace(FRAMES[0], frame_to_object=transform(translation=np.array([0, 0, 0.06])), kind="face")
+    halves = tuple(np.array(list(product((s * 0.015, s * 0.05), (-0.04, 0.04), (0, 0.06)))) for s in (-1, 1))
+    holed = around(replace(BODY, hulls=halves), (block,), 0.5, 0.1)
+    beside_it = replace(block, frame_to_object=transform(translation=np.array([0.03, 0, 0.06])))
+    assert not SKILLS["press"].suits(holed.pool, holed.twin(0), None)
+    solid = around(replace(BODY, hulls=halves), (beside_it,), 0.5, 0.1)
+    assert SKILLS["press"].suits(solid.pool, solid.twin(0), None)
 
 
 def test_a_button_that_lies_on_the_table_has_no_way_to_be_pressed() -> None:

@@ -11,7 +11,8 @@ from manitwin.episodes.planning.closed_hand import first_corner
 from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.skills.held_skill import HeldSkill
 from manitwin.episodes.skills.held_task import Guard, HeldScene, HeldTask
-from manitwin.geometry.poses import transform
+from manitwin.geometry.hulls.error import inside_any_hull
+from manitwin.geometry.poses import transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
@@ -21,6 +22,7 @@ KINDS = ("button", "face", "surface")  # what is pressed, where a thing has seve
 UPWARD = np.cos(np.radians(30))
 ABOVE_M, NEAR_M, BELOW_M, FREE_KNOTS = 0.06, 0.012, 0.006, 6
 LEAST_HEIGHT_M = 0.012  # above the table: the tilted hand goes a little deeper than the place
+SOLID_M = 0.006  # below the place there is something to press on: the middle of a brick's top may be a hole
 TILT_RAD = np.radians([10.0, 25.0])
 LEAST_LEAD_M = 0.0015  # of the corner that presses: where two touch at once, the force is between them, 2 cm off
 TRIED = 24
@@ -34,10 +36,13 @@ class Press(HeldSkill):
     name, predicate = "press", "pressed"
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept a thing with a button, face or surface that looks upward as it stands, and is not as low as the table."""
+        """Accept a thing with a button, face or surface that looks upward as it stands, is solid, and not as low as the table."""
         standing = self.begins_in(target)[0].object_to_plane
         frame = pressed_frame(target.frames, standing)
-        return frame is not None and float((standing @ frame.frame_to_object)[2, 3]) >= LEAST_HEIGHT_M
+        if frame is None or float((standing @ frame.frame_to_object)[2, 3]) < LEAST_HEIGHT_M:
+            return False
+        under_m = transform_points(frame.frame_to_object, np.array([[0, 0, -SOLID_M]]))
+        return bool(inside_any_hull(under_m, pool.body(target.twin_id).body.hulls)[0])
 
     def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
         """Return: the target was pressed, and stays where it is."""
