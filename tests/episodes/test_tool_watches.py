@@ -182,3 +182,13 @@ def test_aiming_is_near_straight_and_lasts() -> None:
     assert aim(0.1, 0.5, 40) == "too_far"
     assert aim(0.1, 0.01, 40) == "too_near"
     assert aim(0.1, 0.15, 10) == "too_short"
+
+
+def test_the_best_aim_is_told_to_less_than_a_milliradian() -> None:
+    ways = iter([np.array([0.0, 6e-5, 0.2]), np.array([0.0, 1e-5, 0.1]), np.array([0.0, 6e-5, 0.2])])
+    nozzle = transform(np.eye(3) * (1 + 1e-7))  # as single precision has axes
+    watch = AimWatch("tool", "cup", lambda: nozzle, lambda: next(ways), STEP_S)
+    for _ in range(3):
+        watch.look(READER, (), 0.0)
+    assert watch.events[0].values["angle_rad"] == pytest.approx(1e-4, rel=1e-3)
+    assert watch.events[0].values["distance_m"] == pytest.approx(0.1, rel=1e-3)

@@ -259,7 +259,8 @@ class AimWatch:
         nozzle = self.nozzle()
         way = self.target() - nozzle[:3, 3]
         distance_m = float(np.linalg.norm(way))
-        angle_rad = float(np.arccos(np.clip(nozzle[:3, 2] @ way / max(distance_m, 1e-9), -1, 1)))
+        across_m = float(np.linalg.norm(np.cross(nozzle[:3, 2], way)))
+        angle_rad = float(np.arctan2(across_m, nozzle[:3, 2] @ way))  # by its cosine half a milliradian would be 0
         on_it = angle_rad <= AIMED_RAD and AIMED_M[0] <= distance_m <= AIMED_M[1]
         self._looks = self._looks + 1 if on_it else 0
         self._longest = max(self._longest, self._looks)
