@@ -6,11 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pyarrow.parquet as pq
+import pytest
 from synthetic_episodes import attempt
 
 from grasped_twins import write_brick
 from manitwin.episodes.retirement import find_retirements, retire
 from manitwin.episodes.target_grasps import usable_grasps
+from manitwin.errors import UsageError
 from manitwin.robots.grippers.gripper import load_gripper, of_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.twin.dataset_root import twin_name
@@ -56,7 +58,19 @@ def test_a_retired_grasp_is_marked_and_used_no_more(tmp_path: Path) -> None:
     )
     table = pq.read_table(folder / "grasps.parquet").to_pylist()
     assert [row["grasp_id"] for row in table if row["retired"]] == ["panda-0002"]
+    twin = twins.twin(identity)
+    every = twin.grasps(retired=True)
+    assert "panda-0002" not in twin.grasps().columns["grasp_id"] and len(twin.grasps()) == len(every) - 1
+    assert "panda-0002" not in twin.grasps(verified_only=False).columns["grasp_id"]
+    assert [every.columns["grasp_id"][at] for at, gone in enumerate(every.columns["retired"]) if gone] == ["panda-0002"]
     gripper = of_kind(load_gripper("panda"), ParallelGripper)
     assert "panda-0002" not in {each.grasp.grasp_id for each in usable_grasps(twins.twin(identity), gripper)}
     assert retire(twins, found) == 0
     assert read_record(folder).revision == after.revision
+
+
+def test_grasps_of_a_gripper_that_was_never_tried_are_refused_by_name(tmp_path: Path) -> None:
+    twin = TwinSource(tmp_path).twin(write_brick(tmp_path, 0))
+    assert len(twin.grasps(gripper="panda")) == len(twin.grasps()) == 6
+    with pytest.raises(UsageError, match="unknown gripper 'pandas'; did you mean 'panda'"):
+        twin.grasps(gripper="pandas")

@@ -74,7 +74,7 @@ def _of_gripper(twin: Twin, name: str, gripper: Gripper) -> tuple[TargetGrasp, .
         # a cup holds at no width, and a hand with joints says where these are
         of_jaws = grasps.width_m[i] > 0 and grasps.columns[JOINTS[0]][i] is None
         fits = of_jaws and grasps.width_m[i] + CLEARANCE_M <= gripper.opening_m
-        if grasps.columns["retired"][i] or not (fits or name == gripper.name):
+        if not (fits or name == gripper.name):
             continue
         shift = transform(None, np.array([0, 0, grasps.depth_m[i] - gripper.tip_depth_m if jaws else 0.0]))
         pose, width_m = grasps.gripper_to_object[i] @ shift, float(grasps.width_m[i])

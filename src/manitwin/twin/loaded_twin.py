@@ -160,20 +160,23 @@ class Twin:
         """Return all rows of ``grasps.parquet`` (docs/grasps.md); raises TwinError where it cannot be read."""
         return read_grasp_table(self.folder / "grasps.parquet")
 
-    def grasps(self, verified_only: bool = True, gripper: str | None = None) -> Grasps:
+    def grasps(self, verified_only: bool = True, gripper: str | None = None, *, retired: bool = False) -> Grasps:
         """Return the grasps of a gripper (by default the one that the twin was verified with).
 
-        Leaves out the unfiltered sample and the jittered controls. Retired grasps are there: ``columns["retired"]`` says which.
+        Leaves out the unfiltered sample, the jittered controls, and grasps that are retired: with ``retired`` those are there
+        too, and ``columns["retired"]`` says which. Raises UsageError for a gripper that the twin was not tried with.
         """
         self.physical  # noqa: B018
         table = self.grasp_table().to_pydict()
-        wanted = gripper or (self.record.grasps.gripper if self.record.grasps else "")
+        wanted = self._tried_gripper(gripper)
+        rows = zip(table["gripper"], table["proposer"], table["verified"], table["retired"], strict=True)
         keep = [
             i
-            for i, (name, proposer, held) in enumerate(
-                zip(table["gripper"], table["proposer"], table["verified"], strict=True)
-            )
-            if name == wanted and not proposer.endswith((":unfiltered", ":jittered")) and (held or not verified_only)
+            for i, (name, proposer, held, gone) in enumerate(rows)
+            if name == wanted
+            and not proposer.endswith((":unfiltered", ":jittered"))
+            and (held or not verified_only)
+            and (retired or not gone)
         ]
         columns = {name: [values[i] for i in keep] for name, values in table.items()}
         rotations = rotation_from_quaternion_wxyz(np.array(columns["quaternion_wxyz"], float).reshape(-1, 4))
@@ -187,6 +190,18 @@ class Twin:
             outcome=np.array(columns["outcome"], str),
             columns=columns,
         )
+
+    def _tried_gripper(self, name: str | None) -> str:
+        """Return the name of a gripper that the twin has grasps of, or says why it has none; "" where it has none at all."""
+        summary = self.record.grasps
+        tried = [] if summary is None else [summary.gripper, *sorted(summary.other_grippers)]
+        if name is None:
+            return tried[0] if tried else ""
+        if not tried:
+            raise UsageError(f"{self.folder}: has no grasps of any gripper")
+        if name not in tried:
+            raise UsageError(f"{self.folder}: {choose_from('gripper', name, tried)}")
+        return name
 
     def add_to_sapien(self, scene: Any, pose: Any = None, *, visual: bool = True) -> Any:
         """Add the twin to a SAPIEN 3 scene as a dynamic rigid body and return its entity.

@@ -113,7 +113,7 @@ def _grasps(twin: Twin) -> tuple[AnnotatedGrasps, ...]:
         summaries += [summary for summary in others if summary is not None]
     found = []
     for summary in summaries:
-        grasps = twin.grasps(verified_only=False, gripper=summary.gripper)
+        grasps = twin.grasps(verified_only=False, gripper=summary.gripper, retired=True)
         found.append(
             AnnotatedGrasps(
                 summary.gripper, grasps.gripper_to_object, grasps.depth_m, grasps.width_m, held=grasps.verified

@@ -74,9 +74,10 @@ def carry_grasps(thing: Thing, twin: Twin, view: DepthView, plane: Plane, noise_
     if not isinstance(gripper, ParallelGripper):
         return None
     grasps = twin.grasps()
-    usable = np.array([not retired for retired in grasps.columns["retired"]], bool)
     poses = [pose.object_to_camera for pose in location.poses]
-    certain = usable & np.all([_known_in(grasps, usable, poses[0], other) for other in poses[1:]], axis=0)
+    certain = np.ones(len(grasps), bool)
+    for other in poses[1:]:
+        certain &= _known_in(grasps, poses[0], other)
     turns = thing.model.same_poses[:: max(1, len(thing.model.same_poses) // _MOST_TURNS)]
     obstacles = seen_beside(view, thing.mask, poses[0][:3, 3])
     clearance_m = CLEARANCE_M + 2 * noise_m
@@ -91,16 +92,16 @@ def carry_grasps(thing: Thing, twin: Twin, view: DepthView, plane: Plane, noise_
     found.sort(key=lambda each: (-each.value, each.grasp_id))
     return CarriedGrasps(
         gripper.name,
-        int(usable.sum()),
+        len(grasps),
         int(certain.sum()) - len(found),
-        int(usable.sum() - certain.sum()),
+        len(grasps) - int(certain.sum()),
         tuple(found),
     )
 
 
-def _known_in(grasps: Grasps, usable: np.ndarray, pose: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return which grasps at one pose are also near a verified one of the twin in another pose, ``(N,) bool``."""
-    known = grasps.gripper_to_object[usable]
+def _known_in(grasps: Grasps, pose: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return which grasps at one pose are also near one of the twin in another pose, ``(N,) bool``."""
+    known = grasps.gripper_to_object
     if not len(known):
         return np.zeros(len(grasps), bool)
     there = (inverse(other) @ pose) @ grasps.gripper_to_object
