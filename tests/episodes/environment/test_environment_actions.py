@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import copy
+import os
+import pickle
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -54,7 +58,8 @@ def env(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TaskEnvironment]:
     make_layouts(root / "things", root / "s", 1, layouts, executor="inline")
     config = TasksConfig(seed=3, per_scene=1, two_literal_share=0.0, tries_of_kind=2)
     make_tasks(root / "s", root / "tasks", config, executor="inline")
-    made = make_env(root / "tasks", read_tasks(root / "tasks")[0].task_id)
+    tasks = Path(os.path.relpath(root / "tasks"))
+    made = make_env(tasks, read_tasks(tasks)[0].task_id)
     yield made
     made.close()
 
@@ -76,6 +81,29 @@ def test_joints_go_no_faster_than_their_motors_whatever_they_are_told(env: TaskE
         gone = np.abs(observation["joint_positions_rad"] - home)
         assert (gone <= 1.1 * fastest_rad_s * steps / RATE_HZ + 0.02).all()
     assert gone.min() > 0.8 * fastest_rad_s.min() * 5 / RATE_HZ, "it goes as fast as it can"
+
+
+def test_environment_is_made_anew_of_its_pickle_in_any_folder(
+    env: TaskEnvironment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before, _ = env.reset(seed=0)
+    action = np.append(before["joint_positions_rad"], before["gripper_opening_m"]) + np.float32(0.02)
+    after, *_ = env.step(action)
+    monkeypatch.chdir(tmp_path)
+    for other in (pickle.loads(pickle.dumps(env)), copy.deepcopy(env)):
+        with pytest.raises(UsageError, match="step before reset"):
+            other.step(action)
+        begun, _ = other.reset(seed=0)
+        gone_on, *_ = other.step(action)
+        other.close()
+        for seen, same in ((before, begun), (after, gone_on)):
+            assert all(np.array_equal(seen[name], same[name]) for name in seen)
+
+
+def test_environment_of_no_known_maker_is_not_pickled(env: TaskEnvironment, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(env, "_made_by", None)
+    with pytest.raises(pickle.PicklingError, match="make one in each process"):
+        pickle.dumps(env)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pickle import PicklingError
 from typing import Any, Protocol
 
 import gymnasium
@@ -60,7 +61,8 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
     joints move as ``JointTargets`` says, hands evenly from what they were told. Jaws that close on something press the harder
     the smaller their target is
     (``FINGER_STIFFNESS_N_M``). ``observation``: see docs/policies.md. ``info``: ``success``, ``failure`` (the first literal
-    that is not true, and why), ``literals`` (each with whether it holds).
+    that is not true, and why), ``literals`` (each with whether it holds). Pickles and copies are what ``made_by`` makes anew, as
+    it is before ``reset``: a simulation cannot be sent to another process.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": RATE_HZ}  # noqa: RUF012 (Gymnasium declares it so)
@@ -77,8 +79,10 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         cameras: Sequence[str] = (),
         picture_px: int = 128,
         start_noise: StartNoise | None = None,
+        made_by: Callable[[], TaskEnvironment] | None = None,
     ):
         """Take a task that is set up; nothing is simulated before ``reset``."""
+        self._made_by = made_by
         self.task, self.instructions = setting.task, setting.task.instructions
         self.render_mode = "rgb_array" if painter is not None else None
         self._setting, self._planner, self._settings, self._painter = setting, planner, settings, painter
@@ -104,6 +108,12 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
             seen["pictures"] = spaces.Dict(dict.fromkeys(cameras, picture))
         self._seen = seen
         self.observation_space = spaces.Dict(seen)
+
+    def __reduce__(self) -> tuple[Callable[[], TaskEnvironment], tuple[()]]:
+        """Return what makes the environment anew; raises PicklingError for one that was put together by hand."""
+        if self._made_by is None:
+            raise PicklingError("an environment that make_env has not made cannot be pickled; make one in each process")
+        return self._made_by, ()
 
     @property
     def _hand_name(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from numbers import Integral
 from pathlib import Path
 
@@ -81,4 +81,15 @@ def make_env(
         cameras=cameras,
         picture_px=picture_px,
         start_noise=start_noise,
+        made_by=partial(
+            make_env,
+            Path(tasks).absolute(),  # who makes it again may run in another folder
+            task.task_id,
+            twins=None if twins is None else dataset,
+            robot=str(Path(robot).absolute()) if robot is not None and robot.endswith(".toml") else robot,
+            cameras=tuple(cameras),
+            picture_px=picture_px,
+            max_steps=max_steps,
+            start_noise=start_noise,
+        ),
     )
