@@ -8,7 +8,7 @@ import threading
 
 from rich.console import Console
 
-from manitwin.cli.progress import RunProgress, ShownProgress, duration
+from manitwin.cli.progress import RunProgress, ShownProgress, ShownWaits, duration
 from manitwin.engine.events import ItemEnded, StageAdvanced, StageEnded, StageStarted
 from manitwin.engine.stage import StagePart
 from manitwin.engine.task import Task
@@ -161,3 +161,29 @@ def test_nothing_is_shown_on_a_quiet_console() -> None:
     with ShownProgress(RunProgress(), Console(file=stream), Console(file=stream, quiet=True), every_s=0.0) as shown:
         assert shown._live is None and shown._lines is None
     assert stream.getvalue() == ""
+
+
+def test_what_waits_for_a_service_that_is_down_is_told_again_with_the_time_that_is_left() -> None:
+    clock, out = Clock(), io.StringIO()
+    waits = ShownWaits(Console(file=out, width=1000), clock)
+    down = "vlm at http://host does not answer; run again later"
+    for at_s in range(0, 1801, 60):
+        clock.now_s = float(at_s)
+        for number, stage in enumerate(("gate", "points")):
+            waits.stage(StageEnded(task(number), stage, "waiting", detail=down, given_up_in_s=1800.0 - at_s))
+    lines = out.getvalue().splitlines()
+    assert [line.partition(":")[0] for line in lines] == ["gate waits", "points waits", *["gate still waits"] * 14]
+    assert lines[0].startswith("gate waits: vlm at http://host does not answer; asked again for 30 min more")
+    assert lines[-1].count("asked again for 2 min more (run.patience_s)") == 1 and "Ctrl-C stops" in lines[-1]
+    assert "later" not in out.getvalue()
+
+
+def test_what_is_only_tried_again_or_given_up_is_told_once() -> None:
+    clock, out = Clock(), io.StringIO()
+    waits = ShownWaits(Console(file=out, width=1000), clock)
+    for _ in range(5):
+        waits.stage(StageEnded(task(1), "generate", "waiting", detail="asks to wait"))
+        waits.stage(StageEnded(task(1), "gate", "waiting", detail="down; run again later", given_up_in_s=0.0))
+        waits.stage(StageEnded(task(1), "mesh", "done"))
+        clock.now_s += 1000
+    assert out.getvalue() == "generate waits: asks to wait\ngate waits: down; run again later\n"

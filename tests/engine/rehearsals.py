@@ -12,7 +12,7 @@ from manitwin.config import RunConfig
 from manitwin.dataset.check import disagreements
 from manitwin.dataset.index.parts import IndexTables
 from manitwin.engine.driver import Driver, RunResult
-from manitwin.engine.events import ItemEnded
+from manitwin.engine.events import ItemEnded, OnStage
 from manitwin.engine.executors.local import LocalExecutor
 from manitwin.engine.jobs import WorkerSetup
 from manitwin.engine.ledger.ledger import Ledger
@@ -51,6 +51,7 @@ def rehearse(
     ledger_folder: Path | None = None,
     processes: bool = False,
     max_cost_usd: float | None = None,
+    on_stage: OnStage = lambda event: None,
 ) -> Rehearsed:
     """Run once, in this process or in workers."""
     settings = settings or RunConfig(patience_s=0)
@@ -66,7 +67,7 @@ def rehearse(
         sweep = partial(sweep_work, where)
         driver = Driver(
             ledger, executor, recipe, settings, on_ended=ended.append, sweep=sweep, max_cost_usd=max_cost_usd,
-            remove=lambda item_id: where.remove(recipe.folder_of(item_id)),
+            remove=lambda item_id: where.remove(recipe.folder_of(item_id)), on_stage=on_stage,
         )  # fmt: skip
         result = driver.run()
         wrong = [found.what for found in disagreements(ledger, where, settings.keep_work)]

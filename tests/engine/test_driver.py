@@ -11,6 +11,7 @@ from rehearsals import rehearse, runs
 
 from manitwin.config import RunConfig
 from manitwin.dataset.index.parts import indexed_twins
+from manitwin.engine.events import StageEnded, StageEvent
 from manitwin.engine.ledger.ledger import Ledger
 from manitwin.engine.recipe import Identity
 from manitwin.errors import Rejected
@@ -146,7 +147,15 @@ def test_a_service_that_is_down_costs_no_attempt_and_leaves_its_items_to_the_nex
     down.touch()
     recipe = replace(recipe, plan=(("a", "cpu"), ("ask", "vlm"), ("c", "cpu")))
     texts = [f"item {n} unavailable:ask:{down}" for n in range(5)]
-    first = rehearse(tmp_path / "d", texts, recipe=recipe)
+    left_s: list[float | None] = []
+
+    def told(event: StageEvent) -> None:
+        if isinstance(event, StageEnded) and event.state == "waiting":
+            left_s.append(event.given_up_in_s)
+
+    settings = RunConfig(patience_s=0.2)
+    first = rehearse(tmp_path / "d", texts, recipe=recipe, settings=settings, on_stage=told)
+    assert left_s[0] is not None and 0 <= left_s[0] <= 0.2, "how long it is still asked is told"
     assert first.result.left == 5 and set(first.states.values()) == {"open"} and first.wrong == []
     assert all(first.attempts[text, "ask"] == 0 for text in texts if (text, "ask") in first.attempts)
     counts = runs(tmp_path / "log")

@@ -62,12 +62,13 @@ def test_what_the_service_asks_for_is_waited(clock: Clock) -> None:
 
 def test_given_up_after_the_patience_since_the_first_failure(clock: Clock) -> None:
     gate = Gate(None, 5, clock)
-    for seconds in (0, 1, 2):
+    assert gate.given_up_in_s is None
+    for seconds, left_s in ((0, 5), (1, 4), (2, 2)):
         clock.now += seconds
         gate.down()
-        assert not gate.given_up
+        assert not gate.given_up and gate.given_up_in_s == left_s
     clock.now += 4
     gate.down()
-    assert gate.given_up
+    assert gate.given_up and gate.given_up_in_s == 0
     gate.answered()
-    assert not gate.given_up
+    assert not gate.given_up and gate.given_up_in_s is None

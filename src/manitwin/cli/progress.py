@@ -29,6 +29,10 @@ if TYPE_CHECKING:
 
 LINE_EVERY_S = 30.0
 """Between two lines where nobody looks at a terminal."""
+WAITS_EVERY_S = 120.0
+"""Between two lines on a service that does not answer."""
+RUN_LATER = "; run again later"
+"""The remedy of a service's errors, which is none while the run itself asks again."""
 ENOUGH, ENOUGH_OF_PARTS = 3, 0.1
 """Items must have ended before anything is said of the time that is left; long ones that say what they have done count by it."""
 BAR_WIDTH = 24
@@ -138,6 +142,32 @@ def duration(seconds: float) -> str:
     return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
 
 
+class ShownWaits:
+    """Prints which stages wait and why: each at once, and from time to time how long a service that is down is still asked."""
+
+    def __init__(self, err: Console, clock: Callable[[], float] = time.monotonic):
+        self._err, self._clock = err, clock
+        self._told_at: dict[str, float] = {}
+
+    def stage(self, event: StageEvent) -> None:
+        """Print a line where an event is of a stage that waits, unless the like was printed a short while ago."""
+        if not isinstance(event, StageEnded) or event.state != "waiting":
+            return
+        now = self._clock()
+        told = event.stage in self._told_at
+        # one service has several stages waiting: a line on any of them is news of all
+        if told and (not event.given_up_in_s or now - max(self._told_at.values()) < WAITS_EVERY_S):
+            return
+        self._told_at[event.stage] = now
+        said = f"{event.stage} {'still waits' if told else 'waits'}: {event.detail}"
+        if event.given_up_in_s:
+            said = (
+                f"{said.removesuffix(RUN_LATER)}; asked again for {duration(event.given_up_in_s)} more (run.patience_s), "
+                "then left to the next run. Ctrl-C stops at once; the same command goes on where it stopped"
+            )
+        self._err.print(said, markup=False)
+
+
 class ShownProgress:
     """Show a run's progress on a console while the ``with`` statement lasts.
 
@@ -206,11 +236,17 @@ class WatchedRun(ShownProgress):
     def __init__(self, what: str, place: str | Path):
         super().__init__(RunProgress(what), out_console, err_console)
         self._place = place
+        self._waits = ShownWaits(err_console)
 
     @property
     def callbacks(self) -> RunOptions:
         """The callbacks of a run that is shown."""
-        return {"on_start": self.start, "on_stage": self.progress.stage, "on_ended": self.progress.item_ended}
+        return {"on_start": self.start, "on_stage": self.stage, "on_ended": self.progress.item_ended}
+
+    def stage(self, event: StageEvent) -> None:
+        """Note the event of a stage, and tell where it waits."""
+        self.progress.stage(event)
+        self._waits.stage(event)
 
     def start(self, total: int, opened: int) -> None:
         """Begin a run, and its log: what was refused before leaves none behind."""

@@ -273,14 +273,13 @@ class Driver:
         if failure.kind == "changed":  # the next run begins it anew
             self._flights -= 1
             self.ledger.stage_ended(number, stage, "waiting", attempts=attempts - 1, error=failure.message)
-            self._announcer.stage_ended(flight, stage, "waiting", 0.0, failure.message)
+            self._announcer.stage_waits(flight, stage, failure.message, "", None)
             return
         patient = failure.kind in ("unavailable", "rate_limited", "denied", "no_space")
         if patient or (attempts < self.settings.attempts and failure.kind != "unsupported"):
             counted = attempts - 1 if patient else attempts
             flight.attempts[stage] = counted
             self.ledger.stage_ended(number, stage, "waiting", attempts=counted, error=failure.message)
-            self._announcer.stage_ended(flight, stage, "waiting", 0.0, failure.message, failure.trace)
             if failure.kind == "unavailable":
                 gate.down()
             elif failure.kind == "rate_limited":
@@ -289,6 +288,8 @@ class Driver:
                 self.result.stopped = f"{failure.message}; {MAKE_ROOM}"
             elif failure.kind == "denied":
                 self.result.stopped = failure.message
+            left_s = gate.given_up_in_s if failure.kind == "unavailable" else None
+            self._announcer.stage_waits(flight, stage, failure.message, failure.trace, left_s)
             self._queue(flight)
             return
         self._flights -= 1

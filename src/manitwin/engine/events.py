@@ -37,7 +37,10 @@ class StageAdvanced:
 
 @dataclass(frozen=True)
 class StageEnded:
-    """A stage of an item has ended, or waits to be tried again; ``trace`` is the traceback of what went wrong, if any."""
+    """A stage of an item has ended, or waits to be tried again; ``trace`` is the traceback of what went wrong, if any.
+
+    ``given_up_in_s``: of one that waits for a service that is down, for how many seconds that is still asked again.
+    """
 
     task: Task
     stage: str
@@ -45,6 +48,7 @@ class StageEnded:
     seconds: float = 0.0
     detail: str = ""
     trace: str = ""
+    given_up_in_s: float | None = None
 
 
 @dataclass(frozen=True)
@@ -108,8 +112,12 @@ class Announcer:
     def stage_ended(
         self, flight: Flight, stage: str, state: StageState, seconds: float = 0.0, detail: str = "", trace: str = ""
     ) -> None:
-        """Tell that a stage has ended, or waits to be tried again."""
+        """Tell that a stage has ended."""
         self._stage(StageEnded(flight.task, stage, state, seconds, detail, trace))
+
+    def stage_waits(self, flight: Flight, stage: str, detail: str, trace: str, given_up_in_s: float | None) -> None:
+        """Tell that a stage waits to be tried again."""
+        self._stage(StageEnded(flight.task, stage, "waiting", 0.0, detail, trace, given_up_in_s))
 
     def item_ended(
         self, flight: Flight, state: ItemState, detail: str, found: bool = False, reason: str | None = None

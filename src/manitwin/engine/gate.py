@@ -58,6 +58,13 @@ class Gate:
         self.wait(None)
 
     @property
+    def given_up_in_s(self) -> float | None:
+        """For how many seconds a service that is down is still asked again; None where it is not down."""
+        if self._down_since is None:
+            return None
+        return max(0.0, self._down_since + self._patience_s - self._clock())
+
+    @property
     def given_up(self) -> bool:
         """True where the service has been down for longer than a run waits."""
-        return self._down_since is not None and self._clock() - self._down_since >= self._patience_s
+        return self.given_up_in_s == 0

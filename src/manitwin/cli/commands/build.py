@@ -133,7 +133,6 @@ def _watched_build(request: BuildRequest, *, lines: bool, executor: ExecutorName
         require_renderer()
     elif executor == "local":
         require_driver()  # what renders is looked for by the first stage that draws
-    waits: set[str] = set()
     asked: list[bool] = []
 
     def require_device_once() -> None:
@@ -143,12 +142,9 @@ def _watched_build(request: BuildRequest, *, lines: bool, executor: ExecutorName
             require_renderer()
 
     def staged(event: StageEvent) -> None:
-        watched.progress.stage(event)
+        watched.stage(event)
         if getattr(event, "state", None) == "done" and event.stage != INPUT:
             require_device_once()
-        if getattr(event, "state", None) == "waiting" and event.stage not in waits:
-            waits.add(event.stage)
-            err_console.print(f"{event.stage} waits: {event.detail}")  # type: ignore[union-attr]
 
     def ended(result: ItemResult) -> None:
         watched.progress.ended(result.item, result.status, result.reused)
