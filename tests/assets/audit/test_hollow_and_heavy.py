@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import trimesh
 from made_mug import DEPTH_M, clean, frame, scaled
 
-from manitwin.assets.asset import AnnotatedFrame, Asset, Inertial
+from manitwin.assets.asset import AnnotatedFrame, Asset, Contact, Inertial
 from manitwin.assets.audit.check import audit_asset
 from manitwin.assets.audit.rules import RULES
 from manitwin.geometry.poses import transform
@@ -66,3 +67,19 @@ def test_a_heavy_head_leaves_little_inertia_about_a_centre_that_is_in_it() -> No
     assert "INE005" in found(replace(hammer, inertial=replace(hammer.inertial, inertia_kg_m2=inertia / 10)))
     even = replace(hammer.inertial, center_of_mass_m=both.bounds.mean(0))
     assert "INE005" in found(replace(hammer, inertial=even)), "about a centre in its middle it is too little"
+
+
+@pytest.mark.parametrize(
+    ("name", "mass_kg", "wrong"),
+    [("dumbbell", 2.0, False), ("dumbbell", 7.0, True), ("dumbbell", 0.0005, True), ("eraser", 2.0, True)],
+)
+def test_a_coat_of_rubber_says_nothing_of_the_iron_within(name: str, mass_kg: float, wrong: bool) -> None:
+    heads = (box((0.06, 0.06, 0.06), x) for x in (-0.07, 0.07))
+    shape = trimesh.util.concatenate([*heads, box((0.08, 0.03, 0.03), 0.0)])
+    hull_m3 = shape.convex_hull.volume
+    assert 2000 < 2.0 / hull_m3 < 7400 < 7.0 / hull_m3 / 1.25
+    thing = replace(
+        clean(), name=name, category=name, visual=(shape,), collision=(), frames=(), grasps=(), rests=(),
+        inertial=Inertial(mass_kg, None, None), contact=Contact(0.7, 0.6, 0.5, "rubber"),
+    )  # fmt: skip
+    assert ("MAS003" in found(thing)) == wrong

@@ -72,7 +72,9 @@ def possible_mass_kg(measured: MeasuredAsset) -> tuple[float, float, str] | None
     """Return the least and the most that a thing of this shape and material weighs, and what it is made of.
 
     Hollow things decide the least: half of the surface (both sides of a wall) times the thinnest wall of that material, or
-    the volume where that is smaller. The most is the convex hull full of it. None without a shape that has volume.
+    the volume where that is smaller. The most is the convex hull full of it; of things that all are denser than any package
+    (dumbbells) the hull at their highest density, as the declared material is but their coat. None without a shape that has
+    volume.
     """
     surface = measured.surface
     if surface is None or not len(measured.hull):
@@ -89,6 +91,9 @@ def possible_mass_kg(measured: MeasuredAsset) -> tuple[float, float, str] | None
         most = max(
             most, (density.high if name in HOLDS_NOTHING else max(density.high, HEAVIEST_CONTENTS_KG_M3)) * hull_m3
         )
+    bulk = None if measured.prior is None else measured.prior.bulk_density_kg_m3
+    if bulk is not None and bulk.low >= HEAVIEST_CONTENTS_KG_M3:
+        most = max(most, bulk.high * hull_m3)
     what = "common matter" if names == ["unknown"] else " or ".join(names)
     return least / SLACK, most * SLACK, what
 
@@ -149,7 +154,8 @@ RULES = (
         why="A density of 100 kg/m3 for everything made a porcelain mug of 16 g (LIBERO #154, LIBERO-PRO #33); masses lost in"
         " conversion come back as density times a filled volume (urdf-usd-converter #145: 30 kg became 67 kg). The bounds"
         " know hollow things: the least is the thinnest wall that the declared material is used with over half of the"
-        " surface, the most is the convex hull full of the material, or of the heaviest contents a package has.",
+        " surface, the most is the convex hull full of the material, or of the heaviest contents a package has;"
+        " of things that are heavy inside whatever they are coated with (a dumbbell of rubber) it is the hull full of iron.",
         remedy="Correct the mass, the material or the scale: one of the three is wrong.",
         check=against_volume,
     ),
