@@ -39,3 +39,16 @@ def test_run_without_inputs_of_a_data_set_that_is_not_there_makes_none(tmp_path:
     done = CliRunner().invoke(app, ["build", "-o", str(tmp_path / "ds9"), *more])
     assert isinstance(done.exception, UsageError) and "no data set there to go on with" in str(done.exception)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "words", [["evaluate", "grasps", "IN"], ["evaluate", "generation", "IN"], ["locate", "IN"], ["capture"]]
+)
+def test_new_folder_that_has_something_in_it_is_refused_before_any_work(tmp_path: Path, words: list[str]) -> None:
+    (tmp_path / "IN").mkdir()
+    (tmp_path / "OUT").mkdir()
+    (tmp_path / "OUT" / "mine.txt").touch()
+    given = [str(tmp_path / "IN") if word == "IN" else word for word in words]
+    done = CliRunner().invoke(app, [*given, "--out", str(tmp_path / "OUT")])
+    assert isinstance(done.exception, UsageError), done.output
+    assert str(done.exception) == f"{tmp_path / 'OUT'}: is there and not empty; give a new folder"

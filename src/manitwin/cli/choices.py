@@ -211,6 +211,16 @@ def must_exist(remedy: str) -> Callable[[Any], Any]:
     return check
 
 
+def new_folder_to_write(value: Any) -> Any:
+    """Return a folder that can be made and written and has nothing in it yet; a callback."""
+    if value:
+        from manitwin.formats.output_folder import require_new_folder
+
+        folder_to_write(value)
+        require_new_folder(Path(value))
+    return value
+
+
 def folder_to_write(value: Any) -> Any:
     """Return a folder that can be made and written, or a URL, which is not asked; a callback."""
     if value and "://" not in str(value):

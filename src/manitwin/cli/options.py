@@ -163,6 +163,11 @@ def output_folder(help: str) -> Any:
     return typer.Option("--out", "-o", help=help, callback=choices.folder_to_write)
 
 
+def new_folder(help: str) -> Any:
+    """Return the option ``--out`` of a folder that can be written and is empty or not there: asked before any work."""
+    return typer.Option("--out", "-o", help=help, callback=choices.new_folder_to_write)
+
+
 def with_options(
     options: Mapping[str, tuple[Any, Any]], before: str = ""
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:

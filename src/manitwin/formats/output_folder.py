@@ -35,14 +35,19 @@ def require_writable_folder(folder: Path, what: str = "") -> None:
         raise UsageError(f"{folder}: no path ({error}); {remedy}") from error
 
 
+def require_new_folder(out: Path) -> None:
+    """Raise UsageError where a folder is there and has something in it."""
+    if out.exists() and any(out.iterdir()):
+        raise UsageError(f"{out}: is there and not empty; give a new folder")
+
+
 @contextmanager
 def new_folder(out: Path) -> Iterator[Path]:
     """Give a folder to write into, which becomes ``out`` at the end; of a failure nothing stays.
 
     Raises UsageError where ``out`` is there and has something in it.
     """
-    if out.exists() and any(out.iterdir()):
-        raise UsageError(f"{out}: is there and not empty; give a new folder")
+    require_new_folder(out)
     out.parent.mkdir(parents=True, exist_ok=True)
     fresh = Path(tempfile.mkdtemp(prefix=".manitwin-", dir=out.parent))
     try:

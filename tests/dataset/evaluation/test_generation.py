@@ -81,7 +81,9 @@ def test_thirty_views_are_thirty() -> None:
 
 
 def test_a_twin_is_more_like_its_own_photo_and_no_model_measures_nothing(place: Path) -> None:
-    report = evaluate_generation(str(place), Models())
+    compared: list[str] = []
+    report = evaluate_generation(str(place), Models(), on_twin=compared.append)
+    assert sorted(compared) == sorted(twin_id(number) for number in (0, 1)), "texts are compared with nothing"
     rows = {(row["metric"], row["input"]): row for row in report.table("generation_quality")}
     for metric in ("EfficientNet-Lite0 cosine", "silhouette IoU"):
         row = rows[metric, "image"]

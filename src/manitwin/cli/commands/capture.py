@@ -12,7 +12,7 @@ from manitwin.cli.console import out_console
 
 
 def capture(
-    out: Annotated[Path, options.output_folder("A new folder for depth.png, rgb.png and camera.json.")],
+    out: Annotated[Path, options.new_folder("A new folder for depth.png, rgb.png and camera.json.")],
     scene: Annotated[
         Path | None,
         typer.Option(

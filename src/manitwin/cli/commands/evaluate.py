@@ -47,7 +47,7 @@ def evaluate(
         ),
     ] = None,
     ulip: Annotated[Path | None, _model("generation: a ULIP, with a network of points, for ULIP-I/T.")] = None,
-    out: Annotated[Path | None, options.output_folder("A new folder for tables (CSV, Parquet) and a page.")] = None,
+    out: Annotated[Path | None, options.new_folder("A new folder for tables (CSV, Parquet) and a page.")] = None,
     seed: Annotated[int, typer.Option(help="The seed of shuffled pairs.", min=0, max=options.LARGEST_SEED)] = 0,
     json: Json = False,
 ) -> None:

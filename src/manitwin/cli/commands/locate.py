@@ -86,7 +86,7 @@ def locate(
         choices.ROBOTS.option(help="Also which free grasps this robot reaches; needs --base, and implies --grasps."),
     ] = None,
     out: Annotated[
-        Path | None, options.output_folder("A new folder for location.json, overlays, and the scene as a layout.")
+        Path | None, options.new_folder("A new folder for location.json, overlays, and the scene as a layout.")
     ] = None,
     seed: Annotated[int, typer.Option(help="The seed of what is sampled.", min=0, max=options.LARGEST_SEED)] = 0,
     json_: Json = False,

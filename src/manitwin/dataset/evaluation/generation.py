@@ -54,7 +54,7 @@ def evaluate_generation(
     """Return the tables of a data set's generation, by its index and by views of its accepted twins.
 
     ``models`` judge likeness besides the built-in measures; what no model was named for is None, and stands for not measured.
-    ``on_twin`` hears of each twin that is looked at. Raises UsageError for a data set without an index, at a URL, or empty.
+    ``on_twin`` hears of each twin that was compared. Raises UsageError for a data set without an index, at a URL, or empty.
     """
     root = DatasetRoot(dataset)
     if root.local is None:

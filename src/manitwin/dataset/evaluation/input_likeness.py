@@ -61,23 +61,18 @@ def likeness_of_twins(
     """Return the likeness of each twin that was made of an image or a text to it.
 
     The other input is that of a twin drawn by chance of the same kind whose input has other bytes; None where there is none.
-    Raises Unavailable without EfficientNet's weights, RendererMissing where nothing renders.
+    ``on_twin`` hears of each that was compared. Raises Unavailable without EfficientNet's weights, RendererMissing where nothing
+    renders.
     """
     made = [(twin, source) for twin in twins if (source := source_of(twin)) is not None]
     inputs = [_Input.of(source, models) for _, source in made]
     others = partners([source for _, source in made], np.random.default_rng(seed))
     found = []
     for place, (twin, source) in enumerate(made):
-        on_twin(twin.record.twin_id)
-        found.append(
-            _likeness(
-                twin,
-                source,
-                inputs[place],
-                None if (o := others[place]) is None else (made[o][0].record.twin_id, inputs[o]),
-                models,
-            )
-        )
+        other = None if (o := others[place]) is None else (made[o][0].record.twin_id, inputs[o])
+        found.append(_likeness(twin, source, inputs[place], other, models))
+        if found[-1].own:  # a text with no model to read it is compared with nothing
+            on_twin(twin.record.twin_id)
     return found
 
 
