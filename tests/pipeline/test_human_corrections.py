@@ -140,6 +140,17 @@ def test_corrections_come_back_with_their_source_and_what_follows_is_made_again(
     assert [result.reused for result in again.results] == [True], "an amendment holds for later builds"
     assert "0 corrections" in runner.invoke(app, ["review", "apply", str(place)]).output
     assert manitwin.Dataset(place).table(["mass_source"])["mass_source"].to_pylist() == ["human:ada"]
+    huge = {
+        **body,
+        "revision": after.revision,
+        "answers": {"physical": "no"},
+        "corrections": {"longest_side_m": mass(0.8)},
+    }
+    with ReviewStore(place / "reviews.sqlite") as store:
+        store.add([Review.model_validate(huge)], ["2"])
+    done = runner.invoke(app, ["review", "apply", str(place), "--jobs", "1"])
+    assert done.exit_code == 3 and f"{before.twin_id} is rejected with its corrections: " in done.output, done.output
+    assert amendments_name(before.twin_id) in done.output.replace("\n", "")
 
 
 def test_a_moved_point_that_is_gone_is_never_guessed() -> None:

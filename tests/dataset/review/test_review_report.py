@@ -69,6 +69,14 @@ def said(
     return {"twin_id": of, "annotator": annotator, "dimension": dimension, "answer": answer, **more}
 
 
+def test_verdicts_on_twins_as_they_were_before_are_told_as_they_come_in(place: Path, tmp_path: Path) -> None:
+    ids = accepted(place)
+    rows = [said(ids[0], revision="0" * 64), *(said(each, revision="") for each in ids)]
+    told = run("review import", place, verdicts(tmp_path, *rows)).output
+    assert "7 reviews taken up" in told and "1 of the reviews of " in told and "do not count" in told
+    assert "do not count" not in run("review import", place, verdicts(tmp_path, *rows[1:])).output
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".jsonl"])
 def test_verdicts_of_files_are_added_up(place: Path, tmp_path: Path, suffix: str) -> None:
     ids = accepted(place)

@@ -146,6 +146,7 @@ def review_import(
 ) -> None:
     """Take up verdicts that were made elsewhere: all of a file or none, and those that are there already once."""
     from manitwin.dataset.review.store import ReviewStore, reviews_path
+    from manitwin.dataset.review.twins_seen import read_twin
     from manitwin.dataset.review.verdict_files import read_verdicts
     from manitwin.twin.dataset_root import DatasetRoot
 
@@ -155,6 +156,11 @@ def review_import(
         added = store.add((review for review, _ in read), (request for _, request in read))
     there = f", {len(read) - added} were there already" if added < len(read) else ""
     out_console.print(f"{added} reviews taken up{there}; `manitwin review report {dataset}` says what they tell")
+    now = {twin_id: read_twin(root, twin_id).revision for twin_id in {review.twin_id for review, _ in read}}
+    if outdated := sum(review.revision != now[review.twin_id] for review, _ in read):
+        error_console.print(
+            f"{outdated} of the reviews of {verdicts} are of twins that were built anew since, and do not count"
+        )
 
 
 def review_apply(
@@ -168,6 +174,7 @@ def review_apply(
     from manitwin.cli.progress import WatchedRun
     from manitwin.dataset.review.apply import apply_reviews
     from manitwin.dataset.review.report import shown_correction
+    from manitwin.engine.amendments import amendments_name
 
     if dry_run:
         done = apply_reviews(dataset, dry_run=True)
@@ -181,12 +188,17 @@ def review_apply(
         out_console.print(f"not applied: {conflict.twin_id} {conflict.name}: {said}")
     for twin_id, reason in done.left.items():
         out_console.print(f"not applied: {twin_id}: {reason}")
+    for twin_id, reason in done.rejected.items():
+        print_error(
+            f"{twin_id} is rejected with its corrections: {reason}; where that is wrong, remove {dataset}/"
+            f"{amendments_name(twin_id)} and run `manitwin retry {dataset} --state rejected` and the build again"
+        )
     verb = "would be" if dry_run else "are"
     out_console.print(f"{len(done.corrections)} corrections {verb} applied, {len(done.conflicts)} are disputed")
     unfinished = done.run is not None and (done.run.open or done.run.counts_of_given.get("failed"))
     if unfinished:
         print_error(f"twins are not all made again; `manitwin status {dataset}` says why")
-    raise typer.Exit(4 if unfinished else 3 if done.conflicts or done.left else 0)
+    raise typer.Exit(4 if unfinished else 3 if done.conflicts or done.left or done.rejected else 0)
 
 
 def review_report(

@@ -25,12 +25,16 @@ from manitwin.twin.record import TwinRecord
 
 @dataclass(frozen=True)
 class Applied:
-    """What was, or would be, put right: ``run`` is None where nothing was made again; ``left`` says of twins why they are not."""
+    """What was, or would be, put right: ``run`` is None where nothing was made again; ``left`` says of twins why they are not.
+
+    ``rejected``: why twins are none any more with what was put right, by their ids.
+    """
 
     corrections: list[Correction]
     conflicts: list[Conflict]
     left: dict[str, str] = field(default_factory=dict)
     run: RunReport | None = None
+    rejected: dict[str, str] = field(default_factory=dict)
 
 
 def apply_reviews(
@@ -55,7 +59,8 @@ def apply_reviews(
         own = [each for each in corrections if each.twin_id == twin_id]
         write_amendments(root, twin_id, amended(read_amendments(root, twin_id), own, read_twin(root, twin_id)))
     run = made_again(root, items.values(), jobs, **options)
-    return Applied([each for each in corrections if each.twin_id not in left], conflicts, left, run)
+    applied = [each for each in corrections if each.twin_id not in left]
+    return Applied(applied, conflicts, left, run, _rejected(root, items))
 
 
 def amended(before: Amendments, corrections: Iterable[Correction], record: TwinRecord) -> Amendments:
@@ -83,6 +88,19 @@ def _label(record: TwinRecord, point_id: str) -> str | None:
     if point_id not in labels:
         raise UsageError(f"{record.twin_id}: has no point {point_id} now; review it again")
     return labels[point_id]
+
+
+def _rejected(root: DatasetRoot, twin_ids: Iterable[str]) -> dict[str, str]:
+    """Return of those of the twins that are rejected now the code and what is said of it."""
+    found = dict[str, str]()
+    with read_ledger(local_ledger(root)) as ledger:
+        for twin_id in twin_ids:
+            row = ledger.execute(
+                "SELECT reason, detail FROM items WHERE twin_id = ? AND state = 'rejected'", (twin_id,)
+            ).fetchone()
+            if row is not None:
+                found[twin_id] = f"{row[0]}: {row[1]}"
+    return found
 
 
 def _items(root: DatasetRoot, twin_ids: Iterable[str]) -> dict[str, tuple[int, Item]]:
