@@ -141,6 +141,18 @@ def test_what_a_list_leaves_open_stays_as_it_was_said(photos: Path, tmp_path: Pa
     assert found[0] == ("mug", 0.3, "given", "CC0-1.0", "again")
 
 
+def test_licences_get_their_spdx_names_wherever_they_are_said(photos: Path, tmp_path: Path) -> None:
+    said = listed(
+        photos,
+        {"file": "mug.jpg", "license": "CC BY 4.0"},
+        {"file": "thing.png", "license": "by our agreement"},
+        {"url": "https://example.org/a.png"},
+    )
+    add(tmp_path / "c.db", said, Given(source="mine", licence="CC0"))
+    found = sorted(rows(tmp_path / "c.db", "licence"))
+    assert found == [("CC-BY-4.0",), ("CC0-1.0",), ("by our agreement",)]
+
+
 def test_a_broken_list_adds_nothing(photos: Path, tmp_path: Path) -> None:
     bad = photos / "list.csv"
     bad.write_text('file,name\nmug.jpg,mug\nthing.png,"no end\n')

@@ -67,6 +67,7 @@ def test_addresses_unknown_licences_categories_and_sizes_are_left_out_and_counte
     }
     only = plan_inputs(rows, 60, licenses=["CC0-1.0"])
     assert [each.place for each in only.chosen] == ["/inputs/1.obj"]
+    assert plan_inputs(rows, 60, licenses=["cc0-1.0", "MIT"]).chosen == only.chosen
     assert only.left_out["licence not among those allowed"] == 2
 
 

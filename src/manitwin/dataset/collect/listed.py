@@ -10,7 +10,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from manitwin.dataset.collect.facts import UNKNOWN
-from manitwin.dataset.collect.listings import is_listing, read_listing
+from manitwin.dataset.collect.listings import LICENCES, is_listing, read_listing
 from manitwin.errors import UsageError
 from manitwin.formats.csv_file import read_csv, read_lines
 from manitwin.formats.json_file import parse_json
@@ -95,8 +95,10 @@ def _listed(row: Mapping[str, Any]) -> Listed:
 
 
 def licence_or_none(text: str | None) -> str | None:
-    """Return a licence as it is written, or None for words that say nothing."""
-    return None if text is None or text.strip().lower() in _UNSAID else text.strip()
+    """Return a licence by its SPDX name where that is known, else as it is written; None for words that say nothing."""
+    if text is None or text.strip().lower() in _UNSAID:
+        return None
+    return LICENCES.get(text.strip().lower(), text.strip())
 
 
 def _text(row: Mapping[str, Any], column: str) -> str | None:

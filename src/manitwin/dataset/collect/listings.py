@@ -27,12 +27,18 @@ LICENCES = {
     "by-nc": "CC-BY-NC-4.0",
     "by-nc-sa": "CC-BY-NC-SA-4.0",
     "by-nc-nd": "CC-BY-NC-ND-4.0",
+    "cc-by": "CC-BY-4.0",
+    "cc by 4.0": "CC-BY-4.0",
+    "cc by-sa 4.0": "CC-BY-SA-4.0",
+    "cc by-nc 4.0": "CC-BY-NC-4.0",
     "cc0": "CC0-1.0",
+    "cc0 1.0": "CC0-1.0",
+    "cc-0": "CC0-1.0",
     "creative commons attribution 4.0 international": "CC-BY-4.0",
     "creative commons - attribution": "CC-BY-4.0",
     "creative commons zero v1.0 universal": "CC0-1.0",
 }
-"""What listings call a licence, by its SPDX name; others stay as they are written."""
+"""What people and listings call a licence, by its SPDX name; others stay as they are written."""
 
 
 def is_listing(path: Path) -> bool:

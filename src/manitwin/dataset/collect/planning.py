@@ -91,7 +91,9 @@ def _why_left_out(row: Row, licenses: Sequence[str] | None) -> str | None:
         return "an address, which nothing is fetched from"
     if licenses is None and row.licence == UNKNOWN:
         return "unknown licence"
-    if licenses is not None and row.licence not in licenses:
+    if licenses is not None and row.licence.lower() not in {
+        each.strip().lower() for each in licenses
+    }:  # SPDX 2.3, annex D.2
         return "licence not among those allowed"
     if row.grp == UNKNOWN:
         return "unknown category"
