@@ -77,6 +77,13 @@ def test_it_is_a_sequence_in_the_order_of_ids(dataset: Dataset) -> None:
         dataset.filter("mass_kg > 100")[0]
 
 
+def test_a_twin_is_had_by_its_id_where_it_is_among_these(dataset: Dataset) -> None:
+    ids = dataset.ids()
+    assert dataset[ids[2]].record.twin_id == dataset[1:][ids[2]].record.twin_id == ids[2]
+    with pytest.raises(KeyError, match=f"no twin {ids[0]} among these {len(ids) - 1}"):
+        dataset[1:][ids[0]]
+
+
 def test_slices_are_sequences_of_the_same_twins(dataset: Dataset) -> None:
     ids = dataset.ids()
     for part in (slice(1, 4), slice(None, None, -2), slice(-2, None), slice(10, 20), slice(4, 1)):

@@ -72,10 +72,10 @@ class Dataset(Sequence["Twin"]):
         return iter(self.twins())
 
     @overload
-    def __getitem__(self, place: SupportsIndex) -> Twin: ...
+    def __getitem__(self, place: SupportsIndex | str) -> Twin: ...
     @overload
     def __getitem__(self, place: slice) -> Twins: ...
-    def __getitem__(self, place: SupportsIndex | slice) -> Twin | Twins:
+    def __getitem__(self, place: SupportsIndex | str | slice) -> Twin | Twins:
         return self.twins()[place]
 
     def __reversed__(self) -> Iterator[Twin]:

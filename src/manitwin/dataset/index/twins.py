@@ -23,8 +23,8 @@ class Twins(Sequence["Twin"]):
     """Loaded twins, by their place: a slice is another such sequence, and reads no folder.
 
     A twin is loaded anew each time that it is asked for; of a URL, its folder is a copy, which is removed with it. ``in``,
-    ``index`` and ``count`` take a twin or its id, and load none. Raises IndexError for a place that there is not, TwinError
-    for a folder that cannot be read.
+    ``index`` and ``count`` take a twin or its id, and load none. Raises IndexError for a place that there is not, KeyError for
+    an id that is not among these, TwinError for a folder that cannot be read.
     """
 
     def __init__(self, root: DatasetRoot, ids: Sequence[str]):
@@ -42,12 +42,16 @@ class Twins(Sequence["Twin"]):
         return len(self._ids)
 
     @overload
-    def __getitem__(self, place: SupportsIndex) -> Twin: ...
+    def __getitem__(self, place: SupportsIndex | str) -> Twin: ...
     @overload
     def __getitem__(self, place: slice) -> Twins: ...
-    def __getitem__(self, place: SupportsIndex | slice) -> Twin | Twins:
+    def __getitem__(self, place: SupportsIndex | str | slice) -> Twin | Twins:
         if isinstance(place, slice):
             return Twins(self._root, self._ids[place])
+        if isinstance(place, str):
+            if place not in self._ids:
+                raise KeyError(f"no twin {place} among these {len(self._ids)}")
+            return load_twin(self._root, place)
         try:
             twin_id = self._ids[operator.index(place)]
         except IndexError:
