@@ -7,7 +7,8 @@ from pathlib import Path
 import fsspec
 import pytest
 
-from manitwin.errors import UsageError
+from grasped_twins import write_brick
+from manitwin.errors import TwinError, UsageError
 from manitwin.twin.fill_records import Filling
 from manitwin.twin.loaded_twin import Twin, TwinSource
 from manitwin.twin.store import RECORD, canonical_json, revision_of
@@ -94,3 +95,12 @@ def test_missing_twins_are_counted_before_any_is_read(tmp_path: Path) -> None:
     source.check(set(ids))
     with pytest.raises(UsageError, match=r"no twin ffff there \(2 of 4 are missing\).*--twins"):
         source.check({*ids, "gggg", "ffff"})
+
+
+def test_a_twin_without_one_of_its_hulls_is_no_smaller_twin(tmp_path: Path) -> None:
+    folder = TwinSource(tmp_path).folder(write_brick(tmp_path, 0))
+    hulls = sorted((folder / "collision").iterdir())
+    assert len(Twin(folder).hulls) == len(hulls)
+    hulls[-1].unlink()
+    with pytest.raises(TwinError, match=rf"collision/{hulls[-1].name} missing; build the twin again"):
+        _ = Twin(folder).hulls

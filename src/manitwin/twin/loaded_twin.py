@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from fnmatch import fnmatch
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,8 @@ from manitwin.twin.record import Physical, TwinRecord
 from manitwin.twin.store import RECORD, REMEDY, read_record
 
 MAX_HULL_BYTES = 16 << 20
+HULLS = "collision/hull_*.obj"
+"""The names of the files of hulls among those of a record."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +82,12 @@ class Twin:
 
     @cached_property
     def hulls(self) -> list[trimesh.Trimesh]:
-        """The convex collision hulls."""
+        """The convex collision hulls; raises TwinError where one that the record names is not there: a thing with a hole."""
         self.physical  # noqa: B018
-        return [_hull(path, self.folder) for path in sorted((self.folder / "collision").glob("hull_*.obj"))]
+        named = sorted(name for name in self.record.files if fnmatch(name, HULLS))
+        if missing := [name for name in named if not os.path.lexists(self.folder / name)]:
+            raise TwinError(f"{self.folder}: {', '.join(missing)} missing; {REMEDY}")
+        return [_hull(path, self.folder) for path in sorted(self.folder.glob(HULLS))]
 
     def face_parts(self) -> np.ndarray:
         """Return of each face of the visual meshes, one after the other, the place of its part in ``record.parts``.

@@ -21,7 +21,7 @@ from manitwin.assets.writers.format_notes import NOTES, QUANTITIES
 from manitwin.assets.writers.mesh_files import obj_file
 from manitwin.assets.writers.registry import chosen_formats, exporter, formats
 from manitwin.assets.writers.write import export_twin, safe_name, write_exported
-from manitwin.errors import ExportError, UsageError
+from manitwin.errors import ExportError, TwinError, UsageError
 from manitwin.formats.markdown import markdown_escaped
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.record_values import Estimate
@@ -213,10 +213,13 @@ def test_a_body_that_cannot_be_is_refused(physical: dict[str, object], message: 
 
 def test_a_twin_without_hulls_is_refused(tmp_path: Path) -> None:
     folder = made.write_twin(tmp_path / "twin")
-    shutil.rmtree(folder / "collision")
+    twin = replace(TwinContent.of(Twin(folder)), hulls=())
     for name in OURS:
         with pytest.raises(ExportError, match="no collision hulls"):
-            exporter(name)(TwinContent.of(Twin(folder)))
+            exporter(name)(twin)
+    shutil.rmtree(folder / "collision")
+    with pytest.raises(TwinError, match=r"collision/hull_00\.obj.* missing"):
+        TwinContent.of(Twin(folder))
 
 
 def test_formats_are_chosen_by_name() -> None:
