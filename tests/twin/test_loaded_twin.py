@@ -97,6 +97,12 @@ def test_missing_twins_are_counted_before_any_is_read(tmp_path: Path) -> None:
         source.check({*ids, "gggg", "ffff"})
 
 
+def test_a_data_set_that_is_given_as_a_twin_is_called_one(tmp_path: Path) -> None:
+    write_set(tmp_path, accepted=1, rejected=0)
+    with pytest.raises(TwinError, match=r"it is a data set: manitwin\.Dataset opens it"):
+        Twin(tmp_path)
+
+
 def test_a_twin_without_one_of_its_hulls_is_no_smaller_twin(tmp_path: Path) -> None:
     folder = TwinSource(tmp_path).folder(write_brick(tmp_path, 0))
     hulls = sorted((folder / "collision").iterdir())

@@ -197,7 +197,10 @@ def read_record(folder: Path, verify: bool = False) -> TwinRecord:
     """
     path = folder / RECORD
     if not os.path.lexists(path):
-        raise TwinError(f"{folder}: no {RECORD}, so this is no finished twin; give a folder that `manitwin build` made")
+        remedy = "give a folder that `manitwin build` made"
+        if (folder / "twins").is_dir():
+            remedy = "it is a data set: manitwin.Dataset opens it, and its twins are the folders below twins/"
+        raise TwinError(f"{folder}: no {RECORD}, so this is no finished twin; {remedy}")
     require_plain(folder)
     content = read_bytes(path, MAX_JSON_BYTES, TwinError, inside=folder, name=str(path))
     record = parse_record(content, path)
