@@ -17,11 +17,22 @@ import cv2
 import mujoco
 import numpy as np
 import trimesh
+from scipy.spatial.distance import pdist
 
 STEP_M = 0.002
 LEAST_PX_OF_512 = 20
 LITTLE = set(re.findall(r"\w+", "and or such as of on to a the with for from it up things"))
 PAIR = "pair of "
+NO_SUCH_KIND = (
+    "magnifying glass",
+    "trash can",
+    "watering can",
+    "toy car",
+    "rolling pin",
+    "flower pot",
+    "cup and saucer",
+)
+"""Categories that their last word alone does not mean."""
 
 
 class SecondScene:
@@ -178,7 +189,9 @@ class SecondView:
         outermost = re.search(r" that is (left|right)most in the picture$", said)
         said = re.sub(r" that is \w+ in the picture$", "", said).replace(PAIR, "")
         head = said.split()[-1]
-        same = [name for name in self.shown if self.scene.objects[name]["category"].split()[-1] == head]
+        head = next((each for each in NO_SUCH_KIND if said.endswith(each)), head)
+        kinds = {name: self.scene.objects[name]["category"] for name in self.shown}
+        same = [name for name, kind in kinds.items() if head == (kind if kind in NO_SUCH_KIND else kind.split()[-1])]
         if outermost:
             columns = {name: np.nonzero(self.mask(name))[1].mean() for name in same}
             return [(min if outermost[1] == "left" else max)(columns, key=lambda name: columns[name])]
@@ -334,9 +347,9 @@ def _side_picture(q, v, s, asked):
 
 def _gap(q, v, s, asked):
     measured, corners = q["evidence"]["measured"], s.corners(q["evidence"]["measured"])
-    said = re.match(r"The (.+) is (\d+) cm at its longest\. ", q["question"])
-    longest_side = max(trimesh.bounds.oriented_bounds(corners)[1])
-    if v.meant(said[1]) != [measured] or abs(int(said[2]) / 100 - longest_side) > max(0.006, 0.04 * longest_side):
+    said = re.match(r"The (.+) is (\d+) cm between its two farthest points\. ", q["question"])
+    farthest_m = pdist(trimesh.convex.convex_hull(corners).vertices).max()
+    if v.meant(said[1]) != [measured] or abs(int(said[2]) / 100 - farthest_m) > max(0.006, 0.02 * farthest_m):
         return False
     return abs(s.gap(*asked) - float(q["answer"].split()[0]) / 100) < 0.0015
 

@@ -75,7 +75,10 @@ def test_a_model_words_the_questions_of_train_and_what_asks_something_else_is_dr
     worded = [each for each in asked if each["rephrased"]]
     assert len(worded) == done.rephrased > 0
     for each in worded:
-        assert each["family"] == "gap" and " cm at its longest. Roughly how many centimetres lie " in each["question"]
+        assert (
+            each["family"] == "gap"
+            and " cm between its two farthest points. Roughly how many centimetres lie " in each["question"]
+        )
         assert "{" not in each["question"] and each["template"] == 4 and not each["held_out"]
     write_vqa(scenes, tmp_path / "plain", validation_share=0.0)
     plain = [json.loads(line) for line in (tmp_path / "plain" / QUESTIONS).read_text().splitlines()]

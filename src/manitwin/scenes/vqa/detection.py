@@ -9,7 +9,7 @@ import numpy as np
 
 from manitwin.scenes.vqa.context import Context, listed, sentence
 from manitwin.scenes.vqa.question import BOX, CHOICE, LIST, YES_NO, Draft
-from manitwin.scenes.vqa.references import CONTAINERS, OTHER_VESSELS, a_or_an, one_of
+from manitwin.scenes.vqa.references import CONTAINERS, a_or_an, could_be_asked_for, is_container, one_of
 from manitwin.scenes.vqa.things import Seen
 
 APART_SHARE = 0.01
@@ -57,12 +57,7 @@ def _counts(asked: Context) -> Iterator[Draft]:
 def _existence(asked: Context) -> Iterator[Draft]:
     """What is there, and what is not: nothing whose noun is that of something there."""
     there = {each.thing.category for each in asked.view.clear}
-    nouns = {category.split()[-1] for category in there}
-    vessels = nouns & {*CONTAINERS, *OTHER_VESSELS}
-    absent = [
-        category for category in asked.categories
-        if category.split()[-1] not in nouns and not (category.split()[-1] in ("container", "box") and vessels)
-    ]  # fmt: skip
+    absent = [category for category in asked.categories if not could_be_asked_for(category, there)]
     for category in sorted(there):
         count = sum(each.thing.category == category for each in asked.view.clear)
         said = f"there is {a_or_an(one_of(category))}" if count == 1 else f"there are {count}"
@@ -88,10 +83,9 @@ def _lists(asked: Context) -> Iterator[Draft]:
             sentence(f"from left to right: {listed([_described(each) for each in in_order])}"),
             {"objects": asked.names(*in_order)},
         )  # fmt: skip
-    if any(each.thing.head in OTHER_VESSELS for each in in_order):
-        return
-    containers = [each for each in in_order if each.thing.head in CONTAINERS]
-    if not containers:
+    told = [is_container(each.thing.category) for each in in_order]
+    containers = [each for each, is_one in zip(in_order, told, strict=True) if is_one]
+    if None in told or not containers:
         return
     kinds = listed([f"{noun}s" for noun in CONTAINERS])
     number = {1: "one container", 2: "two containers", 3: "three containers"}.get(

@@ -85,8 +85,16 @@ _LITTLE = frozenset(
 )
 
 
+_SAME = {
+    **dict.fromkeys(("drinks", "drinking", "tea", "coffee", "wine", "water", "soda", "beer", "juice", "milk"), "drink"),
+    **dict.fromkeys(("eating", "meals", "soup", "cereal", "snacks"), "food"),
+}  # fmt: skip
+"""Words for what one thing serves as well as another: who holds hot drinks in a mug may do so in a cup for tea."""
+
+
 def _content(function: str | None) -> set[str]:
-    return set((function or "").replace(",", " ").split()) - _LITTLE
+    found = set((function or "").replace(",", " ").split()) - _LITTLE
+    return {_SAME.get(word, word) for word in found}
 
 
 def _function(thing: Thing) -> str | None:

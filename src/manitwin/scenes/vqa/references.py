@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Collection
 
 from manitwin.models.annotators.surface_color import are_near
+from manitwin.models.annotators.words import article
+from manitwin.scenes.vqa.nouns import noun_of, nouns_of
 from manitwin.scenes.vqa.things import Seen, View
 
 MARGIN_PX = 40
@@ -30,8 +33,8 @@ REGION_MARGIN = 0.03
 def references(view: View, rng: random.Random) -> dict[str, str]:
     """Return by object's name words such as ``the yellow bottle`` for each clear object that has some of its own.
 
-    An object's rivals are those of the same noun of which anything may be seen. First its category alone, with its colour now and
-    then; else its colour, where all rivals have others; else that it is the outermost of its kind in the picture.
+    An object's rivals are those that its noun may mean too, and of which anything may be seen. First its category alone, with its
+    colour now and then; else its colour, where all rivals have others; else that it is the outermost of its kind in the picture.
     """
     found = {}
     shown = [each for each in view.seen if not each.is_hidden]
@@ -44,7 +47,7 @@ def references(view: View, rng: random.Random) -> dict[str, str]:
 
 
 def _may_be_called(other: Seen, noun: str) -> bool:
-    return other.thing.head == noun or other.thing.head in _GENERAL.get(noun, ())
+    return noun in nouns_of(other.thing.category) or other.thing.head in _GENERAL.get(noun, ())
 
 
 def _words(seen: Seen, rivals: list[Seen], rng: random.Random, margin_px: float) -> str | None:
@@ -85,4 +88,20 @@ def one_of(noun: str, color: str | None = None) -> str:
 
 def a_or_an(noun: str) -> str:
     """Return a noun with its article."""
-    return f"{'an' if noun[:1].lower() in 'aeiou' else 'a'} {noun}"
+    return f"{article(noun)} {noun}"
+
+
+def could_be_asked_for(category: str, present: Collection[str]) -> bool:
+    """Whether somebody who looks for a category may take one of the categories that are ``present`` for it."""
+    vessels = {noun_of(each) for each in present} & {*CONTAINERS, *OTHER_VESSELS}
+    names = frozenset().union(*(nouns_of(each) for each in present))
+    return bool(nouns_of(category) & names) or (noun_of(category) in ("container", "box") and bool(vessels))
+
+
+def is_container(category: str) -> bool | None:
+    """Whether a category is one of ``CONTAINERS``; None of what somebody may or may not call a container."""
+    noun = noun_of(category)
+    if noun in CONTAINERS:
+        return True
+    called = {category.split()[-1], *nouns_of(category)}
+    return None if called & {*CONTAINERS, *OTHER_VESSELS} else False

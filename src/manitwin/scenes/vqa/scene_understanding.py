@@ -84,8 +84,8 @@ def _gaps(asked: Context) -> Iterator[Draft]:
         if gap_m > FARTHEST_GAP_M or a.thing.name == b.thing.placed_as.supported_by or gap_m < 0.005:
             continue
         tolerance_cm = max(LEAST_TOLERANCE_CM, TOLERANCE_SHARE * 100 * gap_m)
-        length_m = measured.thing.length_m
-        size = sentence(f"{asked.words_of(measured)} is {100 * length_m:.0f} cm at its longest") + " "
+        length_m = measured.thing.longest_m
+        size = sentence(f"{asked.words_of(measured)} is {100 * length_m:.0f} cm between its two farthest points") + " "
         yield Draft(
             "gap", asked.view.name, NUMBER, {"a": asked.words_of(a), "b": asked.words_of(b), "size": size},
             f"{100 * gap_m:.1f} cm", sentence(f"about {100 * gap_m:.0f} cm" if gap_m >= 0.01 else "less than 1 cm"),

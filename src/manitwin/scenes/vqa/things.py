@@ -22,6 +22,7 @@ from manitwin.scenes.loaded_scene import object_pose
 from manitwin.scenes.perception.object_views import ObjectView
 from manitwin.scenes.perception.scene_truth import PictureTruth, SceneTruth
 from manitwin.scenes.scene import SceneObject
+from manitwin.scenes.vqa.nouns import noun_of
 from manitwin.scenes.vqa.question import Point
 from manitwin.scenes.vqa.seen_colors import leading, shows_color
 from manitwin.twin.loaded_twin import Twin
@@ -93,7 +94,7 @@ class Thing:
     @property
     def head(self) -> str:
         """The noun of the category: ``bottle`` of ``ketchup bottle``."""
-        return self.category.split()[-1]
+        return noun_of(self.category)
 
     @property
     def parts(self) -> list[Part]:
@@ -115,12 +116,6 @@ class Thing:
     def longest_m(self) -> float:
         """The distance of the two points of it that are farthest apart."""
         return self.shape.longest_m
-
-    @property
-    def length_m(self) -> float:
-        """Its longest side, as a person measures it: that of the smallest box around it, and not from corner to corner."""
-        physical = self.shape.twin.record.physical
-        return self.longest_m if physical is None else float(max(physical.obb.extents_m))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,34 @@
+"""The nouns that a category may be called by: a wine glass is a glass, a magnifying glass is none, a mug may be called a cup."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from manitwin.models.annotators.priors import named
+
+OF_ANOTHER_KIND = frozenset(
+    {
+        "magnifying glass", "trash can", "watering can", "piggy bank", "power bank", "circuit board", "cutting board",
+        "gravy boat", "toy boat", "set top box", "switch box", "snow globe", "caulking gun", "glue gun", "heat gun",
+        "staple gun", "pot holder", "curling iron", "soldering iron", "allen key", "hex key", "putty knife", "edible nut",
+        "insulin pen", "bowling pin", "rolling pin", "safety pin", "flower pot", "plant pot", "french press",
+        "garlic press", "butter stick", "drum stick", "glue stick", "usb stick", "muffin tin", "test tube", "paper towel",
+        "hair clipper", "nail clipper", "computer mouse", "toy bucket", "toy hammer", "toy car",
+    }
+)  # fmt: skip
+"""Names whose last word means another kind of thing where it stands alone: their noun is all of the name."""
+
+
+def noun_of(category: str) -> str:
+    """Return the noun of a category: ``bottle`` of ``ketchup bottle``, and ``magnifying glass`` of that."""
+    return category if category in OF_ANOTHER_KIND else category.split()[-1]
+
+
+@cache
+def nouns_of(category: str) -> frozenset[str]:
+    """Return every noun that somebody may call a thing by: its own, those of its parts (of a cup and saucer), and those of the
+    priors' other names for it (a mug is a coffee cup)."""
+    prior = named(category)
+    names = {category, *(prior.aliases if prior is not None else ())}
+    found = {noun_of(each) for name in names for each in name.split(" and ")}
+    return frozenset(found - {category.split()[-1]} if category in OF_ANOTHER_KIND else found)

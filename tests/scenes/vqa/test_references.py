@@ -1,0 +1,78 @@
+"""Which words mean one object of a picture, and what somebody may take one thing for."""
+
+from __future__ import annotations
+
+import random
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from manitwin.scenes.vqa.functional_planning import _content
+from manitwin.scenes.vqa.nouns import noun_of
+from manitwin.scenes.vqa.references import a_or_an, could_be_asked_for, is_container, references
+
+
+def picture(*things: tuple[str, str | None]) -> Any:
+    """A picture with things of a category and a colour, from left to right."""
+    seen = [
+        SimpleNamespace(
+            thing=SimpleNamespace(name=f"object_{i:02d}", category=category, head=noun_of(category)),
+            color=color, is_clear=True, is_hidden=False, column=100.0 * i,
+        )
+        for i, (category, color) in enumerate(things)
+    ]  # fmt: skip
+    return SimpleNamespace(seen=seen, clear=seen, camera=SimpleNamespace(width_px=512))
+
+
+def words(*things: tuple[str, str | None]) -> list[str | None]:
+    found = references(picture(*things), random.Random(0))
+    return [found.get(f"object_{i:02d}") for i in range(len(things))]
+
+
+def test_a_magnifying_glass_is_no_glass_that_is_leftmost() -> None:
+    assert words(("magnifying glass", None), ("wine glass", None)) == ["the magnifying glass", "the wine glass"]
+    assert words(("trash can", None), ("drink can", None)) == ["the trash can", "the drink can"]
+    two = words(("magnifying glass", None), ("magnifying glass", None))
+    assert two == [
+        "the magnifying glass that is leftmost in the picture",
+        "the magnifying glass that is rightmost in the picture",
+    ]
+
+
+def test_things_of_one_noun_are_told_apart_by_place_or_color() -> None:
+    outermost = ["the bottle that is leftmost in the picture", "the bottle that is rightmost in the picture"]
+    assert words(("water bottle", None), ("shampoo bottle", None)) == outermost
+    assert words(("mug", "red"), ("mug", "blue")) == ["the red mug", "the blue mug"]
+
+
+@pytest.mark.parametrize("other", ["mug", "cup and saucer"])
+def test_a_cup_has_no_words_where_something_else_may_be_called_one(other: str) -> None:
+    assert words(("cup", None), (other, None))[0] is None
+    assert words(("cup", "green"), (other, "red"))[0] == "the green cup"
+
+
+def test_what_something_there_may_be_taken_for_is_not_said_to_be_absent() -> None:
+    assert could_be_asked_for("cup", {"cup and saucer", "gear"})
+    assert could_be_asked_for("saucer", {"cup and saucer"})
+    assert could_be_asked_for("cup", {"mug"}) and could_be_asked_for("mug", {"cup"})
+    assert could_be_asked_for("box", {"bowl"})
+    assert not could_be_asked_for("wine glass", {"magnifying glass", "mug"})
+
+
+def test_containers() -> None:
+    assert [is_container(each) for each in ("mug", "water bottle", "soup can")] == [True] * 3
+    assert [is_container(each) for each in ("cup and saucer", "trash can", "wine glass", "vase")] == [None] * 4
+    assert [is_container(each) for each in ("hammer", "scissors", "gear")] == [False] * 3
+
+
+def test_who_serves_tea_in_a_cup_holds_hot_drinks_in_a_mug() -> None:
+    assert _content("holding hot drinks") & _content("serving tea or coffee")
+    assert _content("drinking wine") & _content("carrying drinking water")
+    assert not _content("holding hot drinks") & _content("driving nails")
+
+
+def test_articles_follow_the_sound() -> None:
+    assert [a_or_an(each) for each in ("hourglass", "usb stick", "apple", "mug")] == [
+        "an hourglass", "a usb stick", "an apple", "a mug",
+    ]  # fmt: skip
