@@ -68,3 +68,34 @@ def test_ball_is_the_same_after_any_turn_and_a_cylinder_is_not() -> None:
     assert found.ball and not of(cylinder(0.03, 0.12)).ball
     oblique = np.array([0.1, 0.0, 0.0]) + 0.035 * np.array([0.48, 0.6, 0.64])
     assert found.apart_m(np.array([0.135, 0.0, 0.0]), oblique) == pytest.approx(0, abs=1e-3)
+
+
+def gear(teeth: int) -> trimesh.Trimesh:
+    """A gear about Z, of which two turns by one tooth are two teeth."""
+    angles = np.arange(4 * teeth) * 2 * np.pi / (4 * teeth)
+    radii = np.where(np.arange(4 * teeth) % 4 < 2, 0.03, 0.024)
+    outline = np.stack([radii * np.cos(angles), radii * np.sin(angles)], 1)
+    middle, n = np.zeros((1, 2)), len(outline)
+    flat = np.concatenate([middle, outline])
+    vertices = np.concatenate([np.c_[flat, np.full(n + 1, z)] for z in (-0.006, 0.006)])
+    i, j = 1 + np.arange(n), 1 + (np.arange(n) + 1) % n
+    top, zero = n + 1, np.zeros(n, int)
+    faces = [(zero, j, i), (zero + top, i + top, j + top), (i, j, j + top), (i, j + top, i + top)]
+    return trimesh.Trimesh(vertices, np.concatenate([np.stack(each, 1) for each in faces]), process=False)
+
+
+@pytest.mark.parametrize("teeth", [9, 16, 20])
+def test_gear_has_the_turns_of_all_of_its_teeth(teeth: int) -> None:
+    found = of(gear(teeth))
+    assert found.axis is None and (np.linalg.det(found.motions) > 0).sum() == 2 * teeth
+    angles = np.arccos(np.clip((np.trace(found.motions, axis1=1, axis2=2) - 1) / 2, -1, 1))
+    assert np.isclose(angles, 2 * np.pi / teeth).sum() == 2  # there and back
+
+
+def test_motions_are_a_group_where_a_small_part_is_near_its_tolerance() -> None:
+    for radius_m in np.linspace(0.003, 0.008, 11):
+        stem = trimesh.creation.cylinder(radius_m, 0.02, sections=24)
+        stem.apply_translation([0.006, 0, 0.044])
+        motions = of(trimesh.util.concatenate([trimesh.creation.icosphere(3, 0.036), stem])).motions
+        made = np.einsum("aij,bjk->abik", motions, motions).reshape(-1, 1, 3, 3)
+        assert np.abs(made - motions).max((2, 3)).min(1).max() < 1e-2

@@ -1,4 +1,4 @@
-"""The symmetries of a solid by its surface: mirror planes, turns by a half to an eighth, bodies of revolution, and balls."""
+"""The symmetries of a solid by its surface: mirror planes, turns by a half to a 36th, bodies of revolution, and balls."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from manitwin.geometry.sampling import sample_surface
 _TESTED, _SURFACE = 1500, 30_000  # samples that are moved, and those that they are to fall on
 _OFF_SHARE = 0.015  # of the box's diagonal: how far nearly all of a moved surface may be from the surface
 _KEPT_SHARE = 0.99
-_FOLDS = (2, 3, 4, 5, 6, 7, 8)  # a prism of more sides is round, by ``_OFF_SHARE``
-_ODD_TURNS = (0.61, 1.87)  # radians: no share of a turn that a prism or a flower has
-_MOST_MOTIONS, _ONE_MOTION = 64, 1e-3  # a cube has 48; of two matrices that differ by less one is kept
+_MOST_SIDES, _MOST_TEETH = 8, 36  # a prism of more sides is round, by ``_OFF_SHARE``; a gear is not
+_EVEN = 0.05  # of the spread across an axis: how far it may differ by direction where many turns are symmetries
+_ODD_TURNS = (0.61, 1.87, 0.137, 2.71)  # radians: of up to 50 teeth one of them is off by a sixth of a tooth or more
+_MOST_MOTIONS, _ONE_MOTION = 4 * _MOST_TEETH, 1e-3  # a cube has 48; of two matrices that differ by less one is kept
 
 
 @dataclass(frozen=True)
@@ -67,8 +68,8 @@ def find_symmetries(mesh: trimesh.Trimesh, rng: np.random.Generator) -> Symmetri
     for axes in (np.eye(3), box_to_object[:3, :3].T, inertia_axes):
         mirrors = [-np.eye(3), *(np.eye(3) - 2 * np.outer(axis, axis) for axis in axes)]
         round_about = [axis for axis in axes if _is_round(axis, kept)]
-        turns = [turn for axis in axes for turn in _turns_about(axis, kept)]
-        motions = _closed([*(mirror for mirror in mirrors if kept(mirror)), *turns], kept)
+        turns = [turn for axis in axes for turn in _turns_about(axis, surface - center, kept)]
+        motions = _group([*turns, *(mirror for mirror in mirrors if kept(mirror))], kept)
         found.append(Symmetries(center, motions, round_about[0] if round_about else None, len(round_about) > 1))
     return max(found, key=lambda some: (some.ball, some.axis is not None, len(some.motions)))
 
@@ -77,23 +78,51 @@ def _is_round(axis: np.ndarray, kept: Callable[[np.ndarray], bool]) -> bool:
     return all(kept(_turned(axis, angle)) for angle in _ODD_TURNS)
 
 
-def _turns_about(axis: np.ndarray, kept: Callable[[np.ndarray], bool]) -> list[np.ndarray]:
-    """Return the least turn about an axis that is kept, and the half turn where that is too; of what is round a quarter turn."""
+def _turns_about(axis: np.ndarray, points: np.ndarray, kept: Callable[[np.ndarray], bool]) -> list[np.ndarray]:
+    """Return the turns about an axis that are kept, the least first; of what is round a quarter turn."""
     if _is_round(axis, kept):
         return [_turned(axis, np.pi / 2)]
-    folds = [fold for fold in _FOLDS if kept(_turned(axis, 2 * np.pi / fold))]
-    return [_turned(axis, 2 * np.pi / fold) for fold in sorted({*folds[:1], *folds[-1:]})]
+    most = _MOST_TEETH if _is_even(axis, points) else _MOST_SIDES
+    turns = (_turned(axis, 2 * np.pi / fold) for fold in range(most, 1, -1))
+    return [turn for turn in turns if kept(turn)]
 
 
-def _closed(generators: list[np.ndarray], kept: Callable[[np.ndarray], bool]) -> np.ndarray:
-    """Return the identity and all motions ``(K, 3, 3)`` that generators make after each other, as far as these are kept too."""
+def _is_even(axis: np.ndarray, points: np.ndarray) -> bool:
+    """Whether points spread alike in all directions across an axis, as those do that three and more turns leave where they were."""
+    spread = np.linalg.eigvalsh(np.cov((points - np.outer(points @ axis, axis)).T))
+    return bool(spread[1] >= (1 - _EVEN) * spread[2])
+
+
+def _group(generators: list[np.ndarray], kept: Callable[[np.ndarray], bool]) -> np.ndarray:
+    """Return the motions ``(K, 3, 3)`` that generators make after each other, the identity first.
+
+    A generator counts only if all that it makes with those before it are kept: a leaning stem may fall on itself within the
+    tolerance after one small turn, and not after two.
+    """
+    group = [np.eye(3)]
+    for generator in generators:
+        if _is_among(generator, group):
+            continue
+        made = _closed([*group, generator])
+        if made is not None and all(_is_among(motion, group) or kept(motion) for motion in made):
+            group = made
+    return np.array(group)
+
+
+def _closed(generators: list[np.ndarray]) -> list[np.ndarray] | None:
+    """Return the identity and all motions that generators make after each other; None of more than ``_MOST_MOTIONS``."""
     motions = [np.eye(3)]
     for motion in motions:  # which grows meanwhile
         for product in (each @ motion for each in generators):
-            new = np.abs(np.array(motions) - product).max((1, 2)).min() > _ONE_MOTION
-            if new and len(motions) < _MOST_MOTIONS and kept(product):
+            if not _is_among(product, motions):
                 motions.append(product)
-    return np.array(motions)
+        if len(motions) > _MOST_MOTIONS:
+            return None
+    return motions
+
+
+def _is_among(motion: np.ndarray, motions: list[np.ndarray]) -> bool:
+    return bool(np.abs(np.array(motions) - motion).max((1, 2)).min() <= _ONE_MOTION)
 
 
 def _turned(axis: np.ndarray, angle_rad: float) -> np.ndarray:
