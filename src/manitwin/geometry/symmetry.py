@@ -88,7 +88,7 @@ def _turns_about(axis: np.ndarray, points: np.ndarray, kept: Callable[[np.ndarra
 
 
 def _is_even(axis: np.ndarray, points: np.ndarray) -> bool:
-    """Whether points spread alike in all directions across an axis, as those do that three and more turns leave where they were."""
+    """Whether points spread alike in all directions across an axis, as those do that a third of a turn or less leaves as is."""
     spread = np.linalg.eigvalsh(np.cov((points - np.outer(points @ axis, axis)).T))
     return bool(spread[1] >= (1 - _EVEN) * spread[2])
 
