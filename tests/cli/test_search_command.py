@@ -34,7 +34,7 @@ def run(*arguments: object) -> str:
 def test_words_and_a_picture_find_twins(dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(twin_looks, "AROUND", 2)
     assert "knife" in run("search", dataset, "red knives", "--limit", 1)
-    assert "no twin has any of these words" in run("search", dataset, "xylophone")
+    assert "no twin is found by these words" in run("search", dataset, "xylophone")
     catalog = tmp_path / "catalog"
     assert "2 twins" in run("catalog", dataset, "-o", catalog, "--size", 96)
     picture = next(path for path in sorted(catalog.glob("pictures/knife-*/*_r_024.png")))

@@ -13,10 +13,11 @@ from manitwin.cli.main import app
 from manitwin.config import ServicesConfig
 from manitwin.dataset.index.rebuild import rebuild
 from manitwin.dataset.search import twin_looks as drawing
+from manitwin.dataset.search.question import words
 from manitwin.dataset.search.search import search_picture, search_words, text_vectors
 from manitwin.dataset.search.stored import FOLDER, Stored, VectorStore
 from manitwin.dataset.search.twin_looks import SPACE, twin_looks
-from manitwin.dataset.search.words import described, rank_by_words, words
+from manitwin.dataset.search.words import described, rank_by_words
 from manitwin.errors import UsageError
 from manitwin.models.embedders.texts import text_embedder
 from manitwin.render.cameras import framing_camera
@@ -73,6 +74,55 @@ def test_scores_are_those_of_bm25_by_hand() -> None:
     # one field of its mean length: weight 6, k1 1.2; rarities log(1 + 2.5/1.5) and log(1 + 1.5/2.5)
     assert hits[0].score == pytest.approx(np.log(1 + 2.5 / 1.5) * 6 * 2.2 / 7.2)
     assert hits[1].score == hits[2].score == pytest.approx(np.log(1 + 1.5 / 2.5) * 6 * 2.2 / 7.2)
+
+
+SHELF = [
+    {"category": "mug", "color": "red", "material": "ceramic", "function": "holding hot drinks"},
+    {"category": "mug", "color": "blue", "material": "ceramic", "function": "holding hot drinks"},
+    {"category": "mug", "color": "red", "material": "plastic", "function": "holding hot drinks"},
+    {"category": "apple", "color": "green", "function": "eating raw or cooking"},
+    {"category": "wine glass", "color": "white", "material": "glass", "function": "drinking wine"},
+    {"category": "hourglass", "color": "black", "material": "plastic and glass", "function": "measuring time"},
+    {"category": "magnifying glass", "color": "black", "material": "glass", "function": "looking at small things"},
+    {"category": "hammer", "color": "yellow", "material": "wood and steel", "function": "driving nails"},
+]
+LONGEST_M = [0.09, 0.10, 0.15, 0.08, 0.21, 0.13, 0.17, 0.30]
+
+
+def on_the_shelf(question: str) -> list[int]:
+    """The places of what is found, the best first."""
+    return [hit.place for hit in rank_by_words(question, [described(each) for each in SHELF], LONGEST_M)]
+
+
+@pytest.mark.parametrize(
+    ("question", "found"),
+    [
+        ("something red", [0, 2]),  # a red apple is a name of apples, and this one is green
+        ("crimson things", [0, 2]),
+        ("metal", [7]),
+        ("hour glass", [5]),
+        ("tools", [6, 7]),
+        ("something to drink from", [0, 1, 2, 4]),
+        ("a mug that is not red", [1]),
+        ("mugs, but not plastic", [0, 1]),
+    ],
+)
+def test_what_is_found_is_what_is_asked_for(question: str, found: list[int]) -> None:
+    assert sorted(on_the_shelf(question)) == found
+
+
+def test_a_compound_is_found_however_it_is_written() -> None:
+    assert on_the_shelf("wineglass")[0] == 4 and on_the_shelf("wine glass")[0] == 4
+
+
+def test_small_and_large_order_the_things_of_a_category() -> None:
+    assert on_the_shelf("small red mug") == [0, 2, 1] and on_the_shelf("a LARGE red mug")[0] == 2
+    assert on_the_shelf("the largest mug") == [2, 1, 0] and on_the_shelf("tiny mug, the smallest")[0] == 0
+
+
+def test_a_question_of_nothing_but_what_is_unwanted_is_refused() -> None:
+    with pytest.raises(UsageError, match="only what is not looked for"):
+        on_the_shelf("not red")
 
 
 def test_words_are_in_the_singular_and_in_one_spelling() -> None:

@@ -71,7 +71,7 @@ def search(
     for hit in hits:
         out_console.print(f"{hit.score:8.3f}  {hit.twin_id}  {hit.category}: {_cut(hit.caption)}")
     if not hits:
-        out_console.print("no twin has any of these words")
+        out_console.print("no twin is found by these words")
 
 
 def _drawn(twin_id: str) -> None:

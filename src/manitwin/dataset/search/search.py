@@ -20,7 +20,19 @@ if TYPE_CHECKING:
     from manitwin.models.embedders.foreground import Found
     from manitwin.models.embedders.texts import TextEmbedder
 
-COLUMNS = ("twin_id", "revision", "name", "category", "color", "material", "size", "shape", "function", "caption")
+COLUMNS = (
+    "twin_id",
+    "revision",
+    "name",
+    "category",
+    "color",
+    "material",
+    "size",
+    "shape",
+    "function",
+    "caption",
+    "longest_m",
+)
 BEST_VIEWS = 3
 """A twin is as like a picture as the mean of its three most alike views: one alone may be so by chance."""
 FUSION = 60
@@ -49,7 +61,7 @@ def search_words(root: DatasetRoot, question: str, *, limit: int, embedder: Text
     joined. Raises UsageError without an index or words.
     """
     rows = _rows(root)
-    by_words = rank_by_words(question, [described(row) for row in rows])
+    by_words = rank_by_words(question, [described(row) for row in rows], [row["longest_m"] for row in rows])
     scores, matched = {hit.place: hit.score for hit in by_words}, {hit.place: hit.matched for hit in by_words}
     if embedder is not None and rows:
         asked = embedder.embed([question])[0]

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, pairwise
 
-from manitwin.errors import UsageError
+from manitwin.dataset.search.question import Question, words
 from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.words import is_metal
 
 WEIGHTS = {
     "category": 6.0,
@@ -18,24 +19,29 @@ WEIGHTS = {
     "name": 4.0,
     "color": 3.0,
     "material": 2.0,
+    "kind": 1.0,
     "function": 1.0,
     "shape": 1.0,
     "size": 1.0,
     "caption": 0.5,
 }
 """What a word in each field counts: what a thing is before what colour it has, and that before what it is made of."""
+UNWANTED_IN = ("category", "aliases", "name", "color", "material", "kind")
+"""The fields in which a word that is not wanted leaves a twin out."""
+KINDS = {
+    "kitchen": "kitchen kitchenware", "tableware": "tableware kitchen", "tools": "tool", "food": "food", "toys": "toy",
+    "electronics": "electronics electronic device", "office": "office stationery", "household": "household",
+    "containers": "container",
+}  # fmt: skip
+"""Words for all things of a table of the priors."""
 SATURATION, LENGTH_SHARE = 1.2, 0.75
 """k1 and b of BM25, as Robertson and Zaragoza 2009 give them, section 3.5."""
-IGNORED = frozenset(
-    "a an and any are as at be by for from in is it me my of on one or some that the this to with you your".split()  # noqa: SIM905
-)
-SPELLINGS = {
-    "gray": "grey", "aluminum": "aluminium", "colored": "coloured", "golden": "gold", "wooden": "wood", "metallic": "metal",
-    "violet": "purple", "crimson": "red", "navy": "blue", "cloth": "fabric",
-}  # fmt: skip
-"""Other spellings of words that descriptions use."""
-_WORD = re.compile(r"[^\W_]+")
+SIZE_SHARE = 0.25
+"""By how much more the smallest (largest) of a category counts where small (large) ones are asked for."""
 _NOT_A_COLOR = re.compile(r"\(.*?\)|unknown color")
+_COLORS = frozenset(
+    "black white grey gray silver red green blue yellow orange brown pink purple beige gold golden cream".split()  # noqa: SIM905
+)
 
 
 @dataclass(frozen=True)
@@ -48,31 +54,46 @@ class WordHit:
 
 
 def described(row: Mapping[str, object]) -> dict[str, str]:
-    """Return the texts by field of a row of the index's table ``twins``; aliases are those of the category's prior."""
+    """Return the texts by field of a row of the index's table ``twins``; aliases are those of the category's prior.
+
+    Colours in aliases say nothing of this twin: a red apple is one of the names of apples.
+    """
     texts = {field: str(row.get(field) or "") for field in WEIGHTS}
     texts["color"] = _NOT_A_COLOR.sub(" ", texts["color"])
+    if any(is_metal(each) for each in re.split(r", | and | or | with ", texts["material"]) if each):
+        texts["material"] += " metal"
     prior = lookup(texts["category"])
-    texts["aliases"] = " ".join((prior.category, *prior.aliases)) if prior else ""
+    names = " ".join((prior.category, *prior.aliases)) if prior else ""
+    texts["aliases"] = " ".join(word for word in names.split() if word not in _COLORS)
+    texts["kind"] = KINDS.get(prior.domain, "") if prior else ""
     return texts
 
 
-def rank_by_words(question: str, texts: list[dict[str, str]]) -> list[WordHit]:
+def rank_by_words(
+    question: str, texts: list[dict[str, str]], longest_m: Sequence[float] | None = None
+) -> list[WordHit]:
     """Return those of twins (``described``) that have a word of the question, the best first; equal ones as they came.
 
     BM25F: the words of all fields make one document, each counted by its field's weight and length (Robertson, Zaragoza and
-    Taylor 2004, "Simple BM25 extension to multiple weighted fields"). Raises UsageError for a question without such words.
+    Taylor 2004, "Simple BM25 extension to multiple weighted fields"). A twin that has an unwanted word is left out; where small
+    or large ones are asked for, ``longest_m`` orders those of a category. Raises UsageError for a question without such words.
     """
-    asked = list(dict.fromkeys(words(question)))
-    if not asked:
-        raise UsageError(f"{question!r} has no word to look for; say what the thing is, such as: a blue mug")
     counted = [{field: Counter(words(text)) for field, text in each.items()} for each in texts]
+    asked = Question.of(
+        question, {word for each in counted for field in each.values() for word in field}, _pairs(texts)
+    )
     lengths = {field: _mean(sum(each[field].values()) for each in counted) or 1.0 for field in WEIGHTS}
-    holding = Counter(word for each in counted for word in set(chain.from_iterable(each.values())) & set(asked))
+    forms = set(chain.from_iterable(asked.wanted.values()))
+    there = [set(chain.from_iterable(each.values())) & forms for each in counted]
+    holding = {word: sum(not same.isdisjoint(each) for each in there) for word, same in asked.wanted.items()}
+    unwanted = set(chain.from_iterable(asked.unwanted.values()))
     hits = []
     for place, each in enumerate(counted):
+        if any(not unwanted.isdisjoint(each[field]) for field in UNWANTED_IN):
+            continue
         score, matched = 0.0, dict[str, list[str]]()
-        for word in asked:
-            found = {field: counts[word] for field, counts in each.items() if counts[word]}
+        for word, same in asked.wanted.items():
+            found = {field: count for field, counts in each.items() if (count := sum(counts[form] for form in same))}
             frequency = sum(
                 WEIGHTS[field] * count / (1 - LENGTH_SHARE + LENGTH_SHARE * sum(each[field].values()) / lengths[field])
                 for field, count in found.items()
@@ -83,27 +104,28 @@ def rank_by_words(question: str, texts: list[dict[str, str]]) -> list[WordHit]:
                 matched[word] = sorted(found)
         if matched:
             hits.append(WordHit(place, score, matched))
+    if asked.larger_first is not None and longest_m is not None:
+        hits = _by_size(hits, [each["category"] for each in texts], longest_m, asked.larger_first)
     return sorted(hits, key=lambda hit: (-hit.score, hit.place))
 
 
-def words(text: str) -> list[str]:
-    """Return the words of a text that mean something, in the singular and in one spelling."""
-    found = (word.casefold() for word in _WORD.findall(text))
-    return [_singular(SPELLINGS.get(word, word)) for word in found if word not in IGNORED]
+def _by_size(
+    hits: list[WordHit], categories: list[str], longest_m: Sequence[float], larger_first: bool
+) -> list[WordHit]:
+    """Raise the scores of hits by how many of their category they are larger (smaller) than."""
+    weighed = []
+    for hit in hits:
+        others = [each.place for each in hits if categories[each.place] == categories[hit.place] and each is not hit]
+        behind = sum((longest_m[hit.place] > longest_m[other]) == larger_first for other in others)
+        share = behind / len(others) if others else 0.0
+        weighed.append(WordHit(hit.place, hit.score * (1 + SIZE_SHARE * share), hit.matched))
+    return weighed
 
 
-PLURALS = (
-    ("ives", "ife"), ("aves", "af"), ("ies", "y"), ("oes", "o"), ("sses", "ss"), ("xes", "x"), ("zes", "z"), ("ches", "ch"),
-    ("shes", "sh"), ("us", "us"), ("ss", "ss"), ("s", ""),
-)  # fmt: skip
-"""Endings of plurals and what stands for each in the singular; of several that fit the first counts."""
-
-
-def _singular(word: str) -> str:
-    for plural, singular in PLURALS:
-        if word.endswith(plural) and len(word) > len(plural) + 1:
-            return word.removesuffix(plural) + singular
-    return word
+def _pairs(texts: list[dict[str, str]]) -> dict[str, tuple[str, str]]:
+    """Return the words that stand side by side in what twins are called, by both written as one."""
+    named = (words(each[field]) for each in texts for field in ("category", "name"))
+    return {"".join(pair): pair for found in named for pair in pairwise(found)}
 
 
 def _mean(values: Iterable[int]) -> float:

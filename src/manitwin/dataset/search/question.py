@@ -1,0 +1,112 @@
+"""What a question asks for: words that are wanted, words that are not, and whether small or large things come first."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from manitwin.errors import UsageError
+
+IGNORED = frozenset(
+    (
+        "a", "an", "and", "any", "are", "as", "at", "be", "by", "for", "from", "in", "is", "it", "me", "my", "of", "on", "one",
+        "or", "some", "that", "the", "this", "to", "with", "you", "your", "but", "thing", "something", "anything", "object",
+        "item", "stuff", "which", "used",
+    )
+)  # fmt: skip
+NEGATIONS = frozenset(("not", "no", "without", "except", "non", "isn", "aren"))
+SMALL = frozenset(("small", "smaller", "smallest", "little", "mini"))
+LARGE = frozenset(("large", "larger", "largest", "big", "bigger", "biggest", "huge"))
+SPELLINGS = {
+    "gray": "grey", "aluminum": "aluminium", "colored": "coloured", "golden": "gold", "wooden": "wood", "metallic": "metal",
+    "violet": "purple", "crimson": "red", "navy": "blue", "cloth": "fabric",
+}  # fmt: skip
+"""Other spellings of words that descriptions use."""
+PLURALS = (
+    ("ives", "ife"), ("aves", "af"), ("ies", "y"), ("oes", "o"), ("sses", "ss"), ("xes", "x"), ("zes", "z"), ("ches", "ch"),
+    ("shes", "sh"), ("us", "us"), ("ss", "ss"), ("s", ""),
+)  # fmt: skip
+"""Endings of plurals and what stands for each in the singular; of several that fit the first counts."""
+_WORD = re.compile(r"[^\W_]+")
+
+
+@dataclass(frozen=True)
+class Question:
+    """``wanted``: of each word that is looked for, the forms of it that descriptions have; ``unwanted`` alike.
+
+    ``larger_first``: whether large things come first, or small ones; None where the question says neither.
+    """
+
+    wanted: dict[str, frozenset[str]]
+    unwanted: dict[str, frozenset[str]]
+    larger_first: bool | None
+
+    @classmethod
+    def of(cls, text: str, vocabulary: Collection[str], pairs: dict[str, tuple[str, str]]) -> Question:
+        """Read a question; ``vocabulary`` has the words of all descriptions, ``pairs`` those side by side, by both in one.
+
+        Raises UsageError where nothing is looked for.
+        """
+        wanted, unwanted, negated = list[str](), list[str](), False
+        for word in _joined(_all_words(text), vocabulary, pairs):
+            if word in NEGATIONS:
+                negated = True
+            elif word not in IGNORED and word != "t":
+                (unwanted if negated else wanted).append(word)
+                negated = False
+        sizes = [word for word in wanted if word in SMALL or word in LARGE]
+        if len(sizes) == len(wanted) or len({word in LARGE for word in sizes}) != 1:
+            sizes = []  # alone it is a word as others are: descriptions say of what is large that it is
+        told = [word for word in wanted if word not in sizes]
+        if not told:
+            why = "says only what is not looked for" if unwanted else "has no word to look for"
+            raise UsageError(f"{text!r} {why}; say what the thing is, such as: a blue mug")
+        return cls(
+            {word: _forms(word, vocabulary) for word in told},
+            {word: _forms(word, vocabulary) for word in unwanted},
+            sizes[0] in LARGE if sizes else None,
+        )
+
+
+def words(text: str) -> list[str]:
+    """Return the words of a text that mean something, in the singular and in one spelling."""
+    return [word for word in _all_words(text) if word not in IGNORED]
+
+
+def _all_words(text: str) -> list[str]:
+    found = (word.casefold() for word in _WORD.findall(text))
+    return [word if word in IGNORED else _singular(SPELLINGS.get(word, word)) for word in found]
+
+
+def _joined(asked: list[str], vocabulary: Collection[str], pairs: dict[str, tuple[str, str]]) -> list[str]:
+    """Write compounds as descriptions do: ``hour glass`` is an hourglass, and ``wineglass`` a wine glass."""
+    found, place = list[str](), 0
+    while place < len(asked):
+        both = "".join(asked[place : place + 2])
+        if len(asked) > place + 1 and both in vocabulary:
+            found.append(both)
+            place += 2
+            continue
+        word = asked[place]
+        found += pairs[word] if word not in vocabulary and word in pairs else (word,)
+        place += 1
+    return found
+
+
+def _forms(word: str, vocabulary: Collection[str]) -> frozenset[str]:
+    """Return a word, and of its forms with and without -ing those that are in the vocabulary: ``drink`` and ``drinking``."""
+    stems = {word}
+    if word.endswith("ing") and len(word) > len("ring") + 1:
+        stem = word.removesuffix("ing")
+        stems |= {stem, f"{stem}e", *([stem[:-1]] if stem[-1] == stem[-2] else [])}
+    forms = {f"{each}ing" for each in stems} | {f"{each}{each[-1]}ing" for each in stems}
+    forms |= {f"{each[:-1]}ing" for each in stems if each.endswith("e")}
+    return frozenset({word} | {form for form in stems | forms if form in vocabulary})
+
+
+def _singular(word: str) -> str:
+    for plural, singular in PLURALS:
+        if word.endswith(plural) and len(word) > len(plural) + 1:
+            return word.removesuffix(plural) + singular
+    return word
