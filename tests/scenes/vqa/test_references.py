@@ -52,12 +52,18 @@ def test_a_cup_has_no_words_where_something_else_may_be_called_one(other: str) -
     assert words(("cup", "green"), (other, "red"))[0] == "the green cup"
 
 
+def test_a_key_beside_an_allen_key_is_not_surely_the_key() -> None:
+    assert words(("key", None), ("allen key", None)) == [None, "the allen key"]
+    assert words(("key", "gold"), ("allen key", "black")) == ["the gold key", "the allen key"]
+
+
 def test_what_something_there_may_be_taken_for_is_not_said_to_be_absent() -> None:
     assert could_be_asked_for("cup", {"cup and saucer", "gear"})
     assert could_be_asked_for("saucer", {"cup and saucer"})
     assert could_be_asked_for("cup", {"mug"}) and could_be_asked_for("mug", {"cup"})
     assert could_be_asked_for("box", {"bowl"})
-    assert not could_be_asked_for("wine glass", {"magnifying glass", "mug"})
+    assert could_be_asked_for("key", {"allen key"}) and could_be_asked_for("allen key", {"key"})
+    assert not could_be_asked_for("wine glass", {"thermos", "mug"})
 
 
 def test_containers() -> None:

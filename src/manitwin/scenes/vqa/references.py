@@ -8,7 +8,7 @@ from collections.abc import Collection
 from manitwin.models.annotators.surface_color import are_near
 from manitwin.models.annotators.words import article
 from manitwin.scenes.vqa.nouns import noun_of, nouns_of
-from manitwin.scenes.vqa.things import Seen, View
+from manitwin.scenes.vqa.things import Seen, Thing, View
 
 MARGIN_PX = 40
 """How far the outermost of some objects is beyond the next (px of a picture 512 wide)."""
@@ -39,15 +39,18 @@ def references(view: View, rng: random.Random) -> dict[str, str]:
     found = {}
     shown = [each for each in view.seen if not each.is_hidden]
     for seen in view.clear:
-        rivals = [each for each in shown if each is not seen and _may_be_called(each, seen.thing.head)]
+        rivals = [each for each in shown if each is not seen and _may_be_called(each, seen.thing)]
         words = _words(seen, rivals, rng, MARGIN_PX * view.camera.width_px / 512)
         if words is not None:
             found[seen.thing.name] = words
     return found
 
 
-def _may_be_called(other: Seen, noun: str) -> bool:
-    return noun in nouns_of(other.thing.category) or other.thing.head in _GENERAL.get(noun, ())
+def _may_be_called(other: Seen, thing: Thing) -> bool:
+    """Whether the noun of a thing may mean another one too: beside an allen key, a door key is not surely "the key"."""
+    noun = thing.head
+    names_it = noun == thing.category == other.thing.category.split()[-1]
+    return names_it or noun in nouns_of(other.thing.category) or other.thing.head in _GENERAL.get(noun, ())
 
 
 def _words(seen: Seen, rivals: list[Seen], rng: random.Random, margin_px: float) -> str | None:
@@ -94,8 +97,10 @@ def a_or_an(noun: str) -> str:
 def could_be_asked_for(category: str, present: Collection[str]) -> bool:
     """Whether somebody who looks for a category may take one of the categories that are ``present`` for it."""
     vessels = {noun_of(each) for each in present} & {*CONTAINERS, *OTHER_VESSELS}
-    names = frozenset().union(*(nouns_of(each) for each in present))
-    return bool(nouns_of(category) & names) or (noun_of(category) in ("container", "box") and bool(vessels))
+    names = frozenset().union(*(nouns_of(each) | {each.split()[-1]} for each in present))
+    return bool((nouns_of(category) | {category.split()[-1]}) & names) or (
+        noun_of(category) in ("container", "box") and bool(vessels)
+    )
 
 
 def is_container(category: str) -> bool | None:
