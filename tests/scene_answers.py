@@ -31,6 +31,7 @@ NO_SUCH_KIND = (
     "rolling pin",
     "flower pot",
     "cup and saucer",
+    "allen key",
 )
 """Categories that their last word alone does not mean."""
 
