@@ -35,6 +35,8 @@ def test_words_and_a_picture_find_twins(dataset: Path, tmp_path: Path, monkeypat
     monkeypatch.setattr(twin_looks, "AROUND", 2)
     assert "knife" in run("search", dataset, "red knives", "--limit", 1)
     assert "no twin is found by these words" in run("search", dataset, "xylophone")
+    misspelt = CliRunner().invoke(app, ["search", str(dataset), "red nife"])
+    assert "no twin has the word 'nife'; spelt nearly so: knife" in misspelt.output
     catalog = tmp_path / "catalog"
     assert "2 twins" in run("catalog", dataset, "-o", catalog, "--size", 96)
     picture = next(path for path in sorted(catalog.glob("pictures/knife-*/*_r_024.png")))

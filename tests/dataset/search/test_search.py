@@ -17,7 +17,7 @@ from manitwin.dataset.search.question import words
 from manitwin.dataset.search.search import search_picture, search_words, text_vectors
 from manitwin.dataset.search.stored import FOLDER, Stored, VectorStore
 from manitwin.dataset.search.twin_looks import SPACE, twin_looks
-from manitwin.dataset.search.words import described, rank_by_words
+from manitwin.dataset.search.words import described, rank_by_words, unknown_words
 from manitwin.errors import UsageError
 from manitwin.models.embedders.texts import text_embedder
 from manitwin.render.cameras import framing_camera
@@ -113,6 +113,13 @@ def test_what_is_found_is_what_is_asked_for(question: str, found: list[int]) -> 
 
 def test_a_compound_is_found_however_it_is_written() -> None:
     assert on_the_shelf("wineglass")[0] == 4 and on_the_shelf("wine glass")[0] == 4
+
+
+def test_words_that_no_twin_has_are_told_with_those_spelt_nearly_so() -> None:
+    texts = [described(each) for each in SHELF]
+    assert unknown_words("a red hamer, xylophones and a múg", texts) == {"hamer": ["hammer"], "xylophone": []}
+    assert unknown_words("something to drink from", texts) == {}
+    assert on_the_shelf("a múg") == on_the_shelf("a mug")
 
 
 def test_small_and_large_order_the_things_of_a_category() -> None:

@@ -57,11 +57,15 @@ def search(
         hits, background = search_picture(root, read_image(image).pixels, limit=limit, on_twin=_drawn)
     else:
         from manitwin.config import ServicesConfig
-        from manitwin.dataset.search.search import search_words
+        from manitwin.dataset.search.search import search_words, words_of_no_twin
         from manitwin.models.embedders.texts import text_embedder
 
         model = None if embedder is None else text_embedder(embedder, ServicesConfig())
         hits = search_words(root, words or "", limit=limit, embedder=model)
+        if embedder is None:
+            for word, near in words_of_no_twin(root, words or "").items():
+                spelt = f"; spelt nearly so: {', '.join(near)}" if near else ""
+                error_console.print(f"no twin has the word {word!r}{spelt}", markup=False)
     if json_:
         asked = {"words": words, "image": None if image is None else str(image)}
         print_document({**asked, "background": background, "hits": [asdict(hit) for hit in hits]})

@@ -7,6 +7,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from manitwin.errors import UsageError
+from manitwin.models.annotators.diacritics import without_diacritics
 
 IGNORED = frozenset(
     (
@@ -75,7 +76,7 @@ def words(text: str) -> list[str]:
 
 
 def _all_words(text: str) -> list[str]:
-    found = (word.casefold() for word in _WORD.findall(text))
+    found = (word.casefold() for word in _WORD.findall(without_diacritics(text)))
     return [word if word in IGNORED else _singular(SPELLINGS.get(word, word)) for word in found]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from manitwin.dataset.index.query import Index
 from manitwin.dataset.search.stored import Stored, VectorStore
-from manitwin.dataset.search.words import described, rank_by_words
+from manitwin.dataset.search.words import described, rank_by_words, unknown_words
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import sha256_of_json
@@ -70,6 +70,11 @@ def search_words(root: DatasetRoot, question: str, *, limit: int, embedder: Text
         scores = _joined_ranks([hit.place for hit in by_words], nearest)
     order = sorted(scores, key=lambda place: (-scores[place], place))[:limit]
     return [_hit(rows[place], scores[place], matched.get(place)) for place in order]
+
+
+def words_of_no_twin(root: DatasetRoot, question: str) -> dict[str, list[str]]:
+    """Return the words of a question that no twin of a data set has, each with those of twins that are spelt nearly so."""
+    return unknown_words(question, [described(row) for row in _rows(root)])
 
 
 def search_picture(

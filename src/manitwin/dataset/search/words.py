@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from itertools import chain, pairwise
 
 from manitwin.dataset.search.question import Question, words
@@ -38,6 +39,8 @@ SATURATION, LENGTH_SHARE = 1.2, 0.75
 """k1 and b of BM25, as Robertson and Zaragoza 2009 give them, section 3.5."""
 SIZE_SHARE = 0.25
 """By how much more the smallest (largest) of a category counts where small (large) ones are asked for."""
+MOST_NEAR, NEARLY = 3, 0.75
+"""How many words that are spelt nearly as an unknown one are told, and how like it they are (difflib's ratio)."""
 _NOT_A_COLOR = re.compile(r"\(.*?\)|unknown color")
 _COLORS = frozenset(
     "black white grey gray silver red green blue yellow orange brown pink purple beige gold golden cream".split()  # noqa: SIM905
@@ -107,6 +110,17 @@ def rank_by_words(
     if asked.larger_first is not None and longest_m is not None:
         hits = _by_size(hits, [each["category"] for each in texts], longest_m, asked.larger_first)
     return sorted(hits, key=lambda hit: (-hit.score, hit.place))
+
+
+def unknown_words(question: str, texts: list[dict[str, str]]) -> dict[str, list[str]]:
+    """Return the words of a question that no twin (``described``) has in any form, each with those of twins spelt nearly so.
+
+    Raises UsageError for a question without words.
+    """
+    vocabulary = {word for each in texts for text in each.values() for word in words(text)}
+    asked = Question.of(question, vocabulary, _pairs(texts))
+    unknown = [word for word, forms in asked.wanted.items() if vocabulary.isdisjoint(forms)]
+    return {word: get_close_matches(word, sorted(vocabulary), MOST_NEAR, NEARLY) for word in unknown}
 
 
 def _by_size(
