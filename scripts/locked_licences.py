@@ -66,6 +66,8 @@ SAID = {
 READ = {
     "alabaster": ("BSD-3-Clause", "LICENSE.rst"),
     "antlr4-python3-runtime": ("BSD-3-Clause", "antlr4/Parser.py"),
+    "assimp-py": ("BSD-3-Clause", "licenses/src/assimp/LICENSE"),  # the bindings are under MIT (licenses/LICENSE)
+    "cascadio": ("MIT", "METADATA"),  # its own; OpenCASCADE in it is under LGPL 2.1 with an exception
     "cmeel-qhull": ("Qhull", "licenses/qhull/COPYING.txt"),
     "comm": ("BSD-3-Clause", "licenses/LICENSE"),
     "contourpy": ("BSD-3-Clause", "LICENSE"),

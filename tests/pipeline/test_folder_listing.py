@@ -233,12 +233,12 @@ def test_a_mesh_that_cannot_be_inspected_within_the_limits_is_left_alone_by_itse
 
 
 def test_long_lists_are_counted_by_reason_and_kept_whole(tmp_path: Path) -> None:
-    put(tmp_path, {"cup.jpg": b"x", **{f"{i:03}.txt": "x" for i in range(200)}, "scan.fbx": b"x"})
+    put(tmp_path, {"cup.jpg": b"x", **{f"{i:03}.txt": "x" for i in range(200)}, "scan.blend": b"x"})
     listing = listed(tmp_path)
     lines = listing.remarks()
     assert lines[0].endswith("202 files: 1 input (1 image), 201 left alone")
     assert f"{tmp_path}: left alone: 200 files (000.txt, 001.txt, 002.txt, ...): no image or mesh" in lines
-    assert any("scan.fbx: this mesh format is not read; export it" in line for line in lines)
+    assert any("scan.blend: this mesh format is not read; export it" in line for line in lines)
     assert len(lines) == 3 and len(listing.left) == 201
 
 

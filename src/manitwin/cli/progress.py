@@ -150,8 +150,11 @@ class ShownWaits:
         self._told_at: dict[str, float] = {}
 
     def stage(self, event: StageEvent) -> None:
-        """Print a line where an event is of a stage that waits, unless the like was printed a short while ago."""
-        if not isinstance(event, StageEnded) or event.state != "waiting":
+        """Print a line where an event is of a stage that waits, unless the like was printed a short while ago.
+
+        What failed by an error that nobody expected is tried again at once, and waits for nothing.
+        """
+        if not isinstance(event, StageEnded) or event.state != "waiting" or event.trace:
             return
         now = self._clock()
         told = event.stage in self._told_at
