@@ -17,7 +17,7 @@ from manitwin.geometry.parts.striking_face import handle_line, striking_face
 Feature = Literal[
     "opening", "rim", "inside", "handle", "handle_end", "head", "face", "tip", "edge", "middle", "neck", "spout",
     "top", "base", "side", "center", "front", "back", "end", "ring", "mouth", "bristles", "muzzle", "grip", "housing",
-    "apex", "arch_end", "end_wall", "toe",
+    "apex", "arch_end", "end_wall", "toe", "stem",
 ]  # fmt: skip
 """A place on an object that geometry can point out."""
 
@@ -182,6 +182,15 @@ def _top(shape: Shape, points: SurfacePoints) -> np.ndarray:
     return _near(1 - _share_of_height(shape, points), 0.12) * (0.6 + 0.4 * points.normals[:, 2])
 
 
+def _stem(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    """The end of what sticks out of a round thing, else its top, where a stem's mark is if anything shows it."""
+    stem = shape.stem
+    if stem is None:
+        return _top(shape, points)
+    along = (points.positions_m - stem.center_m) @ stem.direction / stem.reach_m
+    return _near(1 - along, 0.12)
+
+
 def _base(shape: Shape, points: SurfacePoints) -> np.ndarray:
     return _near(_share_of_height(shape, points), 0.08) * (0.4 - 0.6 * points.normals[:, 2])
 
@@ -280,7 +289,7 @@ _SCORERS: dict[str, Callable[[Shape, SurfacePoints], np.ndarray | None]] = {
     "opening": _opening, "rim": _rim, "inside": _inside, "handle": _handle, "handle_end": _handle_end, "head": _head,
     "face": striking_face, "tip": _tip, "edge": _edge, "middle": _middle, "neck": _neck, "spout": _spout, "top": _top,
     "base": _base, "side": _side, "center": _center, "front": partial(_large_face, side=1),
-    "back": partial(_large_face, side=-1), "toe": _toe,
+    "back": partial(_large_face, side=-1), "toe": _toe, "stem": _stem,
     "end": _end, "ring": _ring,
     "mouth": _mouth, "bristles": _bristles, "muzzle": _muzzle, "grip": _grip, "housing": _housing,
     "apex": _apex, "arch_end": _arch_end, "end_wall": _end_wall,

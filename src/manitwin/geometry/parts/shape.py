@@ -16,6 +16,7 @@ from manitwin.geometry.parts.outline import SLICES
 from manitwin.geometry.parts.pistol import Pistol, find_pistol
 from manitwin.geometry.parts.protrusions import Protrusion, RoundBody, round_body
 from manitwin.geometry.parts.section_borders import section_borders
+from manitwin.geometry.parts.stem import Stem, find_stem
 from manitwin.geometry.ray_caster import local_thickness
 from manitwin.geometry.sampling import sample_surface
 
@@ -198,6 +199,11 @@ class Shape:
     def arch(self) -> Arch | None:
         """The arch with heavy ends that it may be."""
         return find_arch(self.surface_m, self.obb_extents_m, self.obb_to_object, self.center_of_mass_m)
+
+    @cached_property
+    def stem(self) -> Stem | None:
+        """What sticks out of a round thing on one side."""
+        return find_stem(self.surface_m, self.obb_extents_m)
 
     @property
     def has_ends(self) -> bool:

@@ -268,6 +268,7 @@ _PLACES: dict[str, str] = {
     "arch_end": "end of the arch",
     "end_wall": "side near the end",
     "toe": "end away from the opening",
+    "stem": "stem",
 }
 
 
