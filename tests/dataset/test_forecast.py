@@ -113,5 +113,12 @@ def test_the_command_says_what_the_document_says(dataset: Path) -> None:
     check_keys(document, "plan")
 
 
+def test_few_inputs_take_no_more_cores_than_they_are_and_are_told_in_small_units(dataset: Path) -> None:
+    few, one = forecast(DatasetRoot(dataset), 4, 64), forecast(DatasetRoot(dataset), 4, 4)
+    assert few.hours == one.hours and few.memory_bytes == one.memory_bytes and few.cores == 64
+    told = CliRunner().invoke(app, ["plan", str(dataset), "--items", "4"]).output
+    assert "core minutes" in told and " s (" in told and " 0.00 h" not in told and " 0.00 GB" not in told
+
+
 def test_an_amount_scales_with_its_interval() -> None:
     assert Amount(2.0, 1.0, 4.0).times(0.5) == Amount(1.0, 0.5, 2.0)

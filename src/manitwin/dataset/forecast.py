@@ -101,6 +101,7 @@ def forecast(
             f"{root.path}: no CPU time of its stages is recorded; `manitwin index {root.path}` and try again"
         )
     rng = np.random.default_rng(seed)
+    busy = min(cores, items)  # an input is built on one core
     cpu_hours = _for_all(cpu_s / 3600, items, rng)
     accepted = len(set(status) - set(rejected))
     low, high = wilson_interval(accepted, len(ids))
@@ -113,7 +114,7 @@ def forecast(
         measured=len(ids),
         accepted=Amount(items * accepted / len(ids), items * low, items * high),
         cpu_hours=cpu_hours,
-        hours=cpu_hours.times(1 / cores),
+        hours=cpu_hours.times(1 / busy),
         slowest_cpu_s=float(cpu_s.max()),
         services_usd=services,
         usd=None
@@ -123,7 +124,7 @@ def forecast(
         work_bytes=_for_all(work, items, rng) if work.any() else None,
         index_bytes=_bytes_below(root, "index") / len(ids) * items,
         ledger_bytes=_bytes_of(root, "ledger.sqlite") / len(ids) * items,
-        memory_bytes=_memory_bytes(root, cores),
+        memory_bytes=_memory_bytes(root, busy),
         stages={name: seconds / cpu_s.sum() for name, seconds in sorted(stages.items(), key=lambda each: -each[1])},
     )
 

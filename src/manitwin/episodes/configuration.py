@@ -11,6 +11,7 @@ from manitwin.engine.ledger.location import CONFIG
 from manitwin.errors import EpisodesError
 from manitwin.formats.json_file import read_json_object
 from manitwin.formats.printable import printable_line
+from manitwin.twin.dataset_root import TWINS
 
 _REMEDY = "run manitwin trajectories again, or give the folder that it wrote"
 
@@ -38,6 +39,8 @@ def read_configuration(episodes: Path) -> dict[str, Any]:
     """Return the configuration of a folder of episodes; raises EpisodesError where it has none, or another kind's."""
     path = episodes / CONFIG
     said = read_json_object(path, EpisodesError, inside=episodes, name=str(path), remedy=_REMEDY)
+    if (episodes / TWINS).is_dir():
+        raise EpisodesError(f"{episodes}: a data set of twins, not of episodes; {_REMEDY}")
     try:
         _Configuration.model_validate(said)
     except ValidationError as error:

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from manitwin.dataset.forecast import Amount, Forecast
 
 _STAGES_SHOWN = 5
+_Unit = tuple[float, str]
+_HOURS: tuple[_Unit, ...] = ((1.0, "h"), (1 / 60, "min"), (1 / 3600, "s"))
+_CORE_HOURS: tuple[_Unit, ...] = ((1.0, "core hours"), (1 / 60, "core minutes"))
+_BYTES: tuple[_Unit, ...] = ((1e9, "GB"), (1e6, "MB"), (1e3, "kB"))
 
 
 def plan(
@@ -49,18 +53,19 @@ def _lines(told: Forecast) -> list[str]:
     lines = [
         f"{told.items:,} inputs on {told.cores:,} cores, told from {told.measured:,} inputs (intervals: 95 %)",
         f"accepted twins: {_range(told.accepted, 1, '')}",
-        f"CPU time: {_range(told.cpu_hours, 1, ' core hours')}; of it {shares}",
-        f"time: {_range(told.hours, 1, ' h')} with all cores always busy; the slowest input took {told.slowest_cpu_s:,.0f} CPU s",
+        f"CPU time: {_measured(told.cpu_hours, _CORE_HOURS)}; of it {shares}",
+        f"time: {_measured(told.hours, _HOURS)} with all cores always busy; the slowest input took"
+        f" {told.slowest_cpu_s:,.0f} CPU s",
         f"services: {_range(told.services_usd, 1, ' dollars')}, as recorded",
     ]
     if told.usd is None:
         lines.append("dollars: not known; say the price of a core's hour with --core-hour-usd")
     else:
         lines.append(f"dollars: {_range(told.usd, 1, '')}, services among them")
-    disk = [f"twins {_range(told.twins_bytes, 1e9, ' GB')}"]
+    disk = [f"twins {_measured(told.twins_bytes, _BYTES)}"]
     if told.work_bytes is not None:
-        disk.append(f"results of stages {_range(told.work_bytes, 1e9, ' GB')}, none with run.keep_work = false")
-    disk.append(f"index {told.index_bytes / 1e9:,.2g} GB, ledger {told.ledger_bytes / 1e9:,.2g} GB")
+        disk.append(f"results of stages {_measured(told.work_bytes, _BYTES)}, none with run.keep_work = false")
+    disk.append(f"index {_rounded(told.index_bytes)}, ledger {_rounded(told.ledger_bytes)}")
     lines.append(f"disk: {'; '.join(disk)}")
     if told.memory_bytes is None:
         lines.append("memory: not known; the data set has no run.memory_gb")
@@ -69,6 +74,21 @@ def _lines(told: Forecast) -> list[str]:
             f"memory: {told.memory_bytes / 2**30:,.0f} GiB at most, the limit of all workers; use is not recorded"
         )
     return lines
+
+
+def _unit_of(value: float, units: tuple[_Unit, ...]) -> _Unit:
+    """Return the first of some units, the largest first, of which a value has one or more; else the last."""
+    return next((unit for unit in units if value >= unit[0]), units[-1])
+
+
+def _measured(amount: Amount, units: tuple[_Unit, ...]) -> str:
+    size, name = _unit_of(amount.value, units)
+    return _range(amount, size, f" {name}")
+
+
+def _rounded(size_bytes: float) -> str:
+    size, name = _unit_of(size_bytes, _BYTES)
+    return f"{size_bytes / size:,.3g} {name}"
 
 
 def _range(amount: Amount, unit: float, words: str) -> str:
