@@ -22,7 +22,7 @@ from scipy.spatial.distance import pdist
 STEP_M = 0.002
 LEAST_PX_OF_512 = 20
 LITTLE = set(re.findall(r"\w+", "and or such as of on to a the with for from it up things"))
-PAIR = "pair of "
+COUNTER = re.compile(r"(?:pair|piece|bar|loaf|roll|pack|can|tube|ear) of ")
 NO_SUCH_KIND = (
     "magnifying glass",
     "trash can",
@@ -188,7 +188,7 @@ class SecondView:
         """Return the objects in the picture that some words may mean."""
         said = re.sub(r"^the ", "", words)
         outermost = re.search(r" that is (left|right)most in the picture$", said)
-        said = re.sub(r" that is \w+ in the picture$", "", said).replace(PAIR, "")
+        said = COUNTER.sub("", re.sub(r" that is \w+ in the picture$", "", said))
         head = said.split()[-1]
         head = next((each for each in NO_SUCH_KIND if said.endswith(each)), head)
         kinds = {name: self.scene.objects[name]["category"] for name in self.shown}
@@ -428,7 +428,7 @@ def _count(q, v, s, asked):
 def _is_there(q, v, s, asked):
     present = {s.objects[name]["category"] for name in v.shown}
     ends = r"(?:\?| in this| among)"
-    said = [c for c in present if re.search(rf"\ban? (?:pair of )?{re.escape(c)}{ends}", q["question"])]
+    said = [c for c in present if re.search(rf"\ban? (?:{COUNTER.pattern})?{re.escape(c)}{ends}", q["question"])]
     return bool(said) == (q["answer"] == "yes")
 
 

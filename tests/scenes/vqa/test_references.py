@@ -10,7 +10,7 @@ import pytest
 
 from manitwin.scenes.vqa.functional_planning import _content
 from manitwin.scenes.vqa.nouns import noun_of
-from manitwin.scenes.vqa.references import a_or_an, could_be_asked_for, is_container, references
+from manitwin.scenes.vqa.references import a_or_an, could_be_asked_for, is_container, one_of, references
 
 
 def picture(*things: tuple[str, str | None]) -> Any:
@@ -82,3 +82,18 @@ def test_articles_follow_the_sound() -> None:
     assert [a_or_an(each) for each in ("hourglass", "usb stick", "apple", "mug")] == [
         "an hourglass", "a usb stick", "an apple", "a mug",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("noun", "words"),
+    [
+        ("soap", "a bar of soap"),
+        ("bread", "a loaf of bread"),
+        ("scissors", "a pair of scissors"),
+        ("safety goggles", "a pair of safety goggles"),
+        ("hourglass", "an hourglass"),
+        ("mug", "a mug"),
+    ],
+)
+def test_one_of_what_is_not_counted_by_itself_is_so_much_of_it(noun: str, words: str) -> None:
+    assert a_or_an(one_of(noun)) == words

@@ -19,9 +19,24 @@ OF_ANOTHER_KIND = frozenset(
 """Names whose last word means another kind of thing where it stands alone: their noun is all of the name."""
 
 
+PAIRS = frozenset(
+    {"headphones", "earphones", "scissors", "shears", "pliers", "tongs", "tweezers", "glasses", "sunglasses", "goggles"}
+)
+"""Nouns that are plural, of which one is a pair."""
+
+
 def noun_of(category: str) -> str:
     """Return the noun of a category: ``bottle`` of ``ketchup bottle``, and ``magnifying glass`` of that."""
     return category if category in OF_ANOTHER_KIND else category.split()[-1]
+
+
+@cache
+def counter_of(category: str) -> str | None:
+    """Return what one of a category is counted by: ``pair of`` scissors, a ``bar of`` soap; None of what counts by itself."""
+    if category.split()[-1] in PAIRS:
+        return "pair of"
+    prior = named(category)
+    return None if prior is None or prior.counter is None or prior.counter in category else prior.counter
 
 
 @cache

@@ -7,7 +7,7 @@ from collections.abc import Collection
 
 from manitwin.models.annotators.surface_color import are_near
 from manitwin.models.annotators.words import article
-from manitwin.scenes.vqa.nouns import noun_of, nouns_of
+from manitwin.scenes.vqa.nouns import counter_of, noun_of, nouns_of
 from manitwin.scenes.vqa.things import Seen, Thing, View
 
 MARGIN_PX = 40
@@ -19,10 +19,6 @@ OTHER_VESSELS = (
     "glass", "carton", "tin", "tube", "bag", "case", "shoe", "bin", "crate", "dispenser", "canister", "holder", "teapot",
 )  # fmt: skip
 """Nouns of what somebody may call a container: where one is in view, containers are not asked about."""
-PAIRS = frozenset(
-    {"headphones", "earphones", "scissors", "shears", "pliers", "tongs", "tweezers", "glasses", "sunglasses", "goggles"}
-)
-"""Nouns that are plural, of which one is a pair."""
 _GENERAL = {"container": (*CONTAINERS, *OTHER_VESSELS)}
 """Nouns that are also true of other nouns."""
 
@@ -84,8 +80,9 @@ def region(x: float, y: float) -> str | None:
 
 
 def one_of(noun: str, color: str | None = None) -> str:
-    """Return the words for one thing: ``black pair of scissors``, ``yellow bottle``."""
-    thing = f"pair of {noun}" if noun.split()[-1] in PAIRS else noun
+    """Return the words for one thing: ``black pair of scissors``, ``yellow bottle``, ``bar of soap``."""
+    counter = counter_of(noun)
+    thing = noun if counter is None else f"{counter} {noun}"
     return f"{color} {thing}" if color else thing
 
 
