@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from manitwin.cli.main import app
 from manitwin.config import ServicesConfig
+from manitwin.dataset.index.query import Index
 from manitwin.dataset.index.rebuild import rebuild
 from manitwin.dataset.search import twin_looks as drawing
 from manitwin.dataset.search.question import words
@@ -229,3 +230,19 @@ def test_a_store_gives_back_what_it_was_given_and_refuses_other_lengths(tmp_path
 def test_pictures_want_a_local_data_set() -> None:
     with pytest.raises(UsageError, match="copy the data set"):
         dict(twin_looks(DatasetRoot("memory://nowhere"), {"ab12": "r"}))
+
+
+def test_a_part_is_found_and_left_out_by_what_points_are_called() -> None:
+    rows = [{"category": "mug", "parts": "rim handle"}, {"category": "mug", "parts": "rim"}]
+    texts = [described(row) for row in rows]
+    assert [hit.place for hit in rank_by_words("a mug without a handle", texts)] == [1]
+    assert [hit.place for hit in rank_by_words("a mug with a handle", texts)] == [0, 1]
+
+
+def test_labels_of_functional_points_are_searched(tmp_path: Path) -> None:
+    write_thing(tmp_path, 0, can())
+    rebuild(DatasetRoot(tmp_path), jobs=1)
+    labels = Index(DatasetRoot(tmp_path)).select("points", columns=["role", "label"]).to_pylist()
+    told = next(each["label"] for each in labels if each["role"] == "functional")
+    (hit,) = search_words(DatasetRoot(tmp_path), told, limit=3)
+    assert hit.matched is not None and "parts" in next(iter(hit.matched.values()))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -139,8 +140,14 @@ def _joined_ranks(*orders: list[int]) -> dict[int, float]:
 
 
 def _rows(root: DatasetRoot) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = Index(root).select("twins", columns=COLUMNS).to_pylist()
-    return rows
+    """Return the twins of an index, each with the labels of its functional points as its ``parts``."""
+    index = Index(root)
+    rows: list[dict[str, Any]] = index.select("twins", columns=COLUMNS).to_pylist()
+    labels = defaultdict[str, list[str]](list)
+    for point in index.select("points", columns=["twin_id", "role", "label"]).to_pylist():
+        if point["role"] == "functional":
+            labels[point["twin_id"]].append(point["label"])
+    return [{**row, "parts": " ".join(labels[row["twin_id"]])} for row in rows]
 
 
 def _hit(row: dict[str, Any], score: float, matched: dict[str, list[str]] | None) -> Hit:

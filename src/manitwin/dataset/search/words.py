@@ -24,10 +24,11 @@ WEIGHTS = {
     "function": 1.0,
     "shape": 1.0,
     "size": 1.0,
+    "parts": 0.5,
     "caption": 0.5,
 }
 """What a word in each field counts: what a thing is before what colour it has, and that before what it is made of."""
-UNWANTED_IN = ("category", "aliases", "name", "color", "material", "kind")
+UNWANTED_IN = ("category", "aliases", "name", "color", "material", "kind", "parts")
 """The fields in which a word that is not wanted leaves a twin out."""
 KINDS = {
     "kitchen": "kitchen kitchenware", "tableware": "tableware kitchen", "tools": "tool", "food": "food", "toys": "toy",
