@@ -12,7 +12,7 @@ from manitwin.scenes.vqa.question import BOX, CHOICE, LIST, YES_NO, Draft
 from manitwin.scenes.vqa.references import CONTAINERS, a_or_an, could_be_asked_for, is_container, one_of
 from manitwin.scenes.vqa.things import Seen
 
-APART_SHARE = 0.01
+APART_SHARE = 0.02
 """How far (share of the picture's width) each thing of a list is to the right of the one before it, by either middle."""
 ABSENT = 4
 """How many categories that are not there are offered for each picture."""
