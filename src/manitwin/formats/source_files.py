@@ -16,6 +16,7 @@ from urllib.parse import unquote
 from xml.sax.saxutils import unescape
 
 from manitwin.formats.bounded_file import open_regular, read_bytes
+from manitwin.formats.fbx_names import fbx_file_names
 from manitwin.formats.json_file import parse_json
 
 MESH_SUFFIXES = frozenset(
@@ -92,7 +93,7 @@ def named_files(path: Path) -> Iterator[str]:
     read, or is no regular one, names none: that is for the reader to say.
     """
     names = {".obj": _named_by_obj, ".gltf": _named_by_gltf, ".glb": _named_by_glb, ".dae": _named_by_dae,
-             ".ply": _named_by_ply}.get(path.suffix.lower())  # fmt: skip
+             ".ply": _named_by_ply, ".fbx": _named_by_fbx}.get(path.suffix.lower())  # fmt: skip
     if names is not None and is_regular(path):
         try:
             yield from islice(names(path), _MAX_NAMES)
@@ -231,6 +232,10 @@ def _text_at(data: bytes, start: int) -> tuple[str, int]:
     end = len(data) if end < 0 else end
     text = data[start:end].strip() if end - start <= _MAX_LINE_BYTES else b""
     return text.decode(errors="replace").strip(), end
+
+
+def _named_by_fbx(path: Path) -> Iterator[str]:
+    yield from dict.fromkeys(fbx_file_names(read_bytes(path, MAX_TEXT_BYTES, _Unread)))
 
 
 def _named_by_ply(path: Path) -> Iterator[str]:

@@ -12,6 +12,7 @@ import numpy as np
 import trimesh
 from trimesh.visual.material import PBRMaterial
 
+from manitwin.formats.fbx_names import beside
 from manitwin.formats.isolated import Limits, ProcessCrashed, run_isolated
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import (
@@ -185,13 +186,9 @@ def _material(told: FbxMaterial, source: MeshSource) -> PBRMaterial:
 
 
 def _texture(name: str | None, source: MeshSource) -> Any:
-    """Return a texture that lies beside the file; a path of the machine that wrote it counts by its last part alone."""
-    if name is None:
-        return None
-    plain = name.replace("\\", "/")
-    is_absolute = plain.startswith("/") or plain[1:2] == ":" or ".." in plain.split("/")
-    data = source.sibling(plain.rpartition("/")[2] if is_absolute else plain, "texture")
-    return None if data is None else decode_texture(data, plain, source)
+    """Return a texture that lies beside the file."""
+    data = None if name is None else source.sibling(beside(name), "texture")
+    return None if data is None or name is None else decode_texture(data, beside(name), source)
 
 
 def _part(mesh: FbxMesh, materials: list[PBRMaterial], source: MeshSource) -> trimesh.Trimesh:

@@ -1,0 +1,43 @@
+"""The pictures that FBX files name: found in binary and text, beside the file whatever machine wrote it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fbx_document import fbx_box
+from manitwin.formats.fbx_names import beside, fbx_file_names
+from manitwin.formats.source_files import named_files, side_files
+from manitwin.pipeline.item import Item, twin_id
+
+
+@pytest.mark.parametrize(
+    ("name", "there"),
+    [
+        ("a.png", "a.png"),
+        ("textures\\a.png", "textures/a.png"),
+        ("C:\\Users\\somebody\\a.png", "a.png"),
+        ("/home/somebody/a.png", "a.png"),
+        ("..\\..\\maps\\a.png", "a.png"),
+    ],
+)
+def test_names_of_other_machines_count_by_their_last_part(name: str, there: str) -> None:
+    assert beside(name) == there
+
+
+def test_names_are_found_in_text_and_in_bytes() -> None:
+    assert set(fbx_file_names(fbx_box(texture="maps/a.png").encode())) == {"maps/a.png"}
+    binary = b"\x10RelativeFilenameS" + (9).to_bytes(4, "little") + b"maps\\a.pn" + b"\x08FileNameS\xff\xff\xff\xff"
+    assert list(fbx_file_names(binary)) == ["maps/a.pn"]
+    assert list(fbx_file_names(b"RelativeFilename" * 3 + b"FileName: broken")) == []
+
+
+def test_a_texture_beside_a_file_is_one_of_its_files_and_part_of_what_a_twin_is(tmp_path: Path) -> None:
+    mesh, picture = tmp_path / "box.fbx", tmp_path / "a.png"
+    mesh.write_text(fbx_box(texture="a.png"))
+    picture.write_bytes(b"one")
+    assert list(named_files(mesh)) == ["a.png"] and side_files(mesh) == [picture]
+    before = twin_id(Item(str(mesh)))
+    picture.write_bytes(b"another")
+    assert twin_id(Item(str(mesh))) != before
