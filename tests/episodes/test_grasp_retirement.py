@@ -10,6 +10,8 @@ import pytest
 from synthetic_episodes import attempt
 
 from grasped_twins import write_brick
+from manitwin.dataset.review.store import REVIEWS, ReviewStore
+from manitwin.dataset.review.verdicts import Review
 from manitwin.episodes.retirement import find_retirements, retire
 from manitwin.episodes.target_grasps import usable_grasps
 from manitwin.errors import UsageError
@@ -74,3 +76,23 @@ def test_grasps_of_a_gripper_that_was_never_tried_are_refused_by_name(tmp_path: 
     assert len(twin.grasps(gripper="panda")) == len(twin.grasps()) == 6
     with pytest.raises(UsageError, match="unknown gripper 'pandas'; did you mean 'panda'"):
         twin.grasps(gripper="pandas")
+
+
+def test_what_people_said_of_a_twin_stands_when_a_grasp_is_retired(tmp_path: Path) -> None:
+    identity = write_brick(tmp_path, 0)
+    folder, twins = tmp_path / twin_name(identity), TwinSource(tmp_path)
+    said = Review.model_validate(
+        {
+            "annotator": "ada",
+            "twin_id": identity,
+            "revision": read_record(folder).revision,
+            "answers": {"category": "yes"},
+        }
+    )
+    with ReviewStore(tmp_path / REVIEWS) as store:
+        store.add([said], ["1"])
+    dropped = replace(KEPT, outcome="dropped", twin_id=identity, grasp_id="panda-0002")
+    assert retire(twins, find_retirements([dropped], failed_share=0.5)) == 1
+    with ReviewStore(tmp_path / REVIEWS) as store:
+        (stored,) = store.standing()
+    assert stored.review.revision == read_record(folder).revision != said.revision

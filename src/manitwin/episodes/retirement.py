@@ -12,13 +12,14 @@ from itertools import groupby
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from manitwin.dataset.review.store import REVIEWS, ReviewStore, reviews_path
 from manitwin.engine.ledger.ledger import LEDGER, Ledger
 from manitwin.episodes.attempts import EXECUTION_FAILURES, Attempt
 from manitwin.episodes.settings import HANDOVER
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.grasp_table import read_grasp_table
 from manitwin.twin.loaded_twin import TwinSource
-from manitwin.twin.store import amend
+from manitwin.twin.store import amend, read_record
 from manitwin.twin.wholeness import note_sizes
 
 GRASPS = "grasps.parquet"
@@ -66,11 +67,11 @@ def find_retirements(attempts: Iterable[Attempt], *, failed_share: float) -> lis
 def retire(twins: TwinSource, found: Iterable[Retirement]) -> int:
     """Mark grasps as retired in their twins' tables; returns how many were not so before.
 
-    A data set's ledger and index follow. Raises UsageError for a data set at a URL, whose twins are copies here, or where a
-    run is at work on it.
+    A data set's ledger and index follow, and what people said of those twins stands. Raises UsageError for a data set at a URL,
+    whose twins are copies here, or where a run is at work on it.
     """
     by_twin = {twin_id: {each.grasp_id for each in group} for twin_id, group in _by_twin(found)}
-    count, revised = 0, {}
+    count, revised = 0, dict[str, tuple[str, str]]()
     for twin_id, grasp_ids in by_twin.items():
         folder = twins.folder(twin_id)
         table = read_grasp_table(folder / GRASPS)
@@ -79,11 +80,14 @@ def retire(twins: TwinSource, found: Iterable[Retirement]) -> int:
         fresh = sum(after) - sum(before)
         if fresh:
             count += fresh
-            revised[twin_id] = amend(
-                folder, {GRASPS: _with_column(table, "retired", after)}, partial(note_sizes, folder)
-            ).revision
+            seen = read_record(folder).revision
+            amended = amend(folder, {GRASPS: _with_column(table, "retired", after)}, partial(note_sizes, folder))
+            revised[twin_id] = seen, amended.revision
     if revised and twins.root.exists(LEDGER):
-        _follow(twins.root, revised)
+        _follow(twins.root, {twin_id: revision for twin_id, (_, revision) in revised.items()})
+    if revised and twins.root.exists(REVIEWS):
+        with ReviewStore(reviews_path(twins.root)) as store:  # nobody judged which grasps an arm would fail with
+            store.follow(revised)
     return count
 
 

@@ -17,6 +17,7 @@ from pydantic import ValidationError
 
 from hostile_schemas import ENDLESS
 from manitwin.dataset.review.queues import Plan
+from manitwin.dataset.review.schema import MIGRATIONS
 from manitwin.dataset.review.store import ReviewStore
 from manitwin.dataset.review.verdicts import Review, reason_of
 from manitwin.errors import UsageError
@@ -168,3 +169,32 @@ def test_a_verdict_that_makes_no_sense_is_refused(change: dict[str, object], sai
     with pytest.raises(ValidationError) as error:
         Review.model_validate({**review().model_dump(), **change})
     assert said in reason_of(error.value)
+
+
+def test_reviews_stand_for_what_followed_the_revision_that_was_seen(store: ReviewStore) -> None:
+    store.add([review(revision="r0"), review(annotator="bob", revision="r0")], ["1", "2"])
+    store.follow({"t0": ("r0", "r1")})
+    store.follow({"t0": ("r1", "r2"), "t9": ("r0", "r9")})
+    assert {stored.review.revision for stored in store.standing()} == {"r2"}
+    assert store.judged() == {"t0": {"r2": {"ada", "bob"}}}
+    store.add([review(answer="no", revision="r2")], ["3"])
+    told = {stored.review.annotator: stored.review.answers["category"] for stored in store.standing()}
+    assert told == {"ada": "no", "bob": "yes"}, "the later of two of one person counts"
+    stored = store.of_twin("t0", "bob")
+    assert stored is not None and stored.review.revision == "r2"
+
+
+def test_revisions_that_follow_each_other_in_a_circle_end(store: ReviewStore) -> None:
+    store.add([review(revision="r0")], ["1"])
+    store.follow({"t0": ("r0", "r1")})
+    store.follow({"t0": ("r1", "r0")})
+    assert [stored.review.revision for stored in store.standing()] == ["r1"]
+
+
+def test_a_store_of_the_first_schema_is_brought_to_this_one(tmp_path: Path) -> None:
+    path = tmp_path / "reviews.sqlite"
+    with closing(sqlite3.connect(path)) as connection:
+        connection.executescript(f"{MIGRATIONS[0]}; PRAGMA user_version = 1;")
+    with ReviewStore(path) as store:
+        store.add([review()], ["1"])
+        assert len(store.standing()) == 1

@@ -154,10 +154,11 @@ def review_import(
     path, read = reviews_path(root), read_verdicts(verdicts, root)
     with ReviewStore(path) as store:
         added = store.add((review for review, _ in read), (request for _, request in read))
+        followed = store.followed()
     there = f", {len(read) - added} were there already" if added < len(read) else ""
     out_console.print(f"{added} reviews taken up{there}; `manitwin review report {dataset}` says what they tell")
     now = {twin_id: read_twin(root, twin_id).revision for twin_id in {review.twin_id for review, _ in read}}
-    if outdated := sum(review.revision != now[review.twin_id] for review, _ in read):
+    if outdated := sum(followed(each.twin_id, each.revision) != now[each.twin_id] for each, _ in read):
         error_console.print(
             f"{outdated} of the reviews of {verdicts} are of twins that were built anew since, and do not count"
         )

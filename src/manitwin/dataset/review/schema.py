@@ -37,6 +37,15 @@ MIGRATIONS = (
         PRIMARY KEY (annotator, twin_id)
     ) STRICT, WITHOUT ROWID;
     """,
+    """
+    CREATE TABLE successors (
+        twin_id TEXT NOT NULL,
+        before TEXT NOT NULL,                -- a revision
+        after TEXT NOT NULL,                 -- one that differs from it by nothing that anybody judges
+        at REAL NOT NULL,
+        PRIMARY KEY (twin_id, before)
+    ) STRICT, WITHOUT ROWID;
+    """,
 )
 
 

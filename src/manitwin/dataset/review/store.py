@@ -13,9 +13,9 @@ import sqlite3
 import statistics
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -132,17 +132,56 @@ class ReviewStore:
             self._put_draft(connection, annotator, said.twin_id, said.model_dump(mode="json"))
             return stored
 
+    def follow(self, revisions: Mapping[str, tuple[str, str]]) -> None:
+        """Note revisions of twins that differ from the one before by nothing that is judged: what was said of that stands."""
+        with self._writing() as connection:
+            for twin_id, (before, after) in revisions.items():
+                connection.execute(
+                    "INSERT INTO successors VALUES (?, ?, ?, ?)"
+                    " ON CONFLICT DO UPDATE SET after = excluded.after, at = excluded.at",
+                    (twin_id, before, after, self._now()),
+                )
+
     def standing(self) -> list[Stored]:
-        """Return the last review that stands of each annotator, twin and revision, in the order of their numbers."""
+        """Return the last review that stands of each annotator, twin and revision, in the order of their numbers.
+
+        A review is of the revision that followed the one that was seen, where ``follow`` says so.
+        """
         latest = f"SELECT max(number) FROM events WHERE {_LIVE} GROUP BY annotator, twin_id, revision"
-        return self._rows(f"number IN ({latest}) ORDER BY number", ())
+        followed, last = self.followed(), dict[tuple[str, str, str], Stored]()
+        for stored in self._rows(f"number IN ({latest}) ORDER BY number", ()):
+            said = stored.review
+            now = followed(said.twin_id, said.revision)
+            moved = replace(stored, review=said.model_copy(update={"revision": now}))
+            last[said.annotator, said.twin_id, now] = moved
+        return sorted(last.values(), key=lambda stored: stored.number)
+
+    def followed(self) -> Callable[[str, str], str]:
+        """Return what tells of a twin's revision the last one that followed it."""
+        known = {
+            (twin, before): after
+            for twin, before, after in self._select("SELECT twin_id, before, after FROM successors", ())
+        }
+
+        def last(twin_id: str, revision: str) -> str:
+            seen = {revision}
+            while (after := known.get((twin_id, revision))) is not None and after not in seen:
+                seen.add(after)
+                revision = after
+            return revision
+
+        return last
 
     def of_twin(self, twin_id: str, annotator: str) -> Stored | None:
         """Return the last review that stands of an annotator on a twin."""
         found = self._rows(
             f"{_LIVE} AND twin_id = ? AND annotator = ? ORDER BY number DESC LIMIT 1", (twin_id, annotator)
         )
-        return found[0] if found else None
+        if not found:
+            return None
+        said = found[0].review
+        now = self.followed()(twin_id, said.revision)
+        return replace(found[0], review=said.model_copy(update={"revision": now}))
 
     def median_seconds(self, annotator: str) -> float | None:
         """Return the median time that an annotator's reviews that stand took; None: none says how long."""
@@ -206,9 +245,10 @@ class ReviewStore:
     def judged(self) -> dict[str, dict[str, set[str]]]:
         """Return the annotators of the reviews that stand, by twin and revision."""
         found: dict[str, dict[str, set[str]]] = {}
+        followed = self.followed()
         rows = self._select(f"SELECT DISTINCT twin_id, revision, annotator FROM events WHERE {_LIVE}", ())
         for twin_id, revision, annotator in rows:
-            found.setdefault(twin_id, {}).setdefault(revision, set()).add(annotator)
+            found.setdefault(twin_id, {}).setdefault(followed(twin_id, revision), set()).add(annotator)
         return found
 
     def _rows(self, where: str, values: tuple[Any, ...]) -> list[Stored]:
