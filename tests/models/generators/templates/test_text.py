@@ -795,3 +795,18 @@ def test_what_is_said_of_a_part_behind_a_comma_is_of_that_part() -> None:
     wanted = read("phillips head screwdriver, 15 cm, yellow handle")
     assert wanted.category == "screwdriver" and wanted.lengths_m == {"": 0.15}
     assert wanted.wishes == read("a screwdriver with a yellow handle").wishes
+
+
+@pytest.mark.parametrize(
+    "text", ["a cookie cutter", "a steel glass cutter", "two fried eggs", "a red horse shoe", "an onion ring"]
+)
+def test_a_name_behind_a_word_that_makes_it_another_thing_is_no_template(text: str) -> None:
+    with pytest.raises(UsageError, match="no template makes"):
+        read_text(text, load_templates())
+
+
+@pytest.mark.parametrize(
+    ("text", "category"), [("a box cutter", "utility knife"), ("a glass egg", "egg"), ("a gold ring", "ring")]
+)
+def test_other_words_before_such_a_name_leave_it_one(text: str, category: str) -> None:
+    assert read_text(text, load_templates()).category == category

@@ -35,6 +35,13 @@ _NAMES_OF_OTHERS = _listed(
 )
 """Other names in the priors of a template's category, of what it does not make: a boot is no low shoe, of chess pieces it makes
 the pawn."""
+_COMPOUNDS = _listed(
+    """
+    cookie cutter, biscuit cutter, glass cutter, pipe cutter, bolt cutter, tile cutter, cigar cutter, fried egg, scrambled
+    egg, poached egg, horse shoe, snow shoe, brake shoe, onion ring, boxing ring, piston ring
+    """
+)
+"""A template's name behind a word that makes it another thing: a horse shoe is no shoe."""
 _PARTS_TOO = frozenset({"cap"})
 """What names a thing alone, behind another noun names a part or a cover: a bottle cap is not for a head."""
 
@@ -42,5 +49,7 @@ _PARTS_TOO = frozenset({"cap"})
 def is_of_another_shape(phrase: str, before: Sequence[str]) -> bool:
     """Tell whether no template makes what is named, behind other words, though the priors have it as that of a category."""
     said = {*singulars(phrase)}
+    if before and any(f"{before[-1]} {each}" in _COMPOUNDS for each in (phrase, *singulars(phrase))):
+        return True
     part = before and before[-1] not in FILLER_WORDS and not is_described(before[-1])
     return not said.isdisjoint(_NAMES_OF_OTHERS) or bool(part and not said.isdisjoint(_PARTS_TOO))
