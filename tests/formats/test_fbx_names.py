@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from fbx_document import fbx_box
-from manitwin.formats.fbx_names import beside, fbx_file_names
+from manitwin.formats.fbx_names import beside, embedded_files, fbx_file_names
 from manitwin.formats.source_files import named_files, side_files
 from manitwin.pipeline.item import Item, twin_id
 
@@ -31,6 +31,19 @@ def test_names_are_found_in_text_and_in_bytes() -> None:
     binary = b"\x10RelativeFilenameS" + (9).to_bytes(4, "little") + b"maps\\a.pn" + b"\x08FileNameS\xff\xff\xff\xff"
     assert list(fbx_file_names(binary)) == ["maps/a.pn"]
     assert list(fbx_file_names(b"RelativeFilename" * 3 + b"FileName: broken")) == []
+
+
+def _record(key: bytes, value: bytes, kind: bytes = b"S") -> bytes:
+    return bytes([len(key)]) + key + kind + len(value).to_bytes(4, "little") + value
+
+
+def test_pictures_within_a_file_are_found_by_their_names() -> None:
+    one = _record(b"Filename", b"C:\\maps\\a.png") + _record(b"RelativeFilename", b"maps\\a.png")
+    two = _record(b"Filename", b"/home/b.jpg")
+    data = one + _record(b"Content", b"AAA", b"R") + two + _record(b"Content", b"BB", b"R")
+    assert embedded_files(data) == {"a.png": b"AAA", "b.jpg": b"BB"}
+    cut = _record(b"Content", b"AAA", b"R")[:-1]
+    assert embedded_files(one + cut) == {} and embedded_files(_record(b"Content", b"", b"R")) == {}
 
 
 def test_a_texture_beside_a_file_is_one_of_its_files_and_part_of_what_a_twin_is(tmp_path: Path) -> None:

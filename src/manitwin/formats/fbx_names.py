@@ -1,10 +1,13 @@
-"""The pictures that an FBX file names, binary or text, and where they lie on another machine than the one that wrote it."""
+"""The pictures that an FBX file names or holds, and where they lie on another machine than the one that wrote it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 _KEYS = (b"RelativeFilename", b"FileName")
+_OF_A_PICTURE = (b"RelativeFilenameS", b"FilenameS", b"FileNameS")
+_CONTENT = b"\x07ContentR"
+"""How the record of a picture's bytes begins in a binary file: the length of its name, its name, and that it is raw."""
 _LONGEST_NAME = 4096
 _LENGTH_BYTES = 4
 
@@ -18,6 +21,21 @@ def fbx_file_names(data: bytes) -> Iterator[str]:
             if name:
                 yield beside(name)
             at = data.find(key, at + len(key))
+
+
+def embedded_files(data: bytes) -> dict[str, bytes]:
+    """Return the pictures that a binary FBX file holds, by the last part of the name that stands before each of them."""
+    found = {}
+    at = data.find(_CONTENT)
+    while at >= 0:
+        start = at + len(_CONTENT) + _LENGTH_BYTES
+        length = int.from_bytes(data[at + len(_CONTENT) : start], "little")
+        named = max(data.rfind(key, max(0, at - _LONGEST_NAME), at) + len(key) for key in _OF_A_PICTURE)
+        name = _value_at(data, named - 1)
+        if name and 0 < length <= len(data) - start:
+            found[beside(name).rpartition("/")[2]] = data[start : start + length]
+        at = data.find(_CONTENT, start)
+    return found
 
 
 def beside(name: str) -> str:

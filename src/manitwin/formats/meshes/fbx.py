@@ -12,7 +12,7 @@ import numpy as np
 import trimesh
 from trimesh.visual.material import PBRMaterial
 
-from manitwin.formats.fbx_names import beside
+from manitwin.formats.fbx_names import beside, embedded_files
 from manitwin.formats.isolated import Limits, ProcessCrashed, run_isolated
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import (
@@ -90,7 +90,8 @@ def read_fbx(source: MeshSource) -> list[trimesh.Trimesh]:
         raise source.too_large(str(error)) from error
     if _BOUND in data:
         source.find("it is bound to a skeleton, or has morph targets; it was taken as it was modelled")
-    known = [_material(each, source) for each in materials]
+    held = embedded_files(data)
+    known = [_material(each, held, source) for each in materials]
     return [_part(mesh, known, source) for mesh in meshes]
 
 
@@ -170,8 +171,8 @@ def _told(material: dict[str, Any]) -> FbxMaterial:
     )
 
 
-def _material(told: FbxMaterial, source: MeshSource) -> PBRMaterial:
-    texture, normals = (_texture(name, source) for name in (told.texture, told.normal_texture))
+def _material(told: FbxMaterial, held: dict[str, bytes], source: MeshSource) -> PBRMaterial:
+    texture, normals = (_texture(name, held, source) for name in (told.texture, told.normal_texture))
     color: tuple[float, ...] = told.color
     if told.texture is not None:
         color = (1.0, 1.0, 1.0) if texture is not None else color_of_lost_texture(told.color)
@@ -185,10 +186,13 @@ def _material(told: FbxMaterial, source: MeshSource) -> PBRMaterial:
     )
 
 
-def _texture(name: str | None, source: MeshSource) -> Any:
-    """Return a texture that lies beside the file."""
-    data = None if name is None else source.sibling(beside(name), "texture")
-    return None if data is None or name is None else decode_texture(data, beside(name), source)
+def _texture(name: str | None, held: dict[str, bytes], source: MeshSource) -> Any:
+    """Return a texture that the file holds, or one that lies beside it."""
+    if not name:
+        return None
+    data = held.get(beside(name).rpartition("/")[2])
+    data = source.sibling(beside(name), "texture") if data is None else data
+    return None if data is None else decode_texture(data, beside(name), source)
 
 
 def _part(mesh: FbxMesh, materials: list[PBRMaterial], source: MeshSource) -> trimesh.Trimesh:
