@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import trimesh
@@ -191,3 +193,38 @@ def test_vehicle_of_square_section_stays_on_its_wheels() -> None:
     np.testing.assert_allclose(stood.extents, van.extents, atol=1e-6)
     lengthwise_y = _turned(van, (0, 0, 90))
     assert choose_up(lengthwise_y, stands=True, level=True).up == "z"
+
+
+def _pump_bottle() -> trimesh.Trimesh:
+    """Return a bottle 190 mm high, the head of whose pump reaches out to one side, Z up."""
+    stem = trimesh.creation.cylinder(0.005, 0.06, sections=24)
+    stem.apply_translation([0, 0, 0.158])
+    head = trimesh.creation.box([0.05, 0.014, 0.01])
+    head.apply_translation([0.016, 0, 0.188])
+    body = trimesh.creation.cylinder(0.035, 0.14, sections=48)
+    body.apply_translation([0, 0, 0.07])
+    return trimesh.boolean.union([body, stem, head], engine="manifold")
+
+
+@pytest.mark.parametrize("turn_deg", [(180, 0, 0), (90, 0, 0)])
+def test_a_long_thing_that_is_upside_down_in_its_file_stands_on_its_base(turn_deg: tuple[float, float, float]) -> None:
+    """Its head holds it on no table; it also rests on its side, with another axis of the file upward."""
+    choice = choose_up(_turned(_pump_bottle(), turn_deg), stands=True, opens_up=True)
+    up_in_file = Rotation.from_euler("xyz", turn_deg, degrees=True).apply([0.0, 0.0, 1.0])
+    assert choice.rotation @ up_in_file == pytest.approx([0, 0, 1], abs=0.02)
+
+
+@pytest.mark.parametrize("turn_deg", [(0, 90, 0), (0, -90, 0), (90, 0, 0), (180, 0, 0)])
+def test_a_kettle_whose_file_has_another_axis_up_stands_on_its_base(turn_deg: tuple[float, float, float]) -> None:
+    """It is not long, and rests tilted on its spout too; a file that declares an axis is tilted to the nearest side as before."""
+    body = trimesh.creation.revolve(
+        np.array([[0, 0], [0.085, 0], [0.09, 0.02], [0.08, 0.08], [0.05, 0.11], [0, 0.115]]), sections=48
+    )
+    bars = [([0.075, 0.055], [0.11, 0.085], 0.01), ([0.11, 0.085], [0.125, 0.112], 0.01)]
+    arch = [[-0.06, 0.1], [-0.05, 0.15], [0, 0.17], [0.045, 0.15], [0.05, 0.108]]
+    bars += [(first, last, 0.007) for first, last in pairwise(arch)]
+    solids = [trimesh.creation.cylinder(r, segment=[[p[0], 0, p[1]], [q[0], 0, q[1]]], sections=20) for p, q, r in bars]
+    kettle = trimesh.boolean.union([body, *solids], engine="manifold", check_volume=False)
+    choice = choose_up(_turned(kettle, turn_deg), stands=True, opens_up=True)
+    up_in_file = Rotation.from_euler("xyz", turn_deg, degrees=True).apply([0.0, 0.0, 1.0])
+    assert choice.rotation @ up_in_file == pytest.approx([0, 0, 1], abs=0.02), choice.reason

@@ -32,6 +32,8 @@ _ELONGATED = 1.5
 _LONGER = 1.2
 _LEANING_DEG = 45.0
 _LAY = "it lies with {} up, but such a thing stands, and it is round and long"
+_OVER = "it stands upside down in its file: it rests with {0} down, and not up"
+_EXACTLY_DEG = 1.0  # a thing that a generator has tilted rests on no axis of its file so exactly, but by chance
 _ROUND = 0.1  # relative difference of the two moments across the axis
 
 
@@ -71,8 +73,8 @@ def choose_up(
     ``by_convention``: nobody meant this thing by it, it is the up axis of its world. In order: that axis, but by convention
     after the long axis of a round, long vessel; for things that lie, their likeliest side, the file's if nearly
     as likely; an opening upward, but of one that the file has underneath; for round, long things that stand, their long
-    axis; the file's axis; for things that stand, the file's axis downward; the likeliest side. All but an unstable axis that
-    was said are snapped onto the support facet.
+    axis; the file's axis; for things that stand, another axis of a file that declares none, then the file's axis downward;
+    the likeliest side. All but an unstable axis that was said are snapped onto the support facet.
     """
     poses = stable_poses(solid.vertices, _center_of_mass(solid))
     if user != "auto":
@@ -100,6 +102,10 @@ def choose_up(
         pose_up = _stood_up(solid, poses, _axis(axes[0]))
         if pose_up is not None:
             return _turned(pose_up, axes[0], _LAY.format(axes[0]))
+    if on_end and file_up is None:
+        pose_up = _stood_over(solid, poses, _axis(axes[0]))
+        if pose_up is not None:
+            return _turned(pose_up, axes[0], _OVER.format(axes[0]))
     for candidate in axes:
         near = _nearest(poses, _axis(candidate), _NEAR_DEG)
         if near is not None:
@@ -107,12 +113,18 @@ def choose_up(
                 near, candidate, f"it rests with the {'format' if file_up else 'file'}'s {candidate} axis up"
             )
     tilted = _likeliest_within(poses, _axis(axis), _TILTED_DEG)
+    if on_end and file_up is None:
+        turned = _on_another_axis(poses, axes)
+        if turned is not None and (tilted is None or turned.probability >= tilted.probability):
+            return _turned(
+                turned, axis, f"its file has another axis up: it rests so, and not with {' or '.join(axes)} up"
+            )
     if tilted is not None:
         return _turned(tilted, axis, f"tilted to the nearest side that it rests on, from {axis} up")
     if stands:
         over = _nearest(poses, -_axis(axis), _NEAR_DEG)
         if over is not None:
-            return _turned(over, axis, f"it stands upside down in its file: it rests with {axis} down, and not up")
+            return _turned(over, axis, _OVER.format(axis))
     return _turned(
         _likeliest_side(poses, _axis(axis)), axis, f"it does not rest with {axis} up; this is its likeliest side"
     )
@@ -143,21 +155,38 @@ def _open_below(poses: list[StablePose], axes: list[str], opening: np.ndarray) -
 
 
 def _stood_up(solid: trimesh.Trimesh, poses: list[StablePose], up: np.ndarray) -> StablePose | None:
-    """Return the likelier end on which a lying round, long thing stands; None where it stands with ``up`` upward already.
+    """Return the likelier end on which a lying round, long thing stands; None where it stands with ``up`` upward already."""
+    along = _round_long_axis(solid)
+    if along is None or _along(along, up):
+        return None
+    ends = [_nearest(poses, end, _NEAR_DEG) for end in (along, -along)]
+    return max((pose for pose in ends if pose is not None), key=lambda pose: pose.probability, default=None)
+
+
+def _stood_over(solid: trimesh.Trimesh, poses: list[StablePose], up: np.ndarray) -> StablePose | None:
+    """Return the lower end of a round, long thing that stands on it alone: a pump bottle whose file has it upside down."""
+    along = _round_long_axis(solid)
+    if along is None or not _along(along, up) or _likeliest_within(poses, up, _TILTED_DEG) is not None:
+        return None
+    return _nearest(poses, -up, _NEAR_DEG)
+
+
+def _along(axis: np.ndarray, up: np.ndarray) -> bool:
+    return abs(float(axis @ up)) > np.cos(np.radians(_LEANING_DEG))
+
+
+def _round_long_axis(solid: trimesh.Trimesh) -> np.ndarray | None:
+    """Return the direction ``(3,)`` of the long axis of a round, long thing; None of any other.
 
     Its long axis is that of the least moment of inertia of its hull, round where the other two are nearly equal: a can, a
     bottle, a carton of square section, and no pan with its handle.
     """
     hull = solid.convex_hull
     moments, directions = np.linalg.eigh(np.asarray(hull.moment_inertia))
-    along = directions[:, 0]
     reach = np.ptp(hull.vertices @ directions, axis=0)
     if moments[2] - moments[1] > _ROUND * moments[2] or reach[0] < _LONGER * reach[1:].max():
         return None
-    if abs(float(along @ up)) > np.cos(np.radians(_LEANING_DEG)):
-        return None
-    ends = [_nearest(poses, end, _NEAR_DEG) for end in (along, -along)]
-    return max((pose for pose in ends if pose is not None), key=lambda pose: pose.probability, default=None)
+    return np.asarray(directions[:, 0])
 
 
 def _undeclared_axes(solid: trimesh.Trimesh, on_end: bool) -> list[str]:
@@ -168,6 +197,13 @@ def _undeclared_axes(solid: trimesh.Trimesh, on_end: bool) -> list[str]:
     if on_end and y > _ELONGATED * max(x, z) and round_about_y:
         return ["y", "z"]
     return ["z", "y"]
+
+
+def _on_another_axis(poses: list[StablePose], axes: list[str]) -> StablePose | None:
+    """Return the likeliest pose that has exactly another of the file's axes upward, or one of ``axes`` downward."""
+    others = [sign * _axis(axis) for axis in _FORMAT_TO_Z_UP for sign in (1, -1) if sign < 0 or axis not in axes]
+    found = [_nearest(poses, up, _EXACTLY_DEG) for up in others]
+    return max((pose for pose in found if pose is not None), key=lambda pose: pose.probability, default=None)
 
 
 def _nearest(
