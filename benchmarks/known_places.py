@@ -35,7 +35,8 @@ PARTS_OF: dict[str, tuple[str, ...]] = {
     "neck": ("neck", "collar", "stem"), "lid": ("cap", "lid", "top", "tab"), "spout": ("spout",),
     "blade": ("blade", "edge"), "wick": ("wick",), "tip": ("tip", "lead", "tines"), "bristles": ("bristles",),
     "jaw": ("jaw", "jaws", "mouth"), "jaws": ("jaw", "jaws", "mouth"), "joint": ("joint",), "spring joint": ("spring",),
-    "striking face": ("face", "edge"), "tines": ("tines",), "grip": ("handle", "switch"), "housing": ("body",),
+    "striking face": ("face", "edge"), "blade edge": ("edge",), "tines": ("tines",), "grip": ("handle", "switch"),
+    "housing": ("body",), "shoulder": ("shoulders",),
     "head": (
         "head", "face", "claw", "blade", "bowl", "jaw", "pan", "edge", "wires", "tines", "neck", "glass", "frame", "channel",
     ),

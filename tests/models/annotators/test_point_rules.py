@@ -152,3 +152,94 @@ def test_what_is_too_thick_for_fingertips_is_no_pinch() -> None:
     thin = trimesh.creation.box([0.2, 0.02, 0.02]).apply_translation([0, 0, 0.01])
     assert "pinch" not in {point.type for point in select(thick, "box of pasta").grasp + select(thick, "remote").grasp}
     assert "pinch" in {point.type for point in select(thin, "chopstick").grasp}
+
+
+def bars(*segments: tuple[list[float], list[float], float]) -> list[trimesh.Trimesh]:
+    """Return round bars between two points each, of a radius (m)."""
+    return [trimesh.creation.cylinder(radius, segment=[first, last], sections=20) for first, last, radius in segments]
+
+
+def block(extents_m: tuple[float, float, float], center_m: tuple[float, float, float]) -> trimesh.Trimesh:
+    made = trimesh.creation.box(extents_m)
+    made.apply_translation(center_m)
+    return made
+
+
+def joined(*solids: trimesh.Trimesh) -> trimesh.Trimesh:
+    fine = trimesh.boolean.union(solids, engine="manifold", check_volume=False).subdivide_to_size(0.012)
+    return trimesh.Trimesh(fine.vertices, fine.faces)
+
+
+def turned(mesh: trimesh.Trimesh, deg: float) -> trimesh.Trimesh:
+    mesh.apply_transform(trimesh.transformations.rotation_matrix(np.radians(deg), [0, 0, 1]))
+    return mesh
+
+
+def test_a_nozzle_is_the_outlet_that_a_pump_or_trigger_reaches_out_with() -> None:
+    body, stem = bars(([0, 0, 0], [0, 0, 0.15], 0.035), ([0, 0, 0.15], [0, 0, 0.19], 0.008))
+    pump = joined(body, stem, block((0.05, 0.014, 0.01), (0.016, 0, 0.188)))
+    assert labelled(select(pump, "soap dispenser"), "nozzle")[0] > 0.035
+    head, trigger = block((0.08, 0.026, 0.035), (0.02, 0, 0.2)), block((0.01, 0.01, 0.04), (0.035, 0, 0.17))
+    spray = labelled(select(joined(body, stem, head, trigger), "spray bottle"), "nozzle")
+    assert spray[0] > 0.05 and spray[2] > 0.18
+    cap = joined(body, *bars(([0, 0, 0.15], [0, 0, 0.18], 0.02)))
+    assert labelled(select(cap, "soap dispenser"), "nozzle")[2] > 0.17, "a round one has no side"
+
+
+def test_an_axe_splits_with_its_edge_and_strikes_with_no_face() -> None:
+    corners = ((-0.02, -0.01, 0.012), (0.04, -0.01, 0.012), (-0.03, 0.1, 0.0), (0.07, 0.1, 0.0))
+    head = trimesh.convex.convex_hull(np.array([(x, y, s * z) for x, y, z in corners for s in (1, -1)]))
+    selected = select(joined(head, *bars(([0.0, 0, 0], [0.4, 0, 0], 0.012))), "axe")
+    assert labelled(selected, "blade edge")[1] > 0.08
+    assert [point.label for point in selected.functional] == ["head", "blade edge", "handle"]
+
+
+def test_fingers_go_into_the_rings_of_scissors_and_not_between_their_shanks() -> None:
+    halves = []
+    for side in (1, -1):
+        ring = trimesh.creation.torus(0.016, 0.004)
+        ring.apply_translation((0.14, 0.022 * side, 0))
+        blade = trimesh.convex.convex_hull(
+            np.array(
+                [
+                    (x, y, z * side)
+                    for x, y in ((0.0, -0.02 * side), (0.08, 0), (0.075, -0.012 * side))
+                    for z in (0, 0.003)
+                ]
+            )
+        )
+        halves += [ring, blade, *bars(([0.075, 0, 0.002 * side], [0.127, 0.016 * side, 0.002 * side], 0.004))]
+    selected = select(joined(*halves), "scissors")
+    assert labelled(selected, "finger holes")[0] > 0.124
+    assert next(point for point in selected.grasp if point.type == "pinch").position_m[0] > 0.124
+
+
+def test_bristles_are_on_the_side_that_a_bent_head_turns_to() -> None:
+    turn = trimesh.transformations.rotation_matrix(np.radians(30), [0, 1, 0])
+    head = [block((0.06, 0.025, 0.008), (0.03, 0, 0)), block((0.055, 0.022, 0.02), (0.03, 0, -0.013))]
+    for solid in head:
+        solid.apply_transform(turn)
+    bristles = labelled(select(joined(*head, *bars(([-0.2, 0, 0], [0.005, 0, 0], 0.007))), "dish brush"), "bristles")
+    down = np.linalg.inv(turn)[:3, :3] @ bristles
+    assert down[2] < -0.015 and down[0] > 0.01, "below the block that holds them"
+
+
+def test_a_corkscrew_turns_its_thin_end_into_the_cork() -> None:
+    handle, shank = bars(([0, -0.045, 0], [0, 0.045, 0], 0.011), ([0, 0, 0], [0.1, 0, 0], 0.004))
+    selected = select(joined(handle, shank), "corkscrew")
+    assert labelled(selected, "worm")[0] > 0.04 and labelled(selected, "handle")[0] < 0.02
+
+
+def test_a_coat_hanger_has_a_hook_and_shoulders() -> None:
+    bar = bars(
+        ([-0.2, 0, 0], [0.2, 0, 0], 0.004), ([-0.2, 0, 0], [0, 0.09, 0], 0.004), ([0.2, 0, 0], [0, 0.09, 0], 0.004)
+    )
+    hook = bars(
+        ([0, 0.09, 0], [0, 0.12, 0], 0.003),
+        ([0, 0.12, 0], [0.02, 0.14, 0], 0.003),
+        ([0.02, 0.14, 0], [0, 0.165, 0], 0.003),
+    )
+    for sign in (1, -1):
+        selected = select(turned(joined(*bar, *hook), 90 - 90 * sign), "coat hanger")
+        assert sign * labelled(selected, "hook")[1] > 0.14
+        assert abs(labelled(selected, "shoulder")[0]) > 0.15

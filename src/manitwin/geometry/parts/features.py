@@ -11,13 +11,16 @@ from typing import Literal
 
 import numpy as np
 
+from manitwin.geometry.parts.outermost import crest, outlet
+from manitwin.geometry.parts.scores import near as _near
+from manitwin.geometry.parts.scores import share_of_height as _share_of_height
 from manitwin.geometry.parts.shape import LEAST_HANDLE_REACH, Shape, SurfacePoints
-from manitwin.geometry.parts.striking_face import handle_line, striking_face
+from manitwin.geometry.parts.striking_face import handle_direction, handle_line, striking_face
 
 Feature = Literal[
     "opening", "rim", "inside", "handle", "handle_end", "head", "face", "tip", "edge", "middle", "neck", "spout",
     "top", "base", "side", "center", "front", "back", "end", "ring", "mouth", "bristles", "muzzle", "grip", "housing",
-    "apex", "arch_end", "end_wall", "toe", "stem",
+    "apex", "arch_end", "end_wall", "toe", "stem", "nozzle", "crest",
 ]  # fmt: skip
 """A place on an object that geometry can point out."""
 
@@ -26,16 +29,6 @@ def feature_scores(feature: Feature, shape: Shape, points: SurfacePoints) -> np.
     """Return how well each point stands for a feature, ``(N,)`` in [0, 1]; None where the shape has no such place."""
     scores = _SCORERS[feature](shape, points)
     return None if scores is None else np.clip(scores, 0.0, 1.0)
-
-
-def _near(distance: np.ndarray, width: float) -> np.ndarray:
-    """Return 1 at distance 0, falling to 0.6 at ``width`` and to nothing at three of them."""
-    return np.exp(-0.5 * (distance / max(width, 1e-9)) ** 2)
-
-
-def _share_of_height(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    low, high = shape.bounds_m[:, 2]
-    return (points.positions_m[:, 2] - low) / max(high - low, 1e-9)
 
 
 def _rim(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
@@ -127,8 +120,12 @@ def _bristles(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
     head = shape.surface_m[shape.axis.along(shape.surface_m) < share]
     if not len(head):
         return _head(shape, points)
-    line = handle_line(shape)
-    directions = np.concatenate([shape.axis.across, -shape.axis.across])
+    line, handle = handle_line(shape), handle_direction(shape)
+    across = shape.axis.across - np.outer(
+        shape.axis.across @ handle, handle
+    )  # a bent head turns the box away from the handle
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    directions = np.concatenate([across, -across])
     reach = ((head - line) @ directions.T).max(0)
     lopsided = reach / np.maximum(np.roll(reach, 2), 1e-9)
     best = int(lopsided.argmax())
@@ -180,6 +177,12 @@ def _spout(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
 
 def _top(shape: Shape, points: SurfacePoints) -> np.ndarray:
     return _near(1 - _share_of_height(shape, points), 0.12) * (0.6 + 0.4 * points.normals[:, 2])
+
+
+def _nozzle(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    """The outlet of a pump or trigger, that reaches out to one side; of a round head all of its top."""
+    found = outlet(shape, points)
+    return _top(shape, points) if found is None else found
 
 
 def _stem(shape: Shape, points: SurfacePoints) -> np.ndarray:
@@ -289,7 +292,7 @@ _SCORERS: dict[str, Callable[[Shape, SurfacePoints], np.ndarray | None]] = {
     "opening": _opening, "rim": _rim, "inside": _inside, "handle": _handle, "handle_end": _handle_end, "head": _head,
     "face": striking_face, "tip": _tip, "edge": _edge, "middle": _middle, "neck": _neck, "spout": _spout, "top": _top,
     "base": _base, "side": _side, "center": _center, "front": partial(_large_face, side=1),
-    "back": partial(_large_face, side=-1), "toe": _toe, "stem": _stem,
+    "back": partial(_large_face, side=-1), "toe": _toe, "stem": _stem, "nozzle": _nozzle, "crest": crest,
     "end": _end, "ring": _ring,
     "mouth": _mouth, "bristles": _bristles, "muzzle": _muzzle, "grip": _grip, "housing": _housing,
     "apex": _apex, "arch_end": _arch_end, "end_wall": _end_wall,

@@ -20,7 +20,7 @@ def striking_face(shape: Shape, points: SurfacePoints) -> np.ndarray:
     the box, and then the blunt end seems to reach less far, or not to be of the head.
     """
     along = shape.axis.along(shape.surface_m)
-    line, direction = handle_line(shape), _handle_direction(shape)
+    line, direction = handle_line(shape), handle_direction(shape)
     across = shape.axis.across[0] - (shape.axis.across[0] @ direction) * direction
     across /= np.linalg.norm(across)
     frame = np.stack([across, direction, np.cross(across, direction)])
@@ -56,7 +56,7 @@ def handle_line(shape: Shape) -> np.ndarray:
     return (handle.min(0) + handle.max(0)) / 2 if len(handle) else shape.obb_to_object[:3, 3]
 
 
-def _handle_direction(shape: Shape) -> np.ndarray:
+def handle_direction(shape: Shape) -> np.ndarray:
     """Return the direction ``(3,)`` in which the handle half of a long thing is longest, away from the head."""
     handle = shape.surface_m[shape.axis.along(shape.surface_m) > 0.5]
     longest = np.linalg.eigh(np.cov(handle.T))[1][:, 2] if len(handle) > 2 else shape.axis.direction

@@ -16,7 +16,7 @@ _FEATURES: dict[str, tuple[Feature, ...]] = {
     "rim": ("rim",),
     "base": ("base",),
     "top": ("top",),
-    "cap": ("top",),
+    "cap": ("top", "nozzle"),
     "spout": ("spout",),
     "stem": ("neck",),
     "foot": ("base",),
@@ -34,7 +34,9 @@ _FEATURES: dict[str, tuple[Feature, ...]] = {
 """By role, the features whose label in a prior is the name of the whole part, the best first."""
 _WORDS: dict[str, frozenset[str]] = {
     "handle": frozenset(["handle", "handles", "grip", "grips", "shaft"]),
-    "head": frozenset(["head", "blade", "blades", "shaft", "bowl", "tines", "jaws", "bristles", "beater", "wires"]),
+    "head": frozenset(
+        ["head", "blade", "blades", "shaft", "bowl", "tines", "jaws", "bristles", "beater", "wires", "worm"]
+    ),
     "body": frozenset(["body", "barrel", "wall", "side", "bottle"]),
     "cap": frozenset(["cap", "lid", "nozzle", "pump", "sprayer", "stopper", "top"]),
     "spout": frozenset({"spout"}),

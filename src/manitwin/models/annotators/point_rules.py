@@ -269,6 +269,8 @@ _PLACES: dict[str, str] = {
     "end_wall": "side near the end",
     "toe": "end away from the opening",
     "stem": "stem",
+    "nozzle": "outermost side of the top",
+    "crest": "outermost place across the length",
 }
 
 
