@@ -59,7 +59,7 @@ def _mouth(shape: Shape, points: SurfacePoints) -> np.ndarray:
 
 
 def _away_from_handle(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    if shape.side_handle is None:
+    if shape.side_handle is None or shape.side_handle.bail is not None:
         return np.ones(len(points.positions_m))
     return 0.75 - 0.25 * np.cos(shape.body.azimuth(points.positions_m) - shape.side_handle.azimuth_rad)
 
@@ -82,6 +82,8 @@ def _inside(shape: Shape, points: SurfacePoints) -> np.ndarray:
 def _handle(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
     if shape.side_handle is not None:
         mine = shape.body.belongs(points.positions_m, shape.side_handle)
+        if shape.side_handle.bail is not None:  # held where it is highest
+            return mine * _near(1 - _share_of_height(shape, points), 0.15)
         outside = shape.body.outside_m(points.positions_m) / shape.side_handle.reach_m
         # A ring handle is held in its outer half, a long one (a pan's) well before its end.
         best = 0.7 if shape.side_handle.reach_m < shape.body.radius_m.max() else 0.35
@@ -94,6 +96,8 @@ def _handle(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
 
 
 def _handle_end(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
+    if shape.side_handle is not None and shape.side_handle.bail is not None:
+        return _handle(shape, points)
     if shape.side_handle is not None:
         outside = shape.body.outside_m(points.positions_m) / shape.side_handle.reach_m
         return shape.body.belongs(points.positions_m, shape.side_handle) * _near(outside - 0.9, 0.15)
@@ -176,7 +180,14 @@ def _spout(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
 
 
 def _top(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    return _near(1 - _share_of_height(shape, points), 0.12) * (0.6 + 0.4 * points.normals[:, 2])
+    facing = 0.6 + 0.4 * points.normals[:, 2]
+    handle = shape.side_handle
+    if handle is None or handle.bail is None:
+        return _near(1 - _share_of_height(shape, points), 0.12) * facing
+    low = shape.bounds_m[0, 2]  # the top of the body, below the handle that goes over it
+    below = 1 - (points.positions_m[:, 2] - low) / max(handle.low_m - low, 1e-9)
+    beside = ~shape.body.belongs(points.positions_m, handle) & (shape.body.outside_m(points.positions_m) <= 0)
+    return _near(below, 0.12) * facing * beside
 
 
 def _nozzle(shape: Shape, points: SurfacePoints) -> np.ndarray:

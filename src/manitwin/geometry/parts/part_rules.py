@@ -31,6 +31,8 @@ def _handles(shape: Shape) -> list[Protrusion]:
     first = shape.side_handle
     if first is None:
         return []
+    if first.bail is not None:  # what sticks out beside it are its ears, or a spout
+        return [first]
     least_m = LEAST_HANDLE_REACH * float(shape.body.radius_m.max())
     beside = [p for p in shape.body.protrusions if p.reach_m > least_m and p.low_m < shape.body.top_m]
     return [first, *(p for p in beside if p is not first)]
@@ -51,7 +53,9 @@ def _spouted(shape: Shape, points_m: np.ndarray) -> Membership | None:
     if not found:
         return None
     index = shape.body.belongs(points_m, found[0]).astype(int)
-    opposite = [p for p in found[1:] if np.cos(p.azimuth_rad - found[0].azimuth_rad) < 0]
+    if found[0].bail is not None:
+        found = [found[0], *shape.body.protrusions]
+    opposite = [p for p in found[1:] if found[0].bail is not None or np.cos(p.azimuth_rad - found[0].azimuth_rad) < 0]
     if opposite:
         index[shape.body.belongs(points_m, opposite[0])] = 2
     return Membership(("body", "handle", "spout"), index, _reach_confidence(shape, found[0]))

@@ -1,10 +1,12 @@
-"""Find what sticks out sideways from an upright round body: handles and spouts."""
+"""Find what sticks out sideways from an upright round body, handles and spouts, and the handle that goes over it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+
+from manitwin.geometry.parts.bail import Bail, find_bail
 
 _HEIGHTS = 24
 _DIRECTIONS = 36
@@ -20,6 +22,7 @@ class Protrusion:
 
     ``azimuth_rad`` is where, about the vertical through ``axis_xy_m``; ``reach_m`` how far out it goes beyond the body;
     ``share`` its share of the surface samples; ``height_m`` how tall its outer half is; ``low_m`` is its lowest height.
+    ``bail`` is given where it goes over the body instead, and ``reach_m`` is how far above it then.
     """
 
     azimuth_rad: float
@@ -28,6 +31,7 @@ class Protrusion:
     share: float
     height_m: float
     low_m: float
+    bail: Bail | None = None
 
 
 @dataclass(frozen=True)
@@ -35,7 +39,7 @@ class RoundBody:
     """A body about a vertical axis and what sticks out of it, the largest first.
 
     ``heights_m (24,)`` and ``radius_m (24,)`` are the body's outline, ``top_m`` is the last of the most heights in a row at
-    which it goes round: what stands in a vase is above.
+    which it goes round: what stands in a vase is above. ``over`` is the handle that goes over it, none of ``protrusions``.
     """
 
     axis_xy_m: np.ndarray
@@ -43,6 +47,7 @@ class RoundBody:
     radius_m: np.ndarray
     top_m: float
     protrusions: tuple[Protrusion, ...]
+    over: Protrusion | None = None
 
     def radius_at(self, points_m: np.ndarray) -> np.ndarray:
         """Return the body's radius (m) at the heights of points ``(N, 3)``."""
@@ -59,8 +64,11 @@ class RoundBody:
 
     def belongs(self, points_m: np.ndarray, protrusion: Protrusion) -> np.ndarray:
         """Tell which points ``(N, 3)`` are part of a protrusion."""
+        if protrusion.bail is not None:
+            return protrusion.bail.contains(points_m, points_m[:, :2] - self.axis_xy_m, self.outside_m(points_m))
         turn = np.abs((self.azimuth(points_m) - protrusion.azimuth_rad + np.pi) % (2 * np.pi) - np.pi)
-        return (self.outside_m(points_m) > 0) & (turn <= protrusion.half_width_rad)
+        beside = (self.outside_m(points_m) > 0) & (turn <= protrusion.half_width_rad)
+        return beside if self.over is None else beside & ~self.belongs(points_m, self.over)
 
     def _limit(self, points_m: np.ndarray) -> np.ndarray:
         return _OUT_BY * self.radius_at(points_m) + _OUT_BY_SHARE * self.radius_m.max()
@@ -87,7 +95,19 @@ def round_body(surface_m: np.ndarray, axis_xy_m: np.ndarray | None = None) -> Ro
     outline = np.array([np.median(row[row > 0]) if row.any() else np.nan for row in outermost])
     outline = np.interp(heights, heights[occupied], outline[occupied])
     body = RoundBody(axis_xy_m, heights, outline, float(heights[_longest_run(occupied)[-1]]), ())
-    return replace(body, protrusions=_protrusions(body, surface_m))
+    body = replace(body, over=_over(body, surface_m))
+    beside = surface_m if body.over is None else surface_m[~body.belongs(surface_m, body.over)]
+    return replace(body, protrusions=_protrusions(body, beside))
+
+
+def _over(body: RoundBody, surface_m: np.ndarray) -> Protrusion | None:
+    """Return the handle that goes over a body from side to side, if any."""
+    top_m = body.top_m + 0.5 * float(body.heights_m[1] - body.heights_m[0])
+    bail = find_bail(surface_m, body.axis_xy_m, top_m, float(body.radius_m.max()))
+    if bail is None:
+        return None
+    found = Protrusion(0.0, np.pi, bail.rise_m, 0.0, bail.rise_m, bail.low_m, bail)
+    return replace(found, share=float(body.belongs(surface_m, found).mean()))
 
 
 def _longest_run(flags: np.ndarray) -> np.ndarray:

@@ -169,12 +169,14 @@ class Shape:
 
     @property
     def side_handle(self) -> Protrusion | None:
-        """What sticks out of an upright body and is large enough to be held: the largest, or one that is taller and steeper.
+        """What goes over an upright body, else what sticks out and can be held: the largest, or a taller and steeper one.
 
         It is beside the body: flowers and brushes that stand in it are above.
 
         A spout may reach farther than the handle opposite, but ends in a tip; a handle comes back to the body lower down.
         """
+        if self.upright and self.body.over is not None:
+            return self.body.over
         least_m = LEAST_HANDLE_REACH * self.body.radius_m.max()
         large = [p for p in self.body.protrusions if p.reach_m > least_m and p.low_m < self.body.top_m]
         if not large or not self.upright:

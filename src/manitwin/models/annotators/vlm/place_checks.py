@@ -152,11 +152,12 @@ class PlaceChecks:
         return float(np.hypot(max(-above, 0.0) + max(above - self.spacing_m, 0.0), max(beyond, 0.0)))
 
     def _from_side_handle_m(self, position: np.ndarray) -> float:
-        """Return the distance (m) from the nearest handle that sticks out of an upright body; 0 where there is none."""
+        """Return the distance (m) from the nearest handle beside or over an upright body; 0 where there is none."""
         if self.shape.side_handle is None:
             return 0.0
         body, surface = self.shape.body, self.shape.surface_m
         handles = [p for p in body.protrusions if p.reach_m > LEAST_HANDLE_REACH * body.radius_m.max()]
+        handles = handles if body.over is None else [body.over]
         of_handle = np.any([body.belongs(surface, handle) for handle in handles], axis=0)
         return float(np.linalg.norm(surface[of_handle] - position, axis=1).min()) if of_handle.any() else 0.0
 
