@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import trimesh
@@ -243,3 +245,14 @@ def test_a_coat_hanger_has_a_hook_and_shoulders() -> None:
         selected = select(turned(joined(*bar, *hook), 90 - 90 * sign), "coat hanger")
         assert sign * labelled(selected, "hook")[1] > 0.14
         assert abs(labelled(selected, "shoulder")[0]) > 0.15
+
+
+def test_a_basket_is_carried_by_the_handle_that_goes_over_it_where_it_has_one() -> None:
+    open_box = trimesh.boolean.difference(
+        [block((0.2, 0.14, 0.11), (0, 0, 0.055)), block((0.19, 0.13, 0.11), (0, 0, 0.06))], engine="manifold"
+    )
+    arch = [[0.095 * np.cos(t), 0.0, 0.105 + 0.11 * np.sin(t)] for t in np.linspace(0, np.pi, 14)]
+    handle = bars(*((first, last, 0.005) for first, last in pairwise(arch)))
+    carried, plain = select(joined(open_box, *handle), "basket"), select(joined(open_box), "basket")
+    assert labelled(carried, "handle")[2] > 0.19 and carried.grasp[0].position_m[2] > 0.15
+    assert [point.label for point in plain.functional] == ["opening", "inside", "base"]

@@ -140,8 +140,8 @@ class Prior(Form):
     either). ``like`` is the category whose numbers it has for want of its own, ``kin_of`` that whose form it has. ``counter``
     is what such things are counted by ('pair of'). ``part_materials`` are the materials of its parts by role, where they are
     of unlike matter. ``measured`` names the published measurements; ``sources`` says where the rest is from.
-    ``with_handle`` are the places of such a thing from which a handle sticks out, where some have one; ``stated`` is the material
-    that somebody has said it is of.
+    ``with_handle`` are the places of such a thing from which a handle sticks out, where some have one, ``with_bail`` those of one
+    that a handle goes over; ``stated`` is the material that somebody has said it is of.
     """
 
     category: str
@@ -163,13 +163,16 @@ class Prior(Form):
     sources: tuple[str, ...] = Field(min_length=1)
     measured: tuple[str, ...]
     with_handle: Places | None = None
+    with_bail: Places | None = None
     stated: str | None = None
 
     def of_shape(self, shape: Shape) -> Prior:
-        """Return the prior with the places that a thing of this shape has: a tea cup may have a handle, or none."""
-        if self.with_handle is None or shape.side_handle is None:
+        """Return the prior with the places that a thing of this shape has: a tea cup or a basket may have a handle, or none."""
+        handle = shape.side_handle
+        if handle is None:
             return self
-        return self.model_copy(update=dict(self.with_handle))
+        places = self.with_handle if handle.bail is None else self.with_bail or self.with_handle
+        return self if places is None else self.model_copy(update=dict(places))
 
     @property
     def source(self) -> str:
@@ -215,14 +218,13 @@ def _prior(category: str, row: dict[str, Any], domain: str, defaults: dict[str, 
         "friction_static": contact.friction_static, "friction_dynamic": contact.friction_dynamic,
         "restitution": contact.restitution, **forms[form_name], **row,
     }  # fmt: skip
-    handled = merged.pop("with_handle", None)
     if "functional" in row:
-        handled = None
         merged["parts"] = row.get("parts")  # places of its own: the form's rule is of others
-    if handled is not None:
-        other = forms[handled]
-        told = {key: _worded(other[key], category) for key in ("functional", "grasp")}
-        merged["with_handle"] = {"parts": other["parts"], **told}
+    for key in ("with_handle", "with_bail"):
+        form = merged.pop(key, None)
+        if form is not None and "functional" not in row:
+            told = {each: _worded(forms[form][each], category) for each in ("functional", "grasp")}
+            merged[key] = {"parts": forms[form]["parts"], **told}
     for key in ("functional", "grasp"):
         merged[key] = _worded(merged[key], category)
     return Prior.model_validate({**merged, "category": category, "domain": domain, "surface": surface})
