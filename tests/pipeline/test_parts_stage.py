@@ -11,8 +11,10 @@ import trimesh
 from handmade import cup, mug, visual
 from manitwin.engine.stage import Draft
 from manitwin.formats.glb import read_glb, write_glb
+from manitwin.geometry.parts.part_rules import membership
+from manitwin.geometry.parts.shape import measure_shape
 from manitwin.models.annotators.part_names import part_name
-from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.priors import load_priors, lookup
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.known import known_of
 from manitwin.models.generators.templates.made import make, visual_parts
@@ -109,13 +111,18 @@ def test_name_is_that_of_the_whole_part(role: str, category: str, labels: list[s
         ("clamp", {"shaft": "spring joint", "tip": "jaws", "end": "handles"}),
         ("rolling pin", {"shaft": "roller", "tip": "handle", "end": "handle"}),
         ("wrench", {"shaft": "handle", "tip": "jaw", "end": "end"}),  # no label is of the ring alone
-        ("key", {"shaft": "bow", "tip": "blade"}),  # the shaft goes on to the end that is not told from it
-        ("key", {"shaft": "blade", "end": "bow"}),
     ],
 )
 def test_sections_are_called_by_the_places_that_they_hold(category: str, names: dict[str, str]) -> None:
     prior = lookup(category)
     assert prior is not None and prior.parts == "sectioned"
+    assert {role: part_name(role, prior, [], names) for role in names} == names
+
+
+@pytest.mark.parametrize("names", [{"shaft": "bow", "tip": "blade"}, {"shaft": "blade", "end": "bow"}])
+def test_a_shaft_goes_on_to_the_end_that_is_not_told_from_it(names: dict[str, str]) -> None:
+    """Of a thing that has two ends and no middle, as a key has; keys themselves are told apart by their widths."""
+    prior = load_priors()["key"].model_copy(update={"parts": "sectioned"})
     assert {role: part_name(role, prior, [], names) for role in names} == names
 
 
@@ -141,3 +148,19 @@ def test_faces_that_repair_has_changed_are_not_given_a_templates_parts(tmp_path:
     shown = [visual(mesh, baseColorFactor=[200, 10, 10, 255])]
     draft = draft_of(tmp_path, mesh, shown, "mug", known.model_dump(mode="json"))
     assert {part["source"] for part in PartsStage().run(draft, tmp_path)["parts"]} == {"geometry:handled"}
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_keys_bow_begins_where_it_widens(seed: int) -> None:
+    """A round bow widens by degrees: no sharp step shows it, and a notch of the blade is one."""
+    templates, prior = load_templates(), load_priors()["key"]
+    made = make(templates["key"], read_text("key", templates), np.random.default_rng(seed))
+    solid = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
+    shape = measure_shape(solid, solid.center_mass, prior.head_end, False, np.random.default_rng(seed))
+    assert prior.parts is not None
+    told = membership(prior.parts, shape, shape.surface_m)
+    assert told is not None
+    shown = [told.roles[i] for i in np.unique(told.index)]
+    assert [part_name(role, prior, (), shown) for role in shown] == ["blade", "bow"]
+    border = shape.axis.along(shape.surface_m[told.index == told.roles.index("head")]).max()
+    assert 0.45 < border < 0.75, "blades of keys are half to three quarters of their length"

@@ -9,7 +9,7 @@ from manitwin.geometry.parts.features import Feature
 from manitwin.models.annotators.priors import Prior
 
 _FEATURES: dict[str, tuple[Feature, ...]] = {
-    "handle": ("handle",),
+    "handle": ("handle", "handle_end"),
     "head": ("head", "edge", "tip"),
     "body": ("side", "center"),
     "inside": ("inside",),
@@ -33,7 +33,7 @@ _FEATURES: dict[str, tuple[Feature, ...]] = {
 }
 """By role, the features whose label in a prior is the name of the whole part, the best first."""
 _WORDS: dict[str, frozenset[str]] = {
-    "handle": frozenset(["handle", "handles", "grip", "grips", "shaft"]),
+    "handle": frozenset(["handle", "handles", "grip", "grips", "shaft", "bow"]),
     "head": frozenset(
         ["head", "blade", "blades", "shaft", "bowl", "tines", "jaws", "bristles", "beater", "wires", "worm"]
     ),
