@@ -74,7 +74,7 @@ GRASP_SERVERS = {
     r"python client-server/graspgenx_server\.py": FOREIGN,
 }
 WHEEL = dict.fromkeys(
-    (r"^python3 -m pip wheel", r"^pip install"),
+    (r"^python3 -m venv \.\./manitwin-venv", r"^\.\./manitwin-venv/bin/(pip|manitwin) "),
     "fetches from the network; tests/test_wheel.py does it with what is here",
 )
 TRIPOSR = {r'"command:python docs/examples/triposr\.py .*"': '"command:python generator.py {image} {out} {seed}"'}

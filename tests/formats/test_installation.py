@@ -51,6 +51,8 @@ def test_an_object_that_has_all_it_wants_is_no_finding(tmp_path: Path) -> None:
         ("libxcb.so.1", "libxcb1"),
         ("libstdc++.so.6", "libstdc++6"),
         ("libdrm_intel.so.1", "libdrm-intel1"),
+        ("libglib-2.0.so.0", "libglib2.0-0"),  # one name that is unknown, and apt-get installs none of them
+        ("libgthread-2.0.so.0", "libglib2.0-0"),
     ],
 )
 def test_debian_policy_names_the_package_of_a_library(library: str, package: str) -> None:
@@ -91,7 +93,11 @@ def test_a_command_that_wants_a_missing_library_ends_in_one_line(
 def test_the_doctor_names_the_packages_of_missing_libraries(monkeypatch: pytest.MonkeyPatch, wheel: Path) -> None:
     monkeypatch.setattr(doctor.sysconfig, "get_path", lambda name: str(wheel))
     (finding,) = [each for each in doctor.examine() if each.name == "shared libraries"]
-    assert not finding.ok and "libQ.so.6" in finding.detail and "libq6" in finding.detail
+    assert (
+        not finding.ok
+        and "libQ.so.6" in finding.detail
+        and "sudo apt-get install -y --no-install-recommends libq6 (" in finding.detail
+    )
 
 
 def test_an_import_that_fails_for_another_reason_keeps_its_own_remedy() -> None:

@@ -21,6 +21,8 @@ from typing import Any
 ELF = b"\x7fELF"
 NO_METADATA = "0+unknown"
 AT_A_TIME = 100  # files a call of ldd: a command line has its limits
+GLIB = re.compile(r"lib(glib|gobject|gio|gmodule|gthread)-2\.0\.so\.0")
+"""GLib's libraries, which Debian has in one package of a name that is none of theirs."""
 
 
 def installed_version() -> str:
@@ -138,7 +140,9 @@ def _names_answered(name: str) -> list[str]:
 
 
 def package_by_policy(library: str) -> str:
-    """Return the name that a Debian package of a library has by Debian Policy 8.1: libgomp.so.1 is in libgomp1."""
+    """Return the name that a Debian package of a library has by Debian Policy 8.1: libgomp.so.1 is in libgomp1; GLib's too."""
+    if GLIB.fullmatch(library):
+        return "libglib2.0-0"
     base, _, version = library.partition(".so")
     version = version.lstrip(".")
     hyphen = "-" if version and base[-1:].isdigit() else ""

@@ -162,8 +162,9 @@ def _shared_libraries() -> str:
     if missing:
         packages = " ".join(sorted({package_by_policy(library) for library in missing}))
         raise ImportError(
-            f"{', '.join(missing)} not found by the loader; on Debian and Ubuntu they are in packages of such names: {packages}"
-            " (apt-file search finds others)"
+            f"{', '.join(missing)} not found by the loader; on Debian and Ubuntu run: sudo apt-get update &&"
+            f" sudo apt-get install -y --no-install-recommends {packages} (of a name that is not known there, apt-file"
+            " search finds the right one)"
         )
     return "the loader finds all that the installed packages want"
 
