@@ -9,6 +9,9 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import typer
+
+from manitwin.cli.main import app
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("**/*.md"))]
@@ -33,6 +36,21 @@ def test_settings_page_shows_defaults_as_toml() -> None:
     assert len(rows) > 60
     written = [(name, tomllib.loads(f"value = {text.strip('`')}")["value"]) for name, text in rows if text != "not set"]
     assert all(default in written for default in (("options", {}), ("cache", True), ("generator", "lift")))
+
+
+def test_the_page_of_building_names_every_option_of_the_command() -> None:
+    page = (ROOT / "docs" / "build.md").read_text()
+    command = typer.main.get_command(app).commands["build"]  # type: ignore[attr-defined]
+    options = {name for each in command.params for name in (*each.opts, *each.secondary_opts) if name.startswith("--")}
+    told_elsewhere = {
+        "--help",
+        "--out",
+        "--lines",
+        "--verbose",
+        "--quiet",
+    }  # by their short names, or by their opposite
+    missing = {name for name in options - told_elsewhere if not re.search(rf"{name}\b", page)}
+    assert "--text" in options and not missing
 
 
 def test_readme_make_targets_are_those_that_ci_runs() -> None:

@@ -23,6 +23,11 @@ def one_line(text: str) -> str:
     ("arguments", "message"),
     [
         (("build", "nothing_here.png", "-o", "OUT"), "nothing_here.png: not there"),
+        (
+            ("build", "a red mug", "-o", "OUT"),
+            "a red mug: not there; give an image, a mesh, a folder, or a .csv or .jsonl",
+        ),
+        (("build", "a red mug", "-o", "OUT"), "words to make a thing of go behind --text"),
         (("build", "FILE"), "give a folder or URL with -o"),
         (("build", "FILE", "-o", "OUT", "--units", "inch"), "Valid: auto, cm, m, mm, none"),
         (("build", "FILE", "-o", "OUT", "--jobs", "0"), "jobs is 0"),

@@ -135,7 +135,7 @@ def _given_items(
         if not os.path.exists(path):
             raise UsageError(
                 f"{shortened(str(given))}: {not_there(str(given))}; give an image, a mesh, a folder, or a .csv or .jsonl"
-                " manifest"
+                " manifest; words to make a thing of are a text (texts)"
             )
         if path.is_dir():
             yield from _allowed(_folder_items(path, str(given), defaults, notes), str(given), refusal)

@@ -42,7 +42,7 @@ def build(
         options.existing(
             "Images, meshes, folders, or .csv/.jsonl manifests; none: go on with what is there.",
             "INPUT",
-            "an image, a mesh, a folder, or a .csv or .jsonl manifest",
+            "an image, a mesh, a folder, or a .csv or .jsonl manifest; words to make a thing of go behind --text",
         ),
     ] = None,
     out: Annotated[str, options.output_folder("The data set: a folder, or a URL (s3://, gs://).")] = "",
