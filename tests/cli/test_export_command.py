@@ -34,7 +34,7 @@ def test_a_twin_in_two_formats(dataset: Path, tmp_path: Path, capsys: pytest.Cap
     out = tmp_path / "out"
     status, told, _ = said(capsys, dataset / twin_name(made.TWIN_ID), out=out, to="mjcf,URDF")
     assert status == 0
-    assert told.splitlines() == [f"{made.NAME}: mjcf, urdf", f"1 twins exported to {out}"]
+    assert told.splitlines() == [f"{made.NAME}: mjcf, urdf", f"1 twin exported to {out}"]
     assert (out / made.NAME / "mjcf" / f"{made.NAME}.xml").is_file()
     assert (out / made.NAME / "urdf" / "README.md").is_file()
 

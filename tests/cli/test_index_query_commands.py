@@ -45,7 +45,7 @@ def test_query_prints_a_table_for_people(place: Path) -> None:
     lines = output("query", place, "category = 'mug' and mass_kg < 0.4").splitlines()
     assert lines[0].split() == ["twin_id", "name", "category", "mass_kg", "longest_m", "verified", "success_rate"]
     assert lines[1].split()[1:] == ["thing", "mug", "0.1", "0.1", "3", "0.5"]
-    assert lines[2] == "1 rows"
+    assert lines[2] == "1 row"
 
 
 def test_query_writes_csv_that_reads_back(place: Path) -> None:

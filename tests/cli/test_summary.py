@@ -55,3 +55,14 @@ def test_settled_poses_come_first_and_likely_ones_before_unlikely(tmp_path: Path
         "did not settle lying on its -x side, 90 degrees from upright, probability 0.30, radius 5.0 cm",
         "did not settle lying on its -y side, 90 degrees from upright, probability 0.20, radius 5.0 cm",
     ]
+
+
+def test_a_centre_of_mass_has_no_negative_zero(tmp_path: Path) -> None:
+    folder = tmp_path / twin_name(write_accepted(tmp_path, 1))
+    record = json.loads((folder / RECORD).read_bytes())
+    del record["revision"], record["files"]
+    record["physical"]["center_of_mass_m"] = [0.0, -1e-5, 0.086]
+    seal(folder, record)
+    page = io.StringIO()
+    print_summary(Twin(folder), Console(width=200, file=page))
+    assert "(0, 0, 86) mm" in page.getvalue()

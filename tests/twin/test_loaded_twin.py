@@ -99,7 +99,7 @@ def test_missing_twins_are_counted_before_any_is_read(tmp_path: Path) -> None:
 
 def test_a_data_set_that_is_given_as_a_twin_is_called_one(tmp_path: Path) -> None:
     write_set(tmp_path, accepted=1, rejected=0)
-    with pytest.raises(TwinError, match=r"it is a data set: manitwin\.Dataset opens it"):
+    with pytest.raises(TwinError, match=r"it is a data set: `manitwin view` and manitwin\.Dataset show it"):
         Twin(tmp_path)
 
 

@@ -22,6 +22,7 @@ from manitwin.engine.events import ItemEnded, StageAdvanced, StageEnded, StageEv
 from manitwin.engine.ledger.location import local_log
 from manitwin.engine.stage import StagePart
 from manitwin.engine.task import Payload
+from manitwin.formats.plurals import counted
 from manitwin.twin.dataset_root import DatasetRoot
 
 if TYPE_CHECKING:
@@ -255,4 +256,4 @@ class WatchedRun(ShownProgress):
         """Begin a run, and its log: what was refused before leaves none behind."""
         log_into(local_log(DatasetRoot(self._place)))
         self.progress.start(total, opened)
-        out_console.print(f"{total} {self.progress.what}, {opened} to do", markup=False)
+        out_console.print(f"{counted(total, self.progress.what)}, {opened:,} to do", markup=False)

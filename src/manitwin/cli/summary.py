@@ -49,7 +49,7 @@ def _rows(record: TwinRecord) -> list[tuple[str, str]]:
     if record.physical is not None:
         physical = record.physical
         centimetres = " x ".join(f"{100 * side:.1f}" for side in physical.extents_m)
-        center = ", ".join(f"{1000 * x:.0f}" for x in physical.center_of_mass_m)
+        center = ", ".join(str(round(1000 * x)) for x in physical.center_of_mass_m)
         moments = ", ".join(f"{m:.2e}" for m in np.linalg.eigvalsh(np.array(physical.inertia_kg_m2)))
         rows += [
             ("size", f"{centimetres} cm (scaled by {physical.scale_applied:.4g})"),

@@ -199,7 +199,7 @@ def read_record(folder: Path, verify: bool = False) -> TwinRecord:
     if not os.path.lexists(path):
         remedy = "give a folder that `manitwin build` made"
         if (folder / "twins").is_dir():
-            remedy = "it is a data set: manitwin.Dataset opens it, and its twins are the folders below twins/"
+            remedy = "it is a data set: `manitwin view` and manitwin.Dataset show it, and its twins are the folders below twins/"
         raise TwinError(f"{folder}: no {RECORD}, so this is no finished twin; {remedy}")
     require_plain(folder)
     content = read_bytes(path, MAX_JSON_BYTES, TwinError, inside=folder, name=str(path))

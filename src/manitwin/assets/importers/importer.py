@@ -16,6 +16,7 @@ from manitwin.assets.root import root_of
 from manitwin.assets.within_limits import within_limits
 from manitwin.errors import AssetError, UsageError
 from manitwin.formats.bounded_file import read_bytes
+from manitwin.formats.plurals import counted
 from manitwin.twin.import_record import ImportRecord, is_imported
 from manitwin.twin.store import replace_folder
 
@@ -87,7 +88,7 @@ def kept_words(record: ImportRecord) -> list[str]:
         (sum(len(grasps.held) for grasps in record.grasps), "grasps"),
         (len(record.rests), "resting poses"),
     ):
-        kept += [f"{count} {what}"] if count else []
+        kept += [counted(count, what)] if count else []
     return kept
 
 

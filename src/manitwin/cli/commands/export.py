@@ -12,6 +12,7 @@ import typer
 
 from manitwin.cli import choices, options
 from manitwin.cli.console import note_old_layout, out_console, print_error
+from manitwin.formats.plurals import counted
 
 if TYPE_CHECKING:
     from manitwin.assets.writers.exporter import TwinContent
@@ -50,7 +51,7 @@ def export(
     ids: dict[str, str] = {}
     done = [_export(folder, formats, out, allowed, ids) for folder in twin_folders(twins)]
     refused = done.count(False)
-    line = f"{done.count(True):,} twins exported to {out}"
+    line = f"{counted(done.count(True), 'twins')} exported to {out}"
     out_console.print(f"{line}, {refused:,} refused" if refused else line)
     raise typer.Exit(3 if refused else 0)
 
@@ -75,7 +76,7 @@ def export_scenes(files: list[Path], out: Path, to: str) -> None:
     for file in files:
         written = export_scene(file, [name.strip() for name in to.split(",")], out)
         out_console.print(f"{file.parent.name}: {', '.join(written)}")
-    out_console.print(f"{len(files):,} scenes exported to {out}")
+    out_console.print(f"{counted(len(files), 'scenes')} exported to {out}")
 
 
 def twin_folders(given: list[str]) -> Iterator[Path]:

@@ -14,6 +14,7 @@ import typer
 
 from manitwin.cli import choices
 from manitwin.cli.console import note_old_layout, out_console, write_json, write_text
+from manitwin.formats.plurals import counted
 from manitwin.formats.printable import printable_line
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ def _write_table(rows: pa.Table, write: Write) -> None:
     for line in lines:
         cells = (_cut(cell, width).ljust(width) for cell, width in zip(line, widths, strict=True))
         write("  ".join(cells).rstrip() + "\n")
-    write(f"{len(rows)} rows\n")
+    write(f"{counted(len(rows), 'rows')}\n")
 
 
 def _cut(cell: str, width: int) -> str:
