@@ -299,7 +299,7 @@ def test_anthropics_protocol_serves_as_well(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_limit_of_money_leaves_what_would_cost_more(tmp_path: Path) -> None:
     with servers() as served:
-        report = run_here(tmp_path, served, "a bottle", "a jar", max_cost_usd=0.9)
+        report = run_here(tmp_path, served, "a bottle", "a tall bottle", max_cost_usd=0.9)
         assert report.exit_code == 4 and report.run.stopped is not None and "at most 0.9 USD" in report.run.stopped
         assert served.jobs() == 1
 
