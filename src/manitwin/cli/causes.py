@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from manitwin.engine.ledger.progress import Unaccepted, UnacceptedState
 
 REMEDIES = {
-    "unreadable": "open it in what made it and save it again: a photo as PNG or JPEG, a mesh as GLB without compression",
+    "unreadable": "open it in what made it and save it again: a photo as PNG or JPEG, a mesh as GLB",
     "empty": "export or download it again",
     "wrong_type": "give a photo or a mesh; `manitwin import` takes what other simulators use",
     "too_small": "give a larger photo",
