@@ -70,3 +70,10 @@ def test_help_imports_neither_markdown_nor_tracebacks() -> None:
 def test_what_was_put_off_is_imported_when_it_is_called() -> None:
     done = subprocess.run([sys.executable, "-c", PUT_OFF], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("words", [["-h"], ["build", "-h"], ["review", "sample", "-h"]])
+def test_h_asks_for_help_too(words: list[str]) -> None:
+    asked = [CliRunner().invoke(app, [*words[:-1], option]) for option in ("-h", "--help")]
+    assert [done.exit_code for done in asked] == [0, 0] and asked[0].output == asked[1].output
+    assert "Usage:" in asked[0].output

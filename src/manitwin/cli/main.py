@@ -73,7 +73,12 @@ LASTING_CAUSES = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM,
 """What ails the machine and not the command: what is done stays, and the same command goes on from there."""
 
 _interrupts = Interrupts()
-app = typer.Typer(cls=CommandWords, add_completion=False, pretty_exceptions_enable=False)
+app = typer.Typer(
+    cls=CommandWords,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["--help", "-h"]},
+)
 
 
 def _print_version(wanted: bool) -> None:
