@@ -4,7 +4,7 @@
 
 The reader of words alone (``manitwin.scenes.vqa.blind``) is trained on the questions of SCENES and asked those of OTHER_SCENES,
 which were drawn by another seed; then the other way round. The answers of the first N scenes of OTHER_SCENES are derived again by
-``tests/scene_answers.py``, which reads the files as they lie and asks MuJoCo what touches what.
+``tests/scene_answers.py``, whose ``second_scene.py`` reads the files as they lie and asks MuJoCo what touches what.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from manitwin.scenes.scene_files import dataset_of, scene_files
 from manitwin.scenes.vqa.blind import blind_scores
 from manitwin.scenes.vqa.question import YES_NO, Question
 from manitwin.scenes.vqa.write import ask_scenes
-from scene_answers import SecondScene, SecondView, rederived
+from scene_answers import rederived
+from second_scene import SecondScene, SecondView
 
 
 def main() -> None:

@@ -185,6 +185,31 @@ def test_pieces_that_prusaslicer_does_not_print_are_left_out(tmp_path: Path, kin
     assert read.findings == [finding]
 
 
+@pytest.mark.parametrize(
+    ("settings", "color"),
+    [
+        ("; filament_colour = #FF0000;#0000FF;\n", (0, 0, 255)),
+        ("; filament_colour = #FF0000;#0000FF\n; extruder_colour = ;#00FF00\n", (0, 255, 0)),
+        ("; filament_colour = #FF0000;#0000FF\n; extruder_colour = #00FF00;\n", (0, 0, 255)),
+        ("; filament_colour = ;#0000FF\n", (0, 0, 255)),
+        ("; filament_colour = #FF0000;blue\n", (204, 204, 204)),
+        ("; filament_colour = #FF0000\n", (204, 204, 204)),
+    ],
+)
+def test_the_second_filament_is_the_second_also_where_the_first_has_no_colour(
+    tmp_path: Path, settings: str, color: tuple[int, int, int]
+) -> None:
+    parts = (
+        '<config><object id="1"><volume firstid="0" lastid="11"><metadata type="volume" key="extruder" value="2"/></volume>'
+        "</object></config>"
+    )
+    beside: dict[str, str | bytes] = {
+        "Metadata/Slic3r_PE_model.config": parts,
+        "Metadata/Slic3r_PE.config": settings,
+    }
+    assert _colors(_read(tmp_path, archive(model(mesh_object(1, BOX)), beside))) == [color]
+
+
 def test_pieces_that_bambu_studio_does_not_print_are_left_out(tmp_path: Path) -> None:
     resources = '<object id="8"><components>' + "".join(
         f'<component p:path="/3D/Objects/object_1.model" objectid="{k}" transform="1 0 0 0 1 0 0 0 1 {20 * k} 0 0"/>'

@@ -16,7 +16,8 @@ from manitwin.scenes.vqa.question import YES_NO, Question
 from manitwin.scenes.vqa.references import region
 from manitwin.scenes.vqa.templates import FAMILIES
 from manitwin.scenes.vqa.write import ask_scenes
-from scene_answers import SecondScene, SecondView, rederived
+from scene_answers import rederived
+from second_scene import SecondScene, SecondView
 
 
 @pytest.fixture(scope="module")

@@ -109,6 +109,7 @@ class _Walker:
         self._rows: list[tuple[int, ...]] = []
         self._places = array("d")
         self._aliases: dict[int, tuple[int, list[int]]] = {}
+        self._layer, self._mixed = 0, np.array([_WHITE], np.uint8)
         self._open_object()
 
     def start(self, tag: str, attributes: Mapping[str, str], namespaces: Mapping[str | None, str]) -> None:

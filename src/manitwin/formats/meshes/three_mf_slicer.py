@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import zip_longest
 
 import numpy as np
 from lxml import etree  # type: ignore[import-untyped]
@@ -24,8 +25,7 @@ _PRUSA_PARTS, _PRUSA_SETTINGS = "/Metadata/Slic3r_PE_model.config", "/Metadata/S
 _BAMBU_PARTS, _BAMBU_SETTINGS = "/Metadata/model_settings.config", "/Metadata/project_settings.config"
 _MATTER = frozenset({"ModelPart", "normal_part"})
 _CUT_OUT = frozenset({"NegativeVolume", "negative_part"})
-_COLORS_BY = ("filament_colour", "extruder_colour")
-"""Settings that hold the colours of what is printed, by preference."""
+_FILAMENTS = "filament_colour"
 _MOST_FILAMENTS = 256
 
 
@@ -47,7 +47,7 @@ class SlicerNotes:
     kinds: dict[tuple[int, int], str] = field(default_factory=dict)
     extruders: dict[tuple[int, int], int] = field(default_factory=dict)
     objects: dict[int, int] = field(default_factory=dict)
-    filaments: list[Color] = field(default_factory=list)
+    filaments: list[Color | None] = field(default_factory=list)
 
     def helps(self, object_id: int, part_id: int, source: MeshSource) -> bool:
         """Tell whether a component of an object only helps to print it, with a finding."""
@@ -74,8 +74,10 @@ class SlicerNotes:
         return colors
 
     def _filament(self, extruder: int | None, default: np.ndarray) -> np.ndarray:
-        known = extruder is not None and 1 <= extruder <= len(self.filaments)
-        return np.array(self.filaments[extruder - 1], np.uint8) if known and extruder is not None else default
+        if extruder is None or not 1 <= extruder <= len(self.filaments):
+            return default
+        color = self.filaments[extruder - 1]
+        return default if color is None else np.array(color, np.uint8)
 
 
 def read_notes(package: ThreeMfPackage, source: MeshSource) -> SlicerNotes:
@@ -88,8 +90,8 @@ def read_notes(package: ThreeMfPackage, source: MeshSource) -> SlicerNotes:
         root = parse_xml(text, "config", source.name, refusal=partial(InputError, "unreadable"))
         for each in root.iter("object"):
             _read_object(each, notes)
-    settings = package.text(_PRUSA_SETTINGS), package.text(_BAMBU_SETTINGS)
-    notes.filaments = _prusa_colors(settings[0]) or _bambu_colors(settings[1], source)
+    prusa, bambu = package.text(_PRUSA_SETTINGS), package.text(_BAMBU_SETTINGS)
+    notes.filaments = _bambu_colors(bambu, source) if prusa is None else _prusa_colors(prusa)
     return notes
 
 
@@ -122,29 +124,32 @@ def _metadata(element: etree._Element, key: str) -> str | None:
     return next((each.get("value") for each in element.iterchildren("metadata") if each.get("key") == key), None)
 
 
-def _prusa_colors(text: bytes | None) -> list[Color]:
-    lines = [] if text is None else text.decode("utf-8", "replace").splitlines()
+def _prusa_colors(text: bytes) -> list[Color | None]:
+    """Return the colour of each extruder: its own where somebody gave it one, else that of its filament."""
+    lines = text.decode("utf-8", "replace").splitlines()
     settings = {key.strip("; "): value.strip() for key, _, value in (line.partition("=") for line in lines)}
-    for name in _COLORS_BY:
-        if colors := _colors(settings.get(name, "").split(";")):
-            return colors
-    return []
+    own, filaments = (_colors(settings.get(name, "").split(";")) for name in ("extruder_colour", _FILAMENTS))
+    return [color or filament for color, filament in zip_longest(own, filaments)]
 
 
-def _bambu_colors(text: bytes | None, source: MeshSource) -> list[Color]:
+def _bambu_colors(text: bytes | None, source: MeshSource) -> list[Color | None]:
     if text is None:
         return []
     tree = parse_json(text.decode("utf-8", "replace"), source.name, partial(InputError, "unreadable"))
-    named = tree.get(_COLORS_BY[0]) if isinstance(tree, dict) else None
+    named = tree.get(_FILAMENTS) if isinstance(tree, dict) else None
     return _colors([str(each) for each in named]) if isinstance(named, list) else []
 
 
-def _colors(texts: list[str]) -> list[Color]:
-    """Return the colours that texts say; none where any says none, for they are counted."""
+def _colors(texts: list[str]) -> list[Color | None]:
+    """Return the colours that texts say, None of one that says none: they are counted."""
+    return [_color(text) for text in texts[:_MOST_FILAMENTS]]
+
+
+def _color(text: str) -> Color | None:
     try:
-        return [color_of(text) for text in texts[:_MOST_FILAMENTS] if text.strip()]
+        return color_of(text) if text.strip() else None
     except ValueError:
-        return []
+        return None
 
 
 def _find_left_out(kind: str, source: MeshSource) -> None:
