@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 import typer
@@ -36,6 +37,15 @@ try:
     main()
 finally:
     print(sorted({"rich.markdown", "rich.traceback", "pygments", "numpy"} & set(sys.modules)))
+"""
+PLAN = """
+import sys
+from manitwin.cli.main import main
+sys.argv = ["manitwin", "build", "--text", "a mug", "-o", sys.argv[1], "--dry-run"]
+try:
+    main()
+finally:
+    print(sorted({"trimesh", "cascadio._core", "collada.common"} & set(sys.modules)))
 """
 
 
@@ -70,6 +80,11 @@ def test_help_imports_neither_markdown_nor_tracebacks() -> None:
 def test_what_was_put_off_is_imported_when_it_is_called() -> None:
     done = subprocess.run([sys.executable, "-c", PUT_OFF], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_build_loads_no_reader_of_a_format_that_it_was_not_given(tmp_path: Path) -> None:
+    done = subprocess.run([sys.executable, "-c", PLAN, str(tmp_path / "twins")], capture_output=True, text=True)
+    assert done.stdout.rstrip().endswith("['trimesh']"), done.stdout + done.stderr
 
 
 @pytest.mark.parametrize("words", [["-h"], ["build", "-h"], ["review", "sample", "-h"]])

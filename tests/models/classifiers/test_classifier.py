@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
@@ -83,6 +84,25 @@ def test_the_pictures_centre_the_object_on_its_own_and_on_plain_ground() -> None
     )
     with pytest.raises(ValueError, match="alpha is empty"):
         object_pictures(np.zeros((8, 8, 4), np.uint8), 96)
+
+
+def test_the_plain_grounds_are_laid_under_the_object_before_it_is_made_smaller() -> None:
+    rng = np.random.default_rng(5)
+    rgba = rng.integers(0, 256, (200, 240, 4), dtype=np.uint8)
+    rgba[:20, :, 3] = rgba[-20:, :, 3] = 0
+    rgba[..., :20, 3] = rgba[..., -20:, 3] = 0
+    rgba[21:179, 21:219, 3] |= 128
+    own, *plain = object_pictures(rgba, 96)
+    rows, columns = np.nonzero(rgba[..., 3] > 127)
+    middle = (rows.min() + rows.max() + 1) / 2, (columns.min() + columns.max() + 1) / 2
+    half = 0.6 * max(np.ptp(rows), np.ptp(columns)) + 0.6
+    top, left = round(middle[0] - half), round(middle[1] - half)
+    at = [np.clip(np.arange(first, first + round(2 * half)), 0, size - 1) for first, size in ((top, 200), (left, 240))]
+    around = rgba[np.ix_(*at)].astype(float)
+    alpha = around[..., 3:] / 255
+    for picture, ground in ((own, None), (plain[0], 127), (plain[1], 255)):
+        laid = around[..., :3] if ground is None else around[..., :3] * alpha + ground * (1 - alpha)
+        assert np.abs(picture - cv2.resize(laid, (96, 96), interpolation=cv2.INTER_AREA)).max() <= 0.51
 
 
 def test_probabilities_are_those_of_the_closed_form() -> None:

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from manitwin.models.matting import outline_network
 from manitwin.models.matting.fine_outline import band_px, fine_outline
 from manitwin.models.matting.outline_network import (
     AROUND_PX,
@@ -142,6 +143,18 @@ def test_some_rows_at_a_time_are_those_of_the_whole() -> None:
     rows, columns = np.nonzero(sides.near[100:150])
     whole = patches(patch_windows(sides, 0, len(photo)), rows + 100, columns)
     assert np.array_equal(patches(patch_windows(sides, 100, 150), rows, columns), whole)
+
+
+def test_colours_that_are_worked_out_some_rows_at_a_time_are_those_of_the_whole(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    coverage = ring(14.0)
+    photo = photographed(coverage, (0.7, 0.1, 0.05), plain(0.5))
+    mask = (coverage > 0.5).astype(np.float32)
+    monkeypatch.setattr(outline_network, "ROWS_AT_ONCE", len(photo))
+    whole = BothSides(photo, mask, 3).values(0, len(photo))
+    monkeypatch.setattr(outline_network, "ROWS_AT_ONCE", 7)
+    assert BothSides(photo, mask, 3).values(0, len(photo)) == pytest.approx(whole, abs=1e-4)
 
 
 def test_the_band_follows_the_photos_size() -> None:

@@ -97,9 +97,9 @@ def run(**given: Any) -> None:
 def _print_dry_run(
     inputs: list[Path], out: str, arguments: dict[str, Any], said: dict[str, Any], *, as_json: bool
 ) -> None:
-    from manitwin.cli.dry_run import plan_build, print_plan
-
     request = _request(inputs, out, arguments, said)
+    from manitwin.cli.dry_run import plan_build, print_plan  # after what is put off
+
     print_plan(plan_build(request.items, request.root, request.settings, request.notes.remarks), out, as_json=as_json)
 
 
@@ -109,7 +109,8 @@ def _request(inputs: list[Path], out: str, arguments: dict[str, Any], said: dict
 
     one_thread_each()  # before NumPy is loaded: with its threads this process could not be forked
     put_off("networkx", "Graph")  # a tenth of the imports, which trimesh asks for and few things use
-    put_off("collada")  # a twentieth, which reads one format of nine
+    put_off("collada")  # a twentieth, which reads one format of many
+    put_off("cascadio")  # 32 MB in each worker: what reads STEP runs in a process of its own
     gc.disable()  # imports leave next to nothing to be collected, and a twentieth of their time went into looking for it
     try:
         from manitwin.pipeline.settings import Flags, request_build

@@ -85,7 +85,7 @@ def model_background(rgb: np.ndarray) -> Background:
     height, width = lab.shape[:2]
     fits, unexplained = _fit_surfaces(lab)
     border = border_ring(height, width)
-    surfaces = [(_basis(height, width, degree) @ coefficients).astype(np.float32) for coefficients, degree in fits]
+    surfaces = [_surface(height, width, coefficients, degree) for coefficients, degree in fits]
     fine, residual, expected, noise = _distance(lab, 0.8, surfaces, border)
     coarse, _, _, _ = _distance(lab, 2.5, surfaces, border)
     seam = np.zeros((height, width), bool)
@@ -94,9 +94,26 @@ def model_background(rgb: np.ndarray) -> Background:
     return Background(lab, expected, residual, fine, coarse, noise, unexplained, len(surfaces), border, seam)
 
 
+def _surface(height: int, width: int, coefficients: np.ndarray, degree: int) -> np.ndarray:
+    """Return the colours (H, W, 3) float32 of a surface, term by term: all terms of a picture of 1024 pixels are 60 MB."""
+    x, y = _axis(width), _axis(height)[:, None]
+    colours = np.zeros((height, width, 3))
+    for (i, j), coefficient in zip(_powers(degree), coefficients, strict=True):
+        colours += (x**i * y**j)[..., None] * coefficient
+    return colours.astype(np.float32)
+
+
 def _basis(height: int, width: int, degree: int) -> np.ndarray:
-    y, x = np.mgrid[-1 : 1 : height * 1j, -1 : 1 : width * 1j]
-    return np.stack([x**i * y**j for i in range(degree + 1) for j in range(degree + 1 - i)], -1)
+    x, y = _axis(width), _axis(height)[:, None]
+    return np.stack([x**i * y**j for i, j in _powers(degree)], -1)
+
+
+def _axis(length: int) -> np.ndarray:
+    return np.linspace(-1, 1, length)
+
+
+def _powers(degree: int) -> list[tuple[int, int]]:
+    return [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]
 
 
 def _fit_surfaces(lab: np.ndarray) -> tuple[list[tuple[np.ndarray, int]], float]:

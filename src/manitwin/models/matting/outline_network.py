@@ -26,8 +26,8 @@ NEAR_PX, AROUND_PX, STEP_PX = 11, 9, 3
 """Sides of the two patches, odd, and how many pixels one of the second's is wide."""
 VALUES = 5
 """Of each pixel of a patch; one more, the contrast of both sides, is asked where the patch is."""
-AT_ONCE = 4096
-ROWS_AT_ONCE = 128
+AT_ONCE = 1024
+ROWS_AT_ONCE = 64
 """Patches and rows that are worked on at a time: all of a photo of 2048 pixels would take 200 MB."""
 LEAST_SHARE = 1e-3
 """Of a square, that pixels must fill for their mean to count."""
@@ -65,25 +65,28 @@ def share_near_outline(rgb: np.ndarray, mask: np.ndarray, band_px: int) -> np.nd
     return share
 
 
-@dataclass(frozen=True)
 class _Spread:
-    """Colours that hold at many pixels: ``colours (N, 3)``, and which of them does at each pixel, ``which (H, W)`` int32."""
+    """Colours that hold at many pixels, of which only those are kept that some pixel of a picture asks for."""
 
-    colours: np.ndarray
-    which: np.ndarray
-
-    @classmethod
-    def of(cls, colours: np.ndarray, nearest: np.ndarray, asked: np.ndarray) -> _Spread:
-        """Keep, of colours (H, W, 3), those at the ``nearest`` places (H, W) of the pixels that are ``asked`` for (H, W)."""
+    def __init__(self, nearest: np.ndarray, asked: np.ndarray):
+        """Take which place of the flattened picture is ``nearest (H, W)`` int32 to each pixel, and which pixels ask (H, W)."""
+        wanted = nearest[asked]
         used = np.zeros(nearest.size, bool)
-        used[nearest[asked]] = True
-        number = np.cumsum(used, dtype=np.int32)
-        number -= 1
-        return cls(colours.reshape(-1, 3)[used], np.where(asked, number[nearest], 0))
+        used[wanted] = True
+        self._places = np.flatnonzero(used).astype(np.int32)
+        self._which: np.ndarray = np.zeros(nearest.shape, np.int32)
+        self._which[asked] = np.searchsorted(self._places, wanted)
+        self._colours = np.zeros((len(self._places), 3), np.float32)
+
+    def take(self, colours: np.ndarray, top: int) -> None:
+        """Keep what is asked for of the ``colours (R, W, 3)`` of the rows from ``top`` on."""
+        width = self._which.shape[1]
+        first, end = np.searchsorted(self._places, (top * width, (top + len(colours)) * width))
+        self._colours[first:end] = colours.reshape(-1, 3)[self._places[first:end] - top * width]
 
     def rows(self, top: int, end: int) -> np.ndarray:
         """Return the colours (R, W, 3) of the rows from ``top`` to ``end``; any where none was asked for."""
-        return self.colours[self.which[top:end]]
+        return self._colours[self._which[top:end]]
 
 
 class BothSides:
@@ -95,30 +98,38 @@ class BothSides:
 
     def __init__(self, rgb: np.ndarray, rough: np.ndarray, band_px: int):
         """Take a picture (H, W, 3) uint8, its mask (H, W) float32 at that size, and how far off its outline may be."""
-        self.rough, self._band_px = rough, band_px
-        solid = rough > 0.5
-        depth = cv2.distanceTransform(solid.astype(np.uint8), cv2.DIST_L2, 5)
-        away = cv2.distanceTransform((~solid).astype(np.uint8), cv2.DIST_L2, 5)
-        self.near = (depth <= band_px + 1) & (away <= band_px + 1)
-        reach = 2 * band_px + 3
-        thickest = cv2.dilate(depth, np.ones((reach, reach), np.uint8))
-        inner = solid & (depth >= np.minimum(band_px + 1, 0.7 * thickest))
-        outer = ~solid & (away > band_px + 1) & (away < 4 * band_px + 6)
-        del depth, away, thickest
+        self.rough, self._rgb, self._band_px = rough, rgb, band_px
+        self.near, inner, outer = _where(rough > 0.5, band_px)
         self._told_apart = bool(inner.any() and outer.any())
         if not self._told_apart:
             return
         beyond_px = 4 * band_px + 5
         shown = 2 * (AROUND_PX // 2 * STEP_PX + STEP_PX + band_px) + 1
         asked = cv2.dilate(self.near.astype(np.uint8), np.ones((shown, shown), np.uint8)) > 0
-        nearest_inside = _nearest(inner)
-        nearest_beyond = _nearest(_share_of(outer, beyond_px) > LEAST_SHARE)
-        scaled = rgb.astype(np.float32)
+        self._inside = _Spread(_nearest(inner), asked)
+        self._beyond = _Spread(_nearest(_share_of(outer, beyond_px) > LEAST_SHARE), asked)
+        for top in range(0, len(rough), ROWS_AT_ONCE):
+            end = min(top + ROWS_AT_ONCE, len(rough))
+            self._inside.take(self._mean_of(inner, 3, top, end), top)
+            self._beyond.take(self._mean_of(outer, beyond_px, top, end), top)
+
+    def _mean_of(self, used: np.ndarray, side_px: int, top: int, end: int) -> np.ndarray:
+        """Return the mean colour (R, W, 3) of the ``used`` pixels (H, W) in a square around each of some rows.
+
+        They are those from ``top`` to ``end``. It is near black where there are no such pixels.
+        """
+        first = max(0, top - side_px // 2)
+        some = used[first : end + side_px // 2]
+        total = self._lab(first, end + side_px // 2) * some[..., None]
+        total = cv2.blur(total, (side_px, side_px), dst=total)
+        total /= np.maximum(_share_of(some, side_px), 1e-6)[..., None]
+        return np.asarray(total[top - first :][: end - top])
+
+    def _lab(self, top: int, end: int) -> np.ndarray:
+        """Return the colours (R, W, 3) float32 of the rows from ``top`` to ``end`` in L*a*b*."""
+        scaled = self._rgb[top:end].astype(np.float32)
         scaled /= 255
-        self._lab = cv2.cvtColor(scaled, cv2.COLOR_RGB2LAB)
-        del scaled
-        self._inside = _Spread.of(_mean_of(self._lab, inner, 3), nearest_inside, asked)
-        self._beyond = _Spread.of(_mean_of(self._lab, outer, beyond_px), nearest_beyond, asked)
+        return cv2.cvtColor(scaled, cv2.COLOR_RGB2LAB)
 
     def values(self, top: int, end: int) -> np.ndarray:
         """Return the values (R, W, VALUES + 1) float32 of the rows from ``top`` to ``end``.
@@ -135,7 +146,7 @@ class BothSides:
         own = self._inside.rows(first, end + self._band_px)
         own = cv2.blur(own, (2 * self._band_px + 1, 2 * self._band_px + 1))[top - first :][: end - top]
         beyond = self._beyond.rows(top, end)
-        step, offset = own - beyond, self._lab[top:end] - beyond
+        step, offset = own - beyond, self._lab(top, end) - beyond
         contrast = length(step)
         along = _sum(offset * step) / np.maximum(contrast**2, LEAST_CONTRAST_LAB**2)
         beside = np.sqrt(np.maximum(_sum(offset**2) - (along * contrast) ** 2, 0))
@@ -234,12 +245,16 @@ def _share_of(used: np.ndarray, side_px: int) -> np.ndarray:
     return np.asarray(cv2.blur(used.astype(np.float32), (side_px, side_px)))
 
 
-def _mean_of(lab: np.ndarray, used: np.ndarray, side_px: int) -> np.ndarray:
-    """Return the mean colour (H, W, 3) of the ``used`` pixels in a square around each, near black where there are none."""
-    total = lab * used[..., None]
-    total = cv2.blur(total, (side_px, side_px), dst=total)
-    total /= np.maximum(_share_of(used, side_px), 1e-6)[..., None]
-    return np.asarray(total)
+def _where(solid: np.ndarray, band_px: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return which pixels (H, W) the outline of a mask may run through, which are well inside it, and which are just outside."""
+    depth = cv2.distanceTransform(solid.astype(np.uint8), cv2.DIST_L2, 5)
+    away = cv2.distanceTransform((~solid).astype(np.uint8), cv2.DIST_L2, 5)
+    near = (depth <= band_px + 1) & (away <= band_px + 1)
+    outer = ~solid & (away > band_px + 1) & (away < 4 * band_px + 6)
+    reach = 2 * band_px + 3
+    thickest = np.asarray(cv2.dilate(depth, np.ones((reach, reach), np.uint8), dst=away), np.float32)
+    np.multiply(thickest, 0.7, out=thickest)
+    return near, solid & (depth >= np.minimum(band_px + 1, thickest, out=thickest)), outer
 
 
 def _nearest(used: np.ndarray) -> np.ndarray:
@@ -247,7 +262,7 @@ def _nearest(used: np.ndarray) -> np.ndarray:
     row, column = ndimage.distance_transform_edt(~used, return_distances=False, return_indices=True)
     row *= used.shape[1]
     row += column
-    return np.ascontiguousarray(row)
+    return row.copy()  # and not both
 
 
 def _sum(products: np.ndarray) -> np.ndarray:

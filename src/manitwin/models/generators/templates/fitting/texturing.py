@@ -27,6 +27,7 @@ _GRAZING_COSINE = 0.17  # beyond 80 degrees the photo shows streaks
 _NEARBY = 0.022  # of the half diagonal: what has something else before it as near as this may show that instead
 _BEFORE = 0.05
 _NEAREST = 48
+_NEAR_AT_ONCE = 1 << 19  # neighbours: all unseen faces of a thing have ten times as many, 200 MB
 _LEAST_SEEN = 6
 _BORDER = 0.1
 _ROUND_SPREAD = 0.03
@@ -160,9 +161,13 @@ def _crop(rgba: np.ndarray, side_px: int) -> tuple[np.ndarray, np.ndarray, float
 
 def _sampled(photo: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     """Return the photo's smoothed colours ``(V, 3)`` at places ``(V, 2)``."""
-    soft = cv2.GaussianBlur(photo, (0, 0), max(1.0, 0.006 * max(photo.shape))).astype(np.float32)
+    soft = cv2.GaussianBlur(photo, (0, 0), max(1.0, 0.006 * max(photo.shape)))
     at = pixels.astype(np.float32)
-    return np.asarray(cv2.remap(soft, at[:, :1], at[:, 1:], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[:, 0])
+    channels = [
+        cv2.remap(channel.astype(np.float32), at[:, :1], at[:, 1:], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        for channel in cv2.split(soft)
+    ]
+    return np.concatenate(channels, axis=1)
 
 
 def _unseen_colours(
@@ -194,8 +199,7 @@ def _unseen_colours(
         some, there = of_face[known], centers[known]
         places = _across(centers) if _is_turned(centers[own]) else centers
         count = min(len(some), max(_NEAREST, len(some) // 8))
-        _, near = cKDTree(places[known]).query(places[wanted], k=count)
-        quiet = _medians(some, near.reshape(int(wanted.sum()), -1))
+        quiet = _nearest_medians(some, cKDTree(places[known]), places[wanted], count)
         # at the border of what is seen the colours go over into each other
         distance, close = cKDTree(there).query(centers[wanted], k=6)
         share = np.exp(-((distance[:, 0] / _BORDER) ** 2))[:, None]
@@ -203,9 +207,17 @@ def _unseen_colours(
     return tones
 
 
-def _medians(colours: np.ndarray, groups: np.ndarray) -> np.ndarray:
-    """Return the median (G, 3) of the ``colours (N, 3)`` of each group ``(G, K)`` of their numbers."""
-    return np.column_stack([np.median(channel[groups], axis=1) for channel in np.ascontiguousarray(colours.T)])
+def _nearest_medians(colours: np.ndarray, tree: cKDTree, places: np.ndarray, count: int) -> np.ndarray:
+    """Return the median (M, 3) of the ``count`` of the ``colours (N, 3)`` whose points in the tree are nearest to ``places``."""
+    at_once = max(1, _NEAR_AT_ONCE // count)
+    channels = np.ascontiguousarray(colours.T)
+    medians = np.empty((len(places), 3))
+    for first in range(0, len(places), at_once):
+        some = np.s_[first : first + at_once]
+        _, near = tree.query(places[some], k=count)
+        near = near.reshape(-1, count)
+        medians[some] = np.column_stack([np.median(channel[near], axis=1) for channel in channels])
+    return medians
 
 
 def _is_turned(centers: np.ndarray) -> bool:
