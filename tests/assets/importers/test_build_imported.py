@@ -20,7 +20,7 @@ QUICK = BuildConfig(
 )
 
 
-def built(path: Path, folder: Path) -> manitwin.api.BuildReport:
+def built(path: Path, folder: Path) -> manitwin.BuildReport:
     """Import an asset and build it."""
     (one,) = import_assets([path], folder / "imported")
     assert one.folder is not None, one.error

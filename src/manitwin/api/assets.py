@@ -1,0 +1,31 @@
+"""Import the assets of other tools."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from manitwin.assets.asset import Format
+    from manitwin.assets.importers.importer import Imported
+
+
+def import_assets(
+    paths: str | Path | Iterable[str | Path],
+    out: str | Path,
+    *,
+    format: Format | Literal["auto"] = "auto",
+    lock_joints: bool = False,
+) -> list[Imported]:
+    """Import all assets at and below ``paths`` into folders below ``out`` that ``build`` takes; return what became of each.
+
+    What moves by joints is kept with its links and joints (URDF, MJCF, SDF), of other formats the first rigid part is taken; with
+    ``lock_joints`` all of it (URDF, MJCF, SDF) is one rigid body as the file stands. An asset that cannot be read has an
+    ``error`` and no folder. Nothing is written over. Raises UsageError for a path that is not there, and where a folder of
+    another kind has an asset's name.
+    """
+    from manitwin.assets.importers.importer import import_assets as imported
+
+    given = [paths] if isinstance(paths, str | Path) else paths
+    return list(imported([Path(path) for path in given], Path(out), format=format, lock_joints=lock_joints))

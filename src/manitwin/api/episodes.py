@@ -1,0 +1,94 @@
+"""Make episodes of twins and scenes, and draw their films."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Unpack
+
+from manitwin.api.settings import settings_of
+
+if TYPE_CHECKING:
+    from manitwin.engine.drive import RunOptions, RunReport
+    from manitwin.episodes.collect import AttemptTotals
+    from manitwin.episodes.lerobot.write import LeRobotSummary
+    from manitwin.episodes.retirement import Retirement
+    from manitwin.episodes.settings import PicturesConfig, TrajectoriesConfig
+
+
+@dataclass(frozen=True)
+class EpisodesReport:
+    """The outcome of ``make_episodes``.
+
+    ``totals`` and ``lines``, the same in words, are None and empty where the run has not ended; ``retired`` are all grasps
+    that fail end to end, ``newly_retired`` how many of them were retired just now.
+    """
+
+    run: RunReport
+    totals: AttemptTotals | None = None
+    lines: list[str] = field(default_factory=list)
+    retired: list[Retirement] = field(default_factory=list)
+    newly_retired: int = 0
+
+
+def make_episodes(
+    source: str | Path,
+    out: str | Path,
+    count: int = 100,
+    *,
+    config: TrajectoriesConfig | str | Path | None = None,
+    twins: str | Path | None = None,
+    formats: Iterable[str] = ("lerobot", "maniskill"),
+    retire: bool = True,
+    jobs: int | None = None,
+    **run: Unpack[RunOptions],
+) -> EpisodesReport:
+    """Attempt ``count`` pick-and-place episodes with the twins of a data set or in scenes, and keep what succeeded.
+
+    ``out`` gets ``attempts.parquet`` and the data sets of ``formats`` (docs/episodes.md); episodes that are there stay.
+    ``twins``: where the twins of scenes are now. ``retire`` marks grasps that fail in their twins' records.
+    Raises UsageError for a source without twins or scenes, an unknown robot or format, an ``out`` made with other settings,
+    or where another run is at work there.
+    """
+    from manitwin.episodes.collect import chosen_formats, collect
+    from manitwin.episodes.episodes_run import make_episodes as make_batches
+    from manitwin.episodes.episodes_run import retire_failing
+    from manitwin.episodes.settings import TrajectoriesConfig
+
+    settings, wanted = settings_of(TrajectoriesConfig, config, jobs), chosen_formats(formats)
+    ended = make_batches(source, out, count, settings, twins=twins, **run)
+    if ended.exit_code == 4:
+        return EpisodesReport(ended)
+    collected = collect(Path(out), wanted)
+    retired, fresh = retire_failing(Path(out)) if retire else ([], 0)
+    return EpisodesReport(ended, collected.totals, collected.lines, retired, fresh)
+
+
+def render_episodes(
+    episodes: str | Path,
+    *,
+    config: PicturesConfig | str | Path | None = None,
+    twins: str | Path | None = None,
+    jobs: int | None = None,
+    on_written: Callable[[LeRobotSummary], None] = lambda summary: None,
+    **run: Unpack[RunOptions],
+) -> RunReport:
+    """Draw the kept episodes of a folder by showing their states again, and write its LeRobot data set with the films.
+
+    ``twins``: where their twins are now. What is drawn already stays. Raises EpisodesError where there are no episodes,
+    UsageError for an unknown camera, RendererMissing, and Unavailable without an encoder.
+    """
+    from manitwin.episodes.episode_pictures import draw_episodes, write_with_pictures
+    from manitwin.episodes.settings import PicturesConfig
+    from manitwin.episodes.video import require_encoder
+    from manitwin.render.device import require_renderer
+
+    settings = settings_of(PicturesConfig, config, jobs)
+    if run.get("executor") != "ray":
+        require_renderer()
+        require_encoder(settings.codec)
+    report = draw_episodes(Path(episodes), settings, twins=twins, **run)
+    if report.exit_code != 4:
+        on_written(write_with_pictures(Path(episodes), settings.cameras))
+    return report

@@ -1,0 +1,83 @@
+"""Make scenes of a data set's twins, find, load and export them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Unpack
+
+from manitwin.api.settings import settings_of
+from manitwin.errors import UsageError
+
+if TYPE_CHECKING:
+    from manitwin.engine.drive import RunOptions, RunReport
+    from manitwin.scenes.loaded_scene import Scene
+    from manitwin.scenes.settings import LayoutsConfig
+
+
+def make_layouts(
+    dataset: str | Path,
+    out: str | Path,
+    count: int = 100,
+    *,
+    config: LayoutsConfig | str | Path | None = None,
+    jobs: int | None = None,
+    **run: Unpack[RunOptions],
+) -> RunReport:
+    """Sample ``count`` scenes of a data set's twins at rest below ``out``; those that are there stay (docs/layouts.md).
+
+    ``config``: the settings or a TOML file of them; with its ``pictures`` each scene is drawn. ``jobs``: how many processes,
+    by default one a core. ``find_scenes`` lists the accepted ones. Raises UsageError for a data set without twins, categories
+    that it has not, scenes of other settings at ``out``, or where another run is at work there.
+    """
+    from manitwin.scenes.layouts.layouts_run import make_layouts as make
+    from manitwin.scenes.settings import LayoutsConfig
+
+    settings = settings_of(LayoutsConfig, config, jobs)
+    return make(dataset, out, count, settings, **run)
+
+
+def find_scenes(place: str | Path) -> list[Path]:
+    """Return the files of the scenes at ``place``: a file, a scene's folder, or all that ``make_layouts`` wrote there.
+
+    Raises UsageError where there is none.
+    """
+    from manitwin.scenes.scene_files import scene_files
+
+    found = scene_files(Path(place))
+    if not found:
+        raise UsageError(f"{place}: no scene there; `manitwin layout DATASET -o {place}` makes some")
+    return found
+
+
+def load_scene(scene: str | Path, dataset: str | Path | None = None) -> Scene:
+    """Load a scene of ``manitwin layout`` by its file or folder; ``dataset`` None: the one that it was sampled from.
+
+    Raises UsageError where the scene cannot be read, or does not lie in the folder that says whose twins it has.
+    """
+    from manitwin.scenes.loaded_scene import Scene
+    from manitwin.scenes.scene_files import dataset_of
+
+    return Scene.read(scene, dataset_of(Path(scene)) if dataset is None else dataset)
+
+
+def export_scene(scene: Scene | str | Path, to: str | Iterable[str], out: str | Path) -> dict[str, Path]:
+    """Write a scene in formats (``"mjcf"``, ``["mjcf", "usd"]``, ``"all"``) below ``out``; return the file to open of each.
+
+    An earlier export there is replaced. Raises UsageError for an unknown format and a scene or twin that is not there,
+    ExportError for what cannot be written.
+    """
+    from manitwin.assets.writers.write import write_exported
+    from manitwin.errors import choose_from
+    from manitwin.scenes.layouts.export_mjcf import export_mjcf
+    from manitwin.scenes.layouts.export_usd import export_usd
+
+    exporters = {"mjcf": export_mjcf, "usd": export_usd}
+    asked = [to] if isinstance(to, str) else list(to)
+    names = list(exporters) if "all" in asked else asked
+    for name in names:
+        if name not in exporters:
+            raise UsageError(choose_from("format of a scene", name, exporters))
+    loaded = load_scene(scene) if isinstance(scene, str | Path) else scene
+    place = Path(out) / loaded.record.scene_id
+    return {name: write_exported(exporters[name](loaded), place / name) for name in names}
