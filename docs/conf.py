@@ -38,6 +38,6 @@ python_use_unqualified_type_names = True
 nitpicky = True
 # types of other packages: their manuals are elsewhere, and nothing here loads or links what is elsewhere
 nitpick_ignore_regex = [
-    (r"py:class", r"manitwin\.config\.Kind"),  # a type variable
+    (r"py:class", r"manitwin\.config\.load\.Kind"),  # a type variable
     (r"py:.*", r"(np|numpy|trimesh|pathlib|Path|pa|pyarrow|mujoco|sapien|collections|typing|duckdb|_duckdb)(\..*)?"),
 ]

@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "src" / "manitwin"
 PAGE = (ROOT / "docs" / "architecture.md").read_text()
 (CONTRACT,) = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
-MOST_PACKAGES, MOST_MODULES, MOST_FILES_BEFORE_GEOMETRY = 16, 5, 6
+MOST_PACKAGES, MOST_MODULES, MOST_FILES_BEFORE_GEOMETRY = 17, 4, 6
 
 
 def packages() -> set[str]:
