@@ -16,7 +16,8 @@ from manitwin.robots.grippers.gripper import Gripper, load_gripper
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
-from manitwin.robots.urdf import inertial_of, origin_of, read_urdf
+from manitwin.robots.urdf import inertial_of, origin_of
+from manitwin.robots.urdf_reader import read_urdf
 
 MASS = (
     '<inertial><origin xyz="0 0 0.01"/><mass value="1"/>'

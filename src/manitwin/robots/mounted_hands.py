@@ -19,7 +19,8 @@ from manitwin.robots.grippers.gripper import Gripper, of_kind
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.robots.grippers.suction import SuctionGripper
-from manitwin.robots.urdf import HAND, UrdfTree, child_of, geometry_of, origin_of, read_urdf, set_origin
+from manitwin.robots.urdf import UrdfTree, child_of, geometry_of, origin_of, set_origin
+from manitwin.robots.urdf_reader import HAND, read_urdf
 
 
 @dataclass(frozen=True)

@@ -25,13 +25,8 @@ from manitwin.assets.root import root_of
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.source import MeshLimits
 from manitwin.formats.xml_file import comments_before, number, text_of
-from manitwin.robots.urdf import (
-    JOINT_TYPES,
-    UrdfRules,
-    UrdfTree,
-    inertial_of,
-    read_urdf,
-)
+from manitwin.robots.urdf import UrdfTree, inertial_of
+from manitwin.robots.urdf_reader import JOINT_TYPES, UrdfRules, read_urdf
 
 _TRIPLES = frozenset({"xyz", "rpy", "rgba", "size", "scale"})
 _AXES, _SOFT = 3, "deformable"

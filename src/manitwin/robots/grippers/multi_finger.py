@@ -18,7 +18,7 @@ from manitwin.formats.xml_file import MAX_XML_BYTES
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.robots.grippers.box import STRICT, Box, PlacedBox
 from manitwin.robots.links import Link, link_poses, links_of
-from manitwin.robots.urdf import HAND, read_urdf
+from manitwin.robots.urdf_reader import HAND, read_urdf
 
 BALL_AS_CUBE = (4 * np.pi / 3) ** (1 / 3) / 2  # half the side of the cube of a ball's volume, in radii
 SYMBOL_HALF_WIDTH_M = 0.004
