@@ -1,0 +1,72 @@
+"""The mass properties of MJCF files: declared, computed, or not said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from written_mjcf import mjcf
+
+from manitwin.assets.read import read_asset
+
+
+def test_inertial_is_what_the_file_says(tmp_path: Path) -> None:
+    inertial = '<inertial pos="0.01 0 0.02" mass="0.3" fullinertia="2e-3 3e-3 4e-3 1e-4 2e-4 3e-4"/>'
+    asset = read_asset(mjcf(tmp_path, f'<body><freejoint/>{inertial}<geom size="0.05"/></body>'))
+    assert asset.inertial.mass_kg == pytest.approx(0.3)
+    assert np.allclose(asset.inertial.center_of_mass_m, [0.01, 0, 0.02])
+    tensor = [[2e-3, 1e-4, 2e-4], [1e-4, 3e-3, 3e-4], [2e-4, 3e-4, 4e-3]]  # MJCF order: xx yy zz xy xz yz
+    assert np.allclose(asset.inertial.inertia_kg_m2, tensor, rtol=1e-9)
+
+
+def test_mass_of_mujocos_own_density_is_not_declared(tmp_path: Path) -> None:
+    asset = read_asset(mjcf(tmp_path, '<body><freejoint/><geom size="0.05"/></body>'))
+    assert asset.inertial.mass_kg is None and asset.contact.friction_static is None
+
+
+def test_mass_of_a_written_density_is_declared_and_said(tmp_path: Path) -> None:
+    default = '<default><geom density="100" friction="0.8 0.01 0.001"/></default>'
+    asset = read_asset(mjcf(tmp_path, '<body><freejoint/><geom size="0.05"/></body>', default))
+    mass_kg = 100 * 4 / 3 * np.pi * 0.05**3
+    assert asset.inertial.mass_kg == pytest.approx(mass_kg)
+    assert np.allclose(asset.inertial.center_of_mass_m, 0, atol=1e-12)
+    assert np.allclose(asset.inertial.inertia_kg_m2, 0.4 * mass_kg * 0.05**2 * np.eye(3), rtol=1e-9)
+    assert asset.contact.friction_static == asset.contact.friction_dynamic == 0.8
+    assert any("density" in remark for remark in asset.remarks)
+
+
+def test_a_mass_of_geoms_in_several_bodies_is_combined_as_mujoco_has_it(tmp_path: Path) -> None:
+    bodies = (
+        '<body pos="1 0 0"><freejoint/><geom size="0.05" mass="0.2" pos="0.1 0 0"/>'
+        '<body pos="0 0 0.3" euler="0 0 30"><geom type="box" size="0.1 0.05 0.02" mass="0.4"/></body></body>'
+    )
+    path = mjcf(tmp_path, bodies)
+    inertial = read_asset(path).inertial
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert inertial.mass_kg == pytest.approx(float(model.body_subtreemass[1]))
+    assert np.allclose(inertial.center_of_mass_m, data.subtree_com[1] - [1, 0, 0], atol=1e-9)
+    spinning = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, spinning)
+    about_origin = spinning[3:, 3:]  # of the free joint's turn, about the body's own origin
+    c = inertial.center_of_mass_m
+    moved = inertial.mass_kg * (c @ c * np.eye(3) - np.outer(c, c))
+    assert np.allclose(inertial.inertia_kg_m2 + moved, about_origin, rtol=1e-6, atol=1e-9)
+
+
+def test_a_mass_of_all_together_is_declared(tmp_path: Path) -> None:
+    two = "".join(f'<body name="b{n}" pos="{n} 0 0"><joint/><geom size="0.1"/></body>' for n in range(2))
+    assert read_asset(mjcf(tmp_path, two)).inertial.mass_kg is None
+    whole = read_asset(mjcf(tmp_path, two, '<compiler settotalmass="14"/>'))
+    assert whole.inertial.mass_kg == pytest.approx(7) and whole.inertial.computed
+
+
+def test_a_mass_that_a_part_declares_is_declared(tmp_path: Path) -> None:
+    pole = '<body pos="0 0 1"><geom type="box" size="0.05 0.05 0.05"/></body>'
+    inertial = '<inertial pos="0 0 0" mass="10" diaginertia="1 1 1"/>'
+    asset = read_asset(mjcf(tmp_path, f'<body><freejoint/>{inertial}<geom size="0.1"/>{pole}</body>'))
+    assert asset.inertial.mass_kg == pytest.approx(11) and asset.inertial.computed
+    assert any("a part of its mass is declared" in remark for remark in asset.remarks)
