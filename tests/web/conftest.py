@@ -1,4 +1,4 @@
-"""Fixtures of the pages' tests: a data set to look at, a server of it in a process of its own, a real browser."""
+"""Fixtures of the pages' tests: a data set and a run of episodes to look at, a real browser."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 from viewed_twins import write_viewed
+
+from drawn_episodes import attempt, write_run
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome-stable", "google-chrome")
 
@@ -25,6 +27,18 @@ def viewed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
 def place(viewed: tuple[Path, list[str]], tmp_path: Path) -> Path:
     """A copy of the data set, to write reviews and defects into."""
     return Path(shutil.copytree(viewed[0], tmp_path / "set"))
+
+
+@pytest.fixture(scope="session")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two kept episodes and two failed attempts before them; nothing may write there."""
+    failed = (
+        attempt(
+            7, outcome="goal_missed", goal="in(object_00, object_01)", failure="in(object_00, object_01): on_the_rim"
+        ),
+        attempt(8, outcome="no_plan", plan_failures='{"approach_blocked": 5}', length_s=None),
+    )
+    return write_run(tmp_path_factory.mktemp("run"), failed=failed)
 
 
 @pytest.fixture(scope="session")
