@@ -5,9 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 import trimesh
+from PIL import Image
 
 from manitwin.formats.glb import write_glb
+from manitwin.formats.meshes.textures import make_part, pbr_material
+from manitwin.pipeline import object_state
 from manitwin.pipeline.object_state import KEPT, load_solid, load_visual
 from manitwin.render.surfaces import plain_part
 
@@ -41,3 +45,25 @@ def test_parts_are_the_same_ones_for_stage_after_stage_until_their_file_is_anoth
     assert load_visual(path)[0] is first
     path.write_bytes(write_glb([plain_part(box.apply_scale(2.0), (200, 10, 10))]))
     assert np.allclose(load_visual(path)[0].extents, 0.2)
+
+
+def test_large_textures_make_room_before_meshes_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    paths = []
+    for shade in range(3):
+        box = trimesh.creation.box((0.1, 0.1, 0.1))
+        picture = Image.new("RGB", (64, 32), (80 * shade, 0, 0))
+        part = make_part(
+            box.vertices,
+            box.faces,
+            material=pbr_material(base_color_texture=picture),
+            name="box",
+            uv=box.vertices[:, :2],
+        )
+        paths.append(tmp_path / f"{shade}.glb")
+        paths[-1].write_bytes(write_glb([part]))
+    monkeypatch.setattr(object_state, "MOST_TEXTURE_PIXELS", 2 * 64 * 32)
+    first, second, _ = (load_visual(path)[0] for path in paths)
+    assert load_visual(paths[1])[0] is second and load_visual(paths[0])[0] is not first
+    monkeypatch.setattr(object_state, "MOST_TEXTURE_PIXELS", 0)
+    (last,) = load_visual(paths[2])
+    assert load_visual(paths[2])[0] is last, "the mesh that was loaded last is kept whatever it has"

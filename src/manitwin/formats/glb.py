@@ -228,7 +228,8 @@ def _encoded(image: Image.Image, kind: Literal["color", "data"], with_alpha: boo
         return stream.getvalue(), "image/png"
     quality = _COLOR_QUALITY if kind == "color" else _DATA_QUALITY
     # no chroma subsampling: texture seams and painted vertex colours have edges that it smears
-    image.convert("RGB").save(stream, "JPEG", quality=quality, subsampling=0)
+    opaque = image if image.mode == "RGB" else image.convert("RGB")
+    opaque.save(stream, "JPEG", quality=quality, subsampling=0)
     return stream.getvalue(), "image/jpeg"
 
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import io
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 import trimesh
+from trimesh.visual.material import PBRMaterial
 
 from manitwin.engine.stage import Draft
 from manitwin.formats.glb import read_glb
@@ -27,6 +28,8 @@ from manitwin.twin.import_record import ImportRecord, read_import_record
 
 KEPT = 4
 """A worker has the stages of so many items in turn where two work: of each of two, one is done and one waits beside it."""
+MOST_TEXTURE_PIXELS = 9_000_000
+"""Of all that are kept, two scans' textures, 17 MB each; the mesh that was loaded last is kept whatever it has."""
 _meshes: dict[str, OrderedDict[bytes, tuple[list[int], list[trimesh.Trimesh]]]] = {
     "solid": OrderedDict(), "visual": OrderedDict()
 }  # fmt: skip
@@ -56,9 +59,21 @@ def _loaded(kind: str, path: Path, read: Callable[[bytes], list[trimesh.Trimesh]
         meshes = read(content)
         hashes = [hash(mesh) for mesh in meshes]
     known[digest] = hashes, meshes
-    while len(known) > KEPT:
+    while len(known) > KEPT or (len(known) > 1 and _texture_pixels(known.values()) > MOST_TEXTURE_PIXELS):
         known.popitem(last=False)
     return meshes
+
+
+def _texture_pixels(kept: Iterable[tuple[list[int], list[trimesh.Trimesh]]]) -> int:
+    materials = [getattr(mesh.visual, "material", None) for _, meshes in kept for mesh in meshes]  # a solid has none
+    pictures = {
+        id(picture): picture.width * picture.height
+        for material in materials
+        if isinstance(material, PBRMaterial)
+        for picture in (material.baseColorTexture, material.metallicRoughnessTexture, material.normalTexture)
+        if picture is not None
+    }
+    return sum(pictures.values())
 
 
 def load_hulls(path: Path) -> tuple[np.ndarray, ...]:

@@ -69,7 +69,8 @@ def _decoded(data: Buffer, name: str, source: MeshSource) -> Image.Image | None:
         # 16-bit grey: Pillow's own conversion clips
         image = Image.fromarray((np.asarray(image).astype(np.uint32) >> 8).astype(np.uint8))
     has_alpha = image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info
-    return image.convert("RGBA" if has_alpha else "RGB")
+    mode = "RGBA" if has_alpha else "RGB"
+    return image if image.mode == mode else image.convert(mode)  # a copy of a scan's texture is 17 MB
 
 
 def color_of_lost_texture(color: Sequence[float]) -> tuple[float, ...]:
