@@ -53,7 +53,7 @@ class EpisodesStage:
     """Make the episodes of a batch. Each draws from a generator of its own, by the run's seed and its number in the whole."""
 
     name = "episodes"
-    version = "15"
+    version = "16"
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = (EPISODES, ATTEMPTS, "batch")
     needs: Resource = "cpu"

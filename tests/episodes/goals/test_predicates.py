@@ -206,6 +206,13 @@ def test_events_are_judged_by_what_was_measured_and_only_of_their_subject() -> N
     assert judge(here, literal).failure == "not_touched"
     assert judge(replace(here, events=(press,)), literal).holds
     assert judge(replace(here, events=(press,)), Literal("pressed", "item", value=7.0)).failure == "weak"
+    hard = replace(
+        press, values={**press.values, "force_n": 80.0}
+    )  # a solver that finds a touch late makes such forces
+    assert judge(replace(here, events=(hard,)), Literal("pressed", "item", value=5.0)).failure == "too_hard"
+    assert judge(
+        replace(here, events=(hard, press)), Literal("pressed", "item", value=5.0)
+    ).holds  # fingers grasp harder
     grasped = replace(press, values={"force_n": 24.0, "off_m": 0.004, "angle_rad": 1.4})
     judgement = judge(replace(here, events=(grasped, press)), literal)
     assert judgement.holds, "one touch does it"

@@ -25,7 +25,7 @@ def test_a_button_is_pressed_with_the_force_and_nothing_else() -> None:
     assert facts.outcome == "kept", (facts.evaluation, facts.unplanned)
     best = max(facts.events, key=lambda event: event.values["force_n"])
     assert best.values["off_m"] < 0.003
-    assert 5 <= best.values["force_n"] < 20
+    assert 5 <= best.values["force_n"] < 9.5  # it stops at 8 N; at 4 mm/s up to the touch it reached 10.4
     assert recording is not None
     assert [int(p) for p in dict.fromkeys(recording.phase.tolist())] == [
         Phase.CLOSE, Phase.REACH, Phase.ACT, Phase.HOLD, Phase.RETURN, Phase.REST,

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from manitwin.episodes.courses.course import TURNED_RAD, Course, Ended, Start, first_and_last
-from manitwin.episodes.courses.regulated import Admittance, with_heights
+from manitwin.episodes.courses.regulated import Admittance, pace_of_press, with_heights
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.execution import Execution
@@ -35,6 +35,7 @@ YIELDED_S, PRESSED_S = 0.1, 0.2  # after the touch of a blow, and of a press
 RISEN_M = (0.01, 0.03)  # straight up, before the way back
 PUT_BACK_RAD = np.radians([0.0, 45, -45, 90, -90, 135, -135, 180])  # what has turned in the hand comes back as it can
 PEAK_OF_QUINTIC = 1.875  # its largest by its mean speed
+CREEPS_M = 0.002  # before the touch: as far as things are from where they were measured to be, and a little more
 
 
 class HeldCourse(Course):
@@ -218,8 +219,8 @@ class HeldCourse(Course):
     def _guarded(self, guard: Guard, part: HeldPath, execution: Execution) -> None:
         """Move on until what is watched presses with the guard's force, then hold still (or yield, after a blow).
 
-        The arm goes on until the row ends. So what presses goes on the more slowly the nearer it is to that force, and a blow is
-        begun at such a time that a row ends as it touches; what has not touched by then goes on slowly.
+        The arm goes on until the row ends. So what presses creeps where it is to touch, and a blow is begun at such a time that a
+        row ends as it touches; what has not touched by then goes on slowly.
         """
         watch = self._watch
         assert watch is not None, "a guarded move asks its watch for the force"
@@ -229,13 +230,17 @@ class HeldCourse(Course):
         duration_s = guard.duration_s if guard.speed_m_s is None else PEAK_OF_QUINTIC * way_m / guard.speed_m_s
         motion = self._planner.timed(joints, duration_s, Phase.ACT, beyond=guard.beyond)
         touched: Callable[[], bool] = lambda: watch.force_n >= guard.stop_n  # noqa: E731
+        grasp = self._grasp_now if self.task.empty else execution.gripper_to_object()
+        there_m = (part.poses[max(guard.touches - guard.first, 0)] @ grasp)[:3, 3]
+        ways_m = np.linalg.norm(
+            [self.start.planner.tip_pose(each)[:3, 3] - there_m for each in motion.positions_rad], axis=1
+        )
         if not guard.is_blow:
-            execution.follow(motion, until=touched, pace=lambda _: max(0.0, 1 - watch.force_n / guard.stop_n))
+            creeps = int((ways_m < CREEPS_M).argmax()) if guard.touches else len(ways_m)
+            execution.follow(motion, until=touched, pace=pace_of_press(watch, guard.stop_n, creeps))
             execution.wait_s(Phase.HOLD, PRESSED_S)
             return
-        there_m = (part.poses[guard.touches - guard.first] @ execution.gripper_to_object())[:3, 3]
-        ways_m = [self.start.planner.tip_pose(each)[:3, 3] - there_m for each in motion.positions_rad]
-        touches = int(np.linalg.norm(ways_m, axis=1).argmin())
+        touches = int(ways_m.argmin())
         blow = execution.delayed(motion, touches)
         touches += len(blow.positions_rad) - len(motion.positions_rad)
         if execution.follow(blow, until=touched, pace=lambda first: float(first <= touches), yields=True):

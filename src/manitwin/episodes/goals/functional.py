@@ -14,6 +14,9 @@ from manitwin.geometry.poses import inverse, transform_points
 
 MOST_SPILT = 0.05
 PRESS_RADIUS_M, PRESS_RAD = 0.012, np.radians(30)
+MOST_PRESSED = (
+    3.0  # of the force that is asked for: what is pressed harder might break, and may be an artefact of the solver
+)
 STRIKE_RAD = np.radians(15)
 CORNER_OF_SQUARE = np.sqrt(np.pi / 2)  # 1.25: half a square's diagonal by the radius of the circle with its area
 HANG_SLACK_M = 0.006
@@ -72,10 +75,10 @@ def poured(state: WorldState, literal: Literal) -> Judgement:
 
 
 def pressed(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that a point was pressed with the value's force, within 12 mm of it and 30 degrees of its inward normal.
+    """Judge that a point was pressed with one to three times the value's force, within 12 mm of it and 30 degrees of its normal.
 
-    One touch has to do all that, in its hardest moment; others, as of fingers that grasp, do no harm. What fails is said of the
-    hardest touch.
+    The normal is the inward one. One touch has to do all that, in its hardest moment; others, as of fingers that grasp, do no
+    harm. What fails is said of the hardest touch.
     """
     assert literal.value is not None
     found = _events(state, "pressed", literal)
@@ -87,6 +90,7 @@ def pressed(state: WorldState, literal: Literal) -> Judgement:
                 "off": event.values["off_m"] <= PRESS_RADIUS_M,
                 "askew": event.values["angle_rad"] <= PRESS_RAD,
                 "weak": event.values["force_n"] >= literal.value,
+                "too_hard": event.values["force_n"] <= MOST_PRESSED * literal.value,
             },
             event.values,
         )

@@ -45,8 +45,9 @@ class HeldScene:
 class Guard:
     """A guarded move: from knot ``first`` on, until what is watched presses with ``stop_n``.
 
-    It goes at ``speed_m_s`` at most, or as a blow: as fast as ``duration_s`` says, fastest at the end of the path
-    (``beyond`` > 1, see ``path_timing``), and yielding once it touches, which is expected at knot ``touches``.
+    A touch is expected at knot ``touches``. It goes at ``speed_m_s`` at most and, where a touch is expected, creeps there; or as
+    a blow: as fast as ``duration_s`` says, fastest at the end of the path (``beyond`` > 1, see ``path_timing``), and yielding
+    once it touches.
     """
 
     first: int

@@ -26,7 +26,10 @@ SOLID_M = 0.006  # below the place there is something to press on: the middle of
 TILT_RAD = np.radians([10.0, 25.0])
 LEAST_LEAD_M = 0.0015  # of the corner that presses: where two touch at once, the force is between them, 2 cm off
 TRIED = 24
-SPEED_M_S = 0.004  # 0.2 mm between two actions, in which a stiff thing presses 4 to 8 N more
+TOUCHES = FREE_KNOTS + 2  # the knot at the place's height
+SPEED_M_S = (
+    0.004  # at most; near the place a sixth of it, 0.03 mm between two actions, in which a stiff thing presses 1 N more
+)
 MORE_N = 3.0  # than is asked for, so that what sags away still leaves enough
 
 
@@ -76,7 +79,7 @@ class Press(HeldSkill):
 
         asked_n = SIGNATURES[self.predicate].default
         assert asked_n is not None
-        guard = Guard(FREE_KNOTS, asked_n + MORE_N, speed_m_s=SPEED_M_S)
+        guard = Guard(FREE_KNOTS, asked_n + MORE_N, speed_m_s=SPEED_M_S, touches=TOUCHES)
         return HeldTask(tuple(paths), empty=True, duration_s=1.0, measured=1, ending="keep", guard=guard, watch=watch)
 
 
