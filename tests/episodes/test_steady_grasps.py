@@ -12,6 +12,7 @@ from manitwin.episodes.steady_grasps import (
     LIFTED_WEIGHT,
     bears_weight,
     loads_any_way_up,
+    steady_on_the_way,
     steady_tiers,
     torsion_limits_nm,
     touch_narrowly,
@@ -91,6 +92,23 @@ def test_other_grippers_keep_the_order_of_their_grasps() -> None:
         assert steady_tiers(grasps, bar(2.0), load_gripper(name)) == [tuple(grasps)]
         assert bears_weight(grasps[0], bar(2.0), load_gripper(name))
         assert steady_tiers([], bar(2.0), load_gripper(name)) == []
+
+
+def test_what_stands_safely_in_the_jaws_may_turn_in_them_as_it_is_tilted() -> None:
+    """A bar of 1 kg on end hangs below the jaws; tilted by 90 degrees it bears on them with its whole lever."""
+    on_end = np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]])
+    upright, level = transform(on_end), np.eye(4)
+    grasps = [held_at(0.1), held_at(0.04), held_at(0.0)]  # 1, 0.4 and 0 Nm; a line bears 0.44
+    stands = bar(1.0, on_end)
+    assert steady_tiers(grasps, stands, HAND) == [tuple(grasps)]
+    assert steady_on_the_way(grasps, stands.body, [np.array([upright])], HAND) == grasps
+    assert steady_on_the_way(grasps, stands.body, [np.array([upright, level])], HAND) == grasps[1:]
+    gentle = np.array([upright])
+    assert steady_on_the_way(grasps, stands.body, [np.array([upright, level]), gentle], HAND) == grasps, (
+        "the gentlest way"
+    )
+    suction = load_gripper("suction")
+    assert steady_on_the_way(grasps, stands.body, [np.array([level])], suction) == grasps
 
 
 def raised(grasp: Grasp, by_m: float) -> Grasp:

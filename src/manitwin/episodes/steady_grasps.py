@@ -46,6 +46,31 @@ def steady_tiers(grasps: Sequence[Grasp], target: PlacedObject, gripper: Gripper
     return [tier for tier in tiers if tier]
 
 
+def steady_on_the_way(
+    grasps: Sequence[Grasp], body: RigidBody, ways: Sequence[np.ndarray], gripper: Gripper
+) -> list[Grasp]:
+    """Return the grasps in which a body's weight does not turn it all along a way: those first that bear it on a line.
+
+    ``ways`` are alternatives, each poses ``(K, 4, 4)`` of the body in the world; of each grasp the gentlest counts. On a face as
+    much is borne as by a disc of the area that touches. A jug that stands hangs straight below jaws at its rim, and bears on them
+    with its whole height once it is tilted to pour. Of other grippers than jaws nothing is known, and all are returned.
+    """
+    if not isinstance(gripper, ParallelGripper) or not grasps or not ways:
+        return list(grasps)
+    (line_nm, face_nm), tip_m = torsion_limits_nm(gripper), np.array([[0.0, 0, gripper.tip_depth_m]])
+    on_lines, on_faces = list[Grasp](), list[Grasp]()
+    for grasp, share in zip(grasps, touching_shares(grasps, body, gripper), strict=True):
+        away_m = body.center_of_mass_m - transform_points(grasp.gripper_to_object, tip_m)[0]
+        per_newton_m = np.cross(away_m, grasp.gripper_to_object[:3, 0])
+        largest_m = min(float(np.abs(poses[:, 2, :3] @ per_newton_m).max()) for poses in ways)
+        torque_nm = GRAVITY_M_S2 * body.mass_kg * largest_m
+        if torque_nm <= line_nm:
+            on_lines.append(grasp)
+        elif torque_nm <= face_nm * float(np.sqrt(share)):
+            on_faces.append(grasp)
+    return on_lines + on_faces
+
+
 def bears_weight(grasp: Grasp, target: PlacedObject, gripper: Gripper) -> bool:
     """Tell whether a target that is lifted where it is stays as it is in the jaws; of other grippers nothing is known."""
     if not isinstance(gripper, ParallelGripper):

@@ -10,7 +10,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from manitwin.episodes.courses.course import TURNED_RAD, Course, Ended, Start, first_and_last
+from manitwin.episodes.courses.course import TURNED_RAD, Course, Ended, Start
+from manitwin.episodes.courses.held_grasps import grasps_of_task
 from manitwin.episodes.courses.regulated import Admittance, pace_of_press, with_heights
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
@@ -21,10 +22,9 @@ from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.planning.held_path import HeldPathPlanner, HeldPlan
 from manitwin.episodes.planning.path_timing import joint_spline, time_quintic
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
-from manitwin.episodes.planning.problem import Grasp, Motion, Phase
+from manitwin.episodes.planning.problem import Motion, Phase
 from manitwin.episodes.planning.withdrawal import plan_withdrawal
 from manitwin.episodes.skills.held_task import Guard, HeldScene, HeldTask, Regulated
-from manitwin.episodes.steady_grasps import touch_narrowly
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.contacts import MeantContacts
@@ -35,6 +35,11 @@ YIELDED_S, PRESSED_S = 0.1, 0.2  # after the touch of a blow, and of a press
 RISEN_M = (0.01, 0.03)  # straight up, before the way back
 PUT_BACK_RAD = np.radians([0.0, 45, -45, 90, -90, 135, -135, 180])  # what has turned in the hand comes back as it can
 PEAK_OF_QUINTIC = 1.875  # its largest by its mean speed
+MADE_UP_RAD, MADE_UP_TIMES, MADE_UP_S = (
+    np.radians(4.0),
+    3,
+    0.4,
+)  # what has turned in the hand is turned on to the path's end
 CREEPS_M = 0.002  # before the touch: as far as things are from where they were measured to be, and a little more
 
 
@@ -98,30 +103,24 @@ class HeldCourse(Course):
                 return False
             self._reach, self._held, self._joints = found
             return True
-        tiers = self.tiers()
-        grasps = tuple(grasp for tier in tiers for grasp in self._ranked(tier))
-        blocking = sum(map(len, tiers)) - len(grasps)
+        body, gripper = self.problem.target.body, self._own.robot.gripper
+        grasps, left_out = grasps_of_task(self.tiers(), task, body, gripper)
         self.problem = replace(self.problem, grasps=grasps)
-        plan, report = self._planner.plan(self.problem, task.paths, as_hulls=task.as_hulls, longest_s=task.longest_s)
-        self.facts.grasps_tried += report.tried + blocking
-        self.facts.plan_failures += report.failures
-        if blocking:
-            self.facts.plan_failures["blocks_function"] += blocking
+        self.facts.grasps_tried += left_out.total()
+        self.facts.plan_failures.update(left_out)
+        plan = None
+        for paths in (task.paths, task.otherwise):
+            plan, report = self._planner.plan(self.problem, paths, as_hulls=task.as_hulls, longest_s=task.longest_s)
+            if plan is not None or paths is task.paths:
+                self.facts.grasps_tried += report.tried
+                self.facts.plan_failures += report.failures
+            if plan is not None or not task.otherwise:
+                break
         if plan is None:
             return False
         self._plan, self._held, self._joints = plan, plan.held, plan.joints
         self.facts.grasp = plan.grasp
         return True
-
-    def _ranked(self, grasps: Sequence[Grasp]) -> list[Grasp]:
-        """Return the grasps that leave the function free, but for the last quarter those first that do so best.
-
-        Of equal ones those go first whose pads touch broadly.
-        """
-        narrow = touch_narrowly(grasps, self.problem.target.body, self._own.robot.gripper)
-        ranks = [(self.task.rank(grasp), late, grasp) for grasp, late in zip(grasps, narrow, strict=True)]
-        free = [(rank, late, grasp) for rank, late, grasp in ranks if rank is not None]
-        return [grasp for part in first_and_last(free) for *_, grasp in sorted(part, key=lambda each: each[:2])]
 
     def execute(self, execution: Execution) -> None:
         """Grasp and lift (or close the hand), carry, follow the path, and end as the task says."""
@@ -170,7 +169,7 @@ class HeldCourse(Course):
         measured = execution.gripper_to_object()
         found = self._planner.again(
             self.problem,
-            [held, *(path for path in self.task.paths if path is not held)],
+            [held, *(path for path in (*self.task.paths, *self.task.otherwise) if path is not held)],
             measured,
             execution.commanded_rad,
             joints(0.0),
@@ -195,6 +194,11 @@ class HeldCourse(Course):
             joints = self._onward(self._held.part(first, end), execution, (end - 1) / (count - 1))
             execution.follow(self._planner.timed(joints, task.duration_s / parts, Phase.ACT))
             been += [*joints(np.linspace(0, 1, end - first + 1)[1:-1]), execution.commanded_rad]
+        for _ in range(MADE_UP_TIMES if task.steady else 0):
+            if turned_rad(self._held.poses[-1], execution.target_to_world()) <= MADE_UP_RAD:
+                break
+            joints = self._onward(self._held.part(count - 1, count), execution, 1.0)
+            execution.follow(self._planner.timed(joints, MADE_UP_S, Phase.ACT))
         regulated = task.regulated
         if task.guard is not None:
             end = count if regulated is None else regulated.first

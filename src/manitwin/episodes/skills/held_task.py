@@ -79,15 +79,15 @@ class Regulated:
 
 @dataclass(frozen=True)
 class HeldTask:
-    """One skill's work: ``paths`` are alternatives, of which the first that can be planned is taken.
+    """One skill's work: ``paths`` are alternatives, of which the first that can be planned is taken, ``otherwise`` more of them.
 
     ``rank`` orders grasps, the least first; None: its fingers block the function. ``empty``: the closed hand itself moves, and
     nothing is grasped. ``as_hulls``: the target is carried as its hulls, and may go into the objects that it ``enters``. The
     path takes ``duration_s``, is not taken where the joints need more than ``longest_s``, and is measured and planned anew
-    ``measured`` times. After ``hold_s`` there the target is let go, or kept in the hand, which goes back along the path, or
-    put back where it was. One that ``rises`` goes straight up first, and from there to the path's beginning; one that
-    ``comes_out`` ends where it began, and does not go back. ``level_rad``: the target is tilted by no more on its way to the
-    path. ``watch`` makes what latches events, and what a guard asks for the force.
+    ``measured`` times. After ``hold_s`` there the target is let go, or kept in the hand, which goes back along the path, or put
+    back where it was. One that ``rises`` goes straight up first, and from there to the path's beginning; one that ``comes_out``
+    ends where it began, and does not go back. ``level_rad``: the target is tilted by no more on its way to the path. ``steady``:
+    what turns in the hand on the path spoils it. ``watch`` makes what latches events, and what a guard asks for the force.
     """
 
     paths: tuple[HeldPath, ...]
@@ -105,4 +105,6 @@ class HeldTask:
     rises: bool = False
     comes_out: bool = False
     level_rad: float | None = None
+    otherwise: tuple[HeldPath, ...] = ()
+    steady: bool = False
     watch: Callable[[RobotWorld], EventWatch] | None = None

@@ -23,10 +23,15 @@ from manitwin.scenes.layouts.twin_frames import TwinFrame
 
 SHORT_OF_MIDDLE = 0.45  # rim radii of the vessel that is poured into, from the lip to its middle
 CLEAR_M = 0.015  # of the lowest corner above that vessel's rim
+HIGH_M = 0.10  # the same where a hand that holds the rim comes below it: what is too heavy for its handle is held there
 ABOVE_M, LOW_FROM_RAD = 0.05, np.radians(50)  # it begins higher: what has turned in the hand is measured on the way
 TILT_RAD, TILTS = np.radians(115), 13
 LEVEL_RAD = np.radians(40)  # a vessel that is a sixth full begins to spill at about 60 degrees, sooner as it is swung
-DEEP, DEEP_TILT_RAD = 3.0, np.radians(135)  # rim radii: what lies in a belly below a neck runs out later
+DEEP, DEEP_TILT_RAD, DEEP_LASTS_S = (
+    3.0,
+    np.radians(135),
+    2.0,
+)  # rim radii: a belly below a neck runs out later, and longer
 AZIMUTHS = 8
 POURS_S, LASTS_S, LONGEST_S = 2.5, 0.5, 4.0
 MOST_SHARE = 0.8  # of the vessel that is poured into
@@ -76,14 +81,22 @@ class Pour(HeldSkill):
         lip, vessel = lip_of(scene), scene.openings[scene.partner.name]
         center = transform_points(scene.partner.object_to_world, vessel.center_m[None])[0]
         source = scene.openings[scene.target.name]
-        tilt_rad = DEEP_TILT_RAD if source.depth_m > DEEP * source.rim_radius_m else TILT_RAD
+        deep = source.depth_m > DEEP * source.rim_radius_m
+        tilt_rad = DEEP_TILT_RAD if deep else TILT_RAD
+        first_rad = scene.rng.uniform(-np.pi, np.pi)
+        low, high = (
+            pouring_paths(lip, scene.target.body, center, vessel.rim_radius_m, tilt_rad, first_rad, clear_m)
+            for clear_m in (CLEAR_M, HIGH_M)
+        )
         return HeldTask(
-            paths=pouring_paths(lip, scene.target.body, center, vessel.rim_radius_m, tilt_rad, scene.rng),
+            paths=low,
+            otherwise=high,
+            steady=True,
             rank=lambda grasp: grasp_rank(grasp, source, lip, scene.tip_depth_m),
             as_hulls=True,
             duration_s=POURS_S,
             longest_s=LONGEST_S,
-            hold_s=LASTS_S,
+            hold_s=DEEP_LASTS_S if deep else LASTS_S,
             ending="put_back",
             level_rad=LEVEL_RAD,
         )
@@ -110,18 +123,19 @@ def pouring_paths(
     center_m: np.ndarray,
     rim_radius_m: float,
     tilt_rad: float,
-    rng: np.random.Generator,
+    first_rad: float,
+    clear_m: float,
 ) -> tuple[HeldPath, ...]:
-    """Return tilts about the lip's Y from eight sides: the lip short of the middle, the lowest corner above the rim.
+    """Return tilts about the lip's Y from eight sides: the lip short of the middle, the lowest corner ``clear_m`` above the rim.
 
     Each begins a little higher and comes down while it tilts to ``tilt_rad``.
     """
     corners = transform_points(inverse(lip), np.concatenate(body.hulls))
     paths = []
-    for azimuth in rng.uniform(-np.pi, np.pi) + np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS:
+    for azimuth in first_rad + np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS:
         poses = []
         for tilt in np.linspace(0, tilt_rad, TILTS):
-            above_m = CLEAR_M + (ABOVE_M - CLEAR_M) * max(0.0, 1 - tilt / LOW_FROM_RAD) ** 2
+            above_m = clear_m + (ABOVE_M - CLEAR_M) * max(0.0, 1 - tilt / LOW_FROM_RAD) ** 2
             turn = Rotation.from_euler("ZY", [azimuth, tilt]).as_matrix()
             way = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
             at = center_m - SHORT_OF_MIDDLE * rim_radius_m * way

@@ -1,0 +1,41 @@
+"""Which grasps a held path is planned with, and in what order: those that leave its function free, and bear what they hold."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from manitwin.episodes.courses.course import first_and_last
+from manitwin.episodes.planning.problem import Grasp, PlanFailure
+from manitwin.episodes.skills.held_task import HeldTask
+from manitwin.episodes.steady_grasps import steady_on_the_way, touch_narrowly
+from manitwin.geometry.rigid_body import RigidBody
+from manitwin.robots.grippers.gripper import Gripper
+
+
+def grasps_of_task(
+    tiers: Sequence[Sequence[Grasp]], task: HeldTask, body: RigidBody, gripper: Gripper
+) -> tuple[tuple[Grasp, ...], Counter[PlanFailure]]:
+    """Return the grasps of all tiers that serve, each tier's best first, and how many were left out of what.
+
+    Of a task that must be held ``steady`` those are left out in which the weight turns the thing on its way, and what bears it
+    on a line goes before what needs a face to.
+    """
+    ranked = [grasp for tier in tiers for grasp in _ranked(tier, task, body, gripper)]
+    left_out = Counter[PlanFailure]({"blocks_function": sum(map(len, tiers)) - len(ranked)})
+    if task.steady:
+        steady = steady_on_the_way(ranked, body, [path.poses for path in task.paths], gripper)
+        left_out["weight_not_borne"] = len(ranked) - len(steady)
+        ranked = steady
+    return tuple(ranked), +left_out
+
+
+def _ranked(grasps: Sequence[Grasp], task: HeldTask, body: RigidBody, gripper: Gripper) -> list[Grasp]:
+    """Return the grasps that leave the function free, but for the last quarter those first that do so best.
+
+    Of equal ones those go first whose pads touch broadly.
+    """
+    narrow = touch_narrowly(grasps, body, gripper)
+    ranks = [(task.rank(grasp), late, grasp) for grasp, late in zip(grasps, narrow, strict=True)]
+    free = [(rank, late, grasp) for rank, late, grasp in ranks if rank is not None]
+    return [grasp for part in first_and_last(free) for *_, grasp in sorted(part, key=lambda each: each[:2])]
