@@ -1,9 +1,11 @@
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
-from manitwin.scenes.layouts.surroundings import MATERIALS, make_furniture
+from manitwin.scenes.layouts.surroundings import MATERIALS, make_cameras, make_furniture
 
 
 @pytest.mark.parametrize(("kind", "height_m"), [("table", 0.0), ("shelf", 0.02), ("tray", 0.01)])
@@ -52,3 +54,20 @@ def test_same_seed_same_furniture() -> None:
     assert make_furniture("shelf", np.random.default_rng(3)) == make_furniture("shelf", np.random.default_rng(3))
     drawn = {make_furniture("table", np.random.default_rng(seed)).boxes[0].material for seed in range(40)}
     assert drawn == set(MATERIALS)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_no_board_of_a_shelf_hides_what_stands_below_it_from_its_overview(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    shelf = make_furniture("shelf", rng)
+    lower, upper = shelf.supports
+    half_m = np.array(lower.half_extents_m)
+    corners = [np.array([*(lower.center_m + sign * half_m), at_m]) for sign, at_m in ((-1, 0.02), (1, upper.height_m))]
+    cameras = {camera.name: camera for camera in make_cameras("shelf", corners[0], corners[1] + [0, 0, 0.2], rng)}
+    eye = np.array(cameras["overview"].position_m)
+    board = next(box for box in shelf.boxes if box.name == "shelf_1")
+    for x, y in product(np.linspace(-0.9, 0.9, 7), np.linspace(-0.7, 0.7, 7)):
+        place = np.array([*(lower.center_m + half_m * [x, y]), lower.height_m + 0.01])
+        points = place + np.linspace(0, 1, 2000)[:, None] * (eye - place)
+        inside = (np.abs(points - board.center_m) < board.half_extents_m).all(1)
+        assert not inside.any(), (x, y)

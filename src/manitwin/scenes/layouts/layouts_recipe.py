@@ -53,7 +53,7 @@ class LayoutStage:
     """Sample the layout of a number."""
 
     name = "layout"
-    version = "1"
+    version = "2"
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = (SCENE,)
     needs: Resource = "cpu"

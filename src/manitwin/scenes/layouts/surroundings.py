@@ -20,6 +20,7 @@ _TRAY_HALF_M, _TRAY_FLOOR_M, _RIM_M, _RIM_WALL_M = (0.22, 0.32), 0.01, 0.03, 0.0
 _SHELF_HALF_M, _SHELF_RISE_M, _SHELF_BOARDS = (0.17, 0.5), 0.34, 2
 
 FOV_Y_RAD = 0.7
+SHELF_ASIDE_RAD, SHELF_ELEVATION_RAD = 0.25, 0.35  # of its overview: to the back of a shelf it is 0.75 rad at most
 LEAST_REACH_M = 0.2
 """A single dice is not all of a picture."""
 
@@ -113,14 +114,15 @@ def make_lights(rng: np.random.Generator) -> tuple[tuple[float, float, float], t
 def make_cameras(kind: str, low_m: np.ndarray, high_m: np.ndarray, rng: np.random.Generator) -> tuple[SceneCamera, ...]:
     """Return ``front`` (from beyond the table, towards the robot's place), ``oblique`` and ``overview`` (from above).
 
-    Each sees all of the box of the objects, from ``low_m (3,)`` to ``high_m (3,)``; the first two look at a shelf from its
-    open side.
+    Each sees all of the box of the objects, from ``low_m (3,)`` to ``high_m (3,)``. All look at a shelf from its open side, and
+    ``overview`` from so low that no board hides what stands below it.
     """
     target = (low_m + high_m) / 2
     reach = max(float(np.linalg.norm(high_m - low_m)) / 2, LEAST_REACH_M)
     front = np.pi if kind == "shelf" else 0.0
+    over = (front - SHELF_ASIDE_RAD, SHELF_ELEVATION_RAD) if kind == "shelf" else (front, 1.45)
     cameras = []
-    for name, azimuth, elevation in (("front", front, 0.55), ("oblique", front + 0.8, 0.75), ("overview", front, 1.45)):
+    for name, azimuth, elevation in (("front", front, 0.55), ("oblique", front + 0.8, 0.75), ("overview", *over)):
         around, up = azimuth + rng.uniform(-0.1, 0.1), elevation + rng.uniform(-0.08, 0.08)
         away = np.array([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
         distance = reach / np.sin(FOV_Y_RAD / 2) * rng.uniform(1.0, 1.1)
