@@ -87,6 +87,16 @@ def test_what_stands_stays_and_says_what_it_stands_on() -> None:
     assert settled.steps < 120
 
 
+def test_what_is_heavy_settles_on_what_is_light_and_not_in_it() -> None:
+    light, heavy = (trimesh.creation.box([0.08, 0.08, 0.04]), 0.005), (trimesh.creation.box([0.06, 0.06, 0.06]), 2.0)
+    objects = [
+        PlacedObject(name, "t", _body(mesh, kg), transform(translation=np.array([0, 0, z])))
+        for name, (mesh, kg), z in (("light", light, 0.02), ("heavy", heavy, 0.0705))
+    ]
+    settled = settle_scene(objects, [TABLE], seconds=2.0)
+    assert settled.object_to_world[1, 2, 3] - settled.object_to_world[0, 2, 3] == pytest.approx(0.05, abs=3e-4)
+
+
 def test_a_box_on_its_edge_tips_to_the_nearest_side() -> None:
     tilted = transform(Rotation.from_euler("x", 30, degrees=True).as_matrix(), np.array([0, 0, 0.021]))
     settled = settle_scene([PlacedObject("box", "t", BOX, tilted)], [TABLE], seconds=2.0)

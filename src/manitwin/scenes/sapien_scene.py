@@ -9,7 +9,7 @@ import sapien
 from sapien import physx
 
 from manitwin.geometry.poses import quaternion_wxyz
-from manitwin.physics.sapien.body import CONTACT_OFFSET_M, SOLVER_ITERATIONS, add_body, static_box
+from manitwin.physics.sapien.body import CONTACT_OFFSET_M, SOLVER_ITERATIONS, add_body, iterations_beside, static_box
 from manitwin.physics.sapien.visuals import box_visual
 from manitwin.scenes.loaded_scene import Scene
 
@@ -40,8 +40,9 @@ def add_to_sapien(scene: Any, layout: Scene, *, visual: bool = True) -> SapienEn
             entity.add_component(box_visual(box.half_extents_m, PLAIN_COLORS[materials[box.name]]))
         scene.add_entity(entity)
         furniture[box.name] = entity
-    objects = {}
-    for placed in layout.placed_objects():
+    objects, placed_objects = {}, list(layout.placed_objects())
+    counts = iterations_beside([placed.body.mass_kg for placed in placed_objects], SOLVER_ITERATIONS)
+    for placed, count in zip(placed_objects, counts, strict=True):
         twin = layout.twin(placed.twin_id)
         entity = add_body(
             scene,
@@ -53,7 +54,7 @@ def add_to_sapien(scene: Any, layout: Scene, *, visual: bool = True) -> SapienEn
             name=placed.name,
         )
         component = entity.find_component_by_type(physx.PhysxRigidDynamicComponent)
-        component.set_solver_position_iterations(SOLVER_ITERATIONS)
+        component.set_solver_position_iterations(count)
         objects[placed.name] = entity
     if visual:
         scene.set_ambient_light(list(layout.record.ambient))

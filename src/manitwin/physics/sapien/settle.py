@@ -18,6 +18,7 @@ from manitwin.physics.sapien.body import (
     SOLVER_ITERATIONS,
     dynamic_component,
     entity_at,
+    iterations_beside,
     static_box,
     static_plane,
 )
@@ -208,11 +209,12 @@ def settle_scene(
         scene.add_entity(entity)
         names[entity.per_scene_id] = box.name
     with COOKED.lent([placed.body.hulls for placed in objects]) as shapes:
-        bodies = []
-        for placed, own in zip(objects, shapes, strict=True):
+        bodies, counts = [], iterations_beside([each.body.mass_kg for each in objects], SOLVER_ITERATIONS)
+        for placed, own, count in zip(objects, shapes, counts, strict=True):
             pose = placed.object_to_world
             # what sleeps reports no contacts
             component = _release(scene, placed.body, own, pose[:3, 3], pose[:3, :3], may_sleep=False)
+            component.set_solver_position_iterations(count)
             names[component.entity.per_scene_id] = placed.name
             bodies.append(component)
         rest = settle(

@@ -15,7 +15,7 @@ import sapien
 from sapien import physx
 
 from manitwin.geometry.rigid_body import FURNITURE_FRICTION, PlacedObject, RigidBody, StaticBox, stands_for_a_plane
-from manitwin.physics.sapien.body import entity_at, graspable_component, static_box, static_plane
+from manitwin.physics.sapien.body import entity_at, graspable_component, iterations_beside, static_box, static_plane
 from manitwin.physics.sapien.contacts import ContactReader, Role
 from manitwin.physics.sapien.falling import Falling
 from manitwin.physics.sapien.granules import FALL_S, GranuleFill, Granules
@@ -76,8 +76,10 @@ class RobotWorld:
         bearing = [Role.FURNITURE] * len(boxes) + [Role.FIXTURE] * len(fixtures)
         self.granules: Granules | None = None
         self._loan = COOKED.lent([placed.body.hulls for placed in self.placed])
+        counts = iterations_beside([placed.body.mass_kg for placed in self.placed], solver_iterations)
         self.bodies = [
-            self._add_object(placed, shapes) for placed, shapes in zip(self.placed, self._loan.__enter__(), strict=True)
+            self._add_object(placed, shapes, count)
+            for placed, shapes, count in zip(self.placed, self._loan.__enter__(), counts, strict=True)
         ]
         self.robots = tuple(
             SapienRobot(
@@ -193,12 +195,14 @@ class RobotWorld:
         self._scene.add_entity(entity)
         return entity.find_component_by_type(physx.PhysxRigidStaticComponent)
 
-    def _add_object(self, placed: PlacedObject, shapes: HullShapes) -> physx.PhysxRigidDynamicComponent:
+    def _add_object(
+        self, placed: PlacedObject, shapes: HullShapes, iterations: int
+    ) -> physx.PhysxRigidDynamicComponent:
         component = graspable_component(
             placed.body,
             shapes,
             contact_offset_m=self._contact_offset_m,
-            solver_iterations=self._iterations,
+            solver_iterations=iterations,
         )
         self._scene.add_entity(entity_at(component, sapien.Pose(placed.object_to_world)))
         return component
