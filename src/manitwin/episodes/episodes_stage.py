@@ -15,6 +15,7 @@ from manitwin.config import Resource
 from manitwin.engine.stage import Draft, tell_part
 from manitwin.episodes.attempts import ATTEMPTS, Attempt, write_attempts
 from manitwin.episodes.batch import Batch
+from manitwin.episodes.carry_tilt import carry_tilts_rad
 from manitwin.episodes.episode import run_episode
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.fixtures import to_json
@@ -22,6 +23,7 @@ from manitwin.episodes.goals.goal_instructions import goal_instructions
 from manitwin.episodes.hdf5_file import write_episodes
 from manitwin.episodes.instructions import episode_instructions
 from manitwin.episodes.pick_place_tasks import Placeable
+from manitwin.episodes.planning.level_space import kept_level
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import PickPlaceProblem
 from manitwin.episodes.planning.two_arms import planner_of
@@ -215,6 +217,9 @@ class EpisodesStage:
             static_boxes=tuple(furniture_boxes(setting.furniture)),
             seed=seed,
             fixtures=tuple(box for fixture in setting.fixtures for box in fixture.boxes),
+            level=frozenset(
+                each.name for each in task.objects if kept_level(each, self._pool.body(each.twin_id).opening)
+            ),
         )
         facts, recording = run_episode(
             problem, self._planner, self._robot, self.settings.episode, setting.skill_goal,
@@ -242,6 +247,8 @@ class EpisodesStage:
             said["fixtures"] = [to_json(fixture) for fixture in setting.fixtures]
         if setting.skill_goal is not None and setting.skill_goal.granules is not None:
             said["granule_radius_m"] = setting.skill_goal.granules.radius_m
+        if tilts := carry_tilts_rad(recording, task.objects, problem.level):
+            said["carry_tilt_rad"] = tilts
         if facts.taker_grasp is not None:
             said["taker_grasp_id"] = facts.taker_grasp.grasp_id
         if facts.events:

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from planning_problems import TABLE, above, problem, standing, wall
+from planning_problems import TABLE, above, body, box_hull, brick, problem, standing, wall
 
 from manitwin.episodes.planning.arm_kinematics import ArmKinematics
 from manitwin.episodes.planning.collision_world import ProblemWorld
 from manitwin.episodes.planning.convex_shapes import ShapeStore
 from manitwin.episodes.planning.kinematic_body import floating_hand_of
-from manitwin.episodes.planning.level_space import LevelSpace
+from manitwin.episodes.planning.level_space import LEVEL_RAD, LevelSpace, kept_level
 from manitwin.episodes.planning.motions import Motions
+from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Motion, Phase, PlannerSettings
-from manitwin.geometry.poses import inverse
+from manitwin.geometry.cavity import Opening
+from manitwin.geometry.poses import inverse, transform
+from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.robots.load import load_robot
 
 SETTINGS = PlannerSettings()
@@ -63,3 +68,31 @@ def test_a_motion_through_it_stays_level_where_another_one_does_not(carried) -> 
         tilted += tilts_rad(arm, free.positions_rad, grasp).max() > MOST_RAD
         assert tilts_rad(arm, level.positions_rad, grasp).max() <= MOST_RAD + np.radians(1)
     assert tilted
+
+
+def test_what_is_to_be_carried_level_is_where_another_way_would_tilt_it() -> None:
+    planner = PickPlacePlanner(load_robot("panda"))
+    boxes = (TABLE, wall(0.5, 0, (0.15, 0.01, 0.16)))
+    asked = problem(standing(0.45, 0.35), standing(0.45, -0.35), boxes=boxes, seed=7)
+
+    def most_rad(level: frozenset[str], goal: np.ndarray = asked.goal_object_to_world) -> float:
+        plan = planner.plan(replace(asked, level=level, goal_object_to_world=goal)).plan
+        assert plan is not None
+        return float(tilts_rad(planner.arm, plan.carry.positions_rad, plan.gripper_to_object).max())
+
+    assert most_rad(frozenset()) > np.radians(30)
+    assert most_rad(frozenset({asked.target.name})) <= LEVEL_RAD
+    assert most_rad(frozenset({"another"})) > np.radians(30)
+
+
+def test_what_is_carried_level_stands_tall_or_opens_upward() -> None:
+    bowl = Opening(np.array([0.0, 0, 1]), np.array([0.0, 0, 0.05]), 0.06, 4e-4, 0.04)
+    flat = body(box_hull((0.08, 0.08, 0.025), (0, 0, 0.025)))
+    over = transform(np.diag([1.0, -1, -1]), np.array([0, 0, 0.05]))
+    stands, turned = PlacedObject("bowl", "t", flat, standing(0.4, 0.1, 0.7)), PlacedObject("bowl", "t", flat, over)
+    assert kept_level(stands, bowl)
+    assert not kept_level(turned, bowl)
+    assert not kept_level(stands, None)
+    lying = transform(np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]]), np.array([0.4, 0, 0.02]))
+    assert kept_level(PlacedObject("brick", "t", brick(), standing(0.4, 0.1)), None)
+    assert not kept_level(PlacedObject("brick", "t", brick(), lying), None)

@@ -11,7 +11,7 @@ from manitwin.episodes.planning.arm_planning import ArmPlanning
 from manitwin.episodes.planning.collision_world import ProblemWorld
 from manitwin.episodes.planning.grasp_tally import GraspTally
 from manitwin.episodes.planning.narrowed_jaws import narrowed
-from manitwin.episodes.planning.placement import Placement, PlacementPlanner, goals_after_slip
+from manitwin.episodes.planning.placement import Placement, PlacementPlanner, goals_after_slip, goes_level
 from manitwin.episodes.planning.problem import (
     Grasp,
     Grasped,
@@ -78,7 +78,7 @@ class PickPlacePlanner:
 
         At most ``settings.max_grasps`` are tried beyond a look at the hand alone. What a grasp fails of is the latest stage
         that it came to. Where none can be planned that way and the hand was in the way of some, jaws are opened no wider than
-        each grasp needs (``narrowed_jaws``).
+        each grasp needs (``narrowed_jaws``). What is to be carried level is planned so with any grasp first.
         """
         report = self._plan_as_open(problem)
         if report.plan is None and report.failures.keys() & HAND_IN_THE_WAY:
@@ -89,6 +89,13 @@ class PickPlacePlanner:
         return report
 
     def _plan_as_open(self, problem: PickPlaceProblem) -> PlanReport:
+        if goes_level(problem, problem.goal_object_to_world):
+            report = self._plan_grasps(problem, level_only=True)
+            if report.plan is not None:
+                return report
+        return self._plan_grasps(problem, level_only=False)
+
+    def _plan_grasps(self, problem: PickPlaceProblem, *, level_only: bool) -> PlanReport:
         world, rng = self._world_of(problem, problem.goal_object_to_world), np.random.default_rng(problem.seed)
         tally = GraspTally()
         for candidate in self._candidates.of(world):
@@ -97,7 +104,7 @@ class PickPlacePlanner:
                 if tally.is_new(candidate.index) and len(tally.beyond_a_look) == self.settings.max_grasps:
                     return PlanReport(None, tally.count_tried, tally.reasons)
                 tally.beyond_a_look.add(candidate.index)
-                outcome = self._plan_grasp(world, grasp, candidate.gripper_to_object, rng)
+                outcome = self._plan_grasp(world, grasp, candidate.gripper_to_object, rng, level_only)
                 if isinstance(outcome, PickPlacePlan):
                     tally.succeed(candidate.index)
                     return PlanReport(outcome, tally.count_tried, tally.reasons)
@@ -170,14 +177,19 @@ class PickPlacePlanner:
         return any(self._motions.line(world.arm, Phase.APPROACH, found, before) is not None for found in solutions)
 
     def _plan_grasp(
-        self, world: ProblemWorld, grasp: Grasp, gripper_to_object: np.ndarray, rng: np.random.Generator
+        self,
+        world: ProblemWorld,
+        grasp: Grasp,
+        gripper_to_object: np.ndarray,
+        rng: np.random.Generator,
+        level_only: bool,
     ) -> PickPlacePlan | PlanFailure:
         """Return the plan of one pose of a grasp, or the latest stage that failed."""
         gripper_to_world = world.problem.target.object_to_world @ gripper_to_object
         solutions, converged = self._solutions.of(world.arm, Phase.APPROACH, gripper_to_world, self.arm.home)
         failure: PlanFailure = "approach_blocked" if converged else "no_inverse_kinematics"
         for at_grasp in solutions:
-            outcome = self._plan_from(world, grasp, gripper_to_object, at_grasp, rng)
+            outcome = self._plan_from(world, grasp, gripper_to_object, at_grasp, rng, level_only)
             if isinstance(outcome, PickPlacePlan):
                 return outcome
             failure = later(failure, outcome)
@@ -190,6 +202,7 @@ class PickPlacePlanner:
         gripper_to_object: np.ndarray,
         at_grasp: np.ndarray,
         rng: np.random.Generator,
+        level_only: bool,
     ) -> PickPlacePlan | PlanFailure:
         """Plan with the arm at one solution of the grasp."""
         gripper_to_world = self.arm.gripper_pose(at_grasp)
@@ -201,7 +214,7 @@ class PickPlacePlanner:
             return "lift_blocked"
         lifted = self._motions.timed(Phase.LIFT, lift)
         placed = world.goal_object_to_world @ gripper_to_object
-        placement = self._placements.plan(world, lifted.positions_rad[-1], placed, rng)
+        placement = self._placements.plan(world, lifted.positions_rad[-1], placed, rng, level_only=level_only)
         if not isinstance(placement, tuple):
             return placement
         carry, lower, retreat = placement

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from manitwin.episodes.planning.arm_kinematics import ArmKinematics
 from manitwin.episodes.planning.arm_solutions import ArmSolutions
-from manitwin.episodes.planning.collision_world import ProblemWorld
+from manitwin.episodes.planning.collision_world import FreeSpace, ProblemWorld
+from manitwin.episodes.planning.level_space import LEVEL_RAD, UPRIGHT_RAD, LevelSpace, tilts_rad
 from manitwin.episodes.planning.motions import Motions
-from manitwin.episodes.planning.problem import Motion, Phase, PlanFailure, later
+from manitwin.episodes.planning.problem import Motion, Phase, PickPlaceProblem, PlanFailure, later
 from manitwin.episodes.planning.straight_lines import LineEnds
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.geometry.rigid_body import RigidBody
@@ -29,17 +32,34 @@ class PlacementPlanner:
         self._arm, self._solutions, self._motions, self._ends = arm, solutions, motions, ends
 
     def plan(
-        self, world: ProblemWorld, start: np.ndarray, gripper_to_world: np.ndarray, rng: np.random.Generator
+        self,
+        world: ProblemWorld,
+        start: np.ndarray,
+        gripper_to_world: np.ndarray,
+        rng: np.random.Generator,
+        *,
+        level_only: bool = False,
     ) -> Placement | PlanFailure:
-        """Plan from a configuration to where the gripper lets go of what it holds; or tell the latest stage that failed."""
+        """Plan from a configuration to where the gripper lets go of what it holds; or tell the latest stage that failed.
+
+        What is to be carried level is so where there is a way, and with ``level_only`` in any case.
+        """
         solutions, converged = self._solutions.of(world.arm, Phase.LOWER, gripper_to_world, start)
         failure: PlanFailure = "lower_blocked" if converged else "place_unreachable"
-        for at_goal in solutions:
-            outcome = self._plan_to(world, start, at_goal, rng)
-            if isinstance(outcome, tuple):
-                return outcome
-            failure = later(failure, outcome)
+        for space in self._spaces(world, gripper_to_world, level_only=level_only):
+            for at_goal in solutions:
+                outcome = self._plan_to(world, space, start, at_goal, rng)
+                if isinstance(outcome, tuple):
+                    return outcome
+                failure = later(failure, outcome)
         return failure
+
+    def _spaces(self, world: ProblemWorld, gripper_to_world: np.ndarray, *, level_only: bool) -> Sequence[FreeSpace]:
+        """Return where to look for the way: first where what is to be carried level is level, in two searches."""
+        if not goes_level(world.problem, world.goal_object_to_world):
+            return (world.arm,)
+        level = LevelSpace(world.arm, self._arm.gripper_pose, gripper_to_world[:3, :3], LEVEL_RAD)
+        return (level, level) if level_only else (level, level, world.arm)
 
     def plan_from_above(
         self, world: ProblemWorld, start: np.ndarray, gripper_to_world: np.ndarray
@@ -53,7 +73,12 @@ class PlacementPlanner:
         return (None, lowered, retreat) if isinstance(retreat, Motion) else retreat
 
     def _plan_to(
-        self, world: ProblemWorld, start: np.ndarray, at_goal: np.ndarray, rng: np.random.Generator
+        self,
+        world: ProblemWorld,
+        space: FreeSpace,
+        start: np.ndarray,
+        at_goal: np.ndarray,
+        rng: np.random.Generator,
     ) -> Placement | PlanFailure:
         above = self._ends.above(self._arm.gripper_pose(at_goal))
         lower = self._motions.line(world.arm, Phase.LOWER, at_goal, above)
@@ -63,13 +88,19 @@ class PlacementPlanner:
         if not isinstance(retreat, Motion):
             return retreat
         lowered = self._motions.timed(Phase.LOWER, lower, backwards=True)
-        carry = self._motions.free(world.arm, Phase.CARRY, start, lowered.positions_rad[0], rng)
+        carry = self._motions.free(space, Phase.CARRY, start, lowered.positions_rad[0], rng)
         return (carry, lowered, retreat) if isinstance(carry, Motion) else carry
 
     def _retreat(self, world: ProblemWorld, at_goal: np.ndarray) -> Motion | PlanFailure:
         before = self._ends.before(self._arm.gripper_pose(at_goal))
         retreat = self._motions.line(world.arm, Phase.RETREAT, at_goal, before)
         return "retreat_blocked" if retreat is None else self._motions.timed(Phase.RETREAT, retreat)
+
+
+def goes_level(problem: PickPlaceProblem, goal_object_to_world: np.ndarray) -> bool:
+    """Tell whether a problem's target is to be carried level to a goal ``(4, 4)``: it is at it as upright as it stands."""
+    level, goal = problem.target.object_to_world[:3, :3], goal_object_to_world[None, :3, :3]
+    return problem.target.name in problem.level and bool(tilts_rad(goal, level)[0] <= UPRIGHT_RAD)
 
 
 def goals_after_slip(

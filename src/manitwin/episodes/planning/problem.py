@@ -58,7 +58,8 @@ class PickPlaceProblem:
     """Move ``target`` to ``goal_object_to_world``, upright as it stands, with the first of ``grasps`` that can be planned.
 
     ``static_boxes`` are the furniture, ``fixtures`` the boxes that a skill works with; nothing of either moves.
-    ``entered`` are the names of obstacles that what is held goes into.
+    ``entered`` are the names of obstacles that what is held goes into, ``level`` those of objects that are carried
+    level where that can be planned (``kept_level``).
     """
 
     target: PlacedObject
@@ -69,6 +70,7 @@ class PickPlaceProblem:
     seed: int = 0
     fixtures: tuple[StaticBox, ...] = ()
     entered: frozenset[str] = frozenset()
+    level: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
