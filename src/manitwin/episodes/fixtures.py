@@ -66,7 +66,8 @@ class Fixture:
         if self.kind != "holder":
             return None
         depth_m = 2 * float(self.boxes[1].half_extents_m[2]) - HOLDER_FLOOR_M
-        return Holder(self.frame_to_world, self.size_m, depth_m, frozenset(box.name for box in self.boxes))
+        half_m = np.asarray(self.boxes[0].half_extents_m[:2]) - HOLDER_WALL_M
+        return Holder(self.frame_to_world, half_m, depth_m, frozenset(box.name for box in self.boxes))
 
 
 def peg_stand(position_m: np.ndarray, yaw_rad: float, *, height_m: float = PEG_HEIGHT_M, name: str = "peg") -> Fixture:
@@ -124,19 +125,19 @@ def panel(position_m: np.ndarray, yaw_rad: float, *, name: str = "button") -> Fi
 
 
 def holder(
-    position_m: np.ndarray, yaw_rad: float, bore_half_m: float, depth_m: float, *, name: str = "holder"
+    position_m: np.ndarray, yaw_rad: float, bore_half_m: np.ndarray, depth_m: float, *, name: str = "holder"
 ) -> Fixture:
-    """Return a holder on the table at ``position_m (3,)``: a square bore that opens upward; it works at its rim."""
+    """Return a holder on the table at ``position_m (3,)``: a bore of half widths ``(2,)`` that opens upward, its rim."""
     upright = transform(Rotation.from_euler("z", yaw_rad).as_matrix(), np.asarray(position_m, float))
     outer_m, half_height_m = bore_half_m + HOLDER_WALL_M, (HOLDER_FLOOR_M + depth_m) / 2
-    floor_m = np.array([outer_m, outer_m, HOLDER_FLOOR_M / 2])
+    floor_m = np.array([*outer_m, HOLDER_FLOOR_M / 2])
     boxes = [StaticBox(name, floor_m, upright @ transform(translation=np.array([0.0, 0, HOLDER_FLOOR_M / 2])))]
     for number, (x, y) in enumerate(((1, 0), (-1, 0), (0, 1), (0, -1))):
-        half_m = np.array([*(HOLDER_WALL_M / 2 if each else outer_m for each in (x, y)), half_height_m])
+        half_m = np.array([*np.where([x, y], HOLDER_WALL_M / 2, outer_m), half_height_m])
         middle = np.array([*((bore_half_m + HOLDER_WALL_M / 2) * np.array([x, y])), half_height_m])
         boxes.append(StaticBox(f"{name}_wall_{number}", half_m, upright @ transform(translation=middle)))
     rim = upright @ transform(translation=np.array([0.0, 0, 2 * half_height_m]))
-    return Fixture("holder", name, tuple(boxes), rim, bore_half_m)
+    return Fixture("holder", name, tuple(boxes), rim, float(np.max(bore_half_m)))
 
 
 def to_json(fixture: Fixture) -> dict[str, Any]:

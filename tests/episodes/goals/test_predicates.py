@@ -246,7 +246,7 @@ def test_hung() -> None:
 
 
 def test_inserted() -> None:
-    bore = Holder(at(0.5, 0, 0.07), 0.02, 0.06, frozenset({"holder", "wall"}))
+    bore = Holder(at(0.5, 0, 0.07), np.array([0.02, 0.02]), 0.06, frozenset({"holder", "wall"}))
     up = np.diag([1.0, -1, -1, 1])  # the item's tip is at its +Z end: down where it is turned over
 
     def stands(x: float, turn: np.ndarray, *touching: tuple[str, str], z: float = 0.04) -> str | None:

@@ -154,11 +154,12 @@ def inserted(state: WorldState, literal: Literal) -> Judgement:
     to_rim = inverse(into.rim_to_world) @ thing.object_to_world
     tip_m = transform_points(to_rim, thing.tip.position_m[None])[0]
     off_m, below_m = float(np.abs(tip_m[:2]).max()), float(-tip_m[2])
+    within = bool((np.abs(tip_m[:2]) <= into.half_m + INSERTED_SLACK_M).all())
     angle_rad = float(np.arccos(np.clip(-(to_rim[:3, :3] @ thing.tip.direction)[2], -1, 1)))
     touched = state.neighbours(literal.subject)
     return judged(
         {
-            "beside_it": off_m <= into.half_m + INSERTED_SLACK_M,
+            "beside_it": within,
             "wrong_end": angle_rad <= np.pi / 2,
             "lying": angle_rad <= INSERTED_RAD,
             "not_deep": literal.value <= below_m <= into.depth_m + INSERTED_SLACK_M,

@@ -89,10 +89,10 @@ class Peg:
 
 @dataclass(frozen=True)
 class Holder:
-    """A square bore: its rim's middle with Z out of it ``(4, 4)``, its half width and depth (m), the names of its boxes."""
+    """A bore: its rim's middle with Z out of it ``(4, 4)``, its half widths ``(2,)`` and depth (m), the names of its boxes."""
 
     rim_to_world: np.ndarray
-    half_m: float
+    half_m: np.ndarray
     depth_m: float
     bodies: frozenset[str]
 
