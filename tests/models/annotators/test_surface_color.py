@@ -181,3 +181,26 @@ def test_the_inside_of_a_deep_vessel_does_not_count() -> None:
         visual(bottom, name="bottom", baseColorFactor=[200, 10, 10, 255]),
     )
     assert [color.name for color in measure_colors(parts, np.random.default_rng(0))] == ["red"]
+
+
+def test_what_is_hidden_between_leaves_does_not_count_however_much_it_is() -> None:
+    """A black book whose leaves are each modelled is black: its leaves have ten times the area of its covers."""
+    leaves = [
+        trimesh.creation.box((0.19, 0.29, 0.0003), trimesh.transformations.translation_matrix((0, 0, 0.001 * i)))
+        for i in range(1, 20)
+    ]
+    covers = [
+        trimesh.creation.box((0.2, 0.3, 0.001), trimesh.transformations.translation_matrix((0, 0, z)))
+        for z in (0, 0.02)
+    ]
+    book = (
+        visual(trimesh.util.concatenate(covers), name="cover", baseColorFactor=[2, 2, 2, 255]),
+        visual(trimesh.util.concatenate(leaves), name="paper", baseColorFactor=[240, 240, 240, 255]),
+    )
+    assert measure_colors(book, np.random.default_rng(0))[0].name == "black"
+
+
+def test_a_mesh_that_is_inside_out_has_the_colour_of_all_its_surface() -> None:
+    cup = trimesh.creation.annulus(0.035, 0.04, 0.1)
+    cup.invert()
+    assert names(visual(cup, name="paint", baseColorFactor=[200, 5, 5, 255])) == ["red"]

@@ -74,7 +74,9 @@ _SAME_COLOR = 16.0  # CIELAB distance under which clusters are shades of one col
 _NEAR = 25.0  # CIELAB distance of shades that one may be taken for the other: dark grey and black, white and light grey
 _LIGHTNESS = 0.5  # how much a difference in lightness counts of one in tint
 _LEAST_OPEN = 1 / 3  # of the surroundings: the bottom of a mug sees less, and hardly anybody sees it
-_LEAST_SEEN = 1 / 4
+_LEAST_SEEN = (
+    1 / 50
+)  # of the samples: a book whose leaves are each modelled shows a twentieth; inside out, hardly any is seen
 _LEAST_SHARE = 0.12  # of the surface, to be named beside the main colour
 _MOST_NAMES = 3
 _MOST_OF = 2 / 3  # of a family's share: it is called as its member of that much
