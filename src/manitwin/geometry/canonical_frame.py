@@ -31,10 +31,14 @@ _NEARLY_AS_LIKELY = 0.6
 _ELONGATED = 1.5
 _LONGER = 1.2
 _LEANING_DEG = 45.0
-_LAY = "it lies with {} up, but such a thing stands, and it is round and long"
+_LAY = "it lies with {} up, but such a thing stands, and it is round"
 _OVER = "it stands upside down in its file: it rests with {0} down, and not up"
 _EXACTLY_DEG = 1.0  # a thing that a generator has tilted rests on no axis of its file so exactly, but by chance
 _ROUND = 0.1  # relative difference of the two moments across the axis
+_TALL = 0.9  # of its width: a lower vessel that is round about its file's horizontal axis may be a flask that stands on edge
+_AS_WIDE = 0.05  # relative difference of a round thing's widths across its axis
+_ROUND_SHARE = 0.6  # of the directions across the axis: the tab of a can makes it wider in the others
+_WIDTHS = 36
 
 
 @dataclass(frozen=True)
@@ -72,13 +76,13 @@ def choose_up(
     stood on no end. ``said_by`` names who said the axis ``user``, for the reason;
     ``by_convention``: nobody meant this thing by it, it is the up axis of its world. In order: that axis, but by convention
     after the long axis of a round, long vessel; for things that lie, their likeliest side, the file's if nearly
-    as likely; an opening upward, but of one that the file has underneath; for round, long things that stand, their long
-    axis; the file's axis; for things that stand, another axis of a file that declares none, then the file's axis downward;
-    the likeliest side. All but an unstable axis that was said are snapped onto the support facet.
+    as likely; an opening upward, but of one that the file has underneath; for round, long things that stand and round vessels,
+    their axis; the file's axis; for things that stand, another axis of the file that is as likely as what is near the file's own,
+    then the file's axis downward; the likeliest side. All but an unstable axis that was said are snapped onto the support facet.
     """
     poses = stable_poses(solid.vertices, _center_of_mass(solid))
     if user != "auto":
-        stood = _stood_up(solid, poses, _axis(user)) if by_convention and opens_up else None
+        stood = _stood_up(solid, poses, _axis(user), vessel=True) if by_convention and opens_up else None
         if stood is not None:
             return _turned(stood, user, _LAY.format(user))
         return _as_told(poses, user, said_by)
@@ -99,7 +103,7 @@ def choose_up(
         if pose_up is not None:
             return _turned(pose_up, axis, "its opening points up")
     if on_end:
-        pose_up = _stood_up(solid, poses, _axis(axes[0]))
+        pose_up = _stood_up(solid, poses, _axis(axes[0]), vessel=bool(opens_up))
         if pose_up is not None:
             return _turned(pose_up, axes[0], _LAY.format(axes[0]))
     if on_end and file_up is None:
@@ -113,7 +117,7 @@ def choose_up(
                 near, candidate, f"it rests with the {'format' if file_up else 'file'}'s {candidate} axis up"
             )
     tilted = _likeliest_within(poses, _axis(axis), _TILTED_DEG)
-    if on_end and file_up is None:
+    if on_end:
         turned = _on_another_axis(poses, axes)
         if turned is not None and (tilted is None or turned.probability >= tilted.probability):
             return _turned(
@@ -154,13 +158,22 @@ def _open_below(poses: list[StablePose], axes: list[str], opening: np.ndarray) -
     return None
 
 
-def _stood_up(solid: trimesh.Trimesh, poses: list[StablePose], up: np.ndarray) -> StablePose | None:
-    """Return the likelier end on which a lying round, long thing stands; None where it stands with ``up`` upward already."""
+def _stood_up(solid: trimesh.Trimesh, poses: list[StablePose], up: np.ndarray, *, vessel: bool) -> StablePose | None:
+    """Return the end on which a lying round, long thing or a short round vessel stands; None where it stands with ``up`` upward.
+
+    That is the likelier end; of two ends of a short vessel that are nearly as likely, the one with the file's axis upward.
+    """
     along = _round_long_axis(solid)
+    short = along is None and vessel
+    if short:
+        along = _round_axis(solid)
     if along is None or _along(along, up):
         return None
-    ends = [_nearest(poses, end, _NEAR_DEG) for end in (along, -along)]
-    return max((pose for pose in ends if pose is not None), key=lambda pose: pose.probability, default=None)
+    found = [_nearest(poses, end, _NEAR_DEG) for end in (along, -along)]
+    ends = [pose for pose in found if pose is not None]
+    if short and ends and ends[0].probability >= _NEARLY_AS_LIKELY * ends[-1].probability:
+        return ends[0]
+    return max(ends, key=lambda pose: pose.probability, default=None)
 
 
 def _stood_over(solid: trimesh.Trimesh, poses: list[StablePose], up: np.ndarray) -> StablePose | None:
@@ -187,6 +200,25 @@ def _round_long_axis(solid: trimesh.Trimesh) -> np.ndarray | None:
     if moments[2] - moments[1] > _ROUND * moments[2] or reach[0] < _LONGER * reach[1:].max():
         return None
     return np.asarray(directions[:, 0])
+
+
+def _round_axis(solid: trimesh.Trimesh) -> np.ndarray | None:
+    """Return the axis ``(3,)`` of the file about which a thing is round, no lower than wide; None of any other.
+
+    It is as wide in most directions across it. A ball is round about all: its axis is none of them.
+    """
+    corners = solid.convex_hull.vertices
+    found = [axis for axis in map(_axis, _FORMAT_TO_Z_UP) if _is_round_about(corners, axis)]
+    return found[0] if len(found) == 1 else None
+
+
+def _is_round_about(corners: np.ndarray, axis: np.ndarray) -> bool:
+    angles = np.pi * np.arange(_WIDTHS) / _WIDTHS
+    across = [each for each in np.eye(3) if abs(float(each @ axis)) < 0.5]
+    widths = np.ptp(corners @ (np.cos(angles) * across[0][:, None] + np.sin(angles) * across[1][:, None]), axis=0)
+    usual = float(np.median(widths))
+    alike = np.abs(widths - usual) < _AS_WIDE * usual
+    return bool(alike.mean() >= _ROUND_SHARE and np.ptp(corners @ axis) >= _TALL * usual)
 
 
 def _undeclared_axes(solid: trimesh.Trimesh, on_end: bool) -> list[str]:
