@@ -114,8 +114,8 @@ def _mass(prior: Prior, bulk: Interval | None, longest_m: float, volume_m3: floa
     """Combine what such a thing of this size weighs with ``bulk`` density times volume, the narrower one counting more.
 
     Both are taken as log-normal. A volume is as unsure as the size that it was scaled by, ``size_spread`` in natural logs, three
-    times over (0: the size is known). The answer stays in the category's interval; its own interval is what both leave open, and
-    where they contradict each other, or the size is a guess, it reaches as far beyond the answer as both together are unsure.
+    times over (0: the size is known). The answer stays in the category's interval; its own interval is what the volume leaves
+    open, and reaches at least as far beyond the answer as both together are unsure: an answer at its end is not sure of itself.
     """
     by_size = _scaled(prior.mass_kg, (longest_m / prior.longest_axis_m.typical) ** _SIZE_EXPONENT)
     if bulk is None:
@@ -129,9 +129,8 @@ def _mass(prior: Prior, bulk: Interval | None, longest_m: float, volume_m3: floa
     beyond = float(
         np.exp(DEVIATIONS_ACROSS / 2 * _mass_spread(_SAME_SIZE_SPREAD * by_size.log_spread, by_volume, size_spread))
     )
-    low = by_volume.low if value >= by_volume.low and not size_spread else min(by_volume.low, value / beyond)
-    high = by_volume.high if value <= by_volume.high and not size_spread else max(by_volume.high, value * beyond)
-    return _clamped(value, Interval(low=low, typical=value, high=high), prior.mass_kg, source)
+    open_to = Interval(low=min(by_volume.low, value / beyond), typical=value, high=max(by_volume.high, value * beyond))
+    return _clamped(value, open_to, prior.mass_kg, source)
 
 
 def _mass_spread(spread_at_size: float, by_volume: Interval, size_spread: float) -> float:
