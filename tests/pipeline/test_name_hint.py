@@ -136,6 +136,8 @@ def test_a_size_that_a_mesh_or_a_model_says_is_no_guess(said: dict[str, Any] | N
         (None, 0.013, "it is 13 mm long, but things of a hand's size have 20 mm to 600 mm (centimetres taken for"),
         ("mug", 100.0, "it is 100 m long, but nearly every mug has 80 mm to 160 mm (millimetres taken for metres?)"),
         ("mug", 0.1, None),
+        ("laptop", 0.40001, None),  # "400 mm long, but nearly every laptop has 260 mm to 400 mm"
+        ("tray", 0.595, None),
         (None, 0.1, None),
     ],
 )

@@ -18,6 +18,9 @@ FACTORS = {
 }  # fmt: skip
 """By how much the true size is larger than the declared one, and what happened."""
 
+_BEYOND = 1.25
+"""Times the largest such things: what is that little larger (or smaller) is a large one, and no unit explains it."""
+
 
 def suspicious_size_words(draft: Draft[Any]) -> str | None:
     """Say that a declared size is not that of such things, and which unit would make it so; None where it is theirs.
@@ -31,7 +34,7 @@ def suspicious_size_words(draft: Draft[Any]) -> str | None:
         return None
     longest_m, prior = float(max(physical["extents_m"])), lookup(object_name(draft))
     usual = (prior or unknown_prior()).longest_axis_m
-    if usual.low <= longest_m <= usual.high:
+    if usual.low / _BEYOND <= longest_m <= _BEYOND * usual.high:
         return None
     such = "things of a hand's size have" if prior is None else f"nearly every {prior.category} has"
     mixed = next(
