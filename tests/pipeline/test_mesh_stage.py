@@ -106,6 +106,27 @@ def test_a_hat_of_a_file_lies_on_its_rim(tmp_path: Path) -> None:
         assert opening is not None and opening.axis[2] == pytest.approx(opens, abs=1e-3)
 
 
+@pytest.mark.parametrize(("name", "height_m"), [("alarm clock", 0.11), ("camera", 0.11), ("mobile phone", 0.05)])
+def test_what_often_stands_does_so_where_its_file_has_it_so(tmp_path: Path, name: str, height_m: float) -> None:
+    """A flat, round body on a broad foot: it lies more likely than it stands."""
+    body = trimesh.creation.cylinder(0.05, 0.04, sections=48).apply_transform(
+        trimesh.transformations.rotation_matrix(np.pi / 2, (1, 0, 0))
+    )
+    foot = trimesh.creation.box((0.07, 0.05, 0.02), trimesh.transformations.translation_matrix((0, 0, -0.05)))
+    trimesh.boolean.union([body, foot], engine="manifold").export(tmp_path / "clock.stl")
+    _, solid, _ = _run(tmp_path / "clock.stl", tmp_path / "out", name=name, units="m")
+    assert solid.extents[2] == pytest.approx(height_m, abs=2e-3)
+
+
+@pytest.mark.parametrize(("name", "height_m"), [("shelf", 0.2), ("open container", 0.15)])
+def test_a_shelf_is_open_in_front_and_a_container_above(tmp_path: Path, name: str, height_m: float) -> None:
+    outside = trimesh.creation.box((0.3, 0.15, 0.2))
+    inside = trimesh.creation.box((0.28, 0.15, 0.18), trimesh.transformations.translation_matrix((0, 0.01, 0)))
+    trimesh.boolean.difference([outside, inside], engine="manifold").export(tmp_path / "shelf.stl")
+    _, solid, _ = _run(tmp_path / "shelf.stl", tmp_path / "out", name=name, units="m")
+    assert solid.extents[2] == pytest.approx(height_m, abs=1e-3)
+
+
 def _half_space() -> trimesh.Trimesh:
     return trimesh.creation.box((1, 1, 1)).apply_translation((0, 0, -0.5))
 

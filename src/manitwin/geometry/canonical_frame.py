@@ -64,6 +64,7 @@ def choose_up(
     file_up: str | None = None,
     stands: bool | None = None,
     opens_up: bool | None = None,
+    opens_aside: bool = False,
     level: bool = False,
     said_by: str = "the user",
     by_convention: bool = False,
@@ -72,13 +73,15 @@ def choose_up(
 
     ``file_up`` is the up axis that the format declares (None: no rule; Z is tried before Y). ``stands``: whether such a
     thing is put down upright (None: unknown), ``opens_up`` whether an opening is the top of such a thing (False: it may be
-    hollow from below, as hats and toy bricks are), ``level`` that what stands has its long axis level, as vehicles do, and is
-    stood on no end. ``said_by`` names who said the axis ``user``, for the reason;
-    ``by_convention``: nobody meant this thing by it, it is the up axis of its world. In order: that axis, but by convention
-    after the long axis of a round, long vessel; for things that lie, their likeliest side, the file's if nearly
-    as likely; an opening upward, but of one that the file has underneath; for round, long things that stand and round vessels,
-    their axis; the file's axis; for things that stand, another axis of the file that is as likely as what is near the file's own,
-    then the file's axis downward; the likeliest side. All but an unstable axis that was said are snapped onto the support facet.
+    hollow from below, as hats and toy bricks are), ``opens_aside`` that its openings are in its sides and say nothing, ``level``
+    that what stands has its long axis level, as vehicles do, and is stood on no end. ``said_by`` names who said the axis
+    ``user``, for the reason; ``by_convention``: nobody meant this thing by it, it is the up axis of its world.
+
+    In order: that axis, but by convention after the long axis of a round, long vessel; for things that lie, their likeliest
+    side, the file's if nearly as likely; an opening upward, but of one that the file has underneath; for round, long things
+    that stand and round vessels, their axis; the file's axis; for things that stand, another axis of the file that is as likely
+    as what is near the file's own, then the file's axis downward; the likeliest side. All but an unstable axis that was said
+    are snapped onto the support facet.
     """
     poses = stable_poses(solid.vertices, _center_of_mass(solid))
     if user != "auto":
@@ -90,7 +93,7 @@ def choose_up(
     if stands is False:
         pose = _likeliest_side(poses, _axis(axis))
         return _turned(pose, axis, "such a thing lies; this is the side it most likely lies on")
-    opening = find_opening(solid)
+    opening = None if opens_aside else find_opening(solid)
     on_end = bool(stands) and not level
     axes = [axis] if file_up else _undeclared_axes(solid, on_end)
     unnamed = opens_up is None and stands is None

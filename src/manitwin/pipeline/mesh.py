@@ -105,7 +105,7 @@ class MeshStage:
         ``said`` is the up axis that was said, and who said it; ``by_convention`` as ``choose_up`` has it.
         """
         result = repair(soup, **self.settings.repair.model_dump())
-        stands = None if prior is None else prior.stands
+        stands = None if prior is None or prior.often_stands else prior.stands
         opens_up = None if prior is None else prior.container or prior.vessel
         chosen = choose_up(
             result.mesh,
@@ -113,6 +113,7 @@ class MeshStage:
             file_up=file.up,
             stands=stands,
             opens_up=opens_up,
+            opens_aside=prior is not None and prior.opens_aside,
             level=prior is not None and prior.level,
             said_by=said[1],
             by_convention=by_convention,

@@ -124,6 +124,9 @@ def test_standard_sizes_are_in_the_intervals(name: str) -> None:
         ("lego duplo brick", "building block"), ("concrete hollow block", "brick"), ("bread knife on a rack", "chef's knife"),
         ("trash bin", "trash can"), ("blue recycling bins", "trash can"), ("dish on a rack", "plate"),
         ("bottle no cap", "bottle"), ("yellow bell pepper no stem", "bell pepper"), ("mug no 2", "mug"),
+        ("macaroni and cheese", "pasta box"), ("sd card", "memory card"), ("box lid", "lid"), ("saucepan lid", "pot lid"),
+        ("gas can", "jerry can"), ("storage box", "container"), ("desk caddy", "desk organizer"), ("dial", "control knob"),
+        ("custard cup", "ramekin"), ("wine bottle rack", "wine rack"), ("toy elephant", "toy"), ("plush owl", "stuffed toy"),
     ],
 )  # fmt: skip
 def test_lookup_understands_what_people_say(said: str, category: str) -> None:

@@ -107,13 +107,16 @@ class Material(Record):
 class Form(Record):
     """The shape, rest and parts that a family of categories shares; ``parts`` is the rule that tells them apart on a surface.
 
-    ``level``: what stands has its long axis level, and is put on no end.
+    ``level``: what stands has its long axis level, and is put on no end. ``often_stands``: laid down, but stands where its
+    file has it so. ``opens_aside``: its openings are in its sides and not its top.
     ``vessel``: closed, and weighs what it holds: its bulk densities are from empty to full.
     """
 
     shape: str
     stands: bool | None = None
     level: bool = False
+    often_stands: bool = False
+    opens_aside: bool = False
     container: bool
     mass_distribution: Distribution
     vessel: bool = False
@@ -310,6 +313,10 @@ _NO_THING = re.compile(
 )
 
 
+_IMITATIONS = {"toy": "toy", "plush": "stuffed toy", "stuffed": "stuffed toy"}
+"""What a thing is of which one word says that it is made after another: a toy elephant is a toy."""
+
+
 def found_by(name: str | None) -> tuple[Prior, str] | None:
     """Find the prior of what a person calls a thing, and the words, in the singular, by which it is found.
 
@@ -317,8 +324,8 @@ def found_by(name: str | None) -> tuple[Prior, str] | None:
     the whole again: each as it is, in the singular, and with words dropped from the front ('red coffee mugs' are coffee mugs,
     which are mugs), and before its last word stands alone with words dropped between ('lego duplo brick' is a lego brick). The
     last word decides what a thing is: a mug rack is no mug. Where none is found, numbers and colours at
-    the end say nothing: 'mug_1' and 'pitcher blue' are a mug and a pitcher. File names are never looked up: they are not
-    evidence.
+    the end say nothing ('mug_1' and 'pitcher blue' are a mug and a pitcher), and what is a toy of anything is a toy. File names
+    are never looked up: they are not evidence.
     """
     if not name or not (phrase := normalised(name)):
         return None
@@ -334,7 +341,8 @@ def found_by(name: str | None) -> tuple[Prior, str] | None:
         for candidate in singulars(" ".join(part)):
             if candidate in index and index[candidate].category != "unknown":
                 return index[candidate], candidate
-    return None
+    imitation = next((_IMITATIONS[word] for word in head[:-1] if word in _IMITATIONS), None)
+    return None if imitation is None else (index[imitation], " ".join(head))
 
 
 def _words_dropped(head: list[str]) -> Iterator[list[str]]:
