@@ -137,3 +137,15 @@ def test_a_mug_is_as_long_as_with_its_handle_and_a_bar_that_lies_askew_as_along_
     bar = np.array([[x, y, z] for x in (-0.15, 0.15) for y in (-0.05, 0.05) for z in (0, 0.05)])
     turn = np.array([[np.cos(0.2), -np.sin(0.2)], [np.sin(0.2), np.cos(0.2)]])
     assert extents_along_sides(np.column_stack([bar[:, :2] @ turn.T, bar[:, 2]])) == pytest.approx([0.3, 0.1, 0.05])
+
+
+@pytest.mark.parametrize("turn_rad", [0.0, 0.5, 1.0, np.pi / 4])
+def test_an_aircraft_is_as_long_as_from_nose_to_tail_and_a_square_as_its_side(turn_rad: float) -> None:
+    """A smaller rectangle stands askew around the cross of hull and wings, and a larger one along a square's diagonals."""
+    turn = np.array([[np.cos(turn_rad), -np.sin(turn_rad)], [np.sin(turn_rad), np.cos(turn_rad)]])
+    outline = [[-0.07, -0.02], [-0.07, 0.02], [0.02, 0.07], [0.11, 0.01], [0.11, -0.01], [0.02, -0.07]]
+    aircraft = np.array([[*(turn @ corner), z] for corner in outline for z in (0.0, 0.05)])
+    assert upright_extents(aircraft)[0] < 0.17
+    assert extents_along_sides(aircraft) == pytest.approx([0.18, 0.14, 0.05])
+    square = np.array([[*(turn @ [x, y]), z] for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (0.0, 0.05)])
+    assert extents_along_sides(square) == pytest.approx([0.2, 0.2, 0.05])

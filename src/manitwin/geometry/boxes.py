@@ -12,6 +12,8 @@ from manitwin.geometry.poses import transform
 
 ASKEW_SHARE = 0.9
 """Of the area along the axes: what fits a rectangle that is smaller than that lies at an angle to them."""
+_MIRRORED = 0.02  # of the larger side: how far an outline may be from its mirror image
+_MIRRORED_DIRECTIONS = 72
 
 
 def box_corners(half_extents_m: np.ndarray, box_to_frame: np.ndarray) -> np.ndarray:
@@ -66,12 +68,17 @@ def upright_extents(points: np.ndarray) -> np.ndarray:
 
 
 def extents_along_sides(points: np.ndarray) -> np.ndarray:
-    """Return the extents ``(3,)`` along X, Y and Z, of what lies askew those of ``upright_extents``.
+    """Return length, width and height ``(3,)`` as people measure them: along the axis about which a thing is mirrored from above.
 
-    A round thing with a handle is as long as from the handle to the far side, though a rectangle that is a little smaller stands
-    askew around it.
+    Of several such axes that of the smallest rectangle. Of what is not mirrored the extents are those along X, Y and Z, or, where
+    it lies askew, those of ``upright_extents``. A round thing with a handle is as long as from the handle to the far side, and an
+    aircraft from nose to tail, though a rectangle that is smaller stands askew around them.
     """
-    along_axes, upright = np.ptp(np.asarray(points, dtype=float), axis=0), upright_extents(points)
+    points = np.asarray(points, dtype=float)
+    along_axes, upright = np.ptp(points, axis=0), upright_extents(points)
+    sides = _mirrored_sides(points[:, :2])
+    if sides is not None:
+        return np.array([*sides, upright[2]])
     is_askew = upright[0] * upright[1] < ASKEW_SHARE * along_axes[0] * along_axes[1]
     return upright if is_askew else along_axes
 
@@ -175,6 +182,39 @@ def _smallest_rectangle(points: np.ndarray) -> tuple[float, np.ndarray]:
     areas = (along.max(0) - along.min(0)) * (across.max(0) - across.min(0))
     best = int(areas.argmin())
     return float(areas[best]), edges[best]
+
+
+def _mirrored_sides(points: np.ndarray) -> list[float] | None:
+    """Return the sides, the longer first, of the smallest rectangle along an axis that mirrors the outline of ``(N, 2)``.
+
+    None where no axis does. Axes tried are X, that of the smallest rectangle, and that of the outline's least moment of area.
+    """
+    outline = points[cv2.convexHull((points - points[0]).astype(np.float32), returnPoints=False)[:, 0]]
+    ahead = np.roll(outline, -1, axis=0)
+    middle = outline.mean(0)
+    doubled = (outline - middle)[:, 0] * (ahead - middle)[:, 1] - (outline - middle)[:, 1] * (ahead - middle)[:, 0]
+    corners = np.stack([outline - middle, ahead - middle], axis=1)
+    center = (corners.sum(1) * doubled[:, None]).sum(0) / (3 * doubled.sum())
+    sums = corners.sum(1)
+    second = np.einsum("n,nki,nkj->ij", doubled, corners, corners) + np.einsum("n,ni,nj->ij", doubled, sums, sums)
+    moments = second / 24 - np.outer(center, center) * doubled.sum() / 2
+    principal = np.linalg.eigh(np.sign(doubled.sum()) * moments)[1][:, 1]
+    found = []
+    for along in (np.array([1.0, 0.0]), _smallest_rectangle(points)[1], principal):
+        local = outline @ np.stack([along, [-along[1], along[0]]], axis=1)
+        low, high = local.min(0), local.max(0)
+        if _is_mirrored(local - (low + high) / 2, float((high - low).max())):
+            found.append(sorted((high - low).tolist(), reverse=True))
+    return min(found, key=lambda sides: sides[0] * sides[1], default=None)
+
+
+def _is_mirrored(outline: np.ndarray, size: float) -> bool:
+    """Tell whether a convex outline ``(K, 2)`` around the origin is its own mirror image about X or about Y."""
+    angles = 2 * np.pi * np.arange(_MIRRORED_DIRECTIONS) / _MIRRORED_DIRECTIONS
+    directions = np.stack([np.cos(angles), np.sin(angles)])
+    reach = (outline @ directions).max(0)
+    apart = [np.abs((outline * sign @ directions).max(0) - reach).max() for sign in ([1.0, -1.0], [-1.0, 1.0])]
+    return bool(min(apart) <= _MIRRORED * size)
 
 
 def _nearest_to_identity(axes: np.ndarray) -> np.ndarray:
