@@ -46,13 +46,14 @@ PARTS_OF: dict[str, tuple[str, ...]] = {
     "tissue": ("tissue",), "flap": ("top", "flap", "fin"), "bow": ("bow", "hole"), "cup": ("cup", "inside"), "bulb": ("bulb",),
     "screw base": ("base",), "roller": ("roller",), "positive end": ("pole",), "body": _BODIES, "shaft": _BODIES,
     "bowl": ("bowl", "inside"), "finger holes": ("handle",), "blades": ("blade", "blades"),
-    "stem end": ("stem", "leaves", "dimple"), "front": ("bumper",), "roof": ("cabin",), "underside": ("wheels",),
+    "stem end": ("stem", "leaves", "dimple"), "roof": ("cabin",), "underside": ("wheels",),
     "teeth": ("teeth",), "chuck": ("chuck", "bit"), "shank": ("shank",), "frame": ("frame",),
     "hook": ("hook", "claw"), "chisel end": ("chisel",), "cutting head": ("head", "wheel", "key"), "slots": ("slots",),
     "grating face": ("body", "holes", "slots"), "grinding end": ("tip",),
     "lenses": ("lenses",), "bridge": ("bridge",), "toe": ("toe",), "sole": ("sole",), "valve": ("valve", "lever", "bracket"),
     "grille": ("grille",), "connector": ("connector",), "tips": ("tips",), "arms": ("arms",), "plunger": ("plunger",),
-    "crown": ("crown", "button"), "brim": ("brim", "visor"), "knob": ("knob",),
+    "crown": ("crown", "button"), "brim": ("brim", "visor"), "knob": ("knob",), "spine": ("spine",),
+    "dial": ("dial", "hands", "case"), "screen": ("screen", "case"), "strap": ("strap", "buckle"),
 }  # fmt: skip
 """Which parts of templates a label speaks of."""
 

@@ -149,3 +149,9 @@ def test_an_aircraft_is_as_long_as_from_nose_to_tail_and_a_square_as_its_side(tu
     assert extents_along_sides(aircraft) == pytest.approx([0.18, 0.14, 0.05])
     square = np.array([[*(turn @ [x, y]), z] for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (0.0, 0.05)])
     assert extents_along_sides(square) == pytest.approx([0.2, 0.2, 0.05])
+
+
+def test_a_sheet_on_edge_is_measured_as_long_as_it_is() -> None:
+    """Seen from above it is a line, which has no area."""
+    sheet = np.array([[x, 0.5 * x, z] for x in (0.0, 0.2) for z in (0.0, 0.1)])
+    assert extents_along_sides(sheet)[0] == pytest.approx(0.2 * np.hypot(1, 0.5))

@@ -76,9 +76,10 @@ def extents_along_sides(points: np.ndarray) -> np.ndarray:
     """
     points = np.asarray(points, dtype=float)
     along_axes, upright = np.ptp(points, axis=0), upright_extents(points)
-    sides = _mirrored_sides(points[:, :2])
-    if sides is not None:
-        return np.array([*sides, upright[2]])
+    along = mirror_axis(points[:, :2])
+    if along is not None:
+        sides = np.ptp(points[:, :2] @ np.stack([along, [-along[1], along[0]]], axis=1), axis=0)
+        return np.array([sides.max(), sides.min(), upright[2]])
     is_askew = upright[0] * upright[1] < ASKEW_SHARE * along_axes[0] * along_axes[1]
     return upright if is_askew else along_axes
 
@@ -184,28 +185,37 @@ def _smallest_rectangle(points: np.ndarray) -> tuple[float, np.ndarray]:
     return float(areas[best]), edges[best]
 
 
-def _mirrored_sides(points: np.ndarray) -> list[float] | None:
-    """Return the sides, the longer first, of the smallest rectangle along an axis that mirrors the outline of ``(N, 2)``.
+def mirror_axis(points: np.ndarray) -> np.ndarray | None:
+    """Return the direction ``(2,)`` along or across which the outline of points ``(N, 2)`` is mirrored; None where none is.
 
-    None where no axis does. Axes tried are X, that of the smallest rectangle, and that of the outline's least moment of area.
+    Of several that of the smallest rectangle. Tried are X, a side of the smallest rectangle, and the axis of the outline's
+    least second moment of area.
     """
     outline = points[cv2.convexHull((points - points[0]).astype(np.float32), returnPoints=False)[:, 0]]
-    ahead = np.roll(outline, -1, axis=0)
-    middle = outline.mean(0)
-    doubled = (outline - middle)[:, 0] * (ahead - middle)[:, 1] - (outline - middle)[:, 1] * (ahead - middle)[:, 0]
-    corners = np.stack([outline - middle, ahead - middle], axis=1)
-    center = (corners.sum(1) * doubled[:, None]).sum(0) / (3 * doubled.sum())
-    sums = corners.sum(1)
-    second = np.einsum("n,nki,nkj->ij", doubled, corners, corners) + np.einsum("n,ni,nj->ij", doubled, sums, sums)
-    moments = second / 24 - np.outer(center, center) * doubled.sum() / 2
-    principal = np.linalg.eigh(np.sign(doubled.sum()) * moments)[1][:, 1]
+    tried = [np.array([1.0, 0.0]), _smallest_rectangle(points)[1], *_principal_axis(outline)]
     found = []
-    for along in (np.array([1.0, 0.0]), _smallest_rectangle(points)[1], principal):
+    for along in tried:
         local = outline @ np.stack([along, [-along[1], along[0]]], axis=1)
         low, high = local.min(0), local.max(0)
         if _is_mirrored(local - (low + high) / 2, float((high - low).max())):
-            found.append(sorted((high - low).tolist(), reverse=True))
-    return min(found, key=lambda sides: sides[0] * sides[1], default=None)
+            found.append((float(np.prod(high - low)), along))
+    return min(found, key=lambda each: each[0])[1] if found else None
+
+
+def _principal_axis(outline: np.ndarray) -> list[np.ndarray]:
+    """Return the direction ``(2,)`` about which a convex polygon ``(K, 2)`` has its least second moment; none of a line."""
+    arms = outline - outline.mean(0)
+    ahead = np.roll(arms, -1, axis=0)
+    doubled = np.abs(
+        arms[:, 0] * ahead[:, 1] - arms[:, 1] * ahead[:, 0]
+    )  # twice the area of the triangle to the middle
+    if doubled.sum() < 1e-12 * float(np.ptp(outline, axis=0).max()) ** 2:
+        return []
+    corners, sums = np.stack([arms, ahead], axis=1), arms + ahead
+    second = np.einsum("n,nki,nkj->ij", doubled, corners, corners) + np.einsum("n,ni,nj->ij", doubled, sums, sums)
+    center = (sums * doubled[:, None]).sum(0) / (3 * doubled.sum())
+    moments = second / 24 - np.outer(center, center) * doubled.sum() / 2
+    return [np.asarray(np.linalg.eigh(moments)[1][:, 1])]
 
 
 def _is_mirrored(outline: np.ndarray, size: float) -> bool:

@@ -256,3 +256,53 @@ def test_a_basket_is_carried_by_the_handle_that_goes_over_it_where_it_has_one() 
     carried, plain = select(joined(open_box, *handle), "basket"), select(joined(open_box), "basket")
     assert labelled(carried, "handle")[2] > 0.19 and carried.grasp[0].position_m[2] > 0.15
     assert [point.label for point in plain.functional] == ["opening", "inside", "base"]
+
+
+def test_a_comb_has_teeth_on_one_side_and_a_spine_on_the_other() -> None:
+    comb = trimesh.creation.box((0.16, 0.03, 0.004))
+    slots = [
+        trimesh.creation.box((0.002, 0.02, 0.01), trimesh.transformations.translation_matrix((x, -0.01, 0)))
+        for x in np.linspace(-0.07, 0.07, 36)
+    ]
+    selected = select(trimesh.boolean.difference([comb, *slots], engine="manifold"), "hair comb")
+    assert labelled(selected, "teeth")[1] < -0.008 and labelled(selected, "spine")[1] > 0.008
+    plain = select(comb, "hair comb")
+    assert not {"teeth", "spine"} & {point.label for point in plain.functional}
+
+
+@pytest.mark.parametrize("turn_rad", [0.0, 0.7, 2.5])
+def test_the_dial_of_a_watch_is_on_its_case_and_not_on_its_strap(turn_rad: float) -> None:
+    loop = trimesh.creation.annulus(0.03, 0.032, 0.02, sections=64)
+    box = trimesh.creation.box((0.012, 0.034, 0.034), trimesh.transformations.translation_matrix((0.034, 0, 0)))
+    watch = trimesh.boolean.union([loop, box], engine="manifold")
+    watch.apply_transform(trimesh.transformations.rotation_matrix(turn_rad, (0, 0, 1)))
+    selected = select(watch, "wrist watch")
+    out = np.array([np.cos(turn_rad), np.sin(turn_rad), 0])
+    assert labelled(selected, "dial") @ out > 0.036 and labelled(selected, "strap") @ out < 0.01
+    ring = select(trimesh.creation.annulus(0.03, 0.034, 0.02, sections=64), "wrist watch")
+    assert not {"dial", "strap"} & {point.label for point in ring.functional}
+
+
+def test_a_camera_that_stands_has_its_lens_in_front_and_its_controls_on_top() -> None:
+    body = trimesh.creation.box((0.12, 0.04, 0.07))
+    tube = trimesh.creation.cylinder(0.025, 0.05, sections=48)
+    tube.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, (1, 0, 0)))
+    tube.apply_translation((0.01, -0.03, 0))
+    selected = select(trimesh.boolean.union([body, tube], engine="manifold"), "camera")
+    assert labelled(selected, "lens")[1] < -0.045
+    assert labelled(selected, "controls")[2] > 0.03 and labelled(selected, "controls")[1] > -0.025
+
+
+@pytest.mark.parametrize("turn_rad", [0.0, 0.6])
+def test_a_wing_is_on_one_side_and_an_end_at_nose_or_tail(turn_rad: float) -> None:
+    """The smallest box stands askew around the cross of hull and wings: its ends were neither's, and one of them the 'front'."""
+    hull = trimesh.creation.box((0.18, 0.03, 0.03), trimesh.transformations.translation_matrix((0, 0, 0.015)))
+    wing = trimesh.creation.box((0.03, 0.14, 0.006), trimesh.transformations.translation_matrix((0.02, 0, 0.012)))
+    tail = trimesh.creation.box((0.02, 0.05, 0.006), trimesh.transformations.translation_matrix((-0.08, 0, 0.02)))
+    aircraft = trimesh.boolean.union([hull, wing, tail], engine="manifold")
+    aircraft.apply_transform(trimesh.transformations.rotation_matrix(turn_rad, (0, 0, 1)))
+    selected = select(aircraft, "toy airplane")
+    ahead = np.array([np.cos(turn_rad), np.sin(turn_rad), 0])
+    aside = np.array([-np.sin(turn_rad), np.cos(turn_rad), 0])
+    assert abs(labelled(selected, "end") @ ahead) > 0.08
+    assert abs(labelled(selected, "wing") @ aside) > 0.05

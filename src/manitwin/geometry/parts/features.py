@@ -16,11 +16,12 @@ from manitwin.geometry.parts.scores import near as _near
 from manitwin.geometry.parts.scores import share_of_height as _share_of_height
 from manitwin.geometry.parts.shape import LEAST_HANDLE_REACH, Shape, SurfacePoints
 from manitwin.geometry.parts.striking_face import handle_direction, handle_line, striking_face
+from manitwin.geometry.parts.uneven import case, lens, spine, strap, teeth
 
 Feature = Literal[
     "opening", "rim", "inside", "handle", "handle_end", "head", "face", "tip", "edge", "middle", "neck", "spout",
     "top", "base", "side", "center", "front", "back", "end", "ring", "mouth", "bristles", "muzzle", "grip", "housing",
-    "apex", "arch_end", "end_wall", "toe", "stem", "nozzle", "crest",
+    "apex", "arch_end", "end_wall", "toe", "stem", "nozzle", "crest", "teeth", "spine", "case", "strap", "lens",
 ]  # fmt: skip
 """A place on an object that geometry can point out."""
 
@@ -306,5 +307,6 @@ _SCORERS: dict[str, Callable[[Shape, SurfacePoints], np.ndarray | None]] = {
     "back": partial(_large_face, side=-1), "toe": _toe, "stem": _stem, "nozzle": _nozzle, "crest": crest,
     "end": _end, "ring": _ring,
     "mouth": _mouth, "bristles": _bristles, "muzzle": _muzzle, "grip": _grip, "housing": _housing,
-    "apex": _apex, "arch_end": _arch_end, "end_wall": _end_wall,
+    "apex": _apex, "arch_end": _arch_end, "end_wall": _end_wall, "teeth": teeth, "spine": spine, "case": case,
+    "strap": strap, "lens": lens,
 }  # fmt: skip

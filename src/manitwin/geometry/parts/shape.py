@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import trimesh
 
-from manitwin.geometry.boxes import oriented_bounding_box
+from manitwin.geometry.boxes import mirror_axis, oriented_bounding_box
 from manitwin.geometry.cavity import Opening, find_opening
 from manitwin.geometry.parts.arch import Arch, find_arch
 from manitwin.geometry.parts.outline import SLICES
@@ -17,6 +17,7 @@ from manitwin.geometry.parts.pistol import Pistol, find_pistol
 from manitwin.geometry.parts.protrusions import Protrusion, RoundBody, round_body
 from manitwin.geometry.parts.section_borders import section_borders
 from manitwin.geometry.parts.stem import Stem, find_stem
+from manitwin.geometry.poses import transform
 from manitwin.geometry.ray_caster import local_thickness
 from manitwin.geometry.sampling import sample_surface
 
@@ -143,6 +144,8 @@ def _head_share(width: np.ndarray) -> float:
 
 
 _SAMPLES = 6000
+_IN_LINE_DEG = 15.0  # within which the smallest box fits a thing that leans or has a handle a little askew
+_MIRRORED_BOX = 1.5  # times the volume of the smallest box: of what leans, that along its mirror axis is no box of it
 LEAST_HANDLE_REACH = 0.08  # of the body's radius, beyond the outline's own margin: less is relief, no handle
 _TALLER, _STEEPER = 1.1, 2.0  # a handle beside a long spout: its outer half, and that by its reach
 _ELONGATED, _ELONGATED_LYING = 1.6, 1.15  # length by width from which a thing has ends rather than sides
@@ -235,7 +238,7 @@ def measure_shape(
     side) or lies (its handle is an end of its long axis); None: what opens upward or is tall stands.
     """
     surface, _, _ = sample_surface(mesh, _SAMPLES, rng)
-    extents, obb_to_object = oriented_bounding_box(mesh.vertices)
+    extents, obb_to_object = _box(mesh.vertices)
     opening = find_opening(mesh)
     opens_upward = opening is not None and bool(opening.axis[2] > 0.9)
     tall = bool(mesh.extents[2] > 0.5 * extents.max())
@@ -250,6 +253,33 @@ def measure_shape(
         opening=opening,
         upright=opens_upward or tall if stands is None else stands,
     )
+
+
+def _box(vertices_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the box ``(extents_m (3,), obb_to_object (4, 4))`` whose axes are the thing's own.
+
+    That is the smallest box, which may lean with the thing, but of what is mirrored as seen from above the one along that axis,
+    where it is little larger: the smallest box of an aircraft stands askew around the cross of hull and wings, and its axes are
+    neither's.
+    """
+    extents, obb_to_object = oriented_bounding_box(vertices_m)
+    along = mirror_axis(vertices_m[:, :2])
+    if along is None or _is_in_line(obb_to_object, along):
+        return extents, obb_to_object
+    axes = np.array([[along[0], along[1], 0.0], [-along[1], along[0], 0.0], [0.0, 0.0, 1.0]])
+    local = vertices_m @ axes.T
+    low, high = local.min(0), local.max(0)
+    if np.prod(high - low) > _MIRRORED_BOX * np.prod(extents):
+        return extents, obb_to_object
+    return high - low, transform(axes.T, axes.T @ ((low + high) / 2))
+
+
+def _is_in_line(obb_to_object: np.ndarray, along: np.ndarray) -> bool:
+    """Tell whether an axis of a box runs along a direction ``(2,)`` as seen from above, or across it."""
+    flat = obb_to_object[:2, :3]
+    length = np.linalg.norm(flat, axis=0)
+    sines = np.abs(along[0] * flat[1] - along[1] * flat[0]) / np.maximum(length, 1e-9)
+    return bool(sines[length > 0.5].min() < np.sin(np.radians(_IN_LINE_DEG)))
 
 
 def surface_points(mesh: trimesh.Trimesh, positions_m: np.ndarray, normals: np.ndarray) -> SurfacePoints:

@@ -271,6 +271,11 @@ _PLACES: dict[str, str] = {
     "stem": "stem",
     "nozzle": "outermost side of the top",
     "crest": "outermost place across the length",
+    "teeth": "side with the teeth",
+    "spine": "side away from the teeth",
+    "case": "thickest part",
+    "strap": "thin part away from the thickest",
+    "lens": "what stands out from the body",
 }
 
 
