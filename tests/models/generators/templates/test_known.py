@@ -97,3 +97,13 @@ def test_full_cylinder_weighs_its_density() -> None:
     mass, center, inertia = mass_properties([(cylinder(0.03, 0.2, sides=200), 1000.0)])
     assert mass == pytest.approx(np.pi * 0.03**2 * 0.2 * 1000, rel=1e-3) and center[2] == pytest.approx(0.1)
     assert inertia[2, 2] == pytest.approx(0.5 * mass * 0.03**2, rel=2e-3)
+
+
+def test_a_dumbbell_under_rubber_is_of_iron_and_rubber() -> None:
+    """Its weights have the density of iron whatever they are coated with: 'rubber' alone was told of 2 kg in a hand's size."""
+    for text, materials in (
+        ("a dumbbell with blue rubber weights", {"iron", "rubber"}),
+        ("an iron dumbbell", {"iron"}),
+    ):
+        made = make(TEMPLATES["dumbbell"], read_text(text, TEMPLATES), np.random.default_rng(0))
+        assert set(material_words(made).split(" and ")) == materials

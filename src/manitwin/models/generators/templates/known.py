@@ -16,6 +16,8 @@ from manitwin.twin.import_record import GivenPoint, ImportRecord
 
 MOST_POINTS = 4
 """As many functional points as an object has (paper)."""
+_HEAVY_KG_M3, _HEAVIER = 3000.0, 1.5
+"""A part of a lighter material that weighs so much per volume, and so many times its material, has a core of iron."""
 _TELLING_SHARE = 0.25  # of mass and surface together: less of a material is not what a thing is said to be made of
 
 
@@ -70,14 +72,23 @@ def _called(category: str, text: str) -> str:
 
 
 def material_words(made: Made) -> str:
-    """Say what a thing is made of: one or two materials by their shares of mass and surface, 'steel and wood'."""
+    """Say what a thing is made of: one or two materials by their shares of mass and surface, 'steel and wood'.
+
+    What weighs as metal does under a coat is of iron, and its surface of the coat: 'iron and rubber'.
+    """
     shares: dict[str, float] = {}
     total_kg = sum(made.masses_kg.values())
     corners = made.mesh.vertices[made.mesh.faces]
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     for number, part in enumerate(made.mesh.names):
-        share = made.masses_kg.get(part, 0.0) / total_kg + float(areas[made.mesh.part == number].sum() / areas.sum())
-        shares[made.looks[part].material] = shares.get(made.looks[part].material, 0.0) + share / 2
+        look, mass_kg = made.looks[part], made.masses_kg.get(part, 0.0)
+        is_core = made.densities_kg_m3.get(part, 0.0) > max(_HEAVY_KG_M3, _HEAVIER * look.density_kg_m3)
+        inside = "iron" if is_core else look.material
+        for material, share in (
+            (inside, mass_kg / total_kg),
+            (look.material, float(areas[made.mesh.part == number].sum() / areas.sum())),
+        ):
+            shares[material] = shares.get(material, 0.0) + share / 2
     ranked = sorted(shares, key=lambda material: -shares[material])[:2]
     told = [material for material in ranked if shares[material] >= _TELLING_SHARE] or ranked[:1]
     said = [SAID_OF.get(material, material) for material in told]

@@ -35,7 +35,7 @@ SIZE_MARGIN = 2.0
 
 @dataclass(frozen=True)
 class Made:
-    """A thing from a template: its mesh with parts, looks by part, known points, measures, masses by part (kg).
+    """A thing from a template: its mesh with parts, looks by part, known points, measures, masses (kg) and densities by part.
 
     ``solids`` are what the parts add, without overlap, with their density (kg/m^3)."""
 
@@ -46,6 +46,7 @@ class Made:
     measures: dict[str, float]
     solids: list[tuple[Manifold, float]]
     masses_kg: dict[str, float]
+    densities_kg_m3: dict[str, float]
 
 
 def make(template: Template, wanted: Wanted, rng: np.random.Generator, said: Mapping[str, float] | None = None) -> Made:
@@ -111,7 +112,7 @@ def dressed(
     for part, wish in wishes.items():
         if part in looks and part not in template.slots:
             looks[part] = wish.of(looks[part])
-    solids, masses = list[tuple[Manifold, float]](), dict[str, float]()
+    solids, masses, densities = list[tuple[Manifold, float]](), dict[str, float](), dict[str, float]()
     for part, built in model.assembly.solids():
         solid = built.scale((scale, scale, scale))
         density = template.contents_kg_m3.get(part, looks[part].density_kg_m3)
@@ -119,6 +120,7 @@ def dressed(
             density *= min(1.0, SHEET_M * float(solid.surface_area()) / float(solid.volume()))
         solids.append((solid, density))
         masses[part] = masses.get(part, 0.0) + density * float(solid.volume())
+        densities[part] = max(densities.get(part, 0.0), density)
     return Made(
         template.category,
         PartedMesh(mesh.vertices * scale, mesh.faces, mesh.part, mesh.names),
@@ -127,6 +129,7 @@ def dressed(
         {name: value * (scale if template.measures[name].unit == "m" else 1.0) for name, value in measures.items()},
         solids,
         masses,
+        densities,
     )
 
 
