@@ -306,3 +306,16 @@ def test_a_wing_is_on_one_side_and_an_end_at_nose_or_tail(turn_rad: float) -> No
     aside = np.array([-np.sin(turn_rad), np.cos(turn_rad), 0])
     assert abs(labelled(selected, "end") @ ahead) > 0.08
     assert abs(labelled(selected, "wing") @ aside) > 0.05
+
+
+@pytest.mark.parametrize(("crook_m", "cover_m"), [(0.05, 0.03), (0.03, 0.045)])
+def test_the_crook_of_an_umbrella_is_its_handle_and_not_its_wide_end(crook_m: float, cover_m: float) -> None:
+    shaft = trimesh.creation.cylinder(0.005, segment=[[-0.05, 0, 0], [0.75, 0, 0]], sections=24)
+    cover = trimesh.creation.cone(cover_m, 0.55, sections=32)
+    cover.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, (0, 1, 0)))
+    cover.apply_translation((0.1, 0, 0))
+    bow = [(-0.05 - crook_m * np.sin(angle), crook_m * (1 - np.cos(angle)), 0.0) for angle in np.linspace(0, np.pi, 12)]
+    crook = [trimesh.creation.cylinder(0.008, segment=pair, sections=20) for pair in pairwise(bow)]
+    umbrella = trimesh.boolean.union([shaft, cover, *crook], engine="manifold", check_volume=False)
+    selected = select(umbrella, "umbrella")
+    assert labelled(selected, "tip")[0] > 0.7 and labelled(selected, "handle")[0] < -0.03

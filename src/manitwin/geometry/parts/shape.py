@@ -12,6 +12,7 @@ import trimesh
 from manitwin.geometry.boxes import mirror_axis, oriented_bounding_box
 from manitwin.geometry.cavity import Opening, find_opening
 from manitwin.geometry.parts.arch import Arch, find_arch
+from manitwin.geometry.parts.hooked_end import straight_is_last
 from manitwin.geometry.parts.outline import SLICES
 from manitwin.geometry.parts.pistol import Pistol, find_pistol
 from manitwin.geometry.parts.protrusions import Protrusion, RoundBody, round_body
@@ -21,9 +22,10 @@ from manitwin.geometry.poses import transform
 from manitwin.geometry.ray_caster import local_thickness
 from manitwin.geometry.sampling import sample_surface
 
-HeadEnd = Literal["wide", "narrow", "thin", "thick", "short", "heavy", "up"]
+HeadEnd = Literal["wide", "narrow", "thin", "thick", "short", "straight", "heavy", "up"]
 """What tells the working end: its width, its thickness, being the shorter section (a cap; the wider end where no border shows),
-the side of the centre of mass, or being the upper one."""
+being away from an end that is bent to a hook (an umbrella; the wider end where none is), the side of the centre of mass, or
+being the upper one."""
 
 _SLICES = 32
 _DIRECTIONS = 12
@@ -75,8 +77,9 @@ def long_axis(
     share = local[:, 0] / length + 0.5
     width, thickness = _outline(share, local[:, 1:])
     center_share = float((center_of_mass_m - obb_to_object[:3, 3]) @ axes[0] / length + 0.5)
-    shorter = _shorter_is_last(share, local[:, 1:], length) if head_end == "short" else None
-    if _head_is_last(head_end, width, thickness, center_share, axes[0]) if shorter is None else shorter:
+    last = _shorter_is_last(share, local[:, 1:], length) if head_end == "short" else None
+    last = straight_is_last(share, local[:, 1:]) if head_end == "straight" else last
+    if _head_is_last(head_end, width, thickness, center_share, axes[0]) if last is None else last:
         axes[0], width, thickness, center_share = -axes[0], width[::-1], thickness[::-1], 1 - center_share
     return LongAxis(
         origin_m=obb_to_object[:3, 3] - axes[0] * length / 2,
@@ -118,9 +121,9 @@ def _head_is_last(
         return bool(axis[2] > 0)
     if rule == "heavy":
         return center_share > 0.5
-    profile = width if rule in ("wide", "narrow", "short") else thickness
+    profile = width if rule in ("wide", "narrow", "short", "straight") else thickness
     first, last = float(np.mean(profile[:count])), float(np.mean(profile[-count:]))
-    return last > first if rule in ("wide", "thick", "short") else last < first
+    return last > first if rule in ("wide", "thick", "short", "straight") else last < first
 
 
 def _shorter_is_last(share: np.ndarray, across_m: np.ndarray, length_m: float) -> bool | None:

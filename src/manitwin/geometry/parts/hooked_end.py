@@ -1,0 +1,31 @@
+"""Tell the end of a long thing that is bent to a hook, as the crook of an umbrella is, from the straight one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+_SLICES = 32
+_HOOK_SHARE, _MIDDLE_SHARE = (
+    0.15,
+    0.2,
+)  # of the length: an end that may be a hook, and what is to either side of the middle
+_BENT = 0.25  # of its width: how far a hook's middle is from the line of the shaft that goes into one side of it
+
+
+def straight_is_last(share: np.ndarray, across_m: np.ndarray) -> bool | None:
+    """Tell whether the end comes last that goes on in the line of the middle; None where neither is bent, or both are.
+
+    The line is that of the middle's slices: the box leans where one end reaches out to a side.
+    """
+    slices = [part for part in np.array_split(np.argsort(share, kind="stable"), _SLICES) if len(part)]
+    at = np.array([share[part].mean() for part in slices])
+    middles = np.array([(across_m[part].min(0) + across_m[part].max(0)) / 2 for part in slices])
+    inner = np.abs(at - 0.5) < _MIDDLE_SHARE
+    if np.count_nonzero(inner) < 2:
+        return None
+    slope, start = np.polyfit(at[inner], middles[inner], 1)
+    bent = []
+    for part in (share < _HOOK_SHARE, share > 1 - _HOOK_SHARE):
+        end = across_m[part] - start - share[part, None] * slope
+        bent.append(bool(np.linalg.norm(end.min(0) + end.max(0)) / 2 > _BENT * np.ptp(end, axis=0).max()))
+    return bent[0] if bent[0] != bent[1] else None
