@@ -53,7 +53,7 @@ PARTS_OF: dict[str, tuple[str, ...]] = {
     "lenses": ("lenses",), "bridge": ("bridge",), "toe": ("toe",), "sole": ("sole",), "valve": ("valve", "lever", "bracket"),
     "grille": ("grille",), "connector": ("connector",), "tips": ("tips",), "arms": ("arms",), "plunger": ("plunger",),
     "crown": ("crown", "button"), "brim": ("brim", "visor"), "knob": ("knob",), "spine": ("spine",),
-    "dial": ("dial", "hands", "case"), "screen": ("screen", "case"), "strap": ("strap", "buckle"),
+    "weight": ("weights",), "dial": ("dial", "hands", "case"), "screen": ("screen", "case"), "strap": ("strap", "buckle"),
 }  # fmt: skip
 """Which parts of templates a label speaks of."""
 

@@ -319,3 +319,11 @@ def test_the_crook_of_an_umbrella_is_its_handle_and_not_its_wide_end(crook_m: fl
     umbrella = trimesh.boolean.union([shaft, cover, *crook], engine="manifold", check_volume=False)
     selected = select(umbrella, "umbrella")
     assert labelled(selected, "tip")[0] > 0.7 and labelled(selected, "handle")[0] < -0.03
+
+
+def test_a_dumbbell_is_lifted_by_its_bar() -> None:
+    bar = trimesh.creation.cylinder(0.015, segment=[[-0.08, 0, 0], [0.08, 0, 0]])
+    ends = [trimesh.creation.cylinder(0.04, segment=[[s * 0.1, 0, 0], [s * 0.05, 0, 0]], sections=6) for s in (-1, 1)]
+    selected = select(trimesh.boolean.union([bar, *ends], engine="manifold"), "dumbbell")
+    assert abs(labelled(selected, "handle")[0]) < 0.04 and abs(labelled(selected, "weight")[0]) > 0.06
+    assert selected.grasp[0].type == "power" and abs(selected.grasp[0].position_m[0]) < 0.04

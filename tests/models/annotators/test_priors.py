@@ -126,6 +126,7 @@ def test_standard_sizes_are_in_the_intervals(name: str) -> None:
         ("bottle no cap", "bottle"), ("yellow bell pepper no stem", "bell pepper"), ("mug no 2", "mug"),
         ("macaroni and cheese", "pasta box"), ("sd card", "memory card"), ("box lid", "lid"), ("saucepan lid", "pot lid"),
         ("gas can", "jerry can"), ("storage box", "container"), ("desk caddy", "desk organizer"), ("dial", "control knob"),
+        ("cylinder", "geometric solid"),
         ("custard cup", "ramekin"), ("wine bottle rack", "wine rack"), ("toy elephant", "toy"), ("plush owl", "stuffed toy"),
     ],
 )  # fmt: skip
