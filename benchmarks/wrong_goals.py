@@ -13,6 +13,7 @@ from manitwin.episodes.courses.course import Start
 from manitwin.episodes.courses.push import PushCourse
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.planning.closed_hand import first_corner
+from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.skills.held_task import HeldScene, HeldTask
 from manitwin.episodes.skills.skill import SkillGoal
 from manitwin.geometry.poses import transform, transform_points
@@ -63,13 +64,16 @@ def wrong_goal(
         task = make(scene)
         if kind == "turned":
             return replace(task, watch=make(replace(scene, frames=_turned(scene.frames))).watch)
-        ways = [off] * len(task.paths)
-        if (skill, kind) == ("aim", "beside"):
-            ways = [_across(path.poses, off) for path in task.paths]
-        elif (skill, kind) == ("press", "beside"):
-            ways = [_hand_aside(path.poses, off, scene.fingertips_m) for path in task.paths]
-        paths = zip(task.paths, ways, strict=True)
-        return replace(task, paths=tuple(replace(path, poses=way @ path.poses) for path, way in paths))
+
+        def moved(path: HeldPath) -> HeldPath:
+            way = off
+            if (skill, kind) == ("aim", "beside"):
+                way = _across(path.poses, off)
+            elif (skill, kind) == ("press", "beside"):
+                way = _hand_aside(path.poses, off, scene.fingertips_m)
+            return replace(path, poses=way @ path.poses)
+
+        return replace(task, paths=tuple(map(moved, task.paths)), otherwise=tuple(map(moved, task.otherwise)))
 
     return replace(goal, path=another)
 

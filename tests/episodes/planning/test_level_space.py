@@ -7,10 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from planning_problems import TABLE, above, body, box_hull, brick, problem, standing, wall
+from scipy.spatial.transform import Rotation
 
 from manitwin.episodes.planning.arm_kinematics import ArmKinematics
 from manitwin.episodes.planning.collision_world import ProblemWorld
 from manitwin.episodes.planning.convex_shapes import ShapeStore
+from manitwin.episodes.planning.held_knots import HeldPath
+from manitwin.episodes.planning.held_path import HeldPathPlanner, HeldPlan
 from manitwin.episodes.planning.kinematic_body import floating_hand_of
 from manitwin.episodes.planning.level_space import LEVEL_RAD, LevelSpace, kept_level
 from manitwin.episodes.planning.motions import Motions
@@ -83,6 +86,39 @@ def test_what_is_to_be_carried_level_is_where_another_way_would_tilt_it() -> Non
     assert most_rad(frozenset()) > np.radians(30)
     assert most_rad(frozenset({asked.target.name})) <= LEVEL_RAD
     assert most_rad(frozenset({"another"})) > np.radians(30)
+
+
+def test_what_is_used_is_tilted_little_more_on_its_way_there_than_where_it_is_used_and_on_its_way_back() -> None:
+    planner = PickPlacePlanner(load_robot("panda"))
+    boxes = (TABLE, wall(0.5, 0, (0.15, 0.01, 0.16)))
+    asked = problem(standing(0.45, 0.35), standing(0.45, -0.35), boxes=boxes, seed=7)
+    path = HeldPath(np.array([standing(0.45, -0.35, z_m=height_m) for height_m in (0.15, 0.12)]))
+
+    def plan(level: frozenset[str]) -> HeldPlan:
+        found, _ = HeldPathPlanner(planner.parts).plan(
+            replace(asked, level=level), [path], as_hulls=False, longest_s=6.0
+        )
+        assert found is not None
+        return found
+
+    def most_rad(there: HeldPlan, motion: Motion) -> float:
+        return float(tilts_rad(planner.arm, motion.positions_rad, there.gripper_to_object).max())
+
+    freely, level = plan(frozenset()), plan(frozenset({asked.target.name}))
+    assert most_rad(freely, freely.carry) > np.radians(40)
+    assert most_rad(level, level.carry) <= LEVEL_RAD
+    used_rad = 0.8  # tilted so far it is brought back
+    hand = standing(0.45, -0.35, z_m=0.25) @ transform(Rotation.from_euler("y", used_rad).as_matrix())
+    used = planner.arm.inverse(hand @ level.gripper_to_object, level.carry.positions_rad[-1])
+    assert used is not None
+    goal = asked.target.object_to_world
+    back = planner.plan_place(
+        replace(asked, level=frozenset({asked.target.name}), goal_object_to_world=goal),
+        level, used, level.gripper_to_object, goal, True,
+    )  # fmt: skip
+    assert back is not None
+    assert back[0] is not None
+    assert most_rad(level, back[0]) <= used_rad + np.radians(6)
 
 
 def test_what_is_carried_level_stands_tall_or_opens_upward() -> None:

@@ -96,7 +96,10 @@ def attempt(
 
         def moved(scene: object) -> object:
             task = make(scene)
-            return replace(task, paths=tuple(replace(path, poses=off @ path.poses) for path in task.paths))
+            paths, otherwise = (
+                tuple(replace(path, poses=off @ path.poses) for path in each) for each in (task.paths, task.otherwise)
+            )
+            return replace(task, paths=paths, otherwise=otherwise)
 
         goal = replace(goal, path=moved)
     robot, planner = panda()

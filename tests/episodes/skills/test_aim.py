@@ -10,6 +10,7 @@ from brick_episodes import TABLE
 from held_skills import AREA, X_TO_Z, attempt, beside
 
 from manitwin.episodes.planning.problem import Grasp
+from manitwin.episodes.skills.held_task import HeldScene, HeldTask
 from manitwin.episodes.skills.registry import SKILLS
 from manitwin.episodes.skills.skill import SkillGoal, Surroundings
 from manitwin.geometry.frames.words import aims, grip_rank
@@ -77,7 +78,8 @@ def test_another_side_does_not_aim() -> None:
     )
 
     def wrong(scene):
-        return replace(make(scene), paths=make(replace(scene, frames={"object_00": (side, TRIGGER)})).paths)
+        another = make(replace(scene, frames={"object_00": (side, TRIGGER)}))
+        return replace(make(scene), paths=another.paths, otherwise=another.otherwise)
 
     facts, _ = attempt(spot(), replace(asked, path=wrong), GRASPS)
     assert facts.outcome == "goal_missed"
@@ -91,3 +93,21 @@ def test_what_points_is_told_by_its_name(label: str, told: bool) -> None:
 def test_a_trigger_is_held_before_a_handle() -> None:
     ranks = [grip_rank(label) for label in ("trigger", "grip", "handle", "nozzle")]
     assert ranks == [0, 1, 2, None]
+
+
+def test_a_bottle_that_points_stays_as_upright_as_it_can_with_every_grasp_before_it_is_turned_over() -> None:
+    found = goal()
+    assert found.path is not None
+    tasks = []
+
+    def noted(scene: HeldScene) -> HeldTask:
+        assert found.path is not None
+        tasks.append(found.path(scene))
+        return tasks[-1]
+
+    attempt(spot(), replace(found, path=noted), ())
+    (task,) = tasks
+    assert task.paths and task.otherwise
+    tilts = [np.arccos(path.poses[-1][2, 2]) for path in task.paths]
+    assert max(tilts) <= np.radians(60) + 1e-6
+    assert max(np.arccos(path.poses[-1][2, 2]) for path in task.otherwise) > np.radians(90)

@@ -15,10 +15,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from manitwin.episodes.planning.arm_planning import ArmPlanning
-from manitwin.episodes.planning.collision_world import FreeSpace, ProblemWorld
+from manitwin.episodes.planning.collision_world import ProblemWorld
 from manitwin.episodes.planning.grasp_tally import GraspTally
 from manitwin.episodes.planning.held_knots import HeldKnots, HeldPath
-from manitwin.episodes.planning.level_space import LevelSpace
+from manitwin.episodes.planning.level_space import LEVEL_RAD, LevelSpace, tilts_rad
 from manitwin.episodes.planning.path_timing import joint_spline, time_quintic
 from manitwin.episodes.planning.problem import Grasp, Motion, Phase, PickPlaceProblem, PlanFailure, PlanReport, later
 from manitwin.geometry.poses import transform
@@ -180,8 +180,7 @@ class HeldPathPlanner:
             joints = self._knots.follow(world, path, gripper_to_object, near_rad)
             if not isinstance(joints, CubicSpline) or self._drawback(world, joints, longest_s):
                 continue
-            start, level = np.asarray(joints_rad, float), self._level(world, gripper_to_object)
-            carry = self.parts.motions.free(level, Phase.CARRY, start, joints(0.0), rng)
+            carry = self._carry(world, path, gripper_to_object, np.asarray(joints_rad, float), joints(0.0), rng)
             if isinstance(carry, Motion):
                 return carry, path, joints
         return None
@@ -251,8 +250,10 @@ class HeldPathPlanner:
                 failure = later(failure, "lift_blocked")
                 continue
             lifted = parts.motions.timed(Phase.LIFT, lift)
-            level = self._level(world, gripper_to_object)
-            carry = parts.motions.free(level, Phase.CARRY, lifted.positions_rad[-1], joints(0.0), rng)
+            lifted_rad, only = lifted.positions_rad[-1], spare_m > 0
+            carry = self._carry(world, path, gripper_to_object, lifted_rad, joints(0.0), rng, level_only=only)
+            if carry is None:
+                return None
             if not isinstance(carry, Motion):
                 failure = later(failure, carry)
                 continue
@@ -278,12 +279,32 @@ class HeldPathPlanner:
             failure = later(failure, "lift_blocked")
         return failure
 
-    def _level(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> FreeSpace:
-        """Return what is free for the arm with the target in its hand, where it is also level if it is to be so."""
-        if self._level_rad is None:
-            return world.arm
-        arm, upright = self.parts.arm, world.problem.target.object_to_world[:3, :3]
-        return LevelSpace(world.arm, arm.gripper_pose, upright @ gripper_to_object[:3, :3], self._level_rad)
+    def _carry(
+        self,
+        world: ProblemWorld,
+        path: HeldPath,
+        gripper_to_object: np.ndarray,
+        start: np.ndarray,
+        end: np.ndarray,
+        rng: np.random.Generator,
+        *,
+        level_only: bool = False,
+    ) -> Motion | PlanFailure | None:
+        """Return the way to the path: within what the task allows, else little more tilted than the path begins, else any.
+
+        None: it is to be ``level_only``, and there is only another way.
+        """
+        target, arm, free = world.problem.target, self.parts.arm, self.parts.motions.free
+        upright = target.object_to_world[:3, :3]
+        level = upright @ gripper_to_object[:3, :3]
+        if self._level_rad is not None:
+            return free(LevelSpace(world.arm, arm.gripper_pose, level, self._level_rad), Phase.CARRY, start, end, rng)
+        if target.name in world.problem.level:
+            most_rad = float(tilts_rad(path.poses[:1, :3, :3], upright)[0]) + LEVEL_RAD
+            found = free(LevelSpace(world.arm, arm.gripper_pose, level, most_rad), Phase.CARRY, start, end, rng)
+            if isinstance(found, Motion) or level_only:
+                return found if isinstance(found, Motion) else None
+        return free(world.arm, Phase.CARRY, start, end, rng)
 
     def _drawback(self, world: ProblemWorld, joints: CubicSpline, longest_s: float) -> PlanFailure | None:
         """Return why a path is not taken that could be followed: too slow, or no room for the hand's way back from its end."""

@@ -21,6 +21,9 @@ Placement = tuple[Motion | None, Motion, Motion]
 """Carry (None where the arm is above the goal already), lower and retreat."""
 
 DROP_M = 0.003  # so much higher an object may be let go
+SWAYS_RAD = np.radians(
+    5
+)  # beyond a tilt at the start: an arm's joints do not turn what it holds back on the straightest way
 SHARES = (0.5, 0.0)  # of the turn that are made up for, where all of it cannot be
 
 
@@ -46,7 +49,7 @@ class PlacementPlanner:
         """
         solutions, converged = self._solutions.of(world.arm, Phase.LOWER, gripper_to_world, start)
         failure: PlanFailure = "lower_blocked" if converged else "place_unreachable"
-        for space in self._spaces(world, gripper_to_world, level_only=level_only):
+        for space in self._spaces(world, start, gripper_to_world, level_only=level_only):
             for at_goal in solutions:
                 outcome = self._plan_to(world, space, start, at_goal, rng)
                 if isinstance(outcome, tuple):
@@ -54,11 +57,18 @@ class PlacementPlanner:
                 failure = later(failure, outcome)
         return failure
 
-    def _spaces(self, world: ProblemWorld, gripper_to_world: np.ndarray, *, level_only: bool) -> Sequence[FreeSpace]:
-        """Return where to look for the way: first where what is to be carried level is level, in two searches."""
+    def _spaces(
+        self, world: ProblemWorld, start: np.ndarray, gripper_to_world: np.ndarray, *, level_only: bool
+    ) -> Sequence[FreeSpace]:
+        """Return where to look for the way: first where what is to be carried level is level, in two searches.
+
+        What is tilted at the start already, as after it was used, is tilted no farther.
+        """
         if not goes_level(world.problem, world.goal_object_to_world):
             return (world.arm,)
-        level = LevelSpace(world.arm, self._arm.gripper_pose, gripper_to_world[:3, :3], LEVEL_RAD)
+        starts_rad = float(tilts_rad(self._arm.gripper_pose(start)[None, :3, :3], gripper_to_world[:3, :3])[0])
+        most_rad = max(LEVEL_RAD, starts_rad + SWAYS_RAD)
+        level = LevelSpace(world.arm, self._arm.gripper_pose, gripper_to_world[:3, :3], most_rad)
         return (level, level) if level_only else (level, level, world.arm)
 
     def plan_from_above(

@@ -23,7 +23,7 @@ DISTANCES_M = (0.10, 0.22)  # of the nozzle from the middle of what it points at
 FARTHER_M, KNOTS = 0.05, 3  # from which it comes nearer
 DOWNWARD_RAD = np.radians([0.0, 60.0])
 DRAWN, WAYS = 600, 48
-UPRIGHT_SHARE = 0.5  # of the ways, and tried first: the thing is not turned about the nozzle's axis
+UPRIGHT_SHARE = 0.5  # of the ways, and tried first with all grasps: the thing is not turned about the nozzle's axis
 LEAST_HEIGHT_M = 0.02  # of its lowest corner above where it stood
 FREE_M = 0.02  # of a finger's pads from the nozzle's axis, ahead of its end
 NEAR_STEP_M = 0.02  # grasps that are no less apart from the grip count as equal
@@ -66,7 +66,9 @@ class Aim(HeldSkill):
             paths.append((rolled, HeldPath(poses)))
             if len(paths) == WAYS:
                 break
-        ways = tuple(path for _, path in sorted(paths, key=lambda each: each[0]))
+        as_it_stood, turned = (
+            tuple(path for rolled, path in paths if rolled == is_rolled) for is_rolled in (False, True)
+        )
         grip = grip_of(scene.frames[target.name])
 
         def rank(grasp: Grasp) -> float | None:
@@ -87,7 +89,16 @@ class Aim(HeldSkill):
                 world.timestep_s,
             )
 
-        return HeldTask(ways, rank, duration_s=1.0, measured=1, hold_s=HELD_S, ending="put_back", watch=watch)
+        return HeldTask(
+            as_it_stood,
+            rank,
+            duration_s=1.0,
+            measured=1,
+            hold_s=HELD_S,
+            ending="put_back",
+            otherwise=turned,
+            watch=watch,
+        )
 
 
 def nozzle_of(frames: tuple[TwinFrame, ...]) -> TwinFrame | None:
