@@ -159,3 +159,16 @@ def test_the_camera_of_a_size_that_is_not_drawn_any_more_is_given_up(renderer: R
         renderer.render([part], [Camera(front_camera().camera_to_object, 0.5, width, 456)])
     assert len(renderer._scene.entities) == there
     np.testing.assert_array_equal(renderer.render([part], [front_camera()])[0].rgb, before.rgb)
+
+
+def test_textures_are_let_go_with_the_pictures_that_they_were_for(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[str] = []
+    let_go = renderer._let_go
+    monkeypatch.setattr(renderer, "_let_go", lambda: (drawn.append("nothing"), let_go()))
+    before = renderer.render([quad(np.full((8, 8, 3), 200))], [front_camera()])[0]
+    assert drawn == ["nothing"]
+    renderer.render([plain_part(trimesh.creation.torus(0.04, 0.015), (200, 80, 40))], [front_camera()])
+    assert drawn == ["nothing"], "what has no texture takes little"
+    np.testing.assert_array_equal(renderer.render([quad(np.full((8, 8, 3), 200))], [front_camera()])[0].rgb, before.rgb)

@@ -84,7 +84,7 @@ class Renderer:
         points = np.concatenate([s.vertices for s in surfaces])
         low, high = points.min(0), points.max(0)
         center, scale = (low + high) / 2, 2 / float(np.linalg.norm(high - low))  # a sphere of radius 1 holds everything
-        entities = []
+        entities, textured = [], any(surface.color_map is not None for surface in surfaces)
         while surfaces:  # none is kept beside what SAPIEN makes of it: textures are large
             entities.append(self._entity(surfaces.pop(0), center, scale))
             self._scene.add_entity(entities[-1])
@@ -93,6 +93,14 @@ class Renderer:
         finally:
             for entity in entities:
                 self._scene.remove_entity(entity)
+            del entities
+            if textured and self._camera is not None:
+                self._let_go()
+
+    def _let_go(self) -> None:
+        """Draw nothing for once: what the picture before was made of is held until the next, 40 MB of a scan."""
+        self._scene.update_render()
+        self._camera.take_picture()
 
     def close(self) -> None:
         """Give back what the driver holds."""
