@@ -18,7 +18,7 @@ import trimesh
 from points import held_out
 
 from manitwin.geometry.mass_properties import solid_mass_properties
-from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.known import mass_properties
 from manitwin.models.generators.templates.made import make

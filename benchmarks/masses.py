@@ -14,7 +14,7 @@ import numpy as np
 import trimesh
 
 from manitwin.errors import ManiTwinError
-from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.protocol import Subject
 from manitwin.models.annotators.rules import estimate_physical
 from manitwin.models.generators.templates.catalog import load_templates

@@ -26,7 +26,7 @@ from manitwin.config import NamingConfig, ViewsConfig
 from manitwin.errors import Rejected
 from manitwin.formats.image_file import read_image
 from manitwin.models.annotators.likely_names import usual_of
-from manitwin.models.annotators.priors import named
+from manitwin.models.annotators.prior_names import named
 from manitwin.models.annotators.rules import RulesAnnotator
 from manitwin.models.classifiers.classifier import LIKELIEST, TEMPERATURE, classify, softmax
 from manitwin.models.classifiers.efficientnet_lite import SIDE_PX, logits

@@ -30,7 +30,7 @@ from manitwin.engine.stage import Draft
 from manitwin.engine.stage_runner import run_stage
 from manitwin.errors import InputError, Rejected
 from manitwin.geometry.boxes import oriented_bounding_box
-from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.pipeline.item import Item, twin_id
 from manitwin.pipeline.object_state import load_solid, object_name

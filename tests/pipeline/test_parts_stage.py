@@ -14,7 +14,8 @@ from manitwin.formats.glb import read_glb, write_glb
 from manitwin.geometry.parts.part_rules import membership
 from manitwin.geometry.parts.shape import measure_shape
 from manitwin.models.annotators.part_names import part_name
-from manitwin.models.annotators.priors import load_priors, lookup
+from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.priors import load_priors
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.known import known_of
 from manitwin.models.generators.templates.made import make, visual_parts

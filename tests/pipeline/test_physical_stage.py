@@ -20,7 +20,7 @@ from manitwin.formats.glb import read_glb, write_glb
 from manitwin.geometry.mass_properties import solid_mass_properties
 from manitwin.geometry.poses import GLTF_TO_OBJECT
 from manitwin.models.annotators.given import KeepsGiven
-from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.protocol import PhysicalEstimates, Subject
 from manitwin.models.annotators.rules import RulesAnnotator
 from manitwin.pipeline.annotated_mass import annotated_mass

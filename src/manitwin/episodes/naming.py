@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from manitwin.models.annotators.priors import lookup, normalised
+from manitwin.models.annotators.prior_names import lookup, normalised
 from manitwin.models.annotators.words import joined
 from manitwin.twin.record import Language
 

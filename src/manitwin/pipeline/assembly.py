@@ -18,7 +18,7 @@ from manitwin.formats.installation import installed_version
 from manitwin.formats.npy_file import labels_to_npy
 from manitwin.formats.packed_source import pack_photos, pack_source
 from manitwin.geometry.hulls.reduction import hull_to_obj
-from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.prior_names import lookup
 from manitwin.pipeline.grasps import GRASP_POINTS
 from manitwin.pipeline.guesses import (
     OF_NO_NAME,

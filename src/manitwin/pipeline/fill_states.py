@@ -7,7 +7,7 @@ import trimesh
 
 from manitwin.geometry.mass_properties import MassProperties
 from manitwin.geometry.vessel_filling import Vessel
-from manitwin.models.annotators.priors import Prior
+from manitwin.models.annotators.prior_records import Prior
 from manitwin.twin.fill_records import Filling, FillState
 from manitwin.twin.record_values import Estimate
 

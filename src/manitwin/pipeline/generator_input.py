@@ -10,7 +10,7 @@ from typing import Any
 
 from manitwin.config import BuildConfig
 from manitwin.errors import Unavailable
-from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.protocol import Annotator
 from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generator
 from manitwin.models.registry import backends, create, factory

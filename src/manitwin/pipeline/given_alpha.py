@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from manitwin.formats.image_file import MIN_SIDE_PX
-from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.matting.matte import TRANSPARENT_SHARE, DoubtedCutOut, Matte
 
 OPAQUE = 250

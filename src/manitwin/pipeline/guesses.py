@@ -7,7 +7,8 @@ from typing import Any, cast
 
 from manitwin.engine.stage import Draft
 from manitwin.models.annotators.likely_names import OF_LIKELY_NAMES
-from manitwin.models.annotators.priors import load_priors, normalised
+from manitwin.models.annotators.prior_names import normalised
+from manitwin.models.annotators.priors import load_priors
 from manitwin.twin.record_values import Check
 
 PRIOR = "prior:"

@@ -11,7 +11,8 @@ from manitwin.geometry.interior import columns_of, mass_properties_of
 from manitwin.geometry.mass_properties import MassProperties, solid_mass_properties
 from manitwin.geometry.parts.part_rules import membership
 from manitwin.geometry.parts.shape import measure_shape
-from manitwin.models.annotators.priors import Prior, load_materials
+from manitwin.models.annotators.prior_records import Prior
+from manitwin.models.annotators.priors import load_materials
 
 
 def mass_by_parts(

@@ -25,7 +25,8 @@ from manitwin.geometry.length_unit import LengthUnit, decide_unit
 from manitwin.geometry.poses import OBJECT_TO_GLTF
 from manitwin.geometry.repair.cascade import RepairResult, repair
 from manitwin.geometry.repair.components import connected_parts
-from manitwin.models.annotators.priors import Prior, lookup
+from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_records import Prior
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import object_name
 from manitwin.twin.import_record import ImportRecord, read_import_record

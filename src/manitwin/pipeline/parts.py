@@ -15,7 +15,8 @@ from manitwin.geometry.distance import closest_faces
 from manitwin.geometry.parts.segmentation import carried_over, segmented
 from manitwin.geometry.parts.shape import measure_shape
 from manitwin.models.annotators.part_names import part_name
-from manitwin.models.annotators.priors import Prior, lookup
+from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_records import Prior
 from manitwin.pipeline.object_state import load_solid, load_visual, object_name, read_given
 from manitwin.twin.part_records import NO_PART, Part
 

@@ -15,7 +15,8 @@ from manitwin.formats.glb import write_glb
 from manitwin.formats.meshes.textures import bake_transform
 from manitwin.geometry.boxes import oriented_bounding_box, upright_extents
 from manitwin.geometry.mass_properties import MassProperties, shell_mass_properties, solid_mass_properties
-from manitwin.models.annotators.priors import Interval, Prior, lookup
+from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_records import Interval, Prior
 from manitwin.models.annotators.protocol import Annotator, PhysicalEstimates, Subject
 from manitwin.models.annotators.stated_matter import prior_as_named
 from manitwin.pipeline.annotated_mass import annotated_mass, moments_apart

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from manitwin.engine.stage import Draft
-from manitwin.models.annotators.priors import lookup, unknown_prior
+from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.priors import unknown_prior
 from manitwin.pipeline.object_state import object_name
 
 CHECK_SCALE = "check its unit and scale first"

@@ -9,7 +9,8 @@ import pytest
 import trimesh
 
 from handmade import candidates, cup, hammer, mug, screwdriver, subject
-from manitwin.models.annotators.priors import load_priors, lookup
+from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.priors import load_priors
 from manitwin.models.annotators.protocol import PointsRequest, SelectedPoints
 from manitwin.models.annotators.rules import RulesAnnotator
 

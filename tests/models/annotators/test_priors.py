@@ -10,7 +10,9 @@ from pydantic import ValidationError
 
 from manitwin.errors import ManiTwinError
 from manitwin.models.annotators import priors
-from manitwin.models.annotators.priors import Interval, load_materials, load_priors, lookup, named, normalised
+from manitwin.models.annotators.prior_names import lookup, named, normalised
+from manitwin.models.annotators.prior_records import Interval
+from manitwin.models.annotators.priors import load_materials, load_priors
 from manitwin.models.generators.lift.hint import hint_from_name
 
 # Calli et al. 2015, "The YCB Object and Model Set", and its list of object masses: kg.

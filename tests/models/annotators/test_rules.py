@@ -13,7 +13,8 @@ import trimesh
 from handmade import cup, cylinder, subject
 from manitwin.formats.meshes.read import read_mesh
 from manitwin.geometry.repair.cascade import repair
-from manitwin.models.annotators.priors import load_priors, lookup
+from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.priors import load_priors
 from manitwin.models.annotators.rules import RulesAnnotator, estimate_physical
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from handmade import cup, cylinder, subject
-from manitwin.models.annotators.priors import load_materials, lookup
+from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.priors import load_materials
 from manitwin.models.annotators.rules import RulesAnnotator
 from manitwin.models.annotators.stated_matter import prior_as_named
 

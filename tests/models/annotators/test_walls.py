@@ -7,7 +7,8 @@ import pytest
 import trimesh
 
 from handmade import cup, subject
-from manitwin.models.annotators.priors import load_materials, lookup
+from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.priors import load_materials
 from manitwin.models.annotators.rules import estimate_physical
 from manitwin.models.annotators.walls import density_by_wall, wall_materials
 

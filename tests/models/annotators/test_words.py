@@ -10,7 +10,8 @@ import pytest
 import trimesh
 
 from handmade import cylinder, mug, subject, visual
-from manitwin.models.annotators.priors import found_by, load_priors, word_for
+from manitwin.models.annotators.prior_names import found_by, word_for
+from manitwin.models.annotators.priors import load_priors
 from manitwin.models.annotators.rules import RulesAnnotator
 from manitwin.models.annotators.words import article, is_metal, joined, size_words, write_captions
 from manitwin.twin.record import Language

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from manitwin.models.annotators.priors import lookup, named
+from manitwin.models.annotators.prior_names import lookup, named
 from manitwin.models.classifiers.classifier import TEMPERATURE, classify, softmax
 from manitwin.models.classifiers.efficientnet_lite import SIDE_PX, logits
 from manitwin.models.classifiers.imagenet import CLASSES, load_limits, load_names

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from manitwin.models.annotators.priors import Interval
+from manitwin.models.annotators.prior_records import Interval
 from manitwin.models.classifiers.imagenet import load_names
 from manitwin.models.classifiers.size_evidence import ANY_SIZE_LOG_M, OTHER_SIZE_SHARE, _density, size_likelihoods
 

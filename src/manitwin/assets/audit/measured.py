@@ -19,7 +19,8 @@ from manitwin.assets.audit.finding import Complaint
 from manitwin.assets.audit.open_air import OpenAir, open_air
 from manitwin.geometry.distance import closest_points_on_triangles, distance_to_surface
 from manitwin.geometry.sampling import sample_surface
-from manitwin.models.annotators.priors import Prior, found_by, lookup
+from manitwin.models.annotators.prior_names import found_by, lookup
+from manitwin.models.annotators.prior_records import Prior
 from manitwin.twin.record import TwinRecord
 from manitwin.twin.store import read_record
 

@@ -19,7 +19,7 @@ from manitwin.dataset.report_page import Picture, Section, Table, page
 from manitwin.errors import TwinError, UsageError
 from manitwin.formats.image_file import png_of
 from manitwin.formats.label_picture import label_picture
-from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.prior_names import lookup
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.record import Language

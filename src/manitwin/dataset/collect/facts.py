@@ -6,7 +6,7 @@ import re
 from functools import lru_cache
 from typing import NamedTuple
 
-from manitwin.models.annotators.priors import named
+from manitwin.models.annotators.prior_names import named
 
 UNKNOWN = "unknown"
 GROUPS = ("kitchen", "tools", "electronics", "personal", "office", "household")

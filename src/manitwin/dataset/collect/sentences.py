@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from manitwin.models.annotators.priors import Prior
+from manitwin.models.annotators.prior_records import Prior
 
 COLORS = ("black", "white", "grey", "red", "orange", "yellow", "green", "blue", "purple", "brown", "beige", "turquoise")
 

@@ -9,7 +9,7 @@ from functools import partial
 
 from manitwin.dataset.evaluation.labels import Interval, Label
 from manitwin.dataset.evaluation.part_names import is_on_one_of, is_one_of, words_of
-from manitwin.models.annotators.priors import normalised
+from manitwin.models.annotators.prior_names import normalised
 from manitwin.twin.record import TwinRecord
 from manitwin.twin.record_values import Estimate
 

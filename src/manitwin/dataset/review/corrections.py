@@ -8,7 +8,7 @@ from typing import Any
 
 from manitwin.dataset.review.store import Stored
 from manitwin.dataset.review.verdicts import DIMENSIONS, Dimension
-from manitwin.models.annotators.priors import normalised
+from manitwin.models.annotators.prior_names import normalised
 from manitwin.pipeline.human_corrections import HUMAN
 
 

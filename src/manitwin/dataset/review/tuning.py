@@ -23,7 +23,8 @@ from manitwin.dataset.review.verdicts import Dimension
 from manitwin.engine.ledger.location import CONFIG
 from manitwin.errors import UsageError
 from manitwin.formats.json_file import read_json_object
-from manitwin.models.annotators.priors import Interval, lookup
+from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_records import Interval
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.record import TwinRecord
 

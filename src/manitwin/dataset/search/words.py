@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from itertools import chain, pairwise
 
 from manitwin.dataset.search.question import Question, words
-from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.words import is_metal
 
 WEIGHTS = {

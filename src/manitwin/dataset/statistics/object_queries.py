@@ -6,7 +6,8 @@ from collections.abc import Iterable
 
 from manitwin.dataset.index.conditions import sql_text
 from manitwin.dataset.statistics.query import Column, Query, counts, histogram, labels, summary
-from manitwin.models.annotators.priors import Prior, lookup
+from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_records import Prior
 
 ATTRIBUTES = ("category", "color", "material", "size", "shape", "function")
 """The paper's six attributes (section 3.1, semantic captioning)."""

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from manitwin.models.annotators.priors import Interval, lookup, unknown_prior
+from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_records import Interval
+from manitwin.models.annotators.priors import unknown_prior
 from manitwin.twin.record_values import Estimate
 
 OF_LIKELY_NAMES = "prior:likeliest"

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 
 from manitwin.geometry.parts.features import Feature
-from manitwin.models.annotators.priors import Prior
+from manitwin.models.annotators.prior_records import Prior
 
 _FEATURES: dict[str, tuple[Feature, ...]] = {
     "handle": ("handle", "handle_end"),

@@ -16,7 +16,8 @@ from manitwin.geometry.parts.membership import Membership
 from manitwin.geometry.parts.part_rules import membership
 from manitwin.geometry.parts.shape import Shape, SurfacePoints, measure_shape, surface_points
 from manitwin.models.annotators.part_names import part_name
-from manitwin.models.annotators.priors import FunctionalPart, GraspPart, Prior, unknown_prior
+from manitwin.models.annotators.prior_records import FunctionalPart, GraspPart, Prior
+from manitwin.models.annotators.priors import unknown_prior
 from manitwin.models.annotators.protocol import PointsRequest, SelectedPoints
 from manitwin.twin.point_records import FunctionalPoint, GraspPoint, GraspType
 

@@ -8,7 +8,9 @@ from manitwin.config import Resource
 from manitwin.geometry.boxes import upright_extents
 from manitwin.models.annotators.likely_names import usual_of
 from manitwin.models.annotators.point_rules import select_points
-from manitwin.models.annotators.priors import DEVIATIONS_ACROSS, Interval, Prior, lookup, unknown_prior
+from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_records import DEVIATIONS_ACROSS, Interval, Prior
+from manitwin.models.annotators.priors import unknown_prior
 from manitwin.models.annotators.protocol import (
     AnnotatorQuestion,
     PhysicalEstimates,

@@ -14,7 +14,9 @@ import numpy as np
 
 from manitwin.errors import UsageError
 from manitwin.models.annotators.diacritics import without_diacritics
-from manitwin.models.annotators.priors import Interval, Prior, found_by, load_materials, singulars
+from manitwin.models.annotators.prior_names import found_by, singulars
+from manitwin.models.annotators.prior_records import Interval, Prior
+from manitwin.models.annotators.priors import load_materials
 from manitwin.models.generators.templates.described import materials_said
 from manitwin.models.generators.templates.looks import MATERIALS, SAID_OF, Look
 from manitwin.models.generators.templates.matter import is_composite, is_food, looks_in, surfaces_of

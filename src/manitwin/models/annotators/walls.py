@@ -14,7 +14,8 @@ import trimesh
 
 from manitwin.geometry.ray_caster import local_thickness
 from manitwin.geometry.sampling import sample_surface
-from manitwin.models.annotators.priors import DEVIATIONS_ACROSS, Interval, Prior, load_materials
+from manitwin.models.annotators.prior_records import DEVIATIONS_ACROSS, Interval, Prior
+from manitwin.models.annotators.priors import load_materials
 
 METALS = ("steel", "aluminium")
 """What a prior means that says metal."""

@@ -8,7 +8,8 @@ import numpy as np
 
 from manitwin.geometry.cavity import find_opening
 from manitwin.geometry.parts.overall_shape import overall_shape
-from manitwin.models.annotators.priors import Prior, found_by, normalised, word_for
+from manitwin.models.annotators.prior_names import found_by, normalised, word_for
+from manitwin.models.annotators.prior_records import Prior
 from manitwin.models.annotators.protocol import Subject
 from manitwin.models.annotators.surface_color import UNTEXTURED, ColorShare, measure_colors
 from manitwin.twin.record import Language

@@ -7,7 +7,9 @@ from functools import cache
 
 import numpy as np
 
-from manitwin.models.annotators.priors import Interval, named, unknown_prior
+from manitwin.models.annotators.prior_names import named
+from manitwin.models.annotators.prior_records import Interval
+from manitwin.models.annotators.priors import unknown_prior
 from manitwin.models.classifiers.imagenet import load_names
 
 OTHER_SIZE_SHARE = 0.1

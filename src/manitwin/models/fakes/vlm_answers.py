@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from manitwin.models.annotators.priors import Interval, Prior, lookup, unknown_prior
+from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_records import Interval, Prior
+from manitwin.models.annotators.priors import unknown_prior
 from manitwin.models.fakes.picture_proportions import foreground, measure_proportions
 
 ASKED_AGAIN = "It contradicts what is known"

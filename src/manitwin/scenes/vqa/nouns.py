@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from manitwin.models.annotators.priors import named
+from manitwin.models.annotators.prior_names import named
 
 OF_ANOTHER_KIND = frozenset(
     {

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.looks import look_of
 from manitwin.models.generators.templates.made import Made, make, visual_parts

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from manitwin.geometry.solids.shapes import box, cylinder
-from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.known import known_of, mass_properties, material_words
 from manitwin.models.generators.templates.made import make

@@ -10,7 +10,8 @@ from itertools import pairwise
 from manitwin.assets.audit.finding import Complaint, Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.assets.audit.rules.scale import is_of_wrong_size
-from manitwin.models.annotators.priors import HEAVIEST_CONTENTS_KG_M3, load_materials
+from manitwin.models.annotators.prior_records import HEAVIEST_CONTENTS_KG_M3
+from manitwin.models.annotators.priors import load_materials
 
 LEAST_WALL_M = {
     "plastic": 0.0002, "ceramic": 0.002, "glass": 0.0007, "steel": 0.0001, "aluminium": 0.0001, "wood": 0.0005,

@@ -8,7 +8,7 @@ import numpy as np
 
 from manitwin.assets.audit.finding import Complaint, Rule
 from manitwin.assets.audit.measured import MeasuredAsset
-from manitwin.models.annotators.priors import Interval
+from manitwin.models.annotators.prior_records import Interval
 
 SMALLEST_M, LARGEST_M = 0.001, 2.0
 """Longest sides that nothing else has to speak for: from the smallest parts that robots place to what an arm reaches across."""

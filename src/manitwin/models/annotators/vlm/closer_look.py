@@ -15,7 +15,7 @@ from manitwin.geometry.frames.feature import FramedMesh
 from manitwin.geometry.parts.part_rules import membership
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import farthest_point_sampling
-from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.protocol import CloserPlace, PointsRequest
 from manitwin.models.annotators.vlm.place_checks import PlaceChecks
 from manitwin.models.annotators.vlm.prompt_files import Prompt

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from manitwin.geometry.parts.membership import ROLES
 from manitwin.models.annotators.part_names import roles_named
-from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.protocol import PhysicalEstimates, Subject
 from manitwin.models.annotators.vlm.prompt_files import Prompt
 from manitwin.models.annotators.vlm.question_parts import extents_of, name_line, size_phrase

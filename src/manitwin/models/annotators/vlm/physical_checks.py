@@ -10,7 +10,9 @@ import numpy as np
 from manitwin.config import PhysicalConfig
 from manitwin.errors import Rejected
 from manitwin.geometry.boxes import upright_extents
-from manitwin.models.annotators.priors import HEAVIEST_CONTENTS_KG_M3, Interval, load_materials, lookup
+from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_records import HEAVIEST_CONTENTS_KG_M3, Interval
+from manitwin.models.annotators.priors import load_materials
 from manitwin.models.annotators.protocol import Subject
 from manitwin.models.annotators.vlm.physical import PhysicalAnswer
 from manitwin.models.annotators.walls import is_outer_skin, median_thickness

@@ -11,7 +11,7 @@ import numpy as np
 from manitwin.geometry.parts.shape import LEAST_HANDLE_REACH, Shape, measure_shape
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.symmetry import Symmetries, find_symmetries
-from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.protocol import PointsRequest
 
 FINGERS_BETWEEN_M = 0.02  # how far below the surface fingers may reach from above (Franka hand: finger pads of 18 mm)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manitwin.models.annotators.priors import Prior, lookup
+from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_records import Prior
 
 MOST_OUT_OF_ROUND = 1.3
 """Of a ball's longest side over its shortest, and of a plate's over its second."""

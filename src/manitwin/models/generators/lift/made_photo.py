@@ -13,7 +13,7 @@ from trimesh.visual import TextureVisuals
 from manitwin.errors import Rejected
 from manitwin.formats.glb import write_glb
 from manitwin.geometry.poses import GLTF_TO_OBJECT
-from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name, is_cylinder, why_no_cylinder, why_not_round
 from manitwin.models.generators.lift.lifting import DISC_ELLIPSE_IOU, Lifted, lift
 from manitwin.models.generators.lift.plain_solids import (

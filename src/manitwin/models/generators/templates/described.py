@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manitwin.errors import UsageError
-from manitwin.models.annotators.priors import Prior
+from manitwin.models.annotators.prior_records import Prior
 from manitwin.models.generators.templates.looks import (
     BARE_METALS,
     BASIC_COLORS,

@@ -7,7 +7,7 @@ import trimesh
 from manifold3d import Manifold
 
 from manitwin.geometry.mass_properties import solid_mass_properties
-from manitwin.models.annotators.priors import found_by, word_for
+from manitwin.models.annotators.prior_names import found_by, word_for
 from manitwin.models.generators.templates.known_frames import known_frame
 from manitwin.models.generators.templates.looks import SAID_OF
 from manitwin.models.generators.templates.made import Made, face_parts

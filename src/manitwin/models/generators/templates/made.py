@@ -16,7 +16,7 @@ from manitwin.formats.meshes.textures import srgb_to_linear
 from manitwin.formats.meshes.triangles import with_creased_normals
 from manitwin.geometry.seams import has_three_places
 from manitwin.geometry.solids.parts import PartedMesh
-from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.walls import METALS
 from manitwin.models.generators.templates.capacity import held_m3, scale_with
 from manitwin.models.generators.templates.described import Wish

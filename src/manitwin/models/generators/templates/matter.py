@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from manitwin.models.annotators.priors import Prior, load_materials
+from manitwin.models.annotators.prior_records import Prior
+from manitwin.models.annotators.priors import load_materials
 from manitwin.models.generators.templates.looks import MATERIALS, Look, material_of
 
 NO_MATTER_BEFORE = frozenset(

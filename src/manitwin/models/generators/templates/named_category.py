@@ -9,7 +9,9 @@ from difflib import get_close_matches
 from itertools import pairwise
 
 from manitwin.errors import UsageError
-from manitwin.models.annotators.priors import Prior, load_priors, lookup, named
+from manitwin.models.annotators.prior_names import lookup, named
+from manitwin.models.annotators.prior_records import Prior
+from manitwin.models.annotators.priors import load_priors
 from manitwin.models.generators.templates.described import FILLER_WORDS, PURPOSE, is_described, own_materials
 from manitwin.models.generators.templates.looks import color_of, look_of, material_of
 from manitwin.models.generators.templates.matter import is_food

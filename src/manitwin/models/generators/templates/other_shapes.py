@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from manitwin.models.annotators.priors import singulars
+from manitwin.models.annotators.prior_names import singulars
 from manitwin.models.generators.templates.described import FILLER_WORDS, is_described
 
 

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 
 from manitwin.errors import UsageError
-from manitwin.models.annotators.priors import Prior
+from manitwin.models.annotators.prior_records import Prior
 
 _VOLUMES_M3 = {
     r"millilit(?:re|er)s?|ml": 1e-6, r"centilit(?:re|er)s?|cl": 1e-5, r"decilit(?:re|er)s?|dl": 1e-4,

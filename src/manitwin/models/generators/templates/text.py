@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from manitwin.errors import UsageError
-from manitwin.models.annotators.priors import Prior, load_priors
+from manitwin.models.annotators.prior_records import Prior
+from manitwin.models.annotators.priors import load_priors
 from manitwin.models.annotators.walls import METALS
 from manitwin.models.generators.templates.described import (
     FILLER_WORDS,

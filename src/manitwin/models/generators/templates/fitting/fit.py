@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from manitwin.geometry.solids.shapes import SolidError
-from manitwin.models.annotators.priors import Prior, load_priors, lookup, named
+from manitwin.models.annotators.prior_names import lookup, named
+from manitwin.models.annotators.prior_records import Prior
+from manitwin.models.annotators.priors import load_priors
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.fitting.evidence import Evidence, evidence_of
 from manitwin.models.generators.templates.fitting.least_squares import Placed

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from manitwin.geometry.solids.shapes import SolidError, coarser
-from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.generators.templates.fitting.drawing import edges_between
 from manitwin.models.generators.templates.fitting.view import normalised
 from manitwin.models.generators.templates.template import Template

@@ -1,0 +1,115 @@
+"""Find the prior of what a person calls a thing: by category or alias, in the singular, with words left out."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import cache
+from itertools import combinations
+
+from manitwin.errors import ManiTwinError
+from manitwin.models.annotators.diacritics import without_diacritics
+from manitwin.models.annotators.prior_records import Prior
+from manitwin.models.annotators.priors import load_priors
+
+
+def normalised(name: str) -> str:
+    """Return a name in lower-case Latin letters without marks, punctuation, articles and what follows a comma or bracket."""
+    head = re.split(r"[,(\[;:]", without_diacritics(name), maxsplit=1)[0]
+    words = re.sub(r"[^a-z0-9&+']+", " ", head.replace("’", "'").replace("'s ", " ").replace("'", "")).split()
+    return " ".join(words[1:] if words[:1] in (["a"], ["an"], ["the"]) and len(words) > 1 else words)
+
+
+def singulars(phrase: str) -> Iterator[str]:
+    """Yield the phrase, and what its last word may be the plural of."""
+    yield phrase
+    for plural, singular in (("ives", "ife"), ("aves", "af"), ("ies", "y"), ("oes", "o"), ("s", ""), ("es", "")):
+        if phrase.endswith(plural) and len(phrase) > len(plural) + 1:
+            yield phrase.removesuffix(plural) + singular
+
+
+@cache
+def _index() -> dict[str, Prior]:
+    index: dict[str, Prior] = {}
+    for prior in load_priors().values():
+        for name in (prior.category, *prior.aliases):
+            key = normalised(name)
+            if key in index:
+                raise ManiTwinError(f"priors: {name!r} names both {index[key].category!r} and {prior.category!r}")
+            index[key] = prior
+    return index
+
+
+def named(name: str) -> Prior | None:
+    """Return the prior whose category or alias a name is, whole or in the plural; None where it is no such name."""
+    index = _index()
+    return next((index[phrase] for phrase in singulars(normalised(name)) if phrase in index), None)
+
+
+def lookup(name: str | None) -> Prior | None:
+    """Find the prior of what a person calls a thing; None where the table has no such thing (``found_by``)."""
+    found = found_by(name)
+    return None if found is None else found[0]
+
+
+_MOST_WORDS_BEFORE = 6
+_NO_THING = re.compile(
+    r"[a-z]?\d+[a-z]?|[a-z]|black|white|gr[ae]y|silver|red|green|blue|yellow|orange|brown|pink|purple|beige|small|medium|large"
+)
+
+
+_IMITATIONS = {"toy": "toy", "plush": "stuffed toy", "stuffed": "stuffed toy"}
+"""What a thing is of which one word says that it is made after another: a toy elephant is a toy."""
+
+
+def found_by(name: str | None) -> tuple[Prior, str] | None:
+    """Find the prior of what a person calls a thing, and the words, in the singular, by which it is found.
+
+    Tried in order: the whole name, or an alias of it; the part before 'of', 'with', 'without', 'no', 'for', 'in', 'on' or 'from';
+    the whole again: each as it is, in the singular, and with words dropped from the front ('red coffee mugs' are coffee mugs,
+    which are mugs), and before its last word stands alone with words dropped between ('lego duplo brick' is a lego brick). The
+    last word decides what a thing is: a mug rack is no mug. Where none is found, numbers and colours at
+    the end say nothing ('mug_1' and 'pitcher blue' are a mug and a pitcher), and what is a toy of anything is a toy. File names
+    are never looked up: they are not evidence.
+    """
+    if not name or not (phrase := normalised(name)):
+        return None
+    head = re.split(r" (?:made |full )?(?:of|with|for|in|on|without|no|from) ", phrase, maxsplit=1)[0].split()
+    words = phrase.split()
+    tries = [words, *(head[i:] for i in range(len(head) - 1)), *_words_dropped(head), head[-1:]]
+    tries += [words[i:] for i in range(1, len(words))]
+    while head and _NO_THING.fullmatch(head[-1]):
+        head = head[:-1]
+        tries += [head[i:] for i in range(len(head))]
+    index = _index()
+    for part in tries:
+        for candidate in singulars(" ".join(part)):
+            if candidate in index and index[candidate].category != "unknown":
+                return index[candidate], candidate
+    imitation = next((_IMITATIONS[word] for word in head[:-1] if word in _IMITATIONS), None)
+    return None if imitation is None else (index[imitation], " ".join(head))
+
+
+def _words_dropped(head: list[str]) -> Iterator[list[str]]:
+    """Yield a name with words dropped between two that stay, the last of which is its noun; the most and the nearest first."""
+    *before, noun = head
+    if len(before) > _MOST_WORDS_BEFORE:
+        return
+    for kept in range(len(before) - 1, 0, -1):
+        for places in reversed(list(combinations(range(len(before)), kept))):
+            yield [*(before[place] for place in places), noun]
+
+
+def word_for(prior: Prior, said: str) -> str:
+    """Return what a person calls a thing that was found by these words: a 'coffee mug' is a mug, a 'pan' no frying pan.
+
+    What it is sold in is called so where the words say only what is in it: 'ketchup' is a ketchup bottle.
+    """
+    words, category = said.split(), normalised(prior.category).split()
+    if words[-len(category) :] == category:
+        return prior.category
+    whole = [name for name in (prior.category, *prior.aliases) if " of " not in name]
+    packed = next((name for name in whole if normalised(name).startswith(f"{said} ")), None)
+    if packed is not None:
+        return packed
+    return next((alias for alias in prior.aliases if normalised(alias) == said), said)  # a cook's knife as it is spelt
