@@ -22,6 +22,7 @@ from twin_bench import EXECUTED, TwinBench
 from wrong_goals import CONTROLS, pushed_beside, wrong_goal
 
 from manitwin.episodes.episode import run_episode
+from manitwin.episodes.planning.level_space import kept_level
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import PickPlaceProblem
 from manitwin.episodes.setting import table_setting
@@ -66,6 +67,9 @@ class Bench(TwinBench):
             tuple(furniture_boxes(setting.furniture)),
             seed,
             tuple(box for fixture in setting.fixtures for box in fixture.boxes),
+            level=frozenset(
+                each.name for each in setting.task.objects if kept_level(each, self.pool.body(each.twin_id).opening)
+            ),
         )
         with pushed_beside(skill_name, wrong, rng):
             facts, _ = run_episode(problem, self.planner, self.robot, EpisodeSettings(), goal)
