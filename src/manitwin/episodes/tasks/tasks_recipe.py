@@ -69,7 +69,7 @@ class TasksStage:
     """Draw the tasks of a scene."""
 
     name = "tasks"
-    version = "7"
+    version = "8"
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = (TASKS, COUNTS)
     needs: Resource = "cpu"
