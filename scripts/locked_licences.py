@@ -132,6 +132,7 @@ The set-up does not install them on Linux, and where another tool did, the answe
 CARRIED = {
     "docutils": "the text of the GPL, in its licences; the file under it is not in the wheel",
     "jrl-cmakemodules": "files of CMake under the LGPL, which are run when others are built",
+    "opengl-basisu": "a notice that Zstandard is under BSD or the GPL; it is taken under BSD",
     "lxml": "iconv under the LGPL-2.1",
     "markdown2": "nothing under the GPL; test cases, which are not in the wheel, come from projects under it",
     "matplotlib": "FreeType, under its own licence or the GPL-2.0, by choice",

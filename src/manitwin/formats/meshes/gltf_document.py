@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from manitwin.formats.meshes.gltf_meshopt import MESHOPT, decompressed, is_compressed
-from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.textures import Buffer
+from manitwin.formats.meshes.source import Buffer, MeshSource
 
 # glTF 2.0, section 3.6.2.2
 _DTYPES = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}

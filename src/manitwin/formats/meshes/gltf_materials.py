@@ -9,8 +9,8 @@ from PIL import Image
 from trimesh.visual.material import PBRMaterial
 
 from manitwin.formats.meshes.gltf_document import Accessors
-from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.textures import Buffer, color_of_lost_texture, decode_texture, pbr_material
+from manitwin.formats.meshes.source import Buffer, MeshSource
+from manitwin.formats.meshes.textures import color_of_lost_texture, decode_texture, pbr_material
 
 _NAME_CHARACTERS = 200
 
@@ -70,10 +70,11 @@ class GltfMaterials:
         if texture is None:
             self._source.find("a material names a texture that is not in the file; carried on without it")
             return None
-        webp = texture.get("extensions", {}).get("EXT_texture_webp", {}).get("source")
-        image = texture.get("source", webp)
+        extensions = texture.get("extensions", {})
+        others = (extensions.get(name, {}).get("source") for name in ("EXT_texture_webp", "KHR_texture_basisu"))
+        image = next((each for each in (texture.get("source"), *others) if each is not None), None)
         if image is None:
-            self._source.find("a texture is only there as KTX2 (KHR_texture_basisu) and was left out")
+            self._source.find("a texture names no picture of a kind that is read, and was left out")
             return None
         if image not in self._images:
             self._images[image] = self._image(image)

@@ -16,6 +16,8 @@ from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.printable import printable_line
 from manitwin.formats.source_files import inside_folder, is_regular, spellings
 
+Buffer = bytes | memoryview
+
 _SIMPLIFY = "simplify it, or raise the limit"
 _MESSAGE_CHARACTERS = 400
 _MAX_FINDINGS = 100

@@ -14,9 +14,8 @@ from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from manitwin.errors import InputError
-from manitwin.formats.meshes.source import MeshSource
-
-Buffer = bytes | memoryview
+from manitwin.formats.meshes.ktx2 import is_ktx2, ktx2_image
+from manitwin.formats.meshes.source import Buffer, MeshSource
 
 # what real asset packs use; decoders for other formats of Pillow are not reached from untrusted files
 TEXTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF")
@@ -38,7 +37,8 @@ def decode_texture(data: Buffer, name: str, source: MeshSource) -> Image.Image |
     """
     digest = hashlib.sha256(data).hexdigest()
     if digest not in source.textures:
-        source.textures[digest] = _decoded(data, name if len(name) <= 80 else f"{name[:77]}...", source)
+        decode = ktx2_image if is_ktx2(data) else _decoded
+        source.textures[digest] = decode(data, name if len(name) <= 80 else f"{name[:77]}...", source)
     return source.textures[digest]
 
 
