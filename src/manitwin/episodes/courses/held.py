@@ -35,11 +35,8 @@ YIELDED_S, PRESSED_S = 0.1, 0.2  # after the touch of a blow, and of a press
 RISEN_M = (0.01, 0.03)  # straight up, before the way back
 PUT_BACK_RAD = np.radians([0.0, 45, -45, 90, -90, 135, -135, 180])  # what has turned in the hand comes back as it can
 PEAK_OF_QUINTIC = 1.875  # its largest by its mean speed
-MADE_UP_RAD, MADE_UP_TIMES, MADE_UP_S = (
-    np.radians(4.0),
-    3,
-    0.4,
-)  # what has turned in the hand is turned on to the path's end
+MADE_UP_RAD, MADE_UP_TIMES, MADE_UP_S = np.radians(4.0), 3, 0.4
+"""What has turned in the hand is turned on to the path's end, but for so much, so often and so fast."""
 CREEPS_M = 0.002  # before the touch: as far as things are from where they were measured to be, and a little more
 
 

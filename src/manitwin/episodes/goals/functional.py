@@ -14,9 +14,8 @@ from manitwin.geometry.poses import inverse, transform_points
 
 MOST_SPILT = 0.05
 PRESS_RADIUS_M, PRESS_RAD = 0.012, np.radians(30)
-MOST_PRESSED = (
-    3.0  # of the force that is asked for: what is pressed harder might break, and may be an artefact of the solver
-)
+MOST_PRESSED = 3.0
+"""Of the force that is asked for: what is pressed harder might break, and may be an artefact of the solver."""
 STRIKE_RAD = np.radians(15)
 CORNER_OF_SQUARE = np.sqrt(np.pi / 2)  # 1.25: half a square's diagonal by the radius of the circle with its area
 HANG_SLACK_M = 0.006

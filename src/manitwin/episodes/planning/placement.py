@@ -21,9 +21,8 @@ Placement = tuple[Motion | None, Motion, Motion]
 """Carry (None where the arm is above the goal already), lower and retreat."""
 
 DROP_M = 0.003  # so much higher an object may be let go
-SWAYS_RAD = np.radians(
-    5
-)  # beyond a tilt at the start: an arm's joints do not turn what it holds back on the straightest way
+SWAYS_RAD = np.radians(5)
+"""Beyond a tilt at the start: an arm's joints do not turn what it holds back on the straightest way."""
 SHARES = (0.5, 0.0)  # of the turn that are made up for, where all of it cannot be
 
 

@@ -27,11 +27,8 @@ HIGH_M = 0.10  # the same where a hand that holds the rim comes below it: what i
 ABOVE_M, LOW_FROM_RAD = 0.05, np.radians(50)  # it begins higher: what has turned in the hand is measured on the way
 TILT_RAD, TILTS = np.radians(115), 13
 LEVEL_RAD = np.radians(40)  # a vessel that is a sixth full begins to spill at about 60 degrees, sooner as it is swung
-DEEP, DEEP_TILT_RAD, DEEP_LASTS_S = (
-    3.0,
-    np.radians(135),
-    2.0,
-)  # rim radii: a belly below a neck runs out later, and longer
+DEEP, DEEP_TILT_RAD, DEEP_LASTS_S = 3.0, np.radians(135), 2.0
+"""Rim radii from which on a vessel is deep; a belly below a neck runs out later, and longer."""
 AZIMUTHS = 8
 POURS_S, LASTS_S, LONGEST_S = 2.5, 0.5, 4.0
 MOST_SHARE = 0.8  # of the vessel that is poured into

@@ -27,9 +27,8 @@ TILT_RAD = np.radians([10.0, 25.0])
 LEAST_LEAD_M = 0.0015  # of the corner that presses: where two touch at once, the force is between them, 2 cm off
 TRIED = 24
 TOUCHES = FREE_KNOTS + 2  # the knot at the place's height
-SPEED_M_S = (
-    0.004  # at most; near the place a sixth of it, 0.03 mm between two actions, in which a stiff thing presses 1 N more
-)
+SPEED_M_S = 0.004
+"""At most; near the place a sixth of it, 0.03 mm between two actions, in which a stiff thing presses 1 N more."""
 MORE_N = 3.0  # than is asked for, so that what sags away still leaves enough
 
 
