@@ -1,4 +1,4 @@
-"""Textures in KTX2 files, as glTF's ``KHR_texture_basisu`` has them: decoded by Basis Universal's transcoder where it is there.
+"""Textures in KTX2 files, as glTF's ``KHR_texture_basisu`` has them: a format of Pillow's, whose pixels Basis Universal decodes.
 
 Sources: KTX File Format 2.0, Khronos Group 2021, section 3 (the header); glTF extension KHR_texture_basisu (supercompressed
 colours, first row on top). ``pip install 'manitwin[ktx]'`` installs the transcoder.
@@ -9,49 +9,48 @@ from __future__ import annotations
 import struct
 from importlib.util import find_spec
 
-from PIL import Image
+import numpy as np
+from PIL import Image, ImageFile
 
 from manitwin.formats.isolated import Limits, ProcessCrashed, run_isolated
-from manitwin.formats.meshes.source import Buffer, MeshSource
 
+KTX2 = "KTX2"
 KTX2_MAGIC = b"\xabKTX 20\xbb\r\n\x1a\n"
 INSTALL = "pip install 'manitwin[ktx]'"
 _SIZE_AT = 20
 _LIMITS = Limits(seconds=60.0)
+_BROKEN = "KTX2: its data is broken"
 _OPAQUE = 255
 
 
-def is_ktx2(data: Buffer) -> bool:
-    """Whether a texture's bytes begin as a KTX2 file does."""
-    return bytes(data[: len(KTX2_MAGIC)]) == KTX2_MAGIC
+class Ktx2ImageFile(ImageFile.ImageFile):
+    """A KTX2 file of which only the size is known until its pixels are loaded; then it is a picture of mode RGB or RGBA."""
 
+    format = KTX2
+    format_description = "Khronos texture 2.0"
 
-def ktx2_image(data: Buffer, name: str, source: MeshSource) -> Image.Image | None:
-    """Decode a KTX2 texture to mode RGB or RGBA, or return None with a finding where it cannot be read or is too large.
+    def _open(self) -> None:
+        assert self.fp is not None  # Pillow has opened it
+        head = self.fp.read(_SIZE_AT + 8)
+        if not head.startswith(KTX2_MAGIC) or len(head) < _SIZE_AT + 8:
+            raise SyntaxError("no KTX2 file")  # as Pillow wants it of a file of another format
+        self._size = struct.unpack_from("<II", head, _SIZE_AT)
+        self._mode = "RGBA"
 
-    Raises InputError ``too_large`` where all textures together have too many pixels.
-    """
-    size = _size_of(data)
-    if size is None:
-        source.find(f"texture {name!r} is a broken KTX2 file, and was left out")
-        return None
-    width, height = size
-    if width * height > source.limits.max_texture_pixels:
-        source.find(f"texture {name!r} of {width} x {height} pixels is over the limit and was left out")
-        return None
-    source.count_texture(width * height)
-    if not source.limits.decode_textures:
-        return Image.new("RGB", (width, height))
-    if find_spec("opengl_basisu") is None:
-        source.find(f"texture {name!r} is KTX2, and what reads that is not installed ({INSTALL}); it was left out")
-        return None
-    try:
-        mode, pixels = run_isolated(f"{__name__}:pixels_of", bytes(data), limits=_LIMITS)
-    except (ProcessCrashed, ValueError, MemoryError) as error:
-        cause = str(error) if type(error) is ValueError else "its data is broken"
-        source.find(f"texture {name!r} is a KTX2 file that cannot be decoded ({cause}), and was left out")
-        return None
-    return Image.frombytes(mode, size, pixels)
+    def load(self) -> Image.core.PixelAccess | None:
+        """Decode the largest image in a process of its own; raises ValueError for what the transcoder cannot read."""
+        if find_spec("opengl_basisu") is None:
+            raise ValueError(f"what reads KTX2 is not installed: {INSTALL}")
+        assert self.fp is not None
+        self.fp.seek(0)
+        try:
+            mode, pixels = run_isolated(f"{__name__}:pixels_of", self.fp.read(), limits=_LIMITS)
+        except ProcessCrashed as error:
+            raise ValueError(_BROKEN) from error
+        picture = Image.frombytes(mode, self._size, pixels)
+        # from here on it is that picture, as with Pillow's StubImageFile
+        self.__class__, self.__dict__ = Image.Image, picture.__dict__  # type: ignore[assignment]
+        return self.load()
 
 
 def pixels_of(data: bytes) -> tuple[str, bytes]:
@@ -59,26 +58,22 @@ def pixels_of(data: bytes) -> tuple[str, bytes]:
 
     To be run in a process of its own. Raises ValueError for what the transcoder cannot read.
     """
-    import numpy as np
     import opengl_basisu
 
     try:
         texture = opengl_basisu.open(data)
         pixels = np.asarray(texture.transcode(opengl_basisu.Target.RGBA8).data)
     except opengl_basisu.UnsupportedError:  # whose words name classes of the library
-        raise ValueError("it is not compressed as KHR_texture_basisu has it") from None
+        raise ValueError("KTX2: not compressed as KHR_texture_basisu has it") from None
     except opengl_basisu.BasisuError:
-        raise ValueError("its data is broken") from None
-    if (texture.width, texture.height) != _size_of(data):
-        raise ValueError("its data is broken")
+        raise ValueError(_BROKEN) from None
+    if (texture.width, texture.height) != struct.unpack_from("<II", data, _SIZE_AT):
+        raise ValueError(_BROKEN)
     if (pixels[..., 3] == _OPAQUE).all():
         return "RGB", np.ascontiguousarray(pixels[..., :3]).tobytes()
     return "RGBA", pixels.tobytes()
 
 
-def _size_of(data: Buffer) -> tuple[int, int] | None:
-    """Return the width and height in pixels that the header says; None where there is no header, or no pixel."""
-    if len(data) < _SIZE_AT + 8:
-        return None
-    width, height = struct.unpack_from("<II", data, _SIZE_AT)
-    return (width, height) if width > 0 and height > 0 else None
+def register_ktx2() -> None:
+    """Have Pillow know the format by its first bytes; it is opened only where ``KTX2`` is among the formats asked for."""
+    Image.register_open(KTX2, Ktx2ImageFile, lambda head: head.startswith(KTX2_MAGIC))

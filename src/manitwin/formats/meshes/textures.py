@@ -14,11 +14,12 @@ from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from manitwin.errors import InputError
-from manitwin.formats.meshes.ktx2 import is_ktx2, ktx2_image
+from manitwin.formats.meshes.ktx2 import KTX2, register_ktx2
 from manitwin.formats.meshes.source import Buffer, MeshSource
 
 # what real asset packs use; decoders for other formats of Pillow are not reached from untrusted files
-TEXTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF")
+TEXTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF", KTX2)
+register_ktx2()
 DEFAULT_COLOR = (0.8, 0.8, 0.8)
 """The colour of what has none: the default Kd of OBJ material libraries and of Blender."""
 _MAX_UV = 1e6  # textures may repeat, but not so often
@@ -37,8 +38,7 @@ def decode_texture(data: Buffer, name: str, source: MeshSource) -> Image.Image |
     """
     digest = hashlib.sha256(data).hexdigest()
     if digest not in source.textures:
-        decode = ktx2_image if is_ktx2(data) else _decoded
-        source.textures[digest] = decode(data, name if len(name) <= 80 else f"{name[:77]}...", source)
+        source.textures[digest] = _decoded(data, name if len(name) <= 80 else f"{name[:77]}...", source)
     return source.textures[digest]
 
 

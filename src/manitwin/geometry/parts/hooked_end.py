@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 _SLICES = 32
-_HOOK_SHARE, _MIDDLE_SHARE = (
-    0.15,
-    0.2,
-)  # of the length: an end that may be a hook, and what is to either side of the middle
+_HOOK_SHARE = 0.15  # of the length: an end that may be a hook
+_MIDDLE_SHARE = 0.2  # of the length: the shaft to either side of its middle
 _BENT = 0.25  # of its width: how far a hook's middle is from the line of the shaft that goes into one side of it
 
 
