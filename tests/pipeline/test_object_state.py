@@ -12,7 +12,7 @@ from PIL import Image
 from manitwin.formats.glb import write_glb
 from manitwin.formats.meshes.textures import make_part, pbr_material
 from manitwin.pipeline import object_state
-from manitwin.pipeline.object_state import KEPT, load_solid, load_visual
+from manitwin.pipeline.object_state import KEPT, let_go_of_textures, load_solid, load_visual
 from manitwin.render.surfaces import plain_part
 
 
@@ -67,3 +67,17 @@ def test_large_textures_make_room_before_meshes_do(tmp_path: Path, monkeypatch: 
     monkeypatch.setattr(object_state, "MOST_TEXTURE_PIXELS", 0)
     (last,) = load_visual(paths[2])
     assert load_visual(paths[2])[0] is last, "the mesh that was loaded last is kept whatever it has"
+
+
+def test_textures_are_let_go_before_the_next_thing_is_read_and_what_is_plain_stays(tmp_path: Path) -> None:
+    box, paths = trimesh.creation.box((0.1, 0.1, 0.1)), (tmp_path / "textured.glb", tmp_path / "plain.glb")
+    material = pbr_material(base_color_texture=Image.new("RGB", (8, 8), (9, 90, 0)))
+    parts = (
+        make_part(box.vertices, box.faces, material=material, name="box", uv=box.vertices[:, :2]),
+        plain_part(box, (9, 9, 9)),
+    )
+    for path, part in zip(paths, parts, strict=True):
+        path.write_bytes(write_glb([part]))
+    textured, plain = (load_visual(path)[0] for path in paths)
+    let_go_of_textures()
+    assert load_visual(paths[1])[0] is plain and load_visual(paths[0])[0] is not textured

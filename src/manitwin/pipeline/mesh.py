@@ -28,7 +28,7 @@ from manitwin.geometry.repair.components import connected_parts
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.prior_records import Prior
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.object_state import object_name
+from manitwin.pipeline.object_state import let_go_of_textures, object_name
 from manitwin.twin.import_record import ImportRecord, read_import_record
 
 _GENERATED = "generated.glb"
@@ -58,6 +58,7 @@ class MeshStage:
         """
         generated = _GENERATED in draft.paths
         path = _input_path(draft, generated)
+        let_go_of_textures()
         file = read_mesh(path, limits=self._limits())
         prior = lookup(object_name(draft))
         unit = _unit(file, draft, generated, prior)

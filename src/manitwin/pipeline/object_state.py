@@ -26,8 +26,9 @@ from manitwin.render.cameras import Camera
 from manitwin.twin.grasp_table import JOINTS
 from manitwin.twin.import_record import ImportRecord, read_import_record
 
-KEPT = 4
-"""A worker has the stages of so many items in turn where two work: of each of two, one is done and one waits beside it."""
+KEPT = 3
+"""A worker has the stages of so many items in turn where two work: of each of two, one is done and one waits beside it;
+one more would spare a worker a few loads, and costs it 10 MB."""
 MOST_TEXTURE_PIXELS = 9_000_000
 """Of all that are kept, two scans' textures, 17 MB each; the mesh that was loaded last is kept whatever it has."""
 _meshes: dict[str, OrderedDict[bytes, tuple[list[int], list[trimesh.Trimesh]]]] = {
@@ -62,6 +63,13 @@ def _loaded(kind: str, path: Path, read: Callable[[bytes], list[trimesh.Trimesh]
     while len(known) > KEPT or (len(known) > 1 and _texture_pixels(known.values()) > MOST_TEXTURE_PIXELS):
         known.popitem(last=False)
     return meshes
+
+
+def let_go_of_textures() -> None:
+    """Forget the meshes with textures: of the next thing whole pictures are read, four times as large as those of most twins."""
+    known = _meshes["visual"]
+    for digest in [digest for digest, each in known.items() if _texture_pixels([each])]:
+        del known[digest]
 
 
 def _texture_pixels(kept: Iterable[tuple[list[int], list[trimesh.Trimesh]]]) -> int:

@@ -31,7 +31,7 @@ class ViewsStage:
     """
 
     name: ClassVar[str] = "views"
-    version: ClassVar[str] = "4"
+    version: ClassVar[str] = "5"
     reads: ClassVar[tuple[str, ...]] = ("canonical.glb",)
     writes: ClassVar[tuple[str, ...]] = ("views/", "cameras")
     needs: ClassVar[Resource] = "cpu"

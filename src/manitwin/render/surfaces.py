@@ -17,7 +17,7 @@ from PIL import Image
 from manitwin.formats.meshes.textures import make_part, material_of, pbr_material, uv_of
 from manitwin.formats.meshes.triangles import with_creased_normals
 
-MAX_TEXTURE_PX = 2048  # twice the largest picture made here; more only costs time and aliases
+MAX_TEXTURE_PX = 2048  # more only costs time and aliases
 SPECULAR = 0.5  # reflectance of a dielectric at 0.5 * 0.08 = 4 %, the default of glTF 2.0 (index of refraction 1.5)
 
 
@@ -42,18 +42,19 @@ class RenderSurface:
     roughness_map: np.ndarray | None
 
 
-def render_surface(part: trimesh.Trimesh) -> RenderSurface:
+def render_surface(part: trimesh.Trimesh, *, most_texture_px: int = MAX_TEXTURE_PX) -> RenderSurface:
     """Read a visual part as ``formats.glb.read_glb`` gives it; raises TypeError for a mesh without a PBRMaterial.
 
-    Every face comes twice, from either side: SAPIEN culls back faces, and open sheets would vanish from behind.
+    Textures have at most ``most_texture_px`` a side. Every face comes twice, from either side: SAPIEN culls back faces, and
+    open sheets would vanish from behind.
     """
     material, uv = material_of(part), uv_of(part)
     factor = np.asarray(material.baseColorFactor)[:3] / 255
     color_map = mask = None
     if uv is not None and material.baseColorTexture is not None:
-        color_map = _tinted(shrunk(_rgb(material.baseColorTexture), MAX_TEXTURE_PX), factor)
+        color_map = _tinted(shrunk(_rgb(material.baseColorTexture), most_texture_px), factor)
     if uv is not None and material.metallicRoughnessTexture is not None:
-        mask = shrunk(_rgb(material.metallicRoughnessTexture), MAX_TEXTURE_PX)
+        mask = shrunk(_rgb(material.metallicRoughnessTexture), most_texture_px)
     metallic, roughness = float(material.metallicFactor), float(material.roughnessFactor)
     vertices, faces, normals = np.asarray(part.vertices), np.asarray(part.faces), np.asarray(part.vertex_normals)
     uv_down = np.zeros((len(vertices), 2)) if uv is None else uv * [1, -1] + [0, 1]
