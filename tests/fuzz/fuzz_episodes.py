@@ -11,8 +11,9 @@ from lerobot_sets import written
 from synthetic_episodes import attempt, episode, with_granules
 
 from manitwin.episodes.attempts import read_attempts, success_of, write_attempts
-from manitwin.episodes.hdf5_file import EpisodeFile, checked, write_episodes
+from manitwin.episodes.hdf5_file import EpisodeFile, write_episodes
 from manitwin.episodes.lerobot.read import read_lerobot
+from manitwin.episodes.recording_arrays import checked
 from manitwin.errors import EpisodesError
 from manitwin.web.episode_document import episode_document
 from manitwin.web.episode_folders import EpisodeFolders

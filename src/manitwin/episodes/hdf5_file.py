@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator
-from dataclasses import fields
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -21,6 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, TypeAdapter, Val
 from manitwin.episodes.attempts import Attempt, attempt_from
 from manitwin.episodes.handled_objects import handled_objects
 from manitwin.episodes.recording import RATE_HZ, Recording, joint_delta, tip_delta, tip_poses
+from manitwin.episodes.recording_arrays import GRANULES, LITERAL, checked
 from manitwin.episodes.stored_episode import (
     RecordedArm,
     RecordedObject,
@@ -48,20 +48,6 @@ EXTRA = "manitwin"
 
 _NAME = r"^[0-9A-Za-z_-][0-9A-Za-z_. -]*$"
 """What can be the name of a group in the file, and of a twin's folder."""
-
-_KINDS: dict[str, type] = {
-    "phase": np.uint8, "target_on_support": bool, "unplanned_contact": bool, "granules_in_objects": np.int16,
-    "active_literal": np.uint8,
-}  # fmt: skip
-"""All other arrays are float32."""
-
-_GRANULES = ("granule_positions_m", "granules_in_objects")
-"""Only of episodes that have granules."""
-
-_LITERAL = "active_literal"
-"""Only of goals of several literals."""
-
-_OF_ACTIONS = ("phase", _LITERAL)
 
 _COMPRESSED_BYTES = 512
 """Smaller arrays are stored as they are: they would not get smaller."""
@@ -213,9 +199,7 @@ def _write(group: h5py.Group, episode: StoredEpisode) -> None:
         f"{EXTRA}/action_joint_delta": joint_delta(recording),
         f"{EXTRA}/action_tip_delta": tip_delta(recording),
         **{
-            f"{EXTRA}/{name}": found
-            for name in (*_GRANULES, _LITERAL)
-            if (found := getattr(recording, name)) is not None
+            f"{EXTRA}/{name}": found for name in (*GRANULES, LITERAL) if (found := getattr(recording, name)) is not None
         },
     }
     for name, array in arrays.items():
@@ -272,12 +256,12 @@ def _read(content: Hdf5, group: str, said: dict[str, Any], where: str) -> Stored
     extra = {name: array(f"{EXTRA}/{name}") for name in ("phase", "target_on_support", "unplanned_contact")}
     extra["finger_forces_n"] = array(f"{EXTRA}/finger_forces_n", 2 * arms)
     if has_granules(content, group):
-        extra |= {name: content.array(f"{group}/{EXTRA}/{name}") for name in _GRANULES}
-        middles, held = (extra[name].shape for name in _GRANULES)
+        extra |= {name: content.array(f"{group}/{EXTRA}/{name}") for name in GRANULES}
+        middles, held = (extra[name].shape for name in GRANULES)
         if len(middles) != 3 or middles[::2] != (len(states), 3) or held != states.shape[:2]:
             raise EpisodesError(f"{where}: granules have the shapes {middles} and {held}; {_REMEDY}")
-    if content.has(f"{group}/{EXTRA}/{_LITERAL}"):
-        extra[_LITERAL] = array(f"{EXTRA}/{_LITERAL}")
+    if content.has(f"{group}/{EXTRA}/{LITERAL}"):
+        extra[LITERAL] = array(f"{EXTRA}/{LITERAL}")
     recording = Recording(
         target=said["target"],
         joint_positions_rad=positions[:, :arm],
@@ -300,58 +284,4 @@ def _read(content: Hdf5, group: str, said: dict[str, Any], where: str) -> Stored
 
 def has_granules(content: Hdf5, group: str) -> bool:
     """Tell whether a trajectory of a file has granules."""
-    return content.has(f"{group}/{EXTRA}/{_GRANULES[1]}")
-
-
-def checked(episode: StoredEpisode) -> Recording:
-    """Return the recording with the types of the file: float32, phases uint8, flags bool.
-
-    Raises EpisodesError where shapes do not fit together, a number is not finite, or the target is none of the objects.
-    """
-    recording, name = episode.recording, episode.attempt.episode_id
-    steps, things = recording.steps, len(episode.objects)
-    if steps == 0 or not 0 <= recording.target < things:
-        raise EpisodesError(
-            f"episode {name}: {steps} steps, target {recording.target} of {things} objects; record it again"
-        )
-    arrays: dict[str, Any] = {}
-    for entry in fields(Recording):
-        if entry.name == "target":
-            continue
-        if entry.name in (*_GRANULES, _LITERAL) and getattr(recording, entry.name) is None:
-            continue
-        array = np.asarray(getattr(recording, entry.name))
-        rows = steps if entry.name.startswith("action_") or entry.name in _OF_ACTIONS else steps + 1
-        shape = (rows, *_widths(episode.robot, things, recording).get(entry.name, ()))
-        if array.shape != shape:
-            raise EpisodesError(
-                f"episode {name}: {entry.name} has the shape {array.shape}, not {shape}; record it again"
-            )
-        kind = _KINDS.get(entry.name, np.float32)
-        if kind is np.float32 and not np.isfinite(array).all():
-            raise EpisodesError(f"episode {name}: {entry.name} is not finite; record it again")
-        arrays[entry.name] = array.astype(kind)
-    return Recording(target=recording.target, **arrays)
-
-
-def _widths(robot: RecordedRobot, things: int, recording: Recording) -> dict[str, tuple[int, ...]]:
-    arm, arms = len(robot.arm_joints), robot.arm_count
-    positions = recording.granule_positions_m
-    return {
-        "granule_positions_m": () if positions is None else (*positions.shape[1:2], 3),
-        "granules_in_objects": (things,),
-        "joint_positions_rad": (arm,),
-        "joint_velocities_rad_s": (arm,),
-        "tip_position_m": (3 * arms,),
-        "tip_quaternion_wxyz": (4 * arms,),
-        "object_positions_m": (things, 3),
-        "object_quaternions_wxyz": (things, 4),
-        "object_linear_velocities_m_s": (things, 3),
-        "object_angular_velocities_rad_s": (things, 3),
-        "finger_forces_n": (2 * arms,),
-        "hand": (len(robot.hand_state),),
-        "action_hand": (len(robot.hand_action),),
-        "action_joint_positions_rad": (arm,),
-        "action_tip_position_m": (3 * arms,),
-        "action_tip_quaternion_wxyz": (4 * arms,),
-    }
+    return content.has(f"{group}/{EXTRA}/{GRANULES[1]}")

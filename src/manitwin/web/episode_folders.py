@@ -14,8 +14,9 @@ from manitwin.episodes.batch import BATCHES
 from manitwin.episodes.collect import MANISKILL, batch_folders
 from manitwin.episodes.configuration import read_configuration
 from manitwin.episodes.episodes_stage import EPISODES
-from manitwin.episodes.hdf5_file import EpisodeFile, checked
+from manitwin.episodes.hdf5_file import EpisodeFile
 from manitwin.episodes.hdf5_merge import TRAJECTORIES
+from manitwin.episodes.recording_arrays import checked
 from manitwin.episodes.stored_episode import RecordedRobot, StoredEpisode, recorded_robot
 from manitwin.errors import ConfigError, EpisodesError, ManiTwinError, UsageError
 from manitwin.formats.printable import printable_line
