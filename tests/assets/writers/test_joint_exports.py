@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
+from lxml import etree
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
@@ -20,6 +22,7 @@ from manitwin.geometry.articulation import link_motions
 from manitwin.geometry.poses import transform_points
 from manitwin.twin.loaded_twin import Twin
 
+WITH_JOINTS = ("urdf", "mjcf", "sdf")
 POSITIONS = [(0.35, 0.02), (0.0, 0.0), (-0.4, 0.06), (1.1, -0.01), (0.7, 0.03)]
 
 
@@ -31,7 +34,7 @@ def twin(tmp_path_factory: pytest.TempPathFactory) -> Twin:
 @pytest.fixture(scope="module")
 def exports(twin: Twin, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     out = tmp_path_factory.mktemp("exports")
-    return {name: export_twin(TwinContent.of(twin), name, out) for name in ("urdf", "mjcf")}
+    return {name: export_twin(TwinContent.of(twin), name, out) for name in WITH_JOINTS}
 
 
 def wanted(twin: Twin, positions: tuple[float, float]) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -104,7 +107,7 @@ def test_pybullet_has_the_links_where_the_twin_has_them(
         pybullet.disconnect(client)
 
 
-@pytest.mark.parametrize("format", ["urdf", "mjcf"])
+@pytest.mark.parametrize("format", WITH_JOINTS)
 def test_what_goes_out_comes_in_again(twin: Twin, exports: dict[str, Path], format: str) -> None:
     asset = read_asset(exports[format], joints="keep")
     assert asset.articulation is not None
@@ -117,7 +120,8 @@ def test_what_goes_out_comes_in_again(twin: Twin, exports: dict[str, Path], form
         assert (mine.name, mine.kind, mine.lower, mine.upper) == (
             other.name, other.kind, pytest.approx(other.lower), pytest.approx(other.upper)
         )  # fmt: skip
-    standing = link_motions(ours, [joint.stands_at for joint in theirs])  # a URDF stands at 0
+        assert (other.damping, other.friction) == pytest.approx((mine.damping, mine.friction))
+    standing = link_motions(ours, [joint.stands_at for joint in theirs])  # a URDF and an SDF stand at 0
     centers = [transform_points(m, link.center_of_mass_m[None])[0] for m, link in
                zip(link_motions(ours, at), twin.articulated_body().links, strict=True)]  # fmt: skip
     again = [transform_points(m, np.asarray(link.inertial.center_of_mass_m)[None])[0] for m, link in
@@ -132,14 +136,17 @@ def test_other_formats_say_that_joints_are_not_in_them(twin: Twin, tmp_path: Pat
         main = export_twin(content, name, tmp_path, on_locked=locked.append)
         folder = tmp_path / content.name / name
         said = "its 2 joints: it is one rigid body as the twin stands" in (folder / "README.md").read_text()
-        assert said == (name not in ("urdf", "mjcf")) and main.is_file()
-    assert locked == [name for name in formats() if name not in ("urdf", "mjcf")]
+        assert said == (name not in WITH_JOINTS) and main.is_file()
+    assert locked == [name for name in formats() if name not in WITH_JOINTS]
 
 
 def test_the_command_says_in_one_line_what_went_out_without_joints(twin: Twin, tmp_path: Path) -> None:
-    done = CliRunner().invoke(app, ["export", str(twin.folder), "--to", "urdf,sdf,glb", "-o", str(tmp_path)])
+    done = CliRunner().invoke(app, ["export", str(twin.folder), "--to", "urdf,usd,glb", "-o", str(tmp_path)])
     line = " ".join(done.output.split())
-    assert done.exit_code == 0 and "without its joints, as one rigid body, in sdf, glb; mjcf and urdf have them" in line
+    assert (
+        done.exit_code == 0
+        and "without its joints, as one rigid body, in usd, glb; mjcf, urdf and sdf have them" in line
+    )
 
 
 def test_each_link_has_its_own_meshes(exports: dict[str, Path]) -> None:
@@ -149,3 +156,17 @@ def test_each_link_has_its_own_meshes(exports: dict[str, Path]) -> None:
     shown = [model.geom_bodyid[geom] for geom in range(model.ngeom) if not model.geom_contype[geom]]
     felt = [model.geom_bodyid[geom] for geom in range(model.ngeom) if model.geom_contype[geom]]
     assert shown == felt == [1, 2, 3]
+
+
+def test_sdf_has_no_joint_of_a_links_name(twin: Twin, tmp_path: Path) -> None:
+    links, joints = twin.record.links, twin.record.joints
+    names = (links[1].name, f"{links[1].name}_joint")
+    renamed = [joint.model_copy(update={"name": name}) for joint, name in zip(joints, names, strict=True)]
+    content = TwinContent.of(twin)
+    content = replace(content, record=twin.record.model_copy(update={"joints": renamed}))
+    main = export_twin(content, "sdf", tmp_path)
+    model = etree.parse(main).getroot().find("model")
+    assert model is not None
+    said = [each.get("name") for each in (*model.findall("link"), *model.findall("joint"))]
+    assert len(set(said)) == len(said) and said[-2:] == [f"{links[1].name}_joint_joint", names[1]]
+    assert f"{names[0]} is {names[0]}_joint_joint" in (main.parents[1] / "README.md").read_text()

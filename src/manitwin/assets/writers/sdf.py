@@ -1,4 +1,4 @@
-"""SDFormat 1.9: a model folder as Gazebo's resource path takes it, with ``model.config``.
+"""SDFormat 1.9: a model folder as Gazebo's resource path takes it, with ``model.config``; the links and joints of a twin too.
 
 Written after the specification (sdformat.org/spec, version 1.9). Paths of meshes are relative to the file: ``model://`` would
 need the resource path also where only the file is loaded.
@@ -6,16 +6,27 @@ need the resource path also where only the file is loaded.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import PurePosixPath
 
+import numpy as np
 from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.assets.writers.exporter import Exported, TwinContent
 from manitwin.assets.writers.licenses import UNKNOWN, license_of, provenance_lines
-from manitwin.assets.writers.mass_properties import PHYSICS_FILE, TwinInertial, inertial_of, physics_file
-from manitwin.assets.writers.mesh_files import hull_files, lost_maps, visual_parts
+from manitwin.assets.writers.mass_properties import (
+    PHYSICS_FILE,
+    TwinInertial,
+    inertial_of,
+    inertial_of_link,
+    physics_file,
+)
+from manitwin.assets.writers.mesh_files import VisualPart, hull_files, lost_maps, visual_parts
 from manitwin.formats.markdown import one_line
 from manitwin.formats.xml_file import add, document, new_element, number_text
+from manitwin.geometry.articulation import ArticulatedJoint
+from manitwin.robots.urdf import roll_pitch_yaw
+from manitwin.twin.loaded_links import joints_of
 
 VERSION = "1.9"
 MESHES = "meshes"
@@ -29,16 +40,11 @@ def export(twin: TwinContent) -> Exported:
     parts, hulls = visual_parts(twin, MESHES), hull_files(twin, MESHES)
     root = new_element("sdf", version=VERSION)
     model = add(root, "model", name=twin.name)
-    link = add(model, "link", name=twin.name)
-    _add_inertial(link, inertial_of(twin))
-    for part in parts:
-        visual = _add_shape(link, "visual", part.mesh)
-        if part.texture is None:
-            material = add(visual, "material")
-            for tag in ("ambient", "diffuse"):
-                add(material, tag, number_text(*part.rgba))
-    for hull in hulls:
-        _add_surface(_add_shape(link, "collision", hull), twin)
+    if twin.record.links:
+        _add_links(model, twin, parts, list(hulls))
+    else:
+        link = add(model, "link", name=twin.name)
+        _fill_link(link, twin, inertial_of(twin), parts, hulls, np.zeros(3))
     files = {
         "model.sdf": document(root, provenance_lines(twin.record)),
         "model.config": _model_config(twin),
@@ -53,14 +59,100 @@ def export(twin: TwinContent) -> Exported:
             f"dynamic friction: mu and mu2 are the static coefficient in two directions; {PHYSICS_FILE} has both.",
             "how the friction of two bodies is combined: ODE and DART take the smaller of the two, Bullet the product.",
             "that a collision mesh is convex: the attribute for it came with SDFormat 1.11; every one here is.",
+            *_renamed(twin),
             *lost_maps(twin),
         ),
+        joints=True,
     )
 
 
-def _add_inertial(link: etree._Element, inertial: TwinInertial) -> None:
+def _add_links(model: etree._Element, twin: TwinContent, parts: tuple[VisualPart, ...], hulls: list[str]) -> None:
+    """Add every link in the frame of the joint that holds it, which has its origin and the axes of the object frame.
+
+    A link's pose is the one with all joints at 0, relative to the link that holds it.
+    """
+    record, joints = twin.record, joints_of(twin.record)
+    origins = [np.zeros(3), *(joint.origin_m for joint in joints)]
+    for place, said in enumerate(record.links):
+        link = add(model, "link", name=said.name)
+        if place > 0:
+            joint = joints[place - 1]
+            _add_pose_at_zero(link, joint, record.links[joint.parent].name, origins[joint.parent])
+        own = [part for part, of in zip(parts, twin.link_of_visual, strict=True) if of == place]
+        felt = [hulls[number] for number in said.hulls]
+        _fill_link(link, twin, inertial_of_link(twin, said), own, felt, origins[place])
+    for joint, name in zip(joints, joint_names(twin), strict=True):
+        _add_joint(model, joint, name, record.links[joint.parent].name, record.links[joint.child].name)
+
+
+def _add_pose_at_zero(link: etree._Element, joint: ArticulatedJoint, parent: str, parent_origin_m: np.ndarray) -> None:
+    at_zero = joint.motion(0.0)
+    origin_m = at_zero[:3, :3] @ joint.origin_m + at_zero[:3, 3] - parent_origin_m
+    pose = add(link, "pose", number_text(*origin_m, *roll_pitch_yaw(at_zero[:3, :3])))
+    pose.set("relative_to", parent)
+
+
+def _renamed(twin: TwinContent) -> list[str]:
+    pairs = zip(twin.record.joints, joint_names(twin), strict=True)
+    changed = [f"{joint.name} is {name}" for joint, name in pairs if name != joint.name]
+    return [f"joints called as links are: {', '.join(changed)}."] if changed else []
+
+
+def joint_names(twin: TwinContent) -> list[str]:
+    """Return the names of a twin's joints; one that a link has too ends in ``_joint``: SDFormat has one scope for both."""
+    taken = {link.name for link in twin.record.links} | {joint.name for joint in twin.record.joints}
+    links, names = {link.name for link in twin.record.links}, []
+    for joint in twin.record.joints:
+        name = joint.name
+        while name in links or (name != joint.name and name in taken):
+            name += "_joint"
+        taken.add(name)
+        names.append(name)
+    return names
+
+
+def _add_joint(model: etree._Element, joint: ArticulatedJoint, name: str, parent: str, child: str) -> None:
+    """Add a joint in its child's frame, which is where a joint without a pose is."""
+    element = add(model, "joint", name=name, type=joint.kind)
+    add(element, "parent", parent)
+    add(element, "child", child)
+    axis = add(element, "axis")
+    add(axis, "xyz", number_text(*joint.axis))
+    said = {"lower": joint.lower, "upper": joint.upper, "effort": joint.effort, "velocity": joint.velocity}
+    limits = {name: value for name, value in said.items() if value is not None}
+    if limits:
+        limit = add(axis, "limit")
+        for name, value in limits.items():
+            add(limit, name, number_text(value))
+    if joint.damping or joint.friction:
+        dynamics = add(axis, "dynamics")
+        add(dynamics, "damping", number_text(joint.damping))
+        add(dynamics, "friction", number_text(joint.friction))
+
+
+def _fill_link(
+    link: etree._Element,
+    twin: TwinContent,
+    inertial: TwinInertial,
+    parts: Iterable[VisualPart],
+    hulls: Iterable[str],
+    origin_m: np.ndarray,
+) -> None:
+    """Fill a link whose frame has its origin at ``origin_m`` in the object frame; its meshes are in the object frame."""
+    _add_inertial(link, inertial, origin_m)
+    for part in parts:
+        visual = _add_shape(link, "visual", part.mesh, origin_m)
+        if part.texture is None:
+            material = add(visual, "material")
+            for tag in ("ambient", "diffuse"):
+                add(material, tag, number_text(*part.rgba))
+    for hull in hulls:
+        _add_surface(_add_shape(link, "collision", hull, origin_m), twin)
+
+
+def _add_inertial(link: etree._Element, inertial: TwinInertial, origin_m: np.ndarray) -> None:
     element = add(link, "inertial")
-    add(element, "pose", f"{number_text(*inertial.center_of_mass_m)} 0 0 0")
+    add(element, "pose", f"{number_text(*(inertial.center_of_mass_m - origin_m))} 0 0 0")
     add(element, "mass", number_text(inertial.mass_kg))
     tensor = add(element, "inertia")
     for i in range(3):
@@ -68,9 +160,9 @@ def _add_inertial(link: etree._Element, inertial: TwinInertial) -> None:
             add(tensor, f"i{'xyz'[i]}{'xyz'[j]}", number_text(inertial.inertia_kg_m2[i, j]))
 
 
-def _add_shape(link: etree._Element, tag: str, mesh: str) -> etree._Element:
+def _add_shape(link: etree._Element, tag: str, mesh: str, origin_m: np.ndarray) -> etree._Element:
     element = add(link, tag, name=PurePosixPath(mesh).stem)
-    add(element, "pose", STILL)
+    add(element, "pose", f"{number_text(*-origin_m)} 0 0 0" if origin_m.any() else STILL)
     add(add(add(element, "geometry"), "mesh"), "uri", mesh)
     return element
 

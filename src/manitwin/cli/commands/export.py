@@ -138,7 +138,9 @@ def _export(
             print_error(f"{name}: {error}")
     out_console.print(f"{content.name}: {', '.join(written) or 'nothing'}")
     if locked:
-        out_console.print(f"  without its joints, as one rigid body, in {', '.join(locked)}; mjcf and urdf have them")
+        out_console.print(
+            f"  without its joints, as one rigid body, in {', '.join(locked)}; mjcf, urdf and sdf have them"
+        )
     return len(written) == len(formats)
 
 
