@@ -62,7 +62,7 @@ def load_scene(scene: str | Path, dataset: str | Path | None = None) -> Scene:
 
 
 def export_scene(scene: Scene | str | Path, to: str | Iterable[str], out: str | Path) -> dict[str, Path]:
-    """Write a scene in formats (``"mjcf"``, ``["mjcf", "usd"]``, ``"all"``) below ``out``; return the file to open of each.
+    """Write a scene in formats (``"mjcf"``, ``["sdf", "usd"]``, ``"all"``) below ``out``; return the file to open of each.
 
     An earlier export there is replaced. Raises UsageError for an unknown format and a scene or twin that is not there,
     ExportError for what cannot be written.
@@ -70,9 +70,10 @@ def export_scene(scene: Scene | str | Path, to: str | Iterable[str], out: str | 
     from manitwin.assets.writers.write import write_exported
     from manitwin.errors import choose_from
     from manitwin.scenes.layouts.export_mjcf import export_mjcf
+    from manitwin.scenes.layouts.export_sdf import export_sdf
     from manitwin.scenes.layouts.export_usd import export_usd
 
-    exporters = {"mjcf": export_mjcf, "usd": export_usd}
+    exporters = {"mjcf": export_mjcf, "sdf": export_sdf, "usd": export_usd}
     asked = [to] if isinstance(to, str) else list(to)
     names = list(exporters) if "all" in asked else asked
     for name in names:

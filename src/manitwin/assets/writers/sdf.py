@@ -32,6 +32,10 @@ VERSION = "1.9"
 MESHES = "meshes"
 STILL = "0 0 0 0 0 0"
 BOUNCE_THRESHOLD_M_S = 0.0  # the specification's default, 100 km/s, would keep restitution from ever acting
+CANNOT_SAY = (
+    "how the friction of two bodies is combined: ODE and DART take the smaller of the two, Bullet the product.",
+    "that a collision mesh is convex: the attribute for it came with SDFormat 1.11; every one here is.",
+)
 FRICTION = {"ode": ("mu", "mu2"), "bullet": ("friction", "friction2")}  # DART takes ODE's
 
 
@@ -43,8 +47,7 @@ def export(twin: TwinContent) -> Exported:
     if twin.record.links:
         _add_links(model, twin, parts, list(hulls))
     else:
-        link = add(model, "link", name=twin.name)
-        _fill_link(link, twin, inertial_of(twin), parts, hulls, np.zeros(3))
+        add_body(model, twin, parts, hulls)
     files = {
         "model.sdf": document(root, provenance_lines(twin.record)),
         "model.config": _model_config(twin),
@@ -57,13 +60,18 @@ def export(twin: TwinContent) -> Exported:
         main=f"{twin.name}/model.sdf",
         cannot_say=(
             f"dynamic friction: mu and mu2 are the static coefficient in two directions; {PHYSICS_FILE} has both.",
-            "how the friction of two bodies is combined: ODE and DART take the smaller of the two, Bullet the product.",
-            "that a collision mesh is convex: the attribute for it came with SDFormat 1.11; every one here is.",
+            *CANNOT_SAY,
             *_renamed(twin),
             *lost_maps(twin),
         ),
         joints=True,
     )
+
+
+def add_body(model: etree._Element, twin: TwinContent, parts: Iterable[VisualPart], hulls: Iterable[str]) -> None:
+    """Add a twin as one rigid body to a model, with the meshes of ``parts`` and ``hulls``; raises ExportError as ``export``."""
+    link = add(model, "link", name=twin.name)
+    _fill_link(link, twin, inertial_of(twin), parts, hulls, np.zeros(3))
 
 
 def _add_links(model: etree._Element, twin: TwinContent, parts: tuple[VisualPart, ...], hulls: list[str]) -> None:
@@ -169,15 +177,21 @@ def _add_shape(link: etree._Element, tag: str, mesh: str, origin_m: np.ndarray) 
 
 def _add_surface(collision: etree._Element, twin: TwinContent) -> None:
     friction = twin.physical.friction_static.value
+    surface = add_friction(collision, friction)
+    bounce = add(surface, "bounce")
+    add(bounce, "restitution_coefficient", number_text(twin.physical.restitution.value))
+    add(bounce, "threshold", number_text(BOUNCE_THRESHOLD_M_S))
+
+
+def add_friction(collision: etree._Element, friction: float) -> etree._Element:
+    """Add a surface of one coefficient of friction to a collision, for ODE, DART and Bullet; returns it."""
     surface = add(collision, "surface")
     engines = add(surface, "friction")
     for engine, tags in FRICTION.items():
         element = add(engines, engine)
         for tag in tags:
             add(element, tag, number_text(friction))
-    bounce = add(surface, "bounce")
-    add(bounce, "restitution_coefficient", number_text(twin.physical.restitution.value))
-    add(bounce, "threshold", number_text(BOUNCE_THRESHOLD_M_S))
+    return surface
 
 
 def _model_config(twin: TwinContent) -> bytes:

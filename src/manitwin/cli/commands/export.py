@@ -36,7 +36,7 @@ def export(
         typer.Option(help="Licences that may go out, by commas (CC-BY-4.0,CC0-1.0); default: any, also 'unknown'."),
     ] = None,
 ) -> None:
-    """Write twins as MJCF, URDF, SDF, USD and GLB, and for RoboTwin, ManiSkill, Isaac Lab and graspers; scenes as MJCF, USD."""
+    """Write twins as MJCF, URDF, SDF, USD, GLB, and for RoboTwin, ManiSkill, Isaac Lab and graspers; scenes as MJCF, SDF, USD."""
     from manitwin.assets.writers.licenses import allowed_licenses
     from manitwin.assets.writers.registry import chosen_formats
     from manitwin.errors import UsageError
