@@ -312,6 +312,13 @@ def test_what_loaders_take_beside_the_specification_is_read_and_said(tmp_path: P
     assert len(balls.visual) == 1 and balls.partial and balls.lenient == ()
 
 
+def test_a_colour_of_more_than_four_numbers_is_that_of_the_first_four_and_said(tmp_path: Path) -> None:
+    visual = f'<visual>{BOX_SHAPE}<material name="m"><color rgba="1 0 0 0.5 1"/></material></visual>'
+    asset = read_asset(urdf(tmp_path, f'<link name="l">{visual}</link>'))
+    assert material_of(asset.visual[0]).baseColorFactor.tolist() == [255, 0, 0, 128]
+    assert asset.lenient == ("a colour has 5 numbers, of which the first four were taken",)
+
+
 def test_joints_of_one_name_and_a_namespace_of_the_whole_document_are_read(tmp_path: Path) -> None:
     box = f"<visual>{BOX_SHAPE}</visual>"
     joint = '<joint name="tool" type="fixed"><parent link="l"/><child link="{}"/></joint>'

@@ -29,7 +29,7 @@ from manitwin.robots.urdf import UrdfTree, inertial_of
 from manitwin.robots.urdf_reader import JOINT_TYPES, UrdfRules, read_urdf
 
 _TRIPLES = frozenset({"xyz", "rpy", "rgba", "size", "scale"})
-_AXES, _SOFT = 3, "deformable"
+_AXES, _RGBA, _SOFT = 3, 4, "deformable"
 _WORLD = "world"
 """Drake and Gazebo know it without a <link>."""
 
@@ -100,6 +100,11 @@ def _as_loaders_take_it(root: etree._Element, files: AssetFiles, name: str) -> N
         if len(factors) > _AXES:
             mesh.set("scale", " ".join(factors[:_AXES]))
             files.took_leniently(f"a mesh has {len(factors)} factors of scale, of which the first three were taken")
+    for color in root.iter("color"):
+        numbers = (color.get("rgba") or "").replace(",", " ").split()
+        if len(numbers) > _RGBA:  # urdfdom leaves such a colour out, and no loader the file
+            color.set("rgba", " ".join(numbers[:_RGBA]))
+            files.took_leniently(f"a colour has {len(numbers)} numbers, of which the first four were taken")
     for element in root.iter("origin", "color", "box", "mesh"):
         for key in _TRIPLES.intersection(element.attrib):  # "0.1, 0, 0.2" is read as three numbers
             element.set(key, element.get(key).replace(",", " "))
