@@ -181,6 +181,22 @@ def test_files_that_only_a_program_finds_are_read_by_their_path_and_said(tmp_pat
     assert asset("things/bin/a.stl").missing_files == ("things/bin/a.stl",), "a link out of the root"
 
 
+def test_a_root_that_was_renamed_is_found_by_the_path_that_comes_back_into_it(tmp_path: Path) -> None:
+    root = tmp_path / "kitchen-main"
+    (root / "pan").mkdir(parents=True)
+    trimesh.creation.box([1, 2, 3]).export(root / "pan/p.stl")
+    mesh = "<asset><mesh name='m' file='../kitchen/pan/p.stl'/></asset>"
+    (root / "pan/assets.xml").write_text(f"<mujocoinclude>{mesh}</mujocoinclude>")
+    body = "<worldbody><geom type='mesh' mesh='m'/></worldbody>"
+    file = root / "object.xml"
+    file.write_text(f"<mujoco><include file='../kitchen/pan/assets.xml'/>{body}</mujoco>")
+    asset = read_asset(file, root=root)
+    assert len(asset.visual) == 1 and asset.missing_files == () and "not where it says" in asset.lenient[0]
+    (tmp_path / "kitchen").mkdir()  # it is another folder then, whose files are not there
+    with pytest.raises(AssetError, match=r"kitchen/pan/assets\.xml.*is not there"):
+        read_asset(file, root=root)
+
+
 def test_templates_are_no_assets_and_are_said(tmp_path: Path) -> None:
     for name, size in (
         ("box", "DIM0 DIM1 0.1"),

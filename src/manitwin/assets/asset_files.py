@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -100,7 +101,9 @@ class AssetFiles:
                 self.used.add(found)
                 return found
             outside = outside or not inside
-        elsewhere = self._in_other_letters(name, tried) or self._elsewhere(below or name)
+        elsewhere = (
+            self._in_other_letters(name, tried) or self._in_renamed_root(name, tried) or self._elsewhere(below or name)
+        )
         if elsewhere is not None:
             return elsewhere
         self.missing.append(_short(name))
@@ -150,16 +153,37 @@ class AssetFiles:
         for candidate in with_the_path(name.replace("\\", "/"), self.own, self.root):
             found, _ = self._below(candidate)
             if found is not None:
-                if not any("were read from elsewhere" in each for each in self.lenient):
-                    place = _short(str(found.relative_to(self.root.resolve())))
-                    self.took_leniently(
-                        f"files are not where it says, and were read from elsewhere below the root: {_short(name)} from {place}"
-                    )
-                self.used.add(found)
-                self._strayed[name] = found
-                return found
+                return self._stray(name, found)
         self._vain_searches += 1
         return None
+
+    def _in_renamed_root(self, name: str, tried: Sequence[Path]) -> Path | None:
+        """Return the file of a path that leaves the root and comes back by a name that no folder beside it has: its old one."""
+        root = self.root.resolve()
+        for candidate in tried[:_MOST_TRIED]:
+            try:
+                place = candidate.resolve()
+                outside = place.is_relative_to(root.parent) and not place.is_relative_to(root)
+                old, *inside = place.relative_to(root.parent).parts if outside else ("",)
+                if not inside or os.path.lexists(root.parent / old):
+                    continue
+            except (OSError, ValueError, RuntimeError):  # as in _below
+                continue
+            found, _ = self._below(root.joinpath(*inside))
+            if found is not None:
+                return self._stray(name, found)
+        return None
+
+    def _stray(self, name: str, found: Path) -> Path:
+        """Note a file that is elsewhere below the root than the asset says, and return it."""
+        if not any("were read from elsewhere" in each for each in self.lenient):
+            place = _short(str(found.relative_to(self.root.resolve())))
+            self.took_leniently(
+                f"files are not where it says, and were read from elsewhere below the root: {_short(name)} from {place}"
+            )
+        self.used.add(found)
+        self._strayed[name] = found
+        return found
 
     def used_one(self, name: str, candidates: Iterable[Path]) -> Path | None:
         """Return the file of a name that ``find`` has found before; None where it has not."""
