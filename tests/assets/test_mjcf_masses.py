@@ -70,3 +70,17 @@ def test_a_mass_that_a_part_declares_is_declared(tmp_path: Path) -> None:
     asset = read_asset(mjcf(tmp_path, f'<body><freejoint/>{inertial}<geom size="0.1"/>{pole}</body>'))
     assert asset.inertial.mass_kg == pytest.approx(11) and asset.inertial.computed
     assert any("a part of its mass is declared" in remark for remark in asset.remarks)
+
+
+def test_a_mass_that_is_mostly_of_mujocos_own_density_is_not_declared(tmp_path: Path) -> None:
+    top, legs = '<geom type="box" size="0.5 0.3 0.01" mass="4"/>', '<geom type="box" size="0.5 0.3 0.1" pos="0 0 0.3"/>'
+    table = read_asset(mjcf(tmp_path, f"<body><freejoint/>{top}{legs}</body>"))  # 4 kg and 120 kg
+    assert table.inertial.mass_kg is None
+    assert any("of 124 kg the file declares 4" in remark for remark in table.remarks)
+    dense = legs.replace("/>", ' density="1000"/>')
+    said = read_asset(mjcf(tmp_path, f"<body><freejoint/>{top}{dense}</body>"))
+    assert said.inertial.mass_kg == pytest.approx(124), "who writes 1000 kg/m3 means it"
+    door = '<body pos="1 0 0"><joint axis="0 0 1"/><geom size="0.1" mass="2"/></body>'
+    kept = read_asset(mjcf(tmp_path, f'<body><freejoint/><geom size="0.3"/>{door}</body>'), joints="keep")
+    body, leaf = kept.articulation.links
+    assert body.inertial.mass_kg is None and leaf.inertial.mass_kg == pytest.approx(2) and kept.inertial.mass_kg is None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,7 @@ import mujoco
 import numpy as np
 
 from manitwin.assets.articulation import Articulation, AssetLink
-from manitwin.assets.asset import Asset, Contact, Inertial, combined_inertial
+from manitwin.assets.asset import Asset, Contact
 from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles
 from manitwin.assets.joints import Joints
 from manitwin.assets.licence_text import stated_licence
@@ -19,6 +18,7 @@ from manitwin.assets.readers.joint_elements import mjcf_joints
 from manitwin.assets.readers.mjcf_contents import COMPUTED, LEFT_OUT_COMPOSITE
 from manitwin.assets.readers.mjcf_document import UNNAMED, MjcfSource, open_mjcf
 from manitwin.assets.readers.mjcf_links import moving_bodies
+from manitwin.assets.readers.mjcf_masses import DeclaredMasses
 from manitwin.assets.readers.mjcf_model import compiled
 from manitwin.assets.readers.mjcf_shapes import BodyShapes, is_solid
 from manitwin.assets.readers.mjcf_soft import as_shapes_at_rest, soft_parts
@@ -27,7 +27,6 @@ from manitwin.errors import AssetError
 from manitwin.formats.meshes.source import MeshLimits
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 
-_INERTIA_FROM_GEOM = 1  # mjtInertiaFromGeom: true; 2 is auto
 _WORLD = 0
 
 
@@ -36,8 +35,8 @@ def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS,
 
     Defaults, frames and shapes are resolved by MuJoCo; meshes and textures are read here, below ``root`` (``root_of`` the path
     by default). An <inertial> is what the file declares; a mass that follows from a geom's mass or density that the file writes
-    is kept with the centre and inertia that MuJoCo computes of it, with a remark; what only MuJoCo's own default density gives
-    is not declared. ``joints``: what moves is left out, or held as the
+    is kept with the centre and inertia that MuJoCo computes of it, with a remark; what only, or mostly, MuJoCo's own default
+    density gives is not declared. ``joints``: what moves is left out, or held as the
     file stands. A file of planes and height fields alone is shown as sheets, one of soft bodies alone at rest. Raises
     AssetError naming what is broken. Source: the MJCF reference of MuJoCo.
     """
@@ -59,6 +58,7 @@ def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS,
     ground = not any(is_solid(model, index) for index, _ in bodies)
     shapes = BodyShapes(result, files, planes=ground)
     visual, collision = shapes.of(bodies)
+    masses = DeclaredMasses(source, spec, model, files)
     articulation = None
     if moving is not None:
         by_link = [
@@ -71,7 +71,7 @@ def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS,
         links = (
             AssetLink(
                 model.body(some[0][0]).name or f"body_{some[0][0]:02d}",
-                _declared_inertial(source, spec, model, some, files),
+                masses.of(some),
             )
             for some in by_link
         )
@@ -90,7 +90,7 @@ def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS,
         collision=tuple(collision),
         up="z",
         unit_m=1.0,
-        inertial=_declared_inertial(source, spec, model, bodies, files),
+        inertial=masses.of(bodies),
         contact=_declared_contact(source, model, shapes.colliding(bodies), files),
         static=ground or _stands_fast(model, bodies[0][0]),  # MuJoCo lets no plane move
         license=licence,
@@ -202,38 +202,6 @@ def _stands_fast(model: Any, body: int) -> bool:
 def _is_free(model: Any, body: int) -> bool:
     first = int(model.body_jntadr[body])
     return first >= 0 and int(model.jnt_type[first]) == int(mujoco.mjtJoint.mjJNT_FREE)
-
-
-def _declared_inertial(
-    source: MjcfSource, spec: Any, model: Any, bodies: list[tuple[int, np.ndarray]], files: AssetFiles
-) -> Inertial:
-    by_index = {body.id: body for body in spec.bodies}
-    forced = int(spec.compiler.inertiafromgeom) == _INERTIA_FROM_GEOM
-    massive = [(index, pose) for index, pose in bodies if model.body_mass[index] > 0]
-    explicit = [index for index, _ in bodies if by_index[index].explicitinertial and not forced]
-    if explicit and all(index in explicit for index, _ in massive):
-        return combined_inertial([_inertial(model, index, pose) for index, pose in bodies if index in explicit])
-    if not (explicit or source.weighs()) or files.lacks_a_mesh:  # of which nothing is known
-        return Inertial()
-    if explicit:
-        files.remark(
-            "a part of its mass is declared, and MuJoCo computes the rest of shapes, by its density of 1000 kg/m3"
-        )
-    else:
-        files.remark(
-            "its mass follows from a mass or density written for its geoms; centre and inertia are MuJoCo's own"
-        )
-    found = combined_inertial([_inertial(model, index, pose) for index, pose in massive]) if massive else Inertial(0.0)
-    return replace(found, computed=True)
-
-
-def _inertial(model: Any, index: int, body_to_asset: np.ndarray) -> Inertial:
-    inertial_to_asset = body_to_asset @ transform(
-        rotation_from_quaternion_wxyz(model.body_iquat[index]), model.body_ipos[index]
-    )
-    rotation = inertial_to_asset[:3, :3]
-    tensor = rotation @ np.diag(model.body_inertia[index]) @ rotation.T
-    return Inertial(float(model.body_mass[index]), inertial_to_asset[:3, 3], tensor)
 
 
 def _declared_contact(source: MjcfSource, model: Any, geoms: list[int], files: AssetFiles) -> Contact:

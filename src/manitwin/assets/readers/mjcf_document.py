@@ -57,6 +57,15 @@ class MjcfSource:
         geoms = [geom for root in (self.root, *self.models.values()) for geom in root.iter("geom")]
         return any(geom.get(name) is not None for geom in geoms for name in attributes)
 
+    def writes_density(self, density_kg_m3: float) -> bool:
+        """Tell whether a geom, or a default for geoms, writes this very density."""
+        for root in (self.root, *self.models.values()):
+            for geom in root.iter("geom"):
+                with suppress(ValueError):
+                    if float(geom.get("density", "nan")) == density_kg_m3:
+                        return True
+        return False
+
     def weighs(self) -> bool:
         """Tell whether the file writes a mass, or a density of which one follows: of geoms, or of all of it together."""
         return self.total_mass_kg is not None or self.writes(("mass", "density"))

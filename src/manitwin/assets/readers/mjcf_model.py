@@ -21,7 +21,8 @@ from manitwin.formats.meshes.textures import bake_transform, decode_texture
 from manitwin.formats.xml_file import xml_text
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 
-_LEAST_MASS_KG, _LEAST_INERTIA_KG_M2 = 1e-9, 1e-12
+LEAST_MASS_KG, LEAST_INERTIA_KG_M2 = 1e-9, 1e-12
+"""Of a body that moves, so that MuJoCo takes it."""
 _LEAST_ROWS, _FEW_MESHES = 2, 3
 NO_OBJECTS = "planes and height fields were left out: they are no objects"
 _RGB = int(mujoco.mjtTextureRole.mjTEXROLE_RGB)
@@ -64,7 +65,7 @@ def compiled(source: MjcfSource, files: AssetFiles, chosen: Callable[[Any], set[
                 raise
             if not files.missing:  # else it would have one with its meshes
                 files.took_leniently("a body of it moves and has no mass, which MuJoCo refuses")
-            spec.compiler.boundmass, spec.compiler.boundinertia = _LEAST_MASS_KG, _LEAST_INERTIA_KG_M2
+            spec.compiler.boundmass, spec.compiler.boundinertia = LEAST_MASS_KG, LEAST_INERTIA_KG_M2
             model = spec.compile()
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         raise AssetError(f"{name}: MuJoCo cannot compile it: {_line(error)}") from error
@@ -112,7 +113,7 @@ def _wanted(spec: Any, found: dict[str, Path], chosen: Callable[[Any], set[int]]
     for mesh in trial.meshes:
         if mesh.name in found:
             _stand_in(mesh)
-    trial.compiler.boundmass, trial.compiler.boundinertia = _LEAST_MASS_KG, _LEAST_INERTIA_KG_M2
+    trial.compiler.boundmass, trial.compiler.boundinertia = LEAST_MASS_KG, LEAST_INERTIA_KG_M2
     try:
         bodies = chosen(trial.compile())
     except (ValueError, RuntimeError, AssetError, mujoco.FatalError):
