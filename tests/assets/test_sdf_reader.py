@@ -266,6 +266,13 @@ def test_models_are_found_as_folders_and_as_single_files(tmp_path: Path) -> None
         ("SPDX-License-Identifier: MIT\nCopyright: Ada", "MIT", "Ada"),
         ("license: unknown; author: none", None, None),
         ("this has no licence", None, None),
+        (
+            'Author :: Ada\nLicense :: Under Apache License, Version 2.0 (the "License"); you may not',
+            "Apache-2.0",
+            "Ada",
+        ),
+        ("license: the MIT licence", "MIT", None),
+        ("license: MIT License or Apache 2.0", "MIT License or Apache 2.0", None),
         ("license: " + "!" * 3_000_000 + "a", None, None),
         (";" * 1_000_000 + " " * 1_000_000 + "license: MIT", None, None),
     ],

@@ -319,6 +319,21 @@ def test_a_colour_of_more_than_four_numbers_is_that_of_the_first_four_and_said(t
     assert asset.lenient == ("a colour has 5 numbers, of which the first four were taken",)
 
 
+def test_the_licence_of_its_package_is_that_of_an_asset_without_one(tmp_path: Path) -> None:
+    (tmp_path / "urdf").mkdir()
+    says = "<license>Apache 2.0</license><license>MIT</license><author>Ada</author><maintainer>Bo</maintainer>"
+    (tmp_path / "package.xml").write_text(f"<package><name>cups</name>{says}</package>")
+    link = f'<link name="l"><visual>{BOX_SHAPE}</visual></link>'
+    asset = read_asset(urdf(tmp_path / "urdf", link))
+    assert (asset.license, asset.attribution) == ("Apache-2.0 AND MIT", "Ada")
+    assert any("is that of the package cups (package.xml)" in remark for remark in asset.remarks)
+    own = read_asset(urdf(tmp_path / "urdf", f"<!-- a cup\nlicense: CC0-1.0\n-->{link}"))
+    assert (own.license, own.attribution) == ("CC0-1.0", None)
+    assert read_asset(urdf(tmp_path / "urdf", link), root=tmp_path / "urdf").license is None, "above the root"
+    (tmp_path / "package.xml").write_text("<package><license>TODO: License declaration</license></package>")
+    assert read_asset(urdf(tmp_path / "urdf", link)).license is None
+
+
 def test_joints_of_one_name_and_a_namespace_of_the_whole_document_are_read(tmp_path: Path) -> None:
     box = f"<visual>{BOX_SHAPE}</visual>"
     joint = '<joint name="tool" type="fixed"><parent link="l"/><child link="{}"/></joint>'

@@ -6,7 +6,25 @@ import re
 from collections.abc import Iterable
 
 _KEYS = r"SPDX-License-Identifier|licen[cs]e|attribution|authors?|creator|copyright"
-_STATEMENT = re.compile(rf"\W{{0,100}}({_KEYS})\s{{0,20}}[:=]", re.IGNORECASE)
+_STATEMENT = re.compile(rf"\W{{0,100}}({_KEYS})\s{{0,20}}(?:::|[:=])", re.IGNORECASE)
+_WRITTEN_OUT = (
+    (r"apache(?:\s+licen[cs]e)?,?(?:\s+version|\s+v)?\s*2(?:\.0)?\b", "Apache-2.0"),
+    (r"mit\s+licen[cs]e\b", "MIT"),
+    (r"(?:the\s+)?(?:3-clause\s+bsd|bsd\s+3-clause)(?:\s+licen[cs]e)?\b", "BSD-3-Clause"),
+    (r"(?:the\s+)?(?:2-clause\s+bsd|bsd\s+2-clause)(?:\s+licen[cs]e)?\b", "BSD-2-Clause"),
+    (r"creative\s+commons\s+attribution\s+4\.0(?:\s+international)?\b", "CC-BY-4.0"),
+    (r"creative\s+commons\s+zero\b(?:\s+v?1\.0)?(?:\s+universal)?", "CC0-1.0"),
+)
+"""How licences are called where their SPDX names are not written."""
+_NAMED = tuple(
+    (
+        re.compile(
+            rf"(?:licen[cs]ed\s+)?(?:under\s+)?(?:the\s+)?{name}(?!\s*(?:or|and|with|[/+])(?:\W|$))", re.IGNORECASE
+        ),
+        spdx,
+    )
+    for name, spdx in _WRITTEN_OUT
+)
 _NEXT = re.compile(rf"\n|;(?=\s{{0,20}}(?:{_KEYS})\s{{0,20}}[:=])", re.IGNORECASE)
 _MAX_LETTERS = 1000
 _UNSAID = frozenset({"", "unknown", "none", "todo"})
@@ -25,10 +43,18 @@ def stated_licence(texts: Iterable[str]) -> tuple[str | None, str | None]:
                 continue
             value = statement[found.end() : found.end() + _MAX_LETTERS].strip()
             if "licen" in found.group(1).lower():
-                licence = licence or _without_marks(value)
+                licence = licence or short_licence(_without_marks(value))
             else:
                 attribution = attribution or value
     return stated_or_none(licence), stated_or_none(attribution)
+
+
+def short_licence(text: str) -> str:
+    """Return the SPDX name of a licence with whose name in words a text begins, as ``under Apache License, Version 2.0 (...)``.
+
+    A text that names more than one, and any other, is returned as it is.
+    """
+    return next((spdx for name, spdx in _NAMED if name.match(text)), text)
 
 
 def stated_or_none(text: str | None) -> str | None:

@@ -229,11 +229,13 @@ def read_asset(
         whole: Asset = reader.read(path)
         return whole
     from manitwin.assets.asset_files import MESH_LIMITS, SHAPE_LIMITS
+    from manitwin.assets.package_licence import with_package_licence
+    from manitwin.assets.root import root_of
 
     limits = SHAPE_LIMITS if shape_only else MESH_LIMITS
     read = joints != "part" and chosen in WITH_JOINTS
     asset: Asset = reader.read(path, root, limits, joints=joints) if read else reader.read(path, root, limits)
-    return asset
+    return with_package_licence(asset, root or root_of(path), say=not shape_only)
 
 
 def find_assets(path: Path, fragments: list[Path] | None = None, templates: list[Path] | None = None) -> Iterator[Path]:

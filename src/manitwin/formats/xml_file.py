@@ -214,10 +214,12 @@ def text_of(element: etree._Element, path: str) -> str | None:
 
 
 def comments_before(root: etree._Element) -> tuple[str, ...]:
-    """Return the comments above and directly below the root element, in order, each in one line."""
+    """Return the comments above and directly below the root element, in order, their lines without white space around."""
     above = [n.text for n in reversed(list(root.itersiblings(preceding=True))) if n.tag is etree.Comment]
     below = [n.text for n in root.iterchildren(etree.Comment)]
-    return tuple(" ".join((text or "").split()) for text in [*above, *below])
+    return tuple(
+        "\n".join(" ".join(line.split()) for line in (text or "").strip().splitlines()) for text in [*above, *below]
+    )
 
 
 def new_element(tag: str, **attributes: str) -> etree._Element:
