@@ -9,11 +9,12 @@ from pathlib import Path
 import pytest
 
 import manitwin
-from manitwin.cli.causes import MEASURE_IT, NAME_IT, REMEDIES, cause_lines, group_causes
+from manitwin.cli.causes import AS_SCENERY, MEASURE_IT, NAME_IT, REMEDIES, cause_lines, group_causes
 from manitwin.engine.ledger.progress import Unaccepted
 from manitwin.errors import InputError
 from manitwin.formats.meshes.read import read_mesh
 from manitwin.models.fakes.meshes import draco_glb
+from manitwin.pipeline.gate import TRULY_LARGE
 from manitwin.pipeline.guesses import OF_ANYTHING, SIZE_UNSAID
 from manitwin.twin.record import REJECTION_REASONS
 
@@ -148,3 +149,10 @@ def test_a_size_that_nobody_has_said_asks_for_a_name_before_a_wider_gripper() ->
     assert second.remedy == f"{MEASURE_IT}; else {REMEDIES['too_wide']}" and "--units" in MEASURE_IT
     assert third.remedy == REMEDIES["too_wide"]
     assert f"  remedy: {NAME_IT}" in cause_lines([first], again="", others="")
+
+
+def test_what_truly_is_too_large_is_not_asked_for_its_unit() -> None:
+    sofa = Unaccepted("1", "rejected", "absurd_size", f"the longest side is 2.4 m; a sofa {TRULY_LARGE}")
+    mug = Unaccepted("2", "rejected", "absurd_size", "the longest side is 80 m; give the right units")
+    first, second = group_causes([sofa, mug])
+    assert first.remedy == AS_SCENERY and second.remedy == REMEDIES["absurd_size"]

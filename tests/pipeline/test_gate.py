@@ -97,6 +97,22 @@ def test_size_is_judged_only_where_it_is_known(tmp_path: Path, side_m: float) ->
     assert _gate(draft, tmp_path)["plausible_size"]["passed"] is None
 
 
+@pytest.mark.parametrize(
+    ("name", "side_m", "said"),
+    [
+        ("sofa", 2.4, "a sofa is that large, and no gripper here holds it"),
+        ("sofa", 24.0, "give the right units (m, cm, mm), or the longest side in metres"),
+        ("mug", 1.2, "give the right units (m, cm, mm), or the longest side in metres"),
+        ("flux capacitor", 1.2, "what truly is that large, no gripper here holds"),
+    ],
+)
+def test_what_is_as_large_as_such_things_are_is_told_so(tmp_path: Path, name: str, side_m: float, said: str) -> None:
+    draft = _draft(tmp_path, _box(side=side_m))
+    draft.payload = Item(file=None, name=name)
+    rejection = _rejection(draft, tmp_path)
+    assert rejection.reason == "absurd_size" and rejection.detail.endswith(said)
+
+
 def test_four_things_side_by_side_are_rejected_with_their_number(tmp_path: Path) -> None:
     four = trimesh.util.concatenate([_box(0.08 * i) for i in range(4)])
     rejection = _rejection(_draft(tmp_path, four), tmp_path)

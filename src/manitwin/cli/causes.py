@@ -60,6 +60,12 @@ MEASURE_IT = (
 )
 """The remedy where the usual size of what it is called did: another gripper comes after that."""
 
+AS_SCENERY = (
+    "none: it is no thing for these hands; as scenery simulators take its own file, and `manitwin import` writes its shape in"
+    " metres (asset.glb)"
+)
+"""Of what has the size of such things and is too large to be held."""
+
 LONGEST_MESSAGE = 500  # what a native stack adds is told by status --why
 
 _OWN_ERRORS = "|".join(
@@ -101,7 +107,7 @@ def group_causes(unaccepted: Iterable[Unaccepted]) -> list[Cause]:
     for item in unaccepted:
         told = _without_what_varies(item.message)
         if item.state == "rejected":
-            told = f"{item.reason or ''} {_of_unsaid_size(item.message) or ''}"
+            told = f"{item.reason or ''} {_of_size(item.message) or ''}"
         found.setdefault((item.state, told), []).append(item)
     groups = sorted(found.values(), key=lambda items: -len(items))
     return [_cause(items[0], len(items)) for items in groups]
@@ -132,8 +138,8 @@ def _reason(cause: Cause) -> str:
 
 def _cause(first: Unaccepted, count: int) -> Cause:
     message, remedy = without_prefixes(first.message), REMEDIES.get(first.reason or "")
-    if remedy is not None and (of_size := _of_unsaid_size(first.message)) is not None:
-        remedy = of_size if of_size == NAME_IT else f"{of_size}; else {remedy}"
+    if remedy is not None and (of_size := _of_size(first.message)) is not None:
+        remedy = of_size if of_size in (NAME_IT, AS_SCENERY) else f"{of_size}; else {remedy}"
     if first.reason:
         message = message.removeprefix(f"{first.reason}: ")
     if remedy is None and _is_own(first.message):
@@ -143,11 +149,14 @@ def _cause(first: Unaccepted, count: int) -> Cause:
     return Cause(first.state, first.reason, count, first.which, _shortened(message), remedy)
 
 
-def _of_unsaid_size(message: str) -> str | None:
-    """Return the remedy of a rejection that a merely usual or an unlikely size may have decided, None where the size is sound."""
+def _of_size(message: str) -> str | None:
+    """Return the remedy of a rejection that a size decided which is usual, unlikely, or no hand's; None where it is sound."""
+    from manitwin.pipeline.gate import TRULY_LARGE
     from manitwin.pipeline.guesses import OF_ANYTHING, SIZE_UNSAID
     from manitwin.pipeline.suspicious_size import CHECK_SCALE
 
+    if TRULY_LARGE in message:
+        return AS_SCENERY
     if CHECK_SCALE in message:
         return SCALE_IT
     if SIZE_UNSAID not in message:

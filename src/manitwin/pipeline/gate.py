@@ -13,10 +13,18 @@ from manitwin.config import GateConfig, Resource
 from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
 from manitwin.geometry.repair.components import separate_objects
+from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_records import Prior
 from manitwin.models.annotators.protocol import Annotator, QualityVerdict
+from manitwin.models.annotators.words import article
 from manitwin.pipeline.links import read_articulation
-from manitwin.pipeline.object_state import cut_out_photos, load_solid, read_subject
+from manitwin.pipeline.object_state import cut_out_photos, load_solid, object_name, read_subject
 from manitwin.twin.record_values import Check
+
+TRULY_LARGE = "is that large, and no gripper here holds it"
+"""Of what is too large for a twin and has the size of such things; remedies go by it."""
+_LITTLE_LARGER = 1.25
+"""Times the largest such things: what is that little larger is a large one, and no unit explains it."""
 
 
 class GateStage:
@@ -26,7 +34,7 @@ class GateStage:
     """
 
     name: ClassVar[str] = "gate"
-    version: ClassVar[str] = "2"
+    version: ClassVar[str] = "3"
     reads: ClassVar[tuple[str, ...]] = (
         "canonical.npz", "canonical.glb", "geometry", "views/", "cameras", "naming?", "photo.png?", "photos/?",
     )  # fmt: skip
@@ -48,7 +56,11 @@ class GateStage:
             check_watertight(geometry["watertight"], geometry["repairs"]),
             check_positive_volume(solid, self.settings.min_thickness_share),
             check_plausible_size(
-                solid, geometry["metric"], self.settings.min_longest_side_m, self.settings.max_longest_side_m
+                solid,
+                geometry["metric"],
+                self.settings.min_longest_side_m,
+                self.settings.max_longest_side_m,
+                prior=lookup(object_name(draft)),
             ),
             self._check_single_object(draft, solid),
         ]
@@ -98,18 +110,25 @@ def check_positive_volume(solid: trimesh.Trimesh, min_thickness_share: float) ->
     return Check(name="positive_volume", passed=True, value=thickness_m, limit=limit_m, message="mean thickness, m")
 
 
-def check_plausible_size(solid: trimesh.Trimesh, metric: bool, smallest_m: float, largest_m: float) -> Check:
-    """Check the longest side where the scale is known; raises Rejected absurd_size."""
+def check_plausible_size(
+    solid: trimesh.Trimesh, metric: bool, smallest_m: float, largest_m: float, prior: Prior | None = None
+) -> Check:
+    """Check the longest side where the scale is known; raises Rejected absurd_size.
+
+    ``prior``: what is usual of such things. It tells what truly is too large for hands from what has the wrong unit.
+    """
     side_m = float(np.ptp(solid.vertices, axis=0).max())
     if not metric:
         return Check(
             name="plausible_size", passed=None, value=side_m, message="not judged: the mesh has no known scale yet"
         )
     if not smallest_m <= side_m <= largest_m:
-        detail = (
-            f"the longest side is {side_m:.4g} m, valid is {smallest_m:g} to {largest_m:g} m;"
-            " give the right units (m, cm, mm), or the longest side in metres"
-        )
+        remedy = "give the right units (m, cm, mm), or the longest side in metres"
+        if side_m > largest_m and prior is None:
+            remedy += "; what truly is that large, no gripper here holds"
+        elif prior is not None and largest_m < side_m <= _LITTLE_LARGER * prior.longest_axis_m.high:
+            remedy = f"{article(prior.category)} {prior.category} {TRULY_LARGE}"
+        detail = f"the longest side is {side_m:.4g} m, valid is {smallest_m:g} to {largest_m:g} m; {remedy}"
         raise Rejected("absurd_size", detail, "gate")
     limit_m = smallest_m if side_m < np.sqrt(smallest_m * largest_m) else largest_m
     return Check(

@@ -284,3 +284,28 @@ def test_what_is_named_in_the_plural_says_what_it_is_counted_by() -> None:
     plural = [prior for prior in load_priors().values() if re.search(r"[^su]s$", prior.category)]
     uncounted = {prior.category for prior in plural if prior.counter is None}
     assert uncounted == {"thermos", "camera lens", "bag of chips"}, "'a binoculars' is no English"
+
+
+@pytest.mark.parametrize(
+    ("said", "category"),
+    [
+        ("dining chair", "chair"),
+        ("bar stool", "stool"),
+        ("wooden coffee table", "coffee table"),
+        ("fridge", "refrigerator"),
+        ("tv", "television"),
+        ("tv stand", "cabinet"),
+        ("floor lamp", "floor lamp"),
+        ("cd", "compact disc"),
+        ("toy chair", "toy"),
+        ("dollhouse table", "toy"),
+    ],
+)
+def test_furniture_is_known_and_what_is_a_toy_of_it_is_a_toy(said: str, category: str) -> None:
+    found = lookup(said)
+    assert found is not None and found.category == category
+
+
+@pytest.mark.parametrize("said", ["stand", "music stand", "cake stand"])
+def test_a_stand_of_something_else_is_no_phone_stand(said: str) -> None:
+    assert lookup(said) is None

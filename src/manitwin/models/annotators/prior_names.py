@@ -60,6 +60,10 @@ _NO_THING = re.compile(
 
 _IMITATIONS = {"toy": "toy", "plush": "stuffed toy", "stuffed": "stuffed toy"}
 """What a thing is of which one word says that it is made after another: a toy elephant is a toy."""
+_SMALL = frozenset({*_IMITATIONS, "doll", "dollhouse", "miniature"})
+"""What a chair or a table is called that is none: toys of things with the name alone, as of tools, have entries of their own."""
+_TOO_LARGE = "furniture"
+"""The domain of things that no hand holds, so that what is called a toy of one is a toy."""
 
 
 def found_by(name: str | None) -> tuple[Prior, str] | None:
@@ -69,8 +73,8 @@ def found_by(name: str | None) -> tuple[Prior, str] | None:
     the whole again: each as it is, in the singular, and with words dropped from the front ('red coffee mugs' are coffee mugs,
     which are mugs), and before its last word stands alone with words dropped between ('lego duplo brick' is a lego brick). The
     last word decides what a thing is: a mug rack is no mug. Where none is found, numbers and colours at
-    the end say nothing ('mug_1' and 'pitcher blue' are a mug and a pitcher), and what is a toy of anything is a toy. File names
-    are never looked up: they are not evidence.
+    the end say nothing ('mug_1' and 'pitcher blue' are a mug and a pitcher), and what is a toy of anything is a toy, as is
+    a doll's chair. File names are never looked up: they are not evidence.
     """
     if not name or not (phrase := normalised(name)):
         return None
@@ -85,7 +89,8 @@ def found_by(name: str | None) -> tuple[Prior, str] | None:
     for part in tries:
         for candidate in singulars(" ".join(part)):
             if candidate in index and index[candidate].category != "unknown":
-                return index[candidate], candidate
+                small = index[candidate].domain == _TOO_LARGE and not _SMALL.isdisjoint(head[:-1])
+                return (index["toy"], " ".join(head)) if small else (index[candidate], candidate)
     imitation = next((_IMITATIONS[word] for word in head[:-1] if word in _IMITATIONS), None)
     return None if imitation is None else (index[imitation], " ".join(head))
 
