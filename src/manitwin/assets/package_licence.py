@@ -47,5 +47,5 @@ def with_package_licence(asset: Asset, root: Path, *, say: bool) -> Asset:
         license=licence,
         attribution=asset.attribution or ", ".join(authors) or None,
         files=tuple(sorted({*asset.files, file.resolve()})),
-        remarks=(*asset.remarks, remark) if say else asset.remarks,
+        remarks=(*asset.remarks, remark) if say and asset.visual else asset.remarks,
     )

@@ -43,6 +43,22 @@ def test_urdf_is_brought_to_the_object_frame(tmp_path: Path) -> None:
     assert "mass" not in record.missing and "friction" not in record.missing
 
 
+def test_another_asset_of_the_same_name_gets_that_of_its_file_too(tmp_path: Path) -> None:
+    for place, side in (("red/cup.urdf", 0.1), ("red/small_cup.urdf", 0.05), ("blue/cup.urdf", 0.2)):
+        path = tmp_path / "in" / place
+        path.parent.mkdir(parents=True, exist_ok=True)
+        box = f'<visual><geometry><box size="{side} {side} {side}"/></geometry></visual>'
+        path.write_text(f'<robot name="TeaCup"><link name="l">{box}</link></robot>')
+    for again in (False, True):
+        found = list(import_assets([tmp_path / "in"], tmp_path / "out"))
+        assert [one.there_already for one in found] == [again] * 3
+        names = {one.path.relative_to(tmp_path / "in").as_posix(): one.folder.name for one in found if one.folder}
+        assert names["blue/cup.urdf"] == "tea_cup" and names["red/small_cup.urdf"] == "tea_cup_small_cup"
+        assert names["red/cup.urdf"] == "tea_cup_cup"
+    record = read_import_record(tmp_path / "out" / "tea_cup" / "import.json")
+    assert record.name == "Tea Cup", "which priors know"
+
+
 def _centred(bounds: np.ndarray) -> np.ndarray:
     middle = bounds.mean(0)
     return bounds - [middle[0], middle[1], bounds[0, 2]]

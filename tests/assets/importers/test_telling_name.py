@@ -20,6 +20,9 @@ from manitwin.assets.importers.telling_name import telling_name
         ("object_1", "ketchup", "ketchup"),  # a folder
         ("base_link", "scene/model.urdf", "base_link"),  # nothing of it says anything
         ("model car", "assets/model.sdf", "model car"),
+        ("bowl.urdf", "bowls/bowl.urdf", "bowl"),
+        ("cube.urdf", "assets/pallet.urdf", "pallet"),  # copied from another one
+        ("cube.urdf", "assets/model.urdf", "cube"),
     ],
 )
 def test_a_name_that_tools_write_gives_way_to_that_of_the_file(name: str, path: str, told: str) -> None:

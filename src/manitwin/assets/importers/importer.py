@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from manitwin.assets.importers.telling_name import split_words
 from manitwin.assets.read import find_assets, is_file_below, robotwin_data
 from manitwin.assets.root import root_of
 from manitwin.assets.within_limits import within_limits
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 READ = "manitwin.assets.importers.conversion:read_for_import"
 
+_SUFFIXES = (".urdf", ".sdf", ".xml", ".usd", ".usda", ".usdc", ".usdz", ".json")
+_MOST_LETTERS = 60
 DIGEST_DIGITS = 8
 """32 bits tell apart the few assets that share a name."""
 
@@ -52,8 +55,9 @@ def import_assets(
     What moves by joints is kept with its links and joints where the format's reader keeps them, with ``lock_joints`` taken as one
     rigid body, as ``read_asset`` has it.
     An asset that cannot be read, or not within limits of time and memory, is said and left out. Nothing is written over: an
-    asset that is there already is left as it is, and another one of the same name gets a folder whose name ends in a digest
-    of what was imported. Raises UsageError for a path that is not there, and where a folder of another kind has the name.
+    asset that is there already is left as it is, and another one of the same name gets a folder with the name of its file, or
+    else with a digest of what was imported. Raises UsageError for a path that is not there, and where a folder of another kind
+    has the name.
     """
     joints: Joints = "lock" if lock_joints else "keep"
     for path in paths:
@@ -65,7 +69,7 @@ def import_assets(
             except AssetError as error:
                 yield Imported(place, None, None, str(error))
                 continue
-            folder, there_already = _folder_for(files, out, folder_name(record))
+            folder, there_already = _folder_for(files, out, folder_name(record), record.file)
             if not there_already:
                 _write(files, folder)
             yield Imported(place, folder, record, there_already=there_already)
@@ -96,7 +100,17 @@ def folder_name(record: ImportRecord) -> str:
     """Return a folder's name for an imported asset: letters, digits and underscores."""
     stem = Path(record.file).stem if record.format in ("robotwin", "gso", "manitwin100k") else ""
     words = f"{record.name} {stem}" if stem.lower() not in record.name.lower() else record.name
-    return re.sub(r"[^a-z0-9]+", "_", words.lower()).strip("_")[:60] or "object"
+    return _slug(words) or "object"
+
+
+def _slug(words: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "_", split_words(words).lower()).strip("_")[:_MOST_LETTERS].rstrip("_")
+
+
+def _fuller_name(name: str, file: str) -> str:
+    """Return a folder's name with that of the asset's file, which tells apart what has one name: chair_02, kettle_kitchen1."""
+    own = _slug(Path(file).stem if Path(file).suffix.lower() in _SUFFIXES else file)
+    return own if own.startswith(name) else _slug(f"{name[: _MOST_LETTERS - 1 - len(own)]}_{own}")
 
 
 def _places(path: Path, format: Format | Literal["auto"]) -> list[Path]:
@@ -108,10 +122,13 @@ def _places(path: Path, format: Format | Literal["auto"]) -> list[Path]:
     return found or [path]  # then the reader says what the folder lacks
 
 
-def _folder_for(files: dict[str, bytes], out: Path, name: str) -> tuple[Path, bool]:
-    """Return the folder of an imported asset, and whether the same asset is there already."""
+def _folder_for(files: dict[str, bytes], out: Path, name: str, file: str) -> tuple[Path, bool]:
+    """Return the folder of an imported asset, and whether the same asset is there already.
+
+    Another one of its name gets the name of its file too, and a third one a digest of what was imported.
+    """
     digest = hashlib.sha256(b"".join(hashlib.sha256(files[file]).digest() for file in sorted(files))).hexdigest()
-    for folder in (out / name, out / f"{name}_{digest[:DIGEST_DIGITS]}"):
+    for folder in (out / name, out / _fuller_name(name, file), out / f"{name}_{digest[:DIGEST_DIGITS]}"):
         if not folder.exists():
             return folder, False
         if not is_imported(folder):

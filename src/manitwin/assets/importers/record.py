@@ -18,7 +18,7 @@ from manitwin.assets.importers.dropped import (
     without_placeholder_mass,
 )
 from manitwin.assets.importers.links import given_articulation
-from manitwin.assets.importers.telling_name import telling_name
+from manitwin.assets.importers.telling_name import split_words, telling_name
 from manitwin.errors import AssetError
 from manitwin.geometry.canonical_frame import object_frame
 from manitwin.geometry.poses import GLTF_TO_OBJECT, inverse, transform_points
@@ -183,8 +183,8 @@ def _unit(vector: np.ndarray) -> list[float] | None:
 
 
 def _words(name: str) -> str:
-    """Return a file's or an element's name as words: no underscores, and no numbers around it."""
-    words = name.replace("_", " ").replace("-", " ").split()
+    """Return a file's or an element's name as words: no underscores or capitals between them, and no numbers around it."""
+    words = split_words(name).replace("_", " ").replace("-", " ").split()
     first, last = 0, len(words)
     while first < last - 1 and words[first].isdecimal():
         first += 1

@@ -11,20 +11,33 @@ _SAYS_NOTHING = frozenset({
     "stage", "textured", "unnamed", "untitled", "urdf", "usd", "visual", "world", "xform", "xml",
 })  # fmt: skip
 """Words that tools write where nobody named anything: USD's World, obj2mjcf's textured, MuJoCo's default model name."""
+_BETWEEN_WORDS = re.compile(r"(?<=[a-z]{2})(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z]{2})")
 _FOLDERS_UP = 1
+_OF_A_FILE = re.compile(r"(.+)\.(?:urdf|sdf|xml|mjcf|obj|stl|dae|usda?)", re.IGNORECASE)
+"""A name that is a file's, which authors leave as it is where they copy one: CLIPort's pallet.urdf is called cube.urdf."""
 
 
 def telling_name(name: str, path: Path) -> str:
     """Return an asset's own name; that of its file, else of its folder, where its own says nothing of what it is.
 
-    Of several names none of which says anything, its own.
+    A name that is a file's says nothing but where it is this file's. Of several names none of which says anything, its own.
     """
     place = path.resolve()
+    of_a_file = _OF_A_FILE.fullmatch(name)
+    if of_a_file is not None:
+        name = of_a_file[1]
+        if place.suffix and _says_something(place.stem):
+            return place.stem
     others = [
         place.stem if place.suffix else place.name,
         *(parent.name for parent in list(place.parents)[:_FOLDERS_UP]),
     ]
     return next((each for each in (name, *others) if _says_something(each)), name)
+
+
+def split_words(name: str) -> str:
+    """Return a name with spaces between words that capitals alone tell apart: CoffeeTable, TVCabinet, YcbBanana."""
+    return _BETWEEN_WORDS.sub(" ", name)
 
 
 def _says_something(name: str) -> bool:
