@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -83,3 +84,18 @@ def test_a_coat_of_rubber_says_nothing_of_the_iron_within(name: str, mass_kg: fl
         inertial=Inertial(mass_kg, None, None), contact=Contact(0.7, 0.6, 0.5, "rubber"),
     )  # fmt: skip
     assert ("MAS003" in found(thing)) == wrong
+
+
+@pytest.mark.parametrize(
+    ("factor", "said", "end"),
+    [(20.0, r"up to ([\d.e+]+) times the most$", -1), (0.1, r"down to ([\d.e-]+) of the least$", 0)],
+)
+def test_inertia_is_as_many_times_off_as_its_bounds_say(factor: float, said: str, end: int) -> None:
+    solid = trimesh.creation.box((0.1, 0.06, 0.04))
+    inertial = Inertial(0.3, np.zeros(3), factor * 0.3 * solid.moment_inertia / solid.volume)
+    block = replace(clean(), name="thing", visual=(solid,), collision=(), frames=(), grasps=(), inertial=inertial)
+    finding = next(each for each in audit_asset(block, RULES) if each.code == "INE005")
+    moments, bound = (np.array(finding.values[key]) for key in ("principal_kg_m2", ("low_kg_m2", "high_kg_m2")[end]))
+    told = re.search(said, finding.message)
+    worst = (moments / bound).max() if factor > 1 else (moments / bound).min()
+    assert told is not None and float(told[1]) == pytest.approx(worst, rel=0.06)

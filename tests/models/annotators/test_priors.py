@@ -199,6 +199,7 @@ def test_no_alias_is_another_things_name_in_the_singular_or_plural() -> None:
     ("said", "category"),
     [
         ("pincers", "pliers"), ("swim goggles", "goggles"), ("a wooden mallet", "mallet"), ("plastic spoon", "plastic spoon"),
+        ("plastic plate", "plate"), ("disposable plastic plate", "paper plate"),
         ("highlighter", "highlighter"), ("steel ball", "steel ball"), ("teddy bear", "stuffed toy"), ("creamer", "milk pourer"),
     ],
 )  # fmt: skip

@@ -143,10 +143,11 @@ def magnitude(measured: MeasuredAsset) -> Iterator[Complaint]:
         return
     low, high = band[0] / FACTOR, band[1] * FACTOR
     if (moments < low).any() or (moments > high).any():
-        ratio = float(np.prod(moments / np.sqrt(band[0] * band[1])) ** (1 / 3))
+        above, below = float((moments / band[1]).max()), float((moments / band[0]).min())
+        off = f"up to {above:.2g} times the most" if above * below > 1 else f"down to {below:.2g} of the least"
         yield Complaint(
             f"principal moments {_listed(moments)} kg m2, but this shape and mass have about {_listed(band[0])} (filled or"
-            f" thin-walled, whichever is less) to {_listed(band[1])}: {ratio:.2g} times",
+            f" thin-walled, whichever is less) to {_listed(band[1])}: {off}",
             values={"principal_kg_m2": moments.tolist(), "low_kg_m2": band[0].tolist(), "high_kg_m2": band[1].tolist()},
         )
 
