@@ -32,6 +32,20 @@ def test_article_follows_the_sound(phrase: str, expected: str) -> None:
     assert article(phrase) == expected
 
 
+@pytest.mark.parametrize(
+    ("name", "first", "third"),
+    [
+        ("kitchen utensils", "Orange kitchen utensils, about", "Large kitchen utensils (boxy)."),
+        ("tableware", "Orange tableware, about", "Large tableware (boxy)."),
+        ("flux capacitor", "An orange flux capacitor, about", "A large flux capacitor (boxy)."),
+        ("brass compass", "An orange brass compass, about", "A large brass compass (boxy)."),
+    ],
+)
+def test_what_is_named_in_the_plural_or_as_no_single_thing_has_no_article(name: str, first: str, third: str) -> None:
+    captions = write_captions(name, None, "unknown", "orange", "boxy", "44 x 34 x 7 cm, large")
+    assert captions[0].startswith(first) and captions[2] == third
+
+
 def test_lists_read_as_in_a_sentence() -> None:
     assert joined(["red"]) == "red"
     assert joined(["red", "blue", "white"]) == "red, blue and white"

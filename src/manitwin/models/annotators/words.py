@@ -21,6 +21,11 @@ _SIZE_WORDS = ((0.03, "tiny"), (0.10, "palm-sized"), (0.20, "hand-sized"), (0.35
 
 _A_NOT_AN = ("uk", "uni", "usb", "use", "ute", "eu", "one", "once")  # spelt with a vowel, spoken with a consonant
 _AN_NOT_A = ("hour", "honest", "heir", "mp3", "x-ray")
+_SINGULAR_ENDS = ("ss", "us", "is", "as", "os", "lens", "series")
+_SHORTEST_PLURAL = 3
+_NO_SINGLE_THING = frozenset(
+    {"cutlery", "stationery", "furniture", "equipment", "clothing", "rice", "sand", "gravel", "food", "trash"}
+)
 _METALS = frozenset(
     (
         "metal",
@@ -48,6 +53,13 @@ def article(phrase: str) -> str:
     if first.startswith(_AN_NOT_A) or (first[:1] in "aeiou" and not first.startswith(_A_NOT_AN)):
         return "an"
     return "a"
+
+
+def _takes_no_article(noun: str) -> bool:
+    """Tell whether a thing that no prior knows is named in the plural, or as no single thing: kitchen utensils, tableware."""
+    last = noun.split()[-1]
+    plural = last.endswith("s") and len(last) > _SHORTEST_PLURAL and not last.endswith(_SINGULAR_ENDS)
+    return plural or last in _NO_SINGLE_THING or (last.endswith("ware") and last != "ware")
 
 
 def joined(words: list[str]) -> str:
@@ -129,6 +141,10 @@ def _says(noun: str, material: str) -> bool:
     return material.lower() in words
 
 
+def _capitalised(sentence: str) -> str:
+    return sentence[:1].upper() + sentence[1:]
+
+
 def write_captions(category: str, prior: Prior | None, material: str, color: str, shape: str, size: str) -> list[str]:
     """Return captions of differing length, style and content, the full sentence first; ``color`` may be empty: unknown.
 
@@ -139,14 +155,16 @@ def write_captions(category: str, prior: Prior | None, material: str, color: str
         noun = f"{prior.counter} {noun}"
     colored = f"{color} {noun}".strip()
     numbers, size_word = size.split(", ")
+    one = "" if prior is None and _takes_no_article(noun) else f"{article(colored)} "
+    of_size = f"{size_word} {noun}" if one == "" else f"{article(size_word)} {size_word} {noun}"
     edible = prior is not None and prior.surface == "food skin"
     untold = edible or material.startswith("unknown") or _says(noun, material)
     made_of = "" if untold else f" made of {material}"
     use = f", used for {prior.function}" if prior is not None else ""
     captions = [
-        f"{article(colored).capitalize()} {colored}{made_of}, about {numbers} in size{use}.",
-        f"{article(colored)} {colored}",
-        f"{article(size_word).capitalize()} {size_word} {noun} ({shape}).",
+        f"{_capitalised(one + colored)}{made_of}, about {numbers} in size{use}.",
+        f"{one}{colored}",
+        f"{_capitalised(of_size)} ({shape}).",
         f"It measures {numbers}.",
         f"Pick up the {noun}{made_of}." if made_of else f"Pick up the {size_word} {noun}.",
     ]
