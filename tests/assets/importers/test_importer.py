@@ -59,6 +59,16 @@ def test_another_asset_of_the_same_name_gets_that_of_its_file_too(tmp_path: Path
     assert record.name == "Tea Cup", "which priors know"
 
 
+@pytest.mark.parametrize("fast", ["1", "0"])
+def test_what_stands_fast_in_its_file_is_said_to(tmp_path: Path, fast: str) -> None:
+    shape = '<visual name="v"><geometry><box><size>0.1 0.1 0.1</size></box></geometry></visual>'
+    (tmp_path / "shelf.sdf").write_text(
+        f'<sdf version="1.9"><model name="shelf"><static>{fast}</static><link name="l">{shape}</link></model></sdf>'
+    )
+    record, _ = imported(tmp_path / "shelf.sdf", tmp_path / "out")
+    assert any("stands fast" in remark for remark in record.remarks) == (fast == "1")
+
+
 def _centred(bounds: np.ndarray) -> np.ndarray:
     middle = bounds.mean(0)
     return bounds - [middle[0], middle[1], bounds[0, 2]]

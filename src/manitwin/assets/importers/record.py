@@ -50,6 +50,8 @@ def asset_to_object(asset: Asset) -> np.ndarray:
 def import_record(asset: Asset, to_object: np.ndarray) -> ImportRecord:
     """Return the import record of an asset; what cannot be true is not kept, and named among what is missing."""
     remarks = list(asset.remarks)
+    if asset.static:
+        remarks.append("its file says that it stands fast: its twin is a thing that moves")
     asset, placeholder = without_placeholder_mass(asset)
     numbers, missing, dropped = _numbers(asset)
     dropped = placeholder + dropped
