@@ -276,3 +276,15 @@ def test_hostile_text_takes_no_more_than_a_pass(tmp_path: Path) -> None:
     listing = listed(put(tmp_path, dict(hostile_texts())))
     assert tmp_path / "photo.png" in listing.inputs
     assert listing.parts == {tmp_path / "maps.mtl": tmp_path / "maps.obj"}
+
+
+def test_a_folder_of_asset_descriptions_is_told_of_import_and_one_of_meshes_is_not(tmp_path: Path) -> None:
+    for name in ("cup/seen.obj", "cup/hull.obj"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    assert not any("manitwin import" in line for line in list_folder(tmp_path).remarks())
+    (tmp_path / "cup/cup.urdf").write_text("<robot name='cup'/>")
+    told = list_folder(tmp_path).remarks()[1]
+    assert (
+        "makes one input of each of 1 asset description with its meshes; here 2 meshes are things of their own" in told
+    )

@@ -32,7 +32,8 @@ _OBJ_KEYWORDS = frozenset(
 _LONGEST_NUMBER = 64
 HEIC_NOT_READ = "HEIC is not read; convert it to PNG or JPEG"
 """Its only free decoder comes in wheels that bundle an encoder under the GPL."""
-_IMPORT = "an asset description; manitwin import reads it with its meshes"
+ASSET_DESCRIPTION = "an asset description; manitwin import reads it with its meshes"
+"""URDF, SDF and USD, which name meshes."""
 _CAMERA_RAW = "camera raw is not read; develop it to PNG or JPEG"
 _EXPORT = "this mesh format is not read; export it as glTF 2.0 or OBJ"
 _VIDEO = "a video; give a photo"
@@ -52,7 +53,7 @@ _NO_FILE_ITSELF = (
 """What is often found under the name of an image or a mesh, by how it begins, and what to do about it."""
 NOT_READ = {
     **dict.fromkeys((".heic", ".heif"), HEIC_NOT_READ),
-    **dict.fromkeys((".urdf", ".sdf", ".xacro", ".usd", ".usda", ".usdc"), _IMPORT),
+    **dict.fromkeys((".urdf", ".sdf", ".xacro", ".usd", ".usda", ".usdc"), ASSET_DESCRIPTION),
     **dict.fromkeys((".dng", ".nef", ".cr2", ".cr3", ".arw", ".orf", ".rw2", ".raf", ".pef"), _CAMERA_RAW),
     **dict.fromkeys((".blend", ".3ds", ".max", ".iges", ".igs", ".x3d"), _EXPORT),
     **dict.fromkeys((".abc", ".wrl", ".ma", ".mb", ".c4d", ".skp", ".drc", ".vrm", ".fcstd", ".sldprt"), _EXPORT),

@@ -6,6 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterable
 from pathlib import Path
 
+from manitwin.formats.sniff import ASSET_DESCRIPTION
 from manitwin.formats.source_files import MESH_SUFFIXES
 
 _NAMES_SHOWN = 3
@@ -34,6 +35,14 @@ def listing_remarks(
         counts.append(f"{len(left)} left alone")
     total = _counted(len(inputs) + len(parts) + len(left), "file")
     lines = [f"{folder}: {total}: {', '.join(counts)}"]
+    described = sum(reason == ASSET_DESCRIPTION for reason in left.values())
+    meshes = sum(path.suffix.lower() in MESH_SUFFIXES and path not in assets for path in inputs)
+    if described and meshes:
+        own = "mesh is a thing of its own" if meshes == 1 else "meshes are things of their own"
+        lines.append(
+            f"{folder}: `manitwin import` makes one input of each of {_counted(described, 'asset description')} with its meshes;"
+            f" here {meshes} {own}, also what only collides"
+        )
     if beside_meshes:
         one = len(beside_meshes) == 1
         lines.append(
