@@ -49,15 +49,16 @@ def test_a_mesh_without_a_material_has_the_colour_of_its_visual(tmp_path: Path) 
         box.export(tmp_path / name)
     (tmp_path / "lost.mtl").write_text("newmtl lost\nmap_Kd gone.png\n")
     (tmp_path / "lost.obj").write_text(f"mtllib lost.mtl\nusemtl lost\n{(tmp_path / 'bare.obj').read_text()}")
+    (tmp_path / "named.obj").write_text(f"mtllib gone.mtl\nusemtl wood\n{(tmp_path / 'bare.obj').read_text()}")
     (tmp_path / "own.mtl").write_text("newmtl own\nKd 1 0 0\n")
     (tmp_path / "own.obj").write_text(f"mtllib own.mtl\nusemtl own\n{(tmp_path / 'bare.obj').read_text()}")
     visuals = "".join(
         f'<visual><geometry><mesh filename="{name}"/></geometry><material name="m"><color rgba="0 0 1 1"/></material></visual>'
-        for name in ("box.stl", "bare.obj", "lost.obj", "own.obj")
+        for name in ("box.stl", "bare.obj", "lost.obj", "own.obj", "named.obj")
     )
     asset = read_asset(urdf(tmp_path, f'<link name="l">{visuals}</link>'))
     colors = [material_of(part).baseColorFactor[:3].tolist() for part in asset.visual]
-    assert colors == [[0, 0, 255], [0, 0, 255], [204, 204, 204], [255, 0, 0]]
+    assert colors == [[0, 0, 255], [0, 0, 255], [204, 204, 204], [255, 0, 0], [0, 0, 255]]
 
 
 def test_primitives_have_the_volume_of_what_they_say(tmp_path: Path) -> None:

@@ -99,3 +99,11 @@ def test_inertia_is_as_many_times_off_as_its_bounds_say(factor: float, said: str
     told = re.search(said, finding.message)
     worst = (moments / bound).max() if factor > 1 else (moments / bound).min()
     assert told is not None and float(told[1]) == pytest.approx(worst, rel=0.06)
+
+
+@pytest.mark.parametrize(("lift_m", "forgotten"), [(0.005, True), (0.002, False)])
+def test_a_centre_at_the_surface_of_a_flat_thing_is_a_forgotten_one(lift_m: float, forgotten: bool) -> None:
+    solid = trimesh.creation.box((0.12, 0.2, 0.01), transform(translation=np.array([0, 0, lift_m])))
+    inertial = Inertial(0.5, np.zeros(3), 0.5 * solid.moment_inertia / solid.volume)
+    tablet = replace(clean(), name="thing", visual=(solid,), collision=(), frames=(), grasps=(), inertial=inertial)
+    assert ("COM003" in found(tablet)) == forgotten

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -29,6 +30,7 @@ from manitwin.geometry.poses import GLTF_TO_OBJECT, transform_points
 from manitwin.robots.urdf import UrdfTree, geometry_of, origin_of, values_of
 
 _SCHEMES = ("package://", "model://")
+_LOST_LIBRARY = re.compile(r"material library '.+' is not there")
 
 
 class LinkShapes:
@@ -180,7 +182,8 @@ def mesh_parts(
 ) -> list[trimesh.Trimesh]:
     """Return the parts of a mesh file that a description names, in metres and scaled by ``(3,)``.
 
-    COLLADA's unit counts and its up axis does not, which ``turned_note`` says. Parts without a material take ``color``.
+    COLLADA's unit counts and its up axis does not, which ``turned_note`` says. Parts without a material take ``color``, as do
+    those whose material is a name in a library that is not there.
     """
     if mesh.format == "dae" and mesh.up == "y":
         files.remark(f"{path.name}: its COLLADA says that Y is up; {turned_note}")
@@ -189,18 +192,24 @@ def mesh_parts(
     parts = [bake_transform(part, np.diag([*(factors * unit_m), 1.0])) for part in mesh.parts]
     if color is None or mesh.format == "ply":  # a PLY whose texture is lost looks like one that has none
         return parts
+    lost = any(_LOST_LIBRARY.match(finding) for finding in mesh.findings)
     return [
-        make_part(p.vertices, p.faces, material=plain_material(color), name=p.metadata["name"]) if _is_bare(p) else p
+        make_part(p.vertices, p.faces, material=plain_material(color), name=p.metadata["name"])
+        if _is_bare(p, lost)
+        else p
         for p in parts
     ]
 
 
-def _is_bare(part: trimesh.Trimesh) -> bool:
-    """Whether a mesh file gives a part no material: what has one, also one whose texture is lost, keeps it."""
+def _is_bare(part: trimesh.Trimesh, lost: bool) -> bool:
+    """Whether a mesh file gives a part no material: what has one, also one whose texture is lost, keeps it.
+
+    ``lost``: a library of materials is not there, and what only has the name of one has none.
+    """
     material = material_of(part)
     grey = np.round(np.multiply(DEFAULT_COLOR, 255)).astype(int)
     is_grey = np.array_equal(np.asarray(material.baseColorFactor)[:3].astype(int), grey)
-    return material.name is None and material.baseColorTexture is None and is_grey
+    return (lost or material.name is None) and material.baseColorTexture is None and is_grey
 
 
 def plain_material(rgba: np.ndarray | None) -> trimesh.visual.material.PBRMaterial:

@@ -15,6 +15,8 @@ SLACK_M, SLACK_SHARE = 0.001, 0.01
 
 AWAY_SHARE = 0.1
 """A centre of mass at exactly (0, 0, 0) is taken for forgotten where the shape's is farther away, of the longest side."""
+SURFACE_SHARE = 0.45
+"""So it is where the shape's is so much of a side away along that side: at its very surface, as the origin of a flat thing is."""
 
 
 def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
@@ -53,7 +55,8 @@ def left_at_origin(measured: MeasuredAsset) -> Iterator[Complaint]:
     shapes = measured.shapes if len(measured.shapes) else measured.hull
     expected = shapes.uniform.center_of_mass_m
     away = float(np.linalg.norm(expected))
-    if away > AWAY_SHARE * measured.longest_m:
+    at_the_surface = np.abs(expected) > np.maximum(SURFACE_SHARE * np.ptp(measured.hull.boxes, axis=(0, 1)), SLACK_M)
+    if away > AWAY_SHARE * measured.longest_m or at_the_surface.any():
         yield Complaint(
             f"the centre of mass is the origin, but the shape's lies at {_millimetres(expected)} mm: it was left out or"
             " forgotten",
