@@ -32,12 +32,12 @@ def test_what_stands_fast_is_asked_for_no_mass_and_judged_by_no_hand() -> None:
 def test_a_size_is_wrong_where_its_own_mass_says_so() -> None:
     """A rail of 4 m that weighs as a rail does is none of a hand's things, and not wrong."""
 
-    def long(sides: tuple[float, float, float], mass_kg: float | None) -> set[str]:
+    def long(sides: tuple[float, float, float], mass_kg: float | None, name: str = "rail") -> set[str]:
         mesh = box(sides, (0, 0, sides[2] / 2))
         return codes(
             audit_asset(
                 replace(
-                    clean(), name="rail", category=None, captions=(), visual=(textured(mesh),), frames=(), grasps=(), rests=(),
+                    clean(), name=name, category=None, captions=(), visual=(textured(mesh),), frames=(), grasps=(), rests=(),
                     collision=(shape("rail", np.asarray(mesh.vertices)),), inertial=Inertial(mass_kg),
                 ),
                 RULES,
@@ -48,6 +48,7 @@ def test_a_size_is_wrong_where_its_own_mass_says_so() -> None:
     assert "SCL001" in long((4.0, 4.0, 2.0), 30.0)  # lighter than 32 m3 of air
     assert "SCL001" not in long((4.0, 0.2, 0.2), None) and "SCL001" in long((40.0, 2.0, 2.0), None)
     assert "SCL001" not in long((40.0, 2.0, 2.0), 0.0)  # a scene of Bullet's
+    assert "SCL001" in long((2.1, 1.6, 0.4), 1.0) and "SCL001" not in long((2.1, 1.6, 0.4), 1.0, "quilt")
     assert "SCL001" not in long((0.002, 0.002, 0.001), 1e-5) and "SCL001" in long((8e-5, 8e-5, 8e-5), 0.3)
 
 

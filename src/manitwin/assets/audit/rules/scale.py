@@ -51,6 +51,8 @@ def outside_hand_size(measured: MeasuredAsset) -> Iterator[Complaint]:
         elif longest <= LARGEST_UNWEIGHED_M:
             return
     usual = Interval(low=0.02, typical=0.15, high=0.5) if measured.prior is None else measured.prior.longest_axis_m
+    if measured.prior is not None and LARGEST_M < longest <= usual.high:  # a quilt on a bed has air below it
+        return
     yield Complaint(
         f"the longest side is {_length(longest)}{because}{_mix_up(longest, usual)}", values={"longest_m": longest}
     )
