@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+import trimesh
 
 from grasp_drafts import PANDA, Scripted, box_draft, run_all
 from manitwin.config import GraspConfig, RobustnessConfig, SecondOpinionConfig, VerifyConfig
@@ -179,6 +180,18 @@ def test_radius_grows_where_the_points_cannot_be_gripped(tmp_path: Path) -> None
 def test_too_wide_box_is_rejected_with_its_smallest_width(tmp_path: Path) -> None:
     draft = box_draft(tmp_path, [0.1, 0.12, 0.14], [[0.05, 0, 0.07], [0, 0.06, 0.07]])
     with pytest.raises(Rejected, match=r"narrowest grip is 100\.0 mm, the panda opens 80 mm") as answer:
+        run_grasps(draft, tmp_path)
+    assert answer.value.reason == "too_wide"
+
+
+def test_too_wide_jar_is_rejected_with_its_width_and_not_that_of_a_line_across_it(tmp_path: Path) -> None:
+    draft = box_draft(tmp_path, [0.09, 0.09, 0.165], [[0.045, 0, 0.08], [0, 0.045, 0.08]])
+    jar = trimesh.creation.cylinder(0.045, 0.165, sections=48)
+    jar.apply_translation([0, 0, 0.0825])
+    np.savez(tmp_path / "solid.npz", vertices=jar.vertices, faces=jar.faces)
+    np.savez(tmp_path / "hulls.npz", hull_00=jar.vertices)
+    np.savez(tmp_path / "parts.npz", solid=np.full(len(jar.faces), 255, np.uint8))
+    with pytest.raises(Rejected, match=r"narrowest grip is (88|89|90)\.\d mm, the panda opens 80 mm") as answer:
         run_grasps(draft, tmp_path)
     assert answer.value.reason == "too_wide"
 

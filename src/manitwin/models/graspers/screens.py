@@ -25,6 +25,7 @@ from manitwin.robots.grippers.suction import SuctionGripper
 MIN_WIDTH_M = 0.0005  # thinner than this, a wall is not told from the surface's noise
 WIDTH_SAMPLES = 2000
 CLEARANCE_M = 0.0005
+SQUARE = 0.98  # cosine of normal and closing axis: of pads that lie flat
 MOST_JAMMED_SHARE = 0.75  # of what whole pads bear, where less than whole ones touch, and what touches does not bear it
 GOOD_LOAD = 0.5  # half of the limits: what is left over is for what the twin does not know
 # The arm at which friction under the closing force would just carry weight and slides. Of 600 grasps of six objects 93 % held
@@ -80,7 +81,9 @@ class PadScreen:
         pairs = antipodal_pairs(caster, points, normals, friction=self._friction, max_width_m=anything, rng=rng)
         if not len(pairs):
             return Rejected("no_proposal", "no two opposite surface points can be pressed together")
-        least = pairs.width_m.min()
+        square = pairs.take(np.flatnonzero(pairs.alignment >= SQUARE))
+        # aslant across an edge or a ball two points are as near as one likes; where no pads touch well, such pairs are no grips
+        least = (square if len(square) and not counts.get("after_collision") else pairs).width_m.min()
         if least >= opening_m:
             gripper = f"the {self._gripper.name} opens {opening_m * 1000:.0f} mm"
             return Rejected("too_wide", f"narrowest grip is {least * 1000:.1f} mm, {gripper}")
