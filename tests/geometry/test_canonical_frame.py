@@ -190,6 +190,15 @@ def test_a_bottle_that_lies_in_the_world_of_its_file_is_stood_up_and_one_that_a_
         assert _stood(lying, choice).extents[2] == pytest.approx(height, abs=1e-3), choice.reason
 
 
+def test_a_thing_that_lies_and_stands_on_its_end_in_the_world_of_its_file_is_laid_down() -> None:
+    rod = trimesh.creation.capsule(0.12, 0.008)
+    for by_convention, stands, height in ((True, False, 0.016), (False, False, 0.136), (True, None, 0.136)):
+        choice = choose_up(rod, user="z", stands=stands, by_convention=by_convention)
+        assert _stood(rod, choice).extents[2] == pytest.approx(height, abs=1e-3), choice.reason
+    spoon = _turned(trimesh.creation.box((0.15, 0.03, 0.01)), (20, 0, 0))  # one that is only tilted stays as it is told
+    assert choose_up(spoon, user="z", stands=False, by_convention=True).reason.endswith("although it does not rest so")
+
+
 def _van() -> trimesh.Trimesh:
     """A van of 120 by 64 by 64 mm along x, standing on four wheels with z up."""
     body = trimesh.creation.box((0.12, 0.06, 0.05), trimesh.transformations.translation_matrix((0, 0, 0.039)))
