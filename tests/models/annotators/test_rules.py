@@ -12,6 +12,7 @@ import trimesh
 
 from handmade import cup, cylinder, subject
 from manitwin.formats.meshes.read import read_mesh
+from manitwin.geometry.poses import transform
 from manitwin.geometry.repair.cascade import repair
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.priors import load_priors
@@ -141,6 +142,27 @@ def test_a_closed_skin_of_a_hollow_thing_gets_a_wall_and_a_full_one_none() -> No
     assert estimate_physical(subject(ball, "tennis ball"), lookup("tennis ball")).wall_thickness_m == 0.003
     assert estimate_physical(subject(ball, "baseball"), lookup("baseball")).wall_thickness_m is None
     assert estimate_physical(subject(cup(), "cup"), lookup("cup")).wall_thickness_m is None
+
+
+def _book(leaves: int, opened: bool = False) -> trimesh.Trimesh:
+    """A closed book of 15 x 21 x 3 cm: covers, a spine and leaves of 0.1 mm; opened: its two halves make a roof."""
+    boxes = [((0.002, 0.21, 0.03), (-0.0755, 0, 0.015))]
+    boxes += [((0.15, 0.21, 0.002), (0, 0, z)) for z in (0.001, 0.029)]
+    boxes += [((0.144, 0.204, 1e-4), (-0.003, 0, z)) for z in np.linspace(0.003, 0.027, leaves)]
+    sheets = [trimesh.creation.box(size, transform(translation=np.array(place))) for size, place in boxes]
+    for sheet in sheets[1::2] if opened else []:
+        sheet.apply_transform(trimesh.transformations.rotation_matrix(1.2, [0, 1, 0], [-0.0755, 0, 0]))
+    return trimesh.util.concatenate(sheets)
+
+
+@pytest.mark.parametrize("leaves", [12, 40, 90])
+def test_a_book_whose_leaves_are_modelled_weighs_what_one_solid_book_does(leaves: int) -> None:
+    solid = trimesh.creation.box((0.152, 0.21, 0.03))
+    whole, leafy, opened = (
+        RulesAnnotator().estimate_physical(subject(mesh, "book")).mass_kg.value
+        for mesh in (solid, _book(leaves), _book(leaves, opened=True))
+    )
+    assert leafy == pytest.approx(whole, rel=0.05) and opened < 0.8 * whole
 
 
 def test_every_number_says_where_it_is_from() -> None:

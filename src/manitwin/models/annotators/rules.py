@@ -6,6 +6,7 @@ import numpy as np
 
 from manitwin.config import Resource
 from manitwin.geometry.boxes import upright_extents
+from manitwin.models.annotators.leaves import volume_with_leaves_m3
 from manitwin.models.annotators.likely_names import usual_of
 from manitwin.models.annotators.point_rules import select_points
 from manitwin.models.annotators.prior_names import lookup
@@ -89,7 +90,7 @@ def estimate_physical(subject: Subject, prior: Prior | None) -> PhysicalEstimate
         density = None if bulk is None else bulk.estimate(prior.source)
     extents = upright_extents(subject.solid.vertices)
     scale = 1.0 if subject.metric else size.value / float(extents.max())
-    longest_m, volume_m3 = scale * float(extents.max()), scale**3 * float(subject.solid.volume)
+    longest_m, volume_m3 = scale * float(extents.max()), scale**3 * volume_with_leaves_m3(subject.solid, prior)
     return PhysicalEstimates(
         longest_axis_m=None if subject.metric else size,
         mass_kg=_unknown_mass(density, volume_m3)
