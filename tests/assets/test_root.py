@@ -197,6 +197,17 @@ def test_a_root_that_was_renamed_is_found_by_the_path_that_comes_back_into_it(tm
         read_asset(file, root=root)
 
 
+def test_a_texture_outside_of_the_root_is_missing_and_said_to_be_there(tmp_path: Path) -> None:
+    root = tmp_path / "models"
+    box(root / "cup/cup.obj")
+    mesh = (root / "cup/cup.obj").read_text()
+    (root / "cup/cup.obj").write_text(f"mtllib cup.mtl\nusemtl paint\n{mesh}")
+    (root / "cup/cup.mtl").write_text("newmtl paint\nmap_Kd ../../photos/cup.png\n")
+    asset = read_asset(urdf(root / "cup/cup.urdf", "cup.obj"), root=root)
+    assert asset.missing_files == ("../../photos/cup.png",)
+    assert any("lies outside the folder 'models' and was not read" in remark for remark in asset.remarks)
+
+
 def test_templates_are_no_assets_and_are_said(tmp_path: Path) -> None:
     for name, size in (
         ("box", "DIM0 DIM1 0.1"),

@@ -27,7 +27,7 @@ MESHES = frozenset({".obj", ".stl", ".dae", ".msh", ".glb", ".gltf", ".ply", ".u
 MOST_NAMED = 3
 """Of the parts that are left out: of a robot's or a building's, a person reads the count."""
 _MOST_VAIN_SEARCHES, _MOST_TRIED = 8, 8
-_NOT_THERE = re.compile(r"^(?:texture|material library) '(.+)' is not there")
+_NOT_THERE = re.compile(r"^(?:texture|material library) '(.+)' (is not there|lies outside )")
 
 
 @dataclass
@@ -229,7 +229,7 @@ class AssetFiles:
                 absent = _NOT_THERE.match(sentence)
                 if absent:
                     self.missing.append(absent.group(1))
-                else:
+                if not (absent and absent.group(2) == "is not there"):
                     self.remark(f"{path.name}: {sentence}")
             self._meshes[path] = mesh
         self.count(sum(len(part.faces) for part in self._meshes[path].parts))

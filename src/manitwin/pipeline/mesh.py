@@ -207,7 +207,8 @@ def _geometry(
     if unit.finding is not None:
         findings.append(unit.finding)
     if chosen.probability == 0.0 or (file.up is not None and chosen.turned_deg > _TURNED_DEG):
-        findings.append(f"turned by {chosen.turned_deg:.0f} degrees from {chosen.up} up: {chosen.reason}")
+        turned = f"turned by {chosen.turned_deg:.0f} degrees from {chosen.up} up: " if chosen.turned_deg >= 1 else ""
+        findings.append(f"{turned}{chosen.reason}")
     return {
         "format": file.format,
         "units": unit.source,

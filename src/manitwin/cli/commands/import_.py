@@ -47,7 +47,8 @@ def import_(
 
     from manitwin.assets.importers.importer import import_assets, kept_words
 
-    done = there = failed = 0
+    done = there = same = failed = 0
+    first: dict[str, Path] = {}
     every = []
     for imported in import_assets(paths, out, format=format, lock_joints=lock_joints):  # type: ignore[arg-type]
         every.append(imported)
@@ -56,6 +57,13 @@ def import_(
             named = str(imported.error).startswith(f"{imported.path}: ")
             print_error(str(imported.error) if named else f"{imported.path}: {imported.error}")
             continue
+        if imported.there_already and imported.folder.name in first:
+            same += 1
+            out_console.print(
+                f"{imported.folder.name}: {imported.path} is the same again as {first[imported.folder.name]}"
+            )
+            continue
+        first[imported.folder.name] = imported.path
         if imported.there_already:
             there += 1
             out_console.print(f"{imported.folder.name}: imported before, left as it is")
@@ -71,7 +79,7 @@ def import_(
             out_console.print(f"  {remark}")
     if report is not None:
         _write_report(every, report)
-    before = f", {there} imported before" if there else ""
+    before = (f", {there} imported before" if there else "") + (f", {same} the same again" if same else "")
     then = f"; manitwin build {out} -o TWINS fills in what is missing" if done or there else ""
     out_console.print(f"{done} imported{before}, {failed} not{then}")
     raise typer.Exit(3 if failed else 0)

@@ -113,7 +113,8 @@ class MeshSource:
                 if found is not None and is_regular(found):
                     return self._read(found, inside)
         if outside:
-            self.find(f"{what} {_short(name)} lies outside the file's own folder and was not read")
+            own = "the file's own folder" if self.root is None else f"the folder {self.root.resolve().name!r}"
+            self.find(f"{what} {_short(name)} lies outside {own} and was not read")
         else:
             self.find(f"{what} {_short(name)} is not there; carried on without it")
         return None
