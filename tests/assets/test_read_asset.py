@@ -113,3 +113,17 @@ def test_worlds_of_included_models_and_layers_without_a_shape_are_no_assets(
     aside: list[Path] = []
     assert (list(find_assets(tmp_path, aside)) == [file]) == is_asset
     assert aside == ([] if is_asset else [file])
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("house.world", "<sdf version='1.6'><world name='w'><include/></world></sdf>", "a world of Gazebo"),
+        ("bowl.kinbody.xml", "<KinBody name='bowl'/>", "a body of OpenRAVE, which is not read; give its URDF"),
+        ("notes.xml", "<notes/>", "no asset of a known format"),
+    ],
+)
+def test_what_is_known_and_no_asset_is_told_what_it_is(tmp_path: Path, name: str, text: str, said: str) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(AssetError, match=said):
+        read_asset(tmp_path / name)

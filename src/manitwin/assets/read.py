@@ -10,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from manitwin.assets.unread_formats import why_not_read
 from manitwin.errors import AssetError, choose_from
 from manitwin.formats.bounded_file import open_regular
 
@@ -66,7 +67,7 @@ def detect(path: Path) -> Format:
         return found
     if path.is_dir():
         return detect(only_file(path))
-    raise AssetError(f"{path.name}: no asset of a known format; {VALID_ASSETS}")
+    raise AssetError(f"{path.name}: {why_not_read(path) or f'no asset of a known format; {VALID_ASSETS}'}")
 
 
 def folder_format(folder: Path) -> Format | None:

@@ -1,0 +1,26 @@
+"""Files that are known and no assets: what a person is told who gave one."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from manitwin.errors import AssetError
+from manitwin.formats.bounded_file import open_regular
+
+_HEAD_BYTES = 1 << 16
+_OPENRAVE = re.compile(rb"<(?:kinbody|environment)[\s>]", re.IGNORECASE)
+_WORLD = re.compile(rb"<world[\s>]")
+
+
+def why_not_read(file: Path) -> str | None:
+    """Return what a file of a known format is that is not read, and what to give for it; None of any other. Raises AssetError."""
+    if file.suffix.lower() not in (".world", ".xml", ".sdf"):
+        return None
+    with open_regular(file, AssetError) as opened:
+        head = opened.read(_HEAD_BYTES)
+    if _WORLD.search(head):
+        return "a world of Gazebo, whose things are the models that it includes; give their folder"
+    if file.suffix.lower() == ".xml" and _OPENRAVE.search(head):
+        return "a body of OpenRAVE, which is not read; give its URDF, or its mesh to `manitwin build`"
+    return None
