@@ -135,6 +135,7 @@ def test_a_size_that_a_mesh_or_a_model_says_is_no_guess(said: dict[str, Any] | N
         ),
         (None, 0.013, "it is 13 mm long, but things of a hand's size have 20 mm to 600 mm (centimetres taken for"),
         ("mug", 100.0, "it is 100 m long, but nearly every mug has 80 mm to 160 mm (millimetres taken for metres?)"),
+        ("parts bin", 0.95, "it is 950 mm long, but nearly every bin has 100 mm to 720 mm"),
         ("mug", 0.1, None),
         ("laptop", 0.40001, None),  # "400 mm long, but nearly every laptop has 260 mm to 400 mm"
         ("tray", 0.595, None),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from manitwin.engine.stage import Draft
-from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_names import found_by, word_for
 from manitwin.models.annotators.priors import unknown_prior
 from manitwin.pipeline.object_state import object_name
 
@@ -33,11 +33,12 @@ def suspicious_size_words(draft: Draft[Any]) -> str | None:
     physical = draft.fields.get("physical")
     if physical is None:
         return None
-    longest_m, prior = float(max(physical["extents_m"])), lookup(object_name(draft))
+    longest_m, found = float(max(physical["extents_m"])), found_by(object_name(draft))
+    prior = None if found is None else found[0]
     usual = (prior or unknown_prior()).longest_axis_m
     if usual.low / _BEYOND <= longest_m <= _BEYOND * usual.high:
         return None
-    such = "things of a hand's size have" if prior is None else f"nearly every {prior.category} has"
+    such = "things of a hand's size have" if found is None else f"nearly every {word_for(*found)} has"
     mixed = next(
         (f" ({said}?)" for factor, said in FACTORS.items() if usual.low <= factor * longest_m <= usual.high), ""
     )

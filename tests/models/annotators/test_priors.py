@@ -298,6 +298,8 @@ def test_what_is_named_in_the_plural_says_what_it_is_counted_by() -> None:
         ("tv stand", "cabinet"),
         ("floor lamp", "floor lamp"),
         ("cd", "compact disc"),
+        ("parts bin", "tote"),
+        ("recycling bin", "trash can"),
         ("toy chair", "toy"),
         ("dollhouse table", "toy"),
     ],
