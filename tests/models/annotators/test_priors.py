@@ -246,6 +246,8 @@ def test_no_point_is_named_that_a_shape_does_not_show() -> None:
     assert "stem end" in [part.label for part in lookup("apple").functional]
     assert [part.label for part in lookup("toy").functional] == ["body", "base"]
     assert "chuck" in [part.label for part in lookup("cordless drill").functional]
+    assert [part.label for part in lookup("stamp").functional] == ["handle", "base"]
+    assert [part.label for part in lookup("security camera").functional] == ["lens", "body", "base"]
 
 
 def test_only_what_is_operated_has_controls() -> None:
