@@ -25,6 +25,7 @@ from manitwin.twin.store import RECORD, seal
 from scene_twins import bowl, can, slab, write_thing
 from seen_solids import seen_from
 from tiny_clip import write_tiny_clip
+from turned_things import turned_photo
 from twin_folders import tried_as_built, twin_id
 
 SMALL = """\
@@ -128,6 +129,9 @@ class Folders:
             if right < 183:  # with a neck: an upright rectangle is a picture with bars, of what is called a bottle
                 photo[60:100, left:140] = photo[60:100, 160:right] = 0
             Image.fromarray(photo).save(page / name)
+        if "--views 00.png" in said:
+            for number in range(6):
+                Image.fromarray(turned_photo(60.0 * number, 25.0)).save(page / f"{number:02d}.png")
         (page / "scans").mkdir()
         trimesh.load(ROOT / "samples" / "mug.glb", force="mesh").export(page / "scans" / "mug.obj")
         (page / "list.csv").write_text("file,name,license\nsamples/mug.glb,mug,CC0-1.0\n")

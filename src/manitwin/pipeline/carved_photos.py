@@ -9,7 +9,8 @@ import numpy as np
 
 from manitwin.config import MattingConfig
 from manitwin.errors import UsageError
-from manitwin.models.generators.lift.carving import Carved, are_crossing, carve, power_of
+from manitwin.models.generators.lift.carved_solid import Carved
+from manitwin.models.generators.lift.carving import are_crossing, carve, power_of
 from manitwin.models.generators.lift.hint import hint_from_name
 from manitwin.models.generators.protocol import MOST_PHOTOS
 from manitwin.pipeline.photo import PhotoStage, refused
@@ -41,9 +42,11 @@ def carve_photos(
             "all photos are from one direction or its opposite: give one from the side, such as 90 degrees"
         )
     stage = PhotoStage(MattingConfig())
-    photos, findings = [], copies_told([str(path) for path in paths])
+    photos, lenses, findings = [], set(), copies_told([str(path) for path in paths])
     for path in paths:
         rgba, field = stage.cut_out(path, name, refused)
         photos.append((path.name, rgba))
+        lenses.add(field["focal_mm"])
         findings += [f"{path.name}: {finding}" for finding in field["findings"]]
-    return carve(photos, turns_deg, power=power_of(hint_from_name(name))), findings
+    focal_mm = lenses.pop() if len(lenses) == 1 else None
+    return carve(photos, turns_deg, power=power_of(hint_from_name(name)), focal_mm=focal_mm), findings

@@ -16,7 +16,11 @@ from manitwin.cli.console import err_console, out_console
 def carve(
     paths: Annotated[
         list[Path],
-        options.existing("Photos of one object, from its own height.", "PHOTO...", "two photos or more of one object"),
+        options.existing(
+            "Photos of one object that is turned before the camera, or from its own height.",
+            "PHOTO...",
+            "two photos or more of one object",
+        ),
     ],
     turns: Annotated[
         str,

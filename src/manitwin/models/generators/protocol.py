@@ -13,8 +13,8 @@ from manitwin.twin.import_record import ImportRecord
 
 Asked = Literal["image", "text"]
 """What a generator may be asked with."""
-MOST_PHOTOS = 24
-"""Of one thing: more say nothing new of its shape, and all are held in memory at once."""
+MOST_PHOTOS = 72
+"""Of one thing, every 5 degrees: more say nothing new of its shape, and all are held in memory at once."""
 IMAGE_OR_TEXT: frozenset[Asked] = frozenset({"image", "text"})
 
 

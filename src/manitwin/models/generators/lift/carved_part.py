@@ -2,35 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import trimesh
 from trimesh.visual import TextureVisuals
 
 from manitwin.geometry.poses import GLTF_TO_OBJECT, transform_points
 from manitwin.geometry.ray_caster import RayCaster
-from manitwin.models.generators.lift.carving import HEIGHT_PX, Carved, Outline
+from manitwin.models.generators.lift.carved_solid import Carved, CarvingPhoto
+from manitwin.models.generators.lift.photo_atlas import photo_atlas
 from manitwin.models.generators.lift.surface import bare_mesh
-from manitwin.models.generators.lift.texture import paint_unseen
 from manitwin.models.generators.photo_material import photo_material
 
 SEEN_COSINE = 0.2  # a face seen at less than 12 degrees takes painted colours
+MOST_COLOURING = 12
+"""Photos of many, spread over the directions, that colour: a texture has room for so many in detail."""
 
 
 def carved_part(carved: Carved) -> trimesh.Trimesh:
-    """Return the mesh in the object frame (Z up) with one texture: all photos side by side, painted colours below them."""
-    surface, outlines = carved.surface, carved.outlines
-    view = _best_views(carved)
-    atlas, places = _atlas(outlines)
+    """Return the mesh in the object frame (Z up) with one texture: photos beside each other, painted colours below them."""
+    surface, photos = carved.surface, colouring(carved)
+    view = _best_views(carved, photos)
+    atlas, places = photo_atlas([photo.crop for photo in photos])
     key = surface.faces + len(surface.vertices) * view[:, None]
     used, faces = np.unique(key, return_inverse=True)
     vertex, chosen = used % len(surface.vertices), used // len(surface.vertices)
-    points = transform_points(carved.to_pixels, surface.vertices[vertex])
+    points = transform_points(carved.to_carved, surface.vertices[vertex])
     uv = np.zeros((len(used), 2))
     for number, (left, top, width, height) in enumerate(places):
         own = chosen == number
-        at = _crop_share(outlines[number % len(outlines)], points[own])
+        at = photos[number % len(photos)].crop_share(points[own])
         uv[own] = np.column_stack(
             [(left + at[:, 0] * width) / atlas.shape[1], 1 - (top + at[:, 1] * height) / atlas.shape[0]]
         )
@@ -44,50 +44,33 @@ def carved_part(carved: Carved) -> trimesh.Trimesh:
     )
 
 
+def colouring(carved: Carved) -> tuple[CarvingPhoto, ...]:
+    """Return the photos that colour a carved solid: all, or of many some that are spread over the directions."""
+    photos = carved.outlines
+    if len(photos) <= MOST_COLOURING:
+        return photos
+    toward = [photo.toward(np.zeros((1, 3)))[0] for photo in photos]
+    azimuths = np.array([np.arctan2(each[0], each[2]) for each in toward])
+    order = np.argsort(np.round(azimuths - azimuths[0], 6) % (2 * np.pi), kind="stable")
+    chosen = order[np.linspace(0, len(order), MOST_COLOURING, endpoint=False).astype(int)]
+    return tuple(photos[k] for k in sorted(chosen))
+
+
 def seen_area_share(carved: Carved) -> float:
-    """Return how much of a carved surface's area a photo shows."""
-    mesh = bare_mesh(carved.surface)
+    """Return how much of a carved surface's area the photos show that colour it."""
+    mesh, photos = bare_mesh(carved.surface), colouring(carved)
     areas = np.asarray(mesh.area_faces)
-    return float(areas[_best_views(carved) < len(carved.outlines)].sum() / areas.sum())
+    return float(areas[_best_views(carved, photos) < len(photos)].sum() / areas.sum())
 
 
-def _best_views(carved: Carved) -> np.ndarray:
+def _best_views(carved: Carved, photos: tuple[CarvingPhoto, ...]) -> np.ndarray:
     """Return for each face the photo that shows it best; plus the number of photos where none does."""
     mesh = bare_mesh(carved.surface)
     caster, normals, centers = RayCaster(mesh), np.asarray(mesh.face_normals), mesh.triangles_center
     scores = []
-    for outline in carved.outlines:
-        angle = np.deg2rad(outline.turn_deg)
-        toward = np.array([np.sin(angle), 0.0, np.cos(angle)])
-        hit = caster.first_hits(centers + 1e-3 * normals, np.tile(toward, (len(centers), 1)))[1] >= 0
-        scores.append(np.where(hit, -1.0, normals @ toward))
+    for photo in photos:
+        toward = photo.toward(transform_points(carved.to_carved, centers))
+        hit = caster.first_hits(centers + 1e-3 * normals, toward)[1] >= 0
+        scores.append(np.where(hit, -1.0, (normals * toward).sum(axis=1)))
     best = np.argmax(scores, axis=0)
-    return np.where(np.max(scores, axis=0) >= SEEN_COSINE, best, best + len(carved.outlines))
-
-
-def _crop_share(outline: Outline, points: np.ndarray) -> np.ndarray:
-    """Return where points ``(N, 3)`` (x, height, z towards the first viewer) are in an outline's crop, 0 to 1 right and down."""
-    rows = np.nonzero(outline.crop.mask.any(axis=1))[0]
-    columns = np.nonzero(outline.crop.mask.any(axis=0))[0]
-    scale = (rows[-1] + 1 - rows[0]) / HEIGHT_PX
-    column = columns[0] + (outline.across(points[:, 0], -points[:, 2]) + 0.5) * scale
-    row = rows[0] + (HEIGHT_PX - 0.5 - points[:, 1]) * scale
-    height, width = outline.crop.mask.shape
-    return np.clip(np.column_stack([column / width, row / height]), 0.0, 1.0)
-
-
-def _atlas(outlines: Sequence[Outline]) -> tuple[np.ndarray, list[tuple[int, int, int, int]]]:
-    """Return one picture of all photos, and below them of their painted colours, with the place of each (x, y, w, h)."""
-    rows = [[o.crop.colours for o in outlines], [paint_unseen(o.crop, None) for o in outlines]]
-    heights = [max(picture.shape[0] for picture in row) for row in rows]
-    width = max(sum(picture.shape[1] for picture in row) for row in rows)
-    atlas = np.zeros((sum(heights), width, 3), np.uint8)
-    places, top = [], 0
-    for row, height in zip(rows, heights, strict=True):
-        left = 0
-        for picture in row:
-            atlas[top : top + picture.shape[0], left : left + picture.shape[1]] = picture
-            places.append((left, top, picture.shape[1], picture.shape[0]))
-            left += picture.shape[1]
-        top += height
-    return atlas, places
+    return np.where(np.max(scores, axis=0) >= SEEN_COSINE, best, best + len(photos))

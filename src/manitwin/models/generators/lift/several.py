@@ -9,9 +9,10 @@ from typing import Any
 import trimesh
 
 from manitwin.errors import Rejected
-from manitwin.models.generators.lift.carved_part import carved_part, seen_area_share
-from manitwin.models.generators.lift.carving import are_crossing, carve, power_of, same_from_every_side
+from manitwin.models.generators.lift.carved_part import carved_part, colouring, seen_area_share
+from manitwin.models.generators.lift.carving import are_crossing, carve, power_of
 from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name
+from manitwin.models.generators.lift.level_carving import same_from_every_side
 from manitwin.models.generators.lift.lifting import lift
 from manitwin.models.generators.lift.made_photo import textured_part
 from manitwin.models.generators.lift.surface import unseen_share
@@ -141,15 +142,18 @@ def _carved(views: Sequence[PhotoView], hint: ShapeHint) -> MadeOfViews:
             " from the side",
             "generate",
         )
-    carved = carve(photos, turns, power=power_of(hint))
+    lenses = {view.focal_mm for view in views}
+    carved = carve(photos, turns, power=power_of(hint), focal_mm=lenses.pop() if len(lenses) == 1 else None)
+    shown = [id(photo) for photo in colouring(carved)]
     notes = {
         "primitive": "visual hull",
         "source": f"carved out of {len(views)} photos",
         "rests": "standing",
         "confidence": min(carved.covered),
+        "camera": carved.camera,
         "views": [
-            {"turn_deg": turn, "turn_stated": True, "covered": share, "colours": True}
-            for turn, share in zip(turns, carved.covered, strict=True)
+            {"turn_deg": turn, "turn_stated": True, "covered": share, "colours": id(photo) in shown}
+            for turn, share, photo in zip(turns, carved.covered, carved.outlines, strict=True)
         ],
     }
     return MadeOfViews(carved_part(carved), notes, 1.0 - seen_area_share(carved))

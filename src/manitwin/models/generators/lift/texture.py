@@ -37,11 +37,12 @@ class Crop:
     """The object cut out of a photo: ``colours (H, W, 3) uint8`` with the outline bled outward, ``mask (h, w) bool``.
 
     Both show the same rectangle of the photo; the mask is smaller. Texture coordinates of the mask's pixel (x, y) are
-    ``((x + 0.5) / w, 1 - (y + 0.5) / h)``.
+    ``((x + 0.5) / w, 1 - (y + 0.5) / h)``. ``box`` is the rectangle in the photo's pixels: left, top, width, height.
     """
 
     colours: np.ndarray
     mask: np.ndarray
+    box: tuple[int, int, int, int]
 
 
 def crop_object(rgba: np.ndarray, mask_side_px: int) -> Crop:
@@ -56,7 +57,8 @@ def crop_object(rgba: np.ndarray, mask_side_px: int) -> Crop:
     box = np.pad(rgba[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1], pad)
     colours, alpha = _scaled(box, MAX_SIDE_PX)
     _, small = _scaled(box, mask_side_px)
-    return Crop(bled(colours, alpha > 127), _cleaned(small > 127))
+    place = int(columns[0]) - margin, int(rows[0]) - margin, box.shape[1], box.shape[0]
+    return Crop(bled(colours, alpha > 127), _cleaned(small > 127), place)
 
 
 def beside(

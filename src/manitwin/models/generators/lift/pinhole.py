@@ -1,0 +1,141 @@
+"""Outlines as pinhole cameras see them: which points lie within all of them, and how much of each their common solid fills."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+
+FAR_PX = 24.0
+"""Beyond this distance from an outline, in pixels of a ``Sight``, it is not known how far."""
+RIM_RAYS, MOST_PASSING_PX = 48, 6.0
+_STEPS = 40  # of a ray through the object's surroundings
+_AROUND = 1.15  # of the object's radius as the outlines have it
+
+
+@dataclass(frozen=True)
+class Sight:
+    """A signed distance to one outline, pixels, positive inside, and the camera that saw it.
+
+    ``distance (H, W) float32`` is that of ``signed_distance``, of a mask whose first pixel is ``box (2,)`` (x, y) of the picture;
+    ``matrix (3, 4)`` takes points of the object frame (x to the first photo's right, y away from its camera, z up) to homogeneous
+    pixels of the picture, the third of them the depth; ``focal_px`` is the lens's. All pixels are those of the scaled picture.
+    """
+
+    distance: np.ndarray
+    box: np.ndarray
+    matrix: np.ndarray
+    focal_px: float
+
+    @cached_property
+    def corner(self) -> np.ndarray:
+        """The first pixel (x, y) of the padded ``distance``."""
+        return np.asarray(self.box - FAR_PX)
+
+    @cached_property
+    def rim(self) -> np.ndarray:
+        """The middles of the pixels along the outline's outer border, ``(N, 2)``, of the picture."""
+        inside = (self.distance > 0).astype(np.uint8)
+        lines, _ = cv2.findContours(inside, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+        return np.asarray(max(lines, key=len)[:, 0, :] + self.corner + 0.5, float)
+
+    @property
+    def position(self) -> np.ndarray:
+        """The projection centre ``(3,)``."""
+        return np.asarray(-np.linalg.solve(self.matrix[:, :3], self.matrix[:, 3]))
+
+    def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the columns, rows and depths of points ``(..., 3)``; behind the camera they are far outside."""
+        seen = points @ self.matrix[:, :3].T + self.matrix[:, 3]
+        depth = seen[..., 2]
+        safe = np.where(depth > 1e-6, depth, np.inf)
+        return seen[..., 0] / safe, seen[..., 1] / safe, depth
+
+    def inside(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return how far inside the outline points ``(..., 3)`` are seen, pixels, and the length of a pixel at each."""
+        column, row, depth = self.project(points)
+        flat = column.reshape(1, -1) - self.corner[0] - 0.5, row.reshape(1, -1) - self.corner[1] - 0.5
+        found = _looked_up(self.distance, *flat).reshape(column.shape)
+        return np.where(depth > 1e-6, found, -FAR_PX), np.maximum(depth, 1e-6) / self.focal_px
+
+    def rays(self, pixels: np.ndarray) -> np.ndarray:
+        """Return the directions ``(N, 3)`` through pixels ``(N, 2)``, with a depth of 1."""
+        return np.asarray(np.linalg.solve(self.matrix[:, :3], np.column_stack([pixels, np.ones(len(pixels))]).T).T)
+
+
+def _looked_up(image: np.ndarray, column: np.ndarray, row: np.ndarray) -> np.ndarray:
+    """Return an image's values, between its pixels too; in slices, for OpenCV takes no more than 32,767 columns."""
+    size = 1 << 14
+    parts = [
+        cv2.remap(
+            image,
+            column[:, at : at + size].astype(np.float32),
+            row[:, at : at + size].astype(np.float32),
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_CONSTANT,
+            borderValue=-FAR_PX,
+        )
+        for at in range(0, column.shape[1], size)
+    ]
+    return np.concatenate(parts, axis=1)
+
+
+def signed_distance(mask: np.ndarray) -> np.ndarray:
+    """Return how far inside each pixel of a mask ``(H, W) bool``, padded by ``FAR_PX``, is; at most that far."""
+    padded = np.pad(mask, int(FAR_PX))
+    inside = cv2.distanceTransform(padded.astype(np.uint8), cv2.DIST_L2, 5)
+    outside = cv2.distanceTransform((~padded).astype(np.uint8), cv2.DIST_L2, 5)
+    return np.maximum(np.where(padded, inside - 0.5, 0.5 - outside), -FAR_PX).astype(np.float32)
+
+
+def around(sights: Sequence[Sight]) -> tuple[np.ndarray, float]:
+    """Return a centre ``(3,)`` and a radius that hold the object: where the rays through the outlines' middles are nearest."""
+    normal, moment, middles = np.zeros((3, 3)), np.zeros(3), []
+    for sight in sights:
+        middle = (sight.rim.min(axis=0) + sight.rim.max(axis=0)) / 2
+        ray = sight.rays(middle[None])[0]
+        ray /= np.linalg.norm(ray)
+        across = np.eye(3) - np.outer(ray, ray)
+        normal += across
+        moment += across @ sight.position
+        middles.append(middle)
+    centre = np.linalg.lstsq(normal, moment, rcond=None)[0]
+    reach = [
+        float(np.linalg.norm(sight.rim - middle, axis=1).max())
+        * max(float(sight.project(centre)[2]), 0)
+        / sight.focal_px
+        for sight, middle in zip(sights, middles, strict=True)
+    ]
+    return centre, _AROUND * max(reach)
+
+
+def points_on_rays(sights: Sequence[Sight], number: int, pixels: np.ndarray) -> np.ndarray:
+    """Return points ``(N, steps, 3)`` along the rays through pixels ``(N, 2)`` of one outline, where the object may be."""
+    centre, radius = around(sights)
+    own = sights[number]
+    depth = float(own.project(centre)[2])
+    depths = np.linspace(max(depth - radius, 0.05 * depth), depth + radius, _STEPS)
+    return np.asarray(own.position + own.rays(pixels)[:, None, :] * depths[None, :, None])
+
+
+def inside_others(sights: Sequence[Sight], number: int, points: np.ndarray) -> np.ndarray:
+    """Return how far inside all outlines but one points ``(..., 3)`` are seen, pixels."""
+    least = np.full(points.shape[:-1], FAR_PX, np.float32)
+    for other, sight in enumerate(sights):
+        if other != number:
+            least = np.minimum(least, sight.inside(points)[0])
+    return least
+
+
+def passing_px(sights: Sequence[Sight]) -> float:
+    """Return by how many pixels the rays along all outlines pass outside of the others' in the mean; each at most so many."""
+    passed = []
+    for number, sight in enumerate(sights):
+        some = np.linspace(0, len(sight.rim) - 1, RIM_RAYS).astype(int)
+        best = inside_others(sights, number, points_on_rays(sights, number, sight.rim[some])).max(axis=1)
+        # the middle of a pixel of the rim is half a pixel within the outline
+        passed.append(np.clip(0.5 - best, 0.0, MOST_PASSING_PX))
+    return float(np.mean(passed))

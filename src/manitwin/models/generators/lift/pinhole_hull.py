@@ -1,0 +1,116 @@
+"""The solid within all outlines that pinhole cameras saw, cut off at the ground that it stands on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import ndimage
+
+from manitwin.errors import Rejected
+from manitwin.models.generators.lift.pinhole import FAR_PX, Sight, around, inside_others, points_on_rays
+
+COARSE_CELLS, CELLS = 24, 96
+"""Of the grids along the longest side: one that finds where the solid is, and its own."""
+NEAR_PX = 1.5
+"""A ray that passes the common solid by less, of outlines of ``turntable.SIDE_PX``, is taken to meet it."""
+_COVERED_RAYS = 300
+_LEAST_DOWNWARD = 0.05  # of a ray's slope: flatter ones do not tell how high what they meet is
+_LOWEST_SHARE = 0.25
+
+
+def covered_shares(sights: Sequence[Sight]) -> tuple[list[float], np.ndarray]:
+    """Return how much of each outline the common solid of all fills, and of outline i that of all but k, ``(N, N)`` by (i, k).
+
+    Without itself an outline is filled by the others, as it is with itself.
+    """
+    count = len(sights)
+    shares, without = [], np.zeros((count, count))
+    for number, sight in enumerate(sights):
+        rows, columns = np.nonzero(sight.distance > 0)
+        some = np.linspace(0, len(rows) - 1, min(_COVERED_RAYS, len(rows))).astype(int)
+        pixels = np.column_stack([columns[some], rows[some]]) + sight.corner + 0.5
+        points = points_on_rays(sights, number, pixels)
+        each = np.full((count, *points.shape[:2]), FAR_PX, np.float32)
+        for other in range(count):
+            if other != number:
+                each[other] = sights[other].inside(points)[0]
+        order = np.sort(each, axis=0)[:2]
+        shares.append(float(np.mean(order[0].max(axis=1) > -NEAR_PX)))
+        for left_out in range(count):
+            least = np.where(each[left_out] > order[0], order[0], order[1])
+            without[number, left_out] = np.mean(least.max(axis=1) > -NEAR_PX)
+    return shares, without
+
+
+def hull_field(sights: Sequence[Sight], power: float | None) -> tuple[np.ndarray, float, np.ndarray]:
+    """Return how far inside all outlines each node of a grid (X, Y, Z) is, its cell and its first node, as lengths.
+
+    What would lie below the ground, which cameras from above do not see, is outside. With a ``power`` the corners that outlines
+    along x and y leave are those of superellipses (Barr 1981). Raises Rejected where nothing is inside all.
+    """
+    centre, radius = around(sights)
+    rough = 2 * radius / COARSE_CELLS
+    axes = [np.arange(middle - radius, middle + radius + rough, rough) for middle in centre]
+    inside = _depth(sights, np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)) > -rough
+    if not inside.any():
+        raise Rejected("generator_failed", "the outlines have nothing in common; check the turns", "generate")
+    low, high = (np.array([pick(np.nonzero(inside)[k]) for k in range(3)]) for pick in (np.min, np.max))
+    first = np.array([axis[at] for axis, at in zip(axes, low, strict=True)]) - rough
+    last = np.array([axis[at] for axis, at in zip(axes, high, strict=True)]) + rough
+    cell = float((last - first).max()) / CELLS
+    axes = [np.arange(start, end + 2 * cell, cell) for start, end in zip(first, last, strict=True)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    depth = np.minimum(_depth(sights, points), points[..., 2] - ground_level(sights))
+    if power is not None:
+        depth = _cornered(depth, cell, power)
+    smooth = ndimage.gaussian_filter(np.clip(depth, -3 * cell, 3 * cell), 0.5)
+    for side in (smooth[0], smooth[-1], smooth[:, 0], smooth[:, -1], smooth[:, :, 0], smooth[:, :, -1]):
+        side[...] = -cell
+    return smooth, cell, first
+
+
+def ground_level(sights: Sequence[Sight]) -> float:
+    """Return how high the ground is that the thing stands on; minus infinity where no camera looks down at it.
+
+    Of each photo the rays along the outline that meet the common solid lowest do so at the ground, or just in front of it.
+    """
+    lowest = []
+    for number, sight in enumerate(sights):
+        points = points_on_rays(sights, number, sight.rim)
+        rays = sight.rays(sight.rim)
+        downward = -rays[:, 2] / np.linalg.norm(rays, axis=1) > _LEAST_DOWNWARD
+        met = inside_others(sights, number, points) > -0.5
+        told = downward & met.any(axis=1)
+        if told.any():
+            heights = np.where(met, points[..., 2], -np.inf).max(axis=1)[told]
+            lowest.append(float(heights.min()))
+    return float(np.quantile(lowest, _LOWEST_SHARE)) if lowest else -np.inf
+
+
+def _cornered(depth: np.ndarray, cell: float, power: float) -> np.ndarray:
+    """Cut the corners off each part of each level of a field (X, Y, Z): it is a superellipse over its widths along x and y."""
+    cut = depth.copy()
+    for level in range(depth.shape[2]):
+        parts, _ = ndimage.label(depth[:, :, level] > 0)
+        for number, (along_x, along_y) in enumerate(ndimage.find_objects(parts), 1):
+            own = (
+                slice(max(along_x.start - 1, 0), along_x.stop + 1),
+                slice(max(along_y.start - 1, 0), along_y.stop + 1),
+            )
+            x, y = (np.arange(part.start, part.stop) - (part.start + part.stop - 1) / 2 for part in own)
+            half_x, half_y = (along_x.stop - along_x.start) / 2, (along_y.stop - along_y.start) / 2
+            share = ((np.abs(x[:, None]) / half_x) ** power + (np.abs(y[None]) / half_y) ** power) ** (1 / power)
+            inside = min(half_x, half_y) * cell * (1 - share)
+            other = (parts[own] != 0) & (parts[own] != number)
+            cut[(*own, level)] = np.where(other, cut[(*own, level)], np.minimum(cut[(*own, level)], inside))
+    return cut
+
+
+def _depth(sights: Sequence[Sight], points: np.ndarray) -> np.ndarray:
+    """Return how far inside all outlines points are, as lengths."""
+    least = np.full(points.shape[:-1], np.inf)
+    for sight in sights:
+        inside, pixel = sight.inside(points)
+        least = np.minimum(least, np.where(inside <= -FAR_PX, -np.inf, inside) * pixel)
+    return np.maximum(least, -1e3)
