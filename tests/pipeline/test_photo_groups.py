@@ -171,3 +171,30 @@ def test_a_generator_of_one_photo_gets_the_first_and_the_twin_says_so(photos: Pa
     assert draft.field("generation")["notes"]["photos"] == {"cut_out": 3, "used": 1}
     (check,) = photos_checks(draft)
     assert (check.passed, check.value, check.limit) == (False, 1.0, 3.0) and "command takes one photo" in check.message
+
+
+def test_the_twin_says_which_turns_were_estimated_and_where_the_camera_stood(photos: Path, tmp_path: Path) -> None:
+    draft = _cut_out(photos, tmp_path / "work")
+    used = {"photos": {"cut_out": 3, "used": 3}}
+    fitted = [
+        {"name": "front.png", "turn_deg": 0.0, "turn_stated": False, "colours": True, "confidence": 0.98},
+        {"name": "side.png", "turn_deg": 91.6, "turn_stated": False, "colours": True, "confidence": 0.91},
+        {"name": "back.png", "turn_deg": None, "turn_stated": False, "colours": False, "confidence": 0.87},
+    ]
+    carved = [{"name": each["name"], "turn_deg": 0.0, "turn_stated": True, "colours": True} for each in fitted]
+    camera = {"elevation_deg": 27.2, "focal_of_longer_side": 4.1, "axis_share": 0.5}
+    for notes, said in (
+        (
+            {"views": fitted},
+            "turns estimated, degrees: front.png 0 (confidence 0.98), side.png 92 (confidence 0.91), back.png not told, its"
+            " colours not used (confidence 0.87)",
+        ),
+        (
+            {"views": carved, "camera": camera},
+            "the camera stayed 27 degrees above the thing, its lens 4.1 longer sides",
+        ),
+        ({"views": carved, "camera": None}, ""),
+    ):
+        draft.fields["generation"] = {"generator": "lift", "notes": notes | used}
+        (check,) = photos_checks(draft)
+        assert check.passed and (said in check.message if said else check.message == "")

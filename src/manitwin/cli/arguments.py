@@ -124,13 +124,26 @@ def check_text(called: str, value: str, *, place: bool) -> None:
         raise UsageError(f"{called}: {value[:40]!r}... has {length} bytes; a path has at most {LONGEST_PLACE}")
 
 
-def degrees_of(value: str) -> list[float]:
-    """Return the degrees that stand between commas; raises UsageError for what are none."""
+def degrees_of(value: str, photos: int) -> list[float]:
+    """Return the degrees that stand between commas; with ``...`` at their end they go on by the same step, one a photo.
+
+    Raises UsageError for what are none, and where no step is said.
+    """
+    said = [turn.strip() for turn in value.split(",")]
+    goes_on = len(said) > 1 and said[-1] in ("...", "\N{HORIZONTAL ELLIPSIS}")
     try:
-        return [float(turn) for turn in value.split(",")]
+        turns = [float(turn) for turn in (said[:-1] if goes_on else said)]
     except ValueError:
         told = value if len(value) <= 60 else f"{value[:60]}..."
-        raise UsageError(f"--turns {told!r}: no list of degrees; give one a photo, such as 0,90,180") from None
+        raise UsageError(
+            f"--turns {told!r}: no list of degrees; give one a photo, such as 0,90,180, or 0,10,... where all steps are equal"
+        ) from None
+    if not goes_on:
+        return turns
+    if len(turns) < 2 or len(turns) > photos:
+        raise UsageError(f"--turns {value!r}: for {photos} photos; give at least the first two turns before the dots")
+    step = turns[-1] - turns[-2]
+    return turns + [turns[-1] + step * number for number in range(1, photos - len(turns) + 1)]
 
 
 def _called(parameter: Any) -> str:

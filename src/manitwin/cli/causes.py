@@ -25,7 +25,7 @@ REMEDIES = {
     "no_object": "photograph the object whole and larger, on a plain surface of another colour",
     "several_objects": "one object an input: crop the photo, or give each object in a file of its own",
     "low_confidence_matte": "photograph it whole on a plain surface of another colour, or give an image with an alpha channel;"
-    " where its cutout.webp is right, `manitwin review cutouts DATASET --accept ID` builds it",
+    " where a cutout.webp lies beside a photo's twin.json and is right, `manitwin review cutouts DATASET --accept ID` builds it",
     "generator_failed": "another photo, another generator (--generator, see docs/generators.md), or a mesh",
     "not_watertight": "close the holes of the mesh in a modeller",
     "degenerate": "give a mesh that encloses a volume, with walls and no holes",

@@ -121,8 +121,9 @@ Views = Annotated[bool, typer.Option("--views", help="The inputs are photos of o
 Turns = Annotated[
     str | None,
     typer.Option(
-        help="The camera's turn about the vertical in each photo of --views: degrees, counter-clockwise from above.",
-        metavar="0,90,...",
+        help="The camera's turn about the vertical in each photo of --views: degrees, counter-clockwise from above; 0,10,... goes"
+        " on by equal steps.",
+        metavar="0,90,180",
     ),
 ]
 Name = Annotated[str | None, typer.Option(help="What the object is ('mug'): the key to the priors.")]

@@ -104,8 +104,31 @@ def photos_checks(draft: Draft) -> list[Check]:
         said.append(
             f"the generator {generation['generator']} takes one photo, the first: the others are not in the mesh"
         )
-    value = float(used)
-    return [Check(name="every_photo_used", passed=not said, value=value, limit=float(given), message="; ".join(said))]
+    passed = not said
+    said += _turns_told(generation["notes"])
+    return [
+        Check(name="every_photo_used", passed=passed, value=float(used), limit=float(given), message="; ".join(said))
+    ]
+
+
+def _turns_told(notes: dict[str, Any]) -> list[str]:
+    """Say which turns of the camera were estimated and how sure the fits are, and where it stood where outlines told that."""
+    said, estimated = [], [view for view in notes.get("views", []) if not view["turn_stated"]]
+    if estimated:
+        turns = ", ".join(
+            f"{view['name']} {'not told' if view['turn_deg'] is None else format(view['turn_deg'], '.0f')}"
+            f"{'' if view['colours'] else ', its colours not used'}"
+            + (f" (confidence {view['confidence']:.2f})" if "confidence" in view else "")
+            for view in estimated
+        )
+        said.append(f"turns estimated, degrees: {turns}")
+    camera = notes.get("camera")
+    if camera is not None:
+        said.append(
+            f"as the outlines tell, the camera stayed {camera['elevation_deg']:.0f} degrees above the thing, its lens"
+            f" {camera['focal_of_longer_side']:.1f} longer sides of the picture"
+        )
+    return said
 
 
 def rehearsal_checks(draft: Draft) -> list[Check]:

@@ -11,6 +11,7 @@ import trimesh
 from PIL import Image
 from typer.testing import CliRunner
 
+from manitwin.cli.arguments import degrees_of
 from manitwin.cli.main import app
 from manitwin.errors import Rejected, UsageError
 from manitwin.formats.glb import read_glb
@@ -185,3 +186,16 @@ def test_the_command_says_what_it_needs(tmp_path: Path) -> None:
     ):
         done = CliRunner().invoke(app, ["carve", str(photo), str(photo), *words])
         assert done.exit_code != 0 and told in " ".join(done.output.split()) + str(done.exception)
+
+
+def test_turns_go_on_by_equal_steps_where_dots_say_so() -> None:
+    assert degrees_of("0,90,180", 3) == [0, 90, 180]
+    assert degrees_of("0,-10, ...", 4) == [0, -10, -20, -30]
+    assert degrees_of("0,30,75,...", 3) == [0, 30, 75]
+    for value, photos, told in (
+        ("0,...", 3, "at least the first two"),
+        ("...", 3, "no list"),
+        ("0,1,2,...", 2, "2 photos"),
+    ):
+        with pytest.raises(UsageError, match=told):
+            degrees_of(value, photos)

@@ -67,7 +67,7 @@ def build(
         raise UsageError("no data set to write twins into; give a folder or URL with -o")
     arguments: dict[str, Any] = {
         "texts": text or [], "count": count, "strict": strict, "jobs": jobs, "config": config, "views": views,
-        "turns_deg": None if turns is None else degrees_of(turns),
+        "turns_deg": None if turns is None else degrees_of(turns, len(inputs or [])),
     }  # fmt: skip
     if dry_run:
         _print_dry_run(inputs or [], out, arguments, said, as_json=json)

@@ -25,8 +25,9 @@ def carve(
     turns: Annotated[
         str,
         typer.Option(
-            help="The camera's turn about the vertical in each photo: degrees, counter-clockwise from above, the first 0.",
-            metavar="0,90,...",
+            help="The camera's turn about the vertical in each photo: degrees, counter-clockwise from above, the first 0;"
+            " 0,10,... goes on by equal steps.",
+            metavar="0,90,180",
         ),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="The GLB file to write.", metavar="FILE.glb")],
@@ -47,7 +48,7 @@ def carve(
     why = None if name is None else unusable("name", name)
     if why is not None:
         raise UsageError(f"--name: {why}")
-    carved, findings = carve_photos(paths, degrees_of(turns), name)
+    carved, findings = carve_photos(paths, degrees_of(turns, len(paths)), name)
     for finding in findings:
         err_console.print(finding)
     write_bytes_atomically(out, write_glb([carved_part(carved)]))

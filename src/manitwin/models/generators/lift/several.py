@@ -117,12 +117,13 @@ def _from_fit(found: SeveralFitted, views: Sequence[PhotoView], name: str | None
     worst = min(found.fits, key=lambda fit_: fit_.confidence)
     photos = [
         {
+            "name": view.name,
             "turn_deg": turn if told or stated else None,
             "turn_stated": stated,
             "colours": taken,
             **{key: notes_of(fit_)[key] for key in ("confidence", "residual", "view")},
         }
-        for fit_, turn, told, taken in zip(found.fits, found.turns_deg, found.told, shown, strict=True)
+        for view, fit_, turn, told, taken in zip(views, found.fits, found.turns_deg, found.told, shown, strict=True)
     ]
     notes = notes_of(worst) | {"source": f"template fitted to {len(views)} photos", "views": photos}
     known = known_of_fitted(found.fits[0], name or worst.category, surface)
@@ -152,7 +153,7 @@ def _carved(views: Sequence[PhotoView], hint: ShapeHint) -> MadeOfViews:
         "confidence": min(carved.covered),
         "camera": carved.camera,
         "views": [
-            {"turn_deg": turn, "turn_stated": True, "covered": share, "colours": id(photo) in shown}
+            {"name": photo.name, "turn_deg": turn, "turn_stated": True, "covered": share, "colours": id(photo) in shown}
             for turn, share, photo in zip(turns, carved.covered, carved.outlines, strict=True)
         ],
     }
@@ -175,8 +176,8 @@ def _round(views: Sequence[PhotoView], hint: ShapeHint) -> MadeOfViews:
         )
     lifted = lift(views[0].rgba, hint)
     seen = [
-        {"turn_deg": None, "turn_stated": False, "covered": None, "colours": number == 0}
-        for number in range(len(views))
+        {"name": view.name, "turn_deg": None, "turn_stated": False, "covered": None, "colours": number == 0}
+        for number, view in enumerate(views)
     ]
     notes = lifted.notes | {"source": "a round thing's outline, the same in all photos", "views": seen}
     return MadeOfViews(textured_part(lifted), notes, unseen_share(lifted.surface))
