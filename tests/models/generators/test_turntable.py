@@ -69,6 +69,16 @@ def test_of_many_that_do_not_go_together_one_is_named() -> None:
     assert str(refused.value).count(".png") == 1
 
 
+def test_a_photo_that_was_scaled_is_used_and_one_that_was_cropped_is_named() -> None:
+    photos, turns = _turned(5, 25.0)
+    half = [*photos[:2], ("half.png", photos[2][1][::2, ::2]), *photos[3:]]
+    carved = carve(half, turns)
+    assert carved.camera is not None and carved.camera["elevation_deg"] == pytest.approx(25, abs=3)
+    cropped = [*photos[:2], ("cropped.png", photos[2][1][30:, 30:290]), *photos[3:]]
+    with pytest.raises(Rejected, match=r"cropped\.png: not of the shape of the other photos, 320 x 240 pixels"):
+        carve(cropped, turns)
+
+
 def test_each_side_has_its_colour_from_above() -> None:
     carved = carve(*_turned(6, 25.0))
     part = carved_part(carved)

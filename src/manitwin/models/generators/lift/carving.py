@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import cv2
 import numpy as np
 
 from manitwin.errors import Rejected
@@ -27,6 +28,7 @@ LEAST_COVERED_TURNED = 0.95
 _SUSPECTS = 3
 _MANY = 5
 """Photos by hand, of so many, explained none of a camera that stays."""
+_ROUNDED_PX = 1.0  # by which sizes of photos that were scaled are off their shape
 _LEAST_TURNED = 3
 """Photos from different turns that tell a camera's height, lens and axis; two have too little in common."""
 
@@ -50,13 +52,15 @@ def carve(
 ) -> Carved:
     """Carve what matted ``photos`` (name, ``(H, W, 4) uint8``) show from ``turns_deg`` about the vertical, counter-clockwise.
 
-    Three and more photos of one size may be of a thing that is turned before a camera that stays, at any height, or of a camera
+    Three and more photos of one shape may be of a thing that is turned before a camera that stays, at any height, or of a camera
     that goes round it at one height and distance: the outlines tell it. Else each is from about the thing's own height.
     ``power`` is that of the superellipse at each level where only two directions are seen; ``focal_mm`` is the lens as 35 mm
     equivalent, where it is stated. Raises Rejected ``generator_failed`` naming the photo that does not go with the others.
     """
-    if not _may_be_turned(photos, turns_deg):
-        return carve_level(placed_outlines(photos, turns_deg), power)
+    sized = _of_one_size(photos)
+    if not _may_be_turned(sized, turns_deg):
+        return _carved_level(photos, turns_deg, power)
+    photos = sized
     pictures = [rgba for _, rgba in photos]
     camera, covered, without = _seen_turned(pictures, turns_deg, focal_mm)
     fits = min(covered) >= LEAST_COVERED_TURNED
@@ -69,6 +73,41 @@ def carve(
     if level:
         return carve_level(outlines, power)
     raise Rejected("generator_failed", _told(photos, turns_deg, focal_mm, covered, without), "generate")
+
+
+def _carved_level(photos: Sequence[tuple[str, np.ndarray]], turns_deg: Sequence[float], power: float) -> Carved:
+    """Carve photos of several shapes; where they are refused and few have another shape than the rest, these are named."""
+    try:
+        return carve_level(placed_outlines(photos, turns_deg), power)
+    except Rejected as error:
+        shapes = [rgba.shape[:2] for _, rgba in photos]
+        height, width = max(shapes, key=shapes.count)
+        odd = [name for (name, _), shape in zip(photos, shapes, strict=True) if shape != (height, width)]
+        if not odd or 2 * len(odd) >= len(photos):
+            raise
+        told = (
+            f"{', '.join(odd)}: not of the shape of the other photos, {width} x {height} pixels: of a thing that is turned"
+            " before a camera, give all uncropped"
+        )
+        raise Rejected(error.reason, f"{told}; {error.detail}", error.stage) from error
+
+
+def _of_one_size(photos: Sequence[tuple[str, np.ndarray]]) -> Sequence[tuple[str, np.ndarray]]:
+    """Return photos of one shape in the size of the smallest: what was scaled since still shows what the camera saw."""
+    height, width = min((rgba.shape[:2] for _, rgba in photos), key=lambda shape: shape[0] * shape[1])
+    for _, rgba in photos:
+        scale = rgba.shape[1] / width
+        if abs(rgba.shape[0] - scale * height) > _ROUNDED_PX * max(scale, 1.0):
+            return photos
+    return [
+        (
+            name,
+            rgba
+            if rgba.shape[:2] == (height, width)
+            else cv2.resize(rgba, (width, height), interpolation=cv2.INTER_AREA),
+        )
+        for name, rgba in photos
+    ]
 
 
 def _may_be_turned(photos: Sequence[tuple[str, np.ndarray]], turns_deg: Sequence[float]) -> bool:
