@@ -198,3 +198,11 @@ def test_the_twin_says_which_turns_were_estimated_and_where_the_camera_stood(pho
         draft.fields["generation"] = {"generator": "lift", "notes": notes | used}
         (check,) = photos_checks(draft)
         assert check.passed and (said in check.message if said else check.message == "")
+
+
+def test_a_photo_whose_outline_does_not_go_with_the_others_fails_the_check(photos: Path, tmp_path: Path) -> None:
+    draft = _cut_out(photos, tmp_path / "work")
+    notes = {"views": [], "left_out": ["side.png"], "photos": {"cut_out": 3, "used": 2}}
+    draft.fields["generation"] = {"generator": "lift", "notes": notes}
+    (check,) = photos_checks(draft)
+    assert (check.passed, check.value) == (False, 2.0) and check.message.startswith("side.png: left out")

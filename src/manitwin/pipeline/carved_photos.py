@@ -49,4 +49,8 @@ def carve_photos(
         lenses.add(field["focal_mm"])
         findings += [f"{path.name}: {finding}" for finding in field["findings"]]
     focal_mm = lenses.pop() if len(lenses) == 1 else None
-    return carve(photos, turns_deg, power=power_of(hint_from_name(name)), focal_mm=focal_mm), findings
+    carved = carve(photos, turns_deg, power=power_of(hint_from_name(name)), focal_mm=focal_mm)
+    findings += [
+        f"{left}: left out, its outline does not go with those of the other photos" for left in carved.left_out
+    ]
+    return carved, findings

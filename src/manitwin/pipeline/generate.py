@@ -21,7 +21,7 @@ class GenerateStage:
     """Write ``generated.glb`` and the field ``generation``."""
 
     name: ClassVar[str] = "generate"
-    version: ClassVar[str] = "26"
+    version: ClassVar[str] = "27"
     reads: ClassVar[tuple[str, ...]] = ("photo.png?", "photos/?", "matte?", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("generated.glb", "generation")
 
@@ -56,7 +56,8 @@ class GenerateStage:
         content = as_glb(made.path)
         made.path.unlink()
         (folder / "generated.glb").write_bytes(content)
-        photos = {"photos": {"cut_out": len(views), "used": len(views) if takes_views else 1}} if views else {}
+        used = len(views) - len(made.notes.get("left_out", [])) if takes_views else 1
+        photos = {"photos": {"cut_out": len(views), "used": used}} if views else {}
         return {
             "generation": {
                 "generator": self.generator.name,

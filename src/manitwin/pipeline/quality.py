@@ -100,7 +100,13 @@ def photos_checks(draft: Draft) -> list[Check]:
     photos = generation["notes"].get("photos", {"cut_out": 1, "used": 1})
     used, cut_out = photos["used"], photos["cut_out"]
     said = [f"{given - cut_out} of {given} photos could not be cut out"] if cut_out < given else []
-    if used < cut_out:
+    left_out = generation["notes"].get("left_out", [])
+    if left_out:
+        said.append(
+            f"{', '.join(left_out)}: left out, the outline does not go with those of the other photos (another turn, another"
+            " thing, a wrong cut-out)"
+        )
+    elif used < cut_out:
         said.append(
             f"the generator {generation['generator']} takes one photo, the first: the others are not in the mesh"
         )

@@ -62,6 +62,15 @@ def test_a_photo_at_a_wrong_turn_is_named() -> None:
         carve(photos, turns)
 
 
+def test_of_many_the_one_that_does_not_go_with_the_others_is_left_out_and_told() -> None:
+    photos, turns = _turned(8, 25.0)
+    photos[3] = ("wrong.png", turned_photo(turns[3] + 70, 25.0))
+    made = from_views([PhotoView(name, rgba, turn) for (name, rgba), turn in zip(photos, turns, strict=True)], None)
+    assert made.notes["left_out"] == ["wrong.png"]
+    assert [view["turn_deg"] for view in made.notes["views"]] == [*turns[:3], *turns[4:]]
+    assert made.notes["camera"]["elevation_deg"] == pytest.approx(25, abs=3)
+
+
 def test_of_many_that_do_not_go_together_one_is_named() -> None:
     photos, turns = _turned(5, 25.0)
     with pytest.raises(Rejected, match="these 5 outlines are not of one thing at these turns") as refused:

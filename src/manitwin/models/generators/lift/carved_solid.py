@@ -26,6 +26,10 @@ class CarvingPhoto(Protocol):
         """The file's name."""
 
     @property
+    def turn_deg(self) -> float:
+        """The camera's turn about the vertical, counter-clockwise."""
+
+    @property
     def crop(self) -> Crop:
         """What it shows of the thing."""
 
@@ -42,6 +46,7 @@ class Carved:
 
     ``to_carved (4, 4)`` takes the surface's points to the frame and the unit that it was carved in. ``camera`` says what the
     outlines told of a camera that stays before a turntable; None where they were taken to be from the thing's own height.
+    ``left_out`` are the names of photos whose outlines do not go with the others.
     """
 
     surface: LiftedSurface
@@ -49,6 +54,7 @@ class Carved:
     covered: tuple[float, ...]
     to_carved: np.ndarray
     camera: dict[str, float] | None = None
+    left_out: tuple[str, ...] = ()
 
 
 def carved_of(

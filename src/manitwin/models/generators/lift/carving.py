@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -28,6 +29,7 @@ LEAST_COVERED_TURNED = 0.95
 _SUSPECTS = 3
 _MANY = 5
 """Photos by hand, of so many, explained none of a camera that stays."""
+_LEFT_OUT_OF = 4  # photos, at most one that does not go with the others
 _ROUNDED_PX = 1.0  # by which sizes of photos that were scaled are off their shape
 _LEAST_TURNED = 3
 """Photos from different turns that tell a camera's height, lens and axis; two have too little in common."""
@@ -55,7 +57,8 @@ def carve(
     Three and more photos of one shape may be of a thing that is turned before a camera that stays, at any height, or of a camera
     that goes round it at one height and distance: the outlines tell it. Else each is from about the thing's own height.
     ``power`` is that of the superellipse at each level where only two directions are seen; ``focal_mm`` is the lens as 35 mm
-    equivalent, where it is stated. Raises Rejected ``generator_failed`` naming the photo that does not go with the others.
+    equivalent, where it is stated. Of six photos and more before a camera that stays, at most a quarter is left out where the
+    others go together without them. Raises Rejected ``generator_failed`` naming the photo that does not go with the others.
     """
     sized = _of_one_size(photos)
     if not _may_be_turned(sized, turns_deg):
@@ -72,7 +75,30 @@ def carve(
         return carve_turned(photos, turns_deg, camera, covered, power)
     if level:
         return carve_level(outlines, power)
+    kept = _going_together(photos, turns_deg, focal_mm, without)
+    if kept is not None:
+        left = tuple(name for k, (name, _) in enumerate(photos) if k not in kept)
+        some, turns = [photos[k] for k in kept], [turns_deg[k] for k in kept]
+        return replace(carve(some, turns, power=power, focal_mm=focal_mm), left_out=left)
     raise Rejected("generator_failed", _told(photos, turns_deg, focal_mm, covered, without), "generate")
+
+
+def _going_together(
+    photos: Sequence[tuple[str, np.ndarray]], turns_deg: Sequence[float], focal_mm: float | None, without: np.ndarray
+) -> list[int] | None:
+    """Return the photos that go together once the few are left out that do not; None where these would be too many."""
+    kept = list(range(len(photos)))
+    for _ in range(min(len(photos) // _LEFT_OUT_OF, len(photos) - _MANY)):
+        # the one without which the others are filled most
+        filled = [float(np.delete(without[:, k], k).mean()) for k in range(len(kept))]
+        kept.pop(int(np.argmax(filled)))
+        turns = [turns_deg[k] for k in kept]
+        if not are_crossing(turns) or not _may_be_turned([photos[k] for k in kept], turns):
+            return None
+        _, covered, without = _seen_turned([photos[k][1] for k in kept], turns, focal_mm)
+        if min(covered) >= LEAST_COVERED_TURNED:
+            return kept
+    return None
 
 
 def _carved_level(photos: Sequence[tuple[str, np.ndarray]], turns_deg: Sequence[float], power: float) -> Carved:

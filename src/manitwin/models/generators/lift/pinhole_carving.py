@@ -23,6 +23,7 @@ class SeenPhoto:
     """A photo with its camera, see ``CarvingPhoto``; ``scale`` is that of the camera's pixels against the photo's."""
 
     name: str
+    turn_deg: float
     crop: Crop
     sight: Sight
     scale: float
@@ -56,8 +57,8 @@ def carve_turned(
     sights = sights_of(masks, camera, turns_deg)
     scale = masks[0].size_px[0] / photos[0][1].shape[1]
     seen = [
-        SeenPhoto(name, crop_object(rgba, MASK_PX), sight, scale)
-        for (name, rgba), sight in zip(photos, sights, strict=True)
+        SeenPhoto(name, turn, crop_object(rgba, MASK_PX), sight, scale)
+        for (name, rgba), turn, sight in zip(photos, turns_deg, sights, strict=True)
     ]
     field, cell, origin = hull_field(sights, power if _are_two_crossing(turns_deg) else None)
     told = {

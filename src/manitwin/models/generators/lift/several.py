@@ -152,9 +152,16 @@ def _carved(views: Sequence[PhotoView], hint: ShapeHint) -> MadeOfViews:
         "rests": "standing",
         "confidence": min(carved.covered),
         "camera": carved.camera,
+        "left_out": list(carved.left_out),
         "views": [
-            {"name": photo.name, "turn_deg": turn, "turn_stated": True, "covered": share, "colours": id(photo) in shown}
-            for turn, share, photo in zip(turns, carved.covered, carved.outlines, strict=True)
+            {
+                "name": photo.name,
+                "turn_deg": photo.turn_deg,
+                "turn_stated": True,
+                "covered": share,
+                "colours": id(photo) in shown,
+            }
+            for share, photo in zip(carved.covered, carved.outlines, strict=True)
         ],
     }
     return MadeOfViews(carved_part(carved), notes, 1.0 - seen_area_share(carved))
