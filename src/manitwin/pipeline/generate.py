@@ -21,7 +21,7 @@ class GenerateStage:
     """Write ``generated.glb`` and the field ``generation``."""
 
     name: ClassVar[str] = "generate"
-    version: ClassVar[str] = "27"
+    version: ClassVar[str] = "28"
     reads: ClassVar[tuple[str, ...]] = ("photo.png?", "photos/?", "matte?", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("generated.glb", "generation")
 

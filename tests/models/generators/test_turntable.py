@@ -49,6 +49,14 @@ def test_more_photos_do_not_make_it_worse() -> None:
     assert excess[0] > excess[1] > excess[2] > 0
 
 
+def test_three_level_photos_by_hand_are_taken_as_such() -> None:
+    """Three outlines leave a camera's height and lens open: what level ones explain is not given an invented camera."""
+    turns = [0.0, 120.0, 240.0]
+    photos = [(f"{turn:.0f}.png", turned_photo(turn, 0.0)) for turn in turns]
+    photos[1] = (photos[1][0], np.roll(photos[1][1], 9, axis=1))  # aimed a little beside it
+    assert carve(photos, turns).camera is None
+
+
 def test_turns_that_run_the_other_way_round_are_told() -> None:
     photos, turns = _turned(5, 25.0)
     with pytest.raises(Rejected, match="where the turns are counted the other way round"):

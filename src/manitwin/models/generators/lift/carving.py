@@ -71,7 +71,9 @@ def carve(
         return carve_turned(photos, turns_deg, camera, covered, power)
     outlines = placed_outlines(photos, turns_deg)
     level = min(covered_shares(outlines)) >= LEAST_COVERED
-    if fits and not (level and level_cost_px(outlines, SIDE_PX) < camera.cost_px):
+    # three leave lens and height open; where level ones explain them as well, these are nearer to the truth
+    doubted = level and (len(photos) <= _LEAST_TURNED or level_cost_px(outlines, SIDE_PX) < camera.cost_px)
+    if fits and not doubted:
         return carve_turned(photos, turns_deg, camera, covered, power)
     if level:
         return carve_level(outlines, power)
