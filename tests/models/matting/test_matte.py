@@ -57,6 +57,14 @@ def test_soft_shadow_is_not_part_of_the_object() -> None:
     assert "a cast shadow was left out" in matte.findings
 
 
+def test_a_things_soft_edge_is_no_shadow() -> None:
+    scene, truth = np.full((*SIZE, 3), 233.0), _blob((200, 150), (130, 14))
+    scene[truth] = (60, 90, 150)
+    matte = matte_photo(_photo(scene), "x.png")
+    assert _overlap(matte.rgba, truth) > 0.9
+    assert "a cast shadow was left out" not in matte.findings
+
+
 @pytest.mark.parametrize(
     ("light", "believed"),
     [(1.1, False), (0.8, False), (0.7, True), (0.5, True)],
