@@ -41,7 +41,7 @@ def test_place_without_a_scene_is_a_usage_error(tmp_path: Path) -> None:
 def test_exported_scene_loads_with_its_objects(scenes: Path, tmp_path: Path) -> None:
     file = manitwin.find_scenes(scenes)[0]
     written = manitwin.export_scene(file, "all", tmp_path)
-    assert list(written) == ["mjcf", "usd"] and all(path.is_file() for path in written.values())
+    assert list(written) == ["mjcf", "sdf", "usd"] and all(path.is_file() for path in written.values())
     model = mujoco.MjModel.from_xml_path(str(written["mjcf"]))
     assert model.njnt == len(manitwin.load_scene(file).record.objects)
 

@@ -57,10 +57,13 @@ def test_a_scene_that_lies_elsewhere_needs_its_data_set(tmp_path: Path) -> None:
 def test_scenes_are_exported_like_twins(tmp_path: Path) -> None:
     write_things(tmp_path / "twins_here")
     make_layouts(tmp_path / "twins_here", tmp_path / "made", 1, CONFIG, executor="inline")
-    done = CliRunner().invoke(app, ["export", str(tmp_path / "made"), "-o", str(tmp_path / "out"), "--to", "mjcf,usd"])
+    done = CliRunner().invoke(
+        app, ["export", str(tmp_path / "made"), "-o", str(tmp_path / "out"), "--to", "mjcf,sdf,usd"]
+    )
     assert done.exit_code == 0, done.output
     model = mujoco.MjModel.from_xml_path(str(next((tmp_path / "out" / "layout_4_000000" / "mjcf").glob("*.xml"))))
     assert model.nbody >= 3
+    assert (tmp_path / "out" / "layout_4_000000" / "sdf" / "scene.sdf").is_file()
     assert any((tmp_path / "out" / "layout_4_000000" / "usd").iterdir())
     refused = CliRunner().invoke(app, ["export", str(tmp_path / "made"), "-o", str(tmp_path / "out"), "--to", "urdf"])
-    assert isinstance(refused.exception, UsageError) and "Valid: mjcf, usd" in str(refused.exception)
+    assert isinstance(refused.exception, UsageError) and "Valid: mjcf, sdf, usd" in str(refused.exception)

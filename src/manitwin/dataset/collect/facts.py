@@ -20,10 +20,12 @@ GROUP_OF_DOMAIN = {
     "personal": "personal",
     "office": "office",
     "household": "household",
+    "furniture": "household",
     "toys": "household",
     "food": "household",
 }
-"""The group of each domain of the priors, as the paper sorts them (section 4): bottles are kitchen, toys and food household."""
+"""The group of each domain of the priors, as the paper sorts them (section 4): bottles are kitchen, toys and food household;
+furniture, which it has none of, is household too."""
 SIZE_BANDS_M = (0.02, 0.05, 0.10, 0.20, 0.37)
 """The edges of the bands of size; the first and the last are the smallest and largest object of the paper (table 3)."""
 _COUNTING = re.compile(r"[\d_\-.]+")

@@ -33,7 +33,7 @@ UNWANTED_IN = ("category", "aliases", "name", "color", "material", "kind", "part
 KINDS = {
     "kitchen": "kitchen kitchenware", "tableware": "tableware kitchen", "tools": "tool", "food": "food", "toys": "toy",
     "electronics": "electronics electronic device", "office": "office stationery", "household": "household",
-    "containers": "container",
+    "containers": "container", "furniture": "furniture",
 }  # fmt: skip
 """Words for all things of a table of the priors."""
 SATURATION, LENGTH_SHARE = 1.2, 0.75
