@@ -12,7 +12,7 @@ from PIL import Image
 
 from manitwin.geometry.poses import transform
 from manitwin.render.cameras import framing_camera, project
-from manitwin.render.card import HEIGHT, PANEL, RED, WIDTH, CardText, make_card
+from manitwin.render.card import HEIGHT, PANEL, RED, WIDTH, CardText, make_card, mesh_caption
 from manitwin.render.card_panels import GRASP, CardGrasp, CardPoint, diverse, input_panel
 from manitwin.render.center_of_mass import MassCenter, draw_mass_center
 from manitwin.render.renderer import BACKDROP
@@ -107,3 +107,8 @@ def test_centre_of_mass_is_drawn_where_it_is_with_a_ring_as_wide_as_it_is_uncert
     assert 40 < (small != 128).any(2).sum() < 200, "the disc alone"
     assert {(0, 0, 0), (1, 1, 1)} <= {tuple(p) for p in (small[(small != 128).any(2)] > 128).astype(int)}
     assert card(mass=MassCenter(center, 0.01)) != card()
+
+
+def test_one_hull_is_no_hulls() -> None:
+    assert mesh_caption(10_162, 1) == "10,162 triangles, 1 convex collision hull"
+    assert mesh_caption(12, 2) == "12 triangles, 2 convex collision hulls"

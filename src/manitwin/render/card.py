@@ -90,7 +90,7 @@ def make_card(
     columns = (
         (first, caption),
         (render_panel(parts, mesh, hero), "twin as rendered"),
-        (mesh_panel(solid, hulls, hero, mass), f"{len(solid.faces):,} triangles, {len(hulls)} convex collision hulls"),
+        (mesh_panel(solid, hulls, hero, mass), mesh_caption(len(solid.faces), len(hulls))),
         (grasp_panel(parts, mesh, points, grasps, hero), f"points, and {drawn} of {len(grasps)} verified grasps"),
     )
     card = Image.new("RGB", (WIDTH, HEIGHT), "white")
@@ -167,6 +167,11 @@ def _prompt_panel(prompt: str) -> np.ndarray:
         (PANEL / 2, PANEL / 2), "\n".join(lines), fill=INK, font=font_of(20), anchor="mm", align="center", spacing=8
     )
     return np.asarray(panel)
+
+
+def mesh_caption(triangles: int, hulls: int) -> str:
+    """Return what is written below the mesh and its hulls."""
+    return f"{triangles:,} triangles, {hulls} convex collision {'hull' if hulls == 1 else 'hulls'}"
 
 
 def _shortened(text: str, room_px: float, size_px: int) -> str:
