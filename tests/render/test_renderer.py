@@ -15,8 +15,8 @@ from manitwin.formats.meshes.textures import make_part, pbr_material
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.render.cameras import Camera, framing_camera, look_at, orbit_cameras, project
 from manitwin.render.raycast import cast_camera, merged
-from manitwin.render.renderer import BACKDROP, TEXELS_A_PIXEL, Renderer, shared_renderer, texture_px
-from manitwin.render.surfaces import MAX_TEXTURE_PX, plain_part
+from manitwin.render.renderer import BACKDROP, Renderer, pixels_a_unit, shared_renderer
+from manitwin.render.surfaces import plain_part
 
 DIGEST = """
 import hashlib
@@ -174,22 +174,11 @@ def test_textures_are_let_go_with_the_pictures_that_they_were_for(
     np.testing.assert_array_equal(renderer.render([quad(np.full((8, 8, 3), 200))], [front_camera()])[0].rgb, before.rgb)
 
 
-def test_textures_have_as_many_texels_as_the_nearest_picture_shows() -> None:
-    sides = {}
-    for distance_m in (0.5, 1.0, 2.0, 0.01):
-        camera = Camera(look_at(np.array([distance_m, 0, 0]), np.zeros(3)), np.radians(40), 256, 256)
-        sides[distance_m] = texture_px([camera], np.zeros(3), 0.1)
-    far = camera_px(256, 40, 0.2, 2.0)
-    assert sides[2.0] == pytest.approx(TEXELS_A_PIXEL * far, abs=1) and sides[1.0] == pytest.approx(
-        2 * sides[2.0], abs=1
-    )
-    assert sides[0.01] == MAX_TEXTURE_PX, "a close look has what the file has"
-    both = [Camera(look_at(np.array([d, 0, 0]), np.zeros(3)), np.radians(40), 256, 256) for d in (2.0, 0.5)]
-    assert texture_px(both, np.zeros(3), 0.1) == sides[0.5]
-
-
-def camera_px(height_px: int, fov_deg: float, length_m: float, distance_m: float) -> float:
-    return height_px * length_m / distance_m / (2 * np.tan(np.radians(fov_deg) / 2))
+def test_the_nearest_camera_says_how_fine_a_texture_is_seen() -> None:
+    near, far = (Camera(look_at(np.array([d, 0, 0]), np.zeros(3)), np.radians(40), 256, 256) for d in (0.5, 2.0))
+    of_far = 256 / 2.0 / (2 * np.tan(np.radians(40) / 2))
+    assert pixels_a_unit([far], np.zeros(3), 0.1) == pytest.approx(of_far)
+    assert pixels_a_unit([far, near], np.zeros(3), 0.1) == pytest.approx(4 * of_far)
 
 
 def test_fine_textures_are_averaged_for_small_pictures(renderer: Renderer) -> None:

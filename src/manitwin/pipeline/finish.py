@@ -33,7 +33,7 @@ class FinishStage:
     gripper: Gripper
 
     name: ClassVar[str] = "finish"
-    version: ClassVar[str] = "20"
+    version: ClassVar[str] = "21"
     reads: ClassVar[tuple[str, ...]] = (
         "visual.glb", "solid.npz", "hulls.npz", "grasps.parquet", "photo.png?", "matte?", "naming?", "generation?", "geometry",
         "gate", "physical", "size", "collision", "language", "points", "frames_missing", GRASP_POINTS, "grasps",

@@ -31,7 +31,7 @@ class ViewsStage:
     """
 
     name: ClassVar[str] = "views"
-    version: ClassVar[str] = "5"
+    version: ClassVar[str] = "6"
     reads: ClassVar[tuple[str, ...]] = ("canonical.glb",)
     writes: ClassVar[tuple[str, ...]] = ("views/", "cameras")
     needs: ClassVar[Resource] = "cpu"

@@ -9,7 +9,6 @@ gives exact ones.
 from __future__ import annotations
 
 import atexit
-import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -23,12 +22,11 @@ import trimesh
 from manitwin.geometry.poses import transform
 from manitwin.render.cameras import Camera, sapien_axes
 from manitwin.render.device import RenderDevice, render_scene, require_renderer
-from manitwin.render.surfaces import MAX_TEXTURE_PX, RenderSurface, front_faces, render_surface, triangle_mesh_shape
+from manitwin.render.surfaces import RenderSurface, front_faces, render_surface, triangle_mesh_shape
 
 BACKDROP = (233, 235, 238)  # light enough to be no colour, dark enough that white things stand out
 SUPERSAMPLE = 2  # SAPIEN's edges are not antialiased; twice the size each way removes the steps that are seen
-TEXELS_A_PIXEL = 1.5
-"""Pictures of packages of 4096 texels a side differ by 0.2 to 0.5 of 255 in the mean from those with all of these."""
+TEXELS_A_PIXEL = 1.2
 SHADERS = Path(__file__).parent / "shaders"
 DARKENING_RADIUS = 0.035  # of the picture's height: how far a nearer surface throws its soft shade
 DARKENING_STRENGTH = 2.6
@@ -87,8 +85,8 @@ class Renderer:
         low, high = points.min(0), points.max(0)
         center, scale = (low + high) / 2, 2 / float(np.linalg.norm(high - low))  # a sphere of radius 1 holds everything
         del points
-        most_px = texture_px(cameras, center, 1 / scale)
-        surfaces = [render_surface(part, most_texture_px=most_px) for part in parts]
+        texels_a_unit = TEXELS_A_PIXEL * pixels_a_unit(cameras, center, 1 / scale)
+        surfaces = [render_surface(part, texels_a_unit=texels_a_unit) for part in parts]
         if not with_backs:
             surfaces = [front_faces(surface) for surface in surfaces]
         entities, textured = [], any(surface.color_map is not None for surface in surfaces)
@@ -158,15 +156,10 @@ class Renderer:
         )
 
 
-def texture_px(cameras: Sequence[Camera], center: np.ndarray, radius: float) -> int:
-    """Return how many texels a side a texture needs for an object's pictures; ``center (3,)`` and ``radius`` of its sphere.
-
-    A texture covers what is seen and what is not, and is not filled: ``TEXELS_A_PIXEL`` times the object's length in the
-    picture from nearest by.
-    """
+def pixels_a_unit(cameras: Sequence[Camera], center: np.ndarray, radius: float) -> float:
+    """Return the pixels that a unit of length has in an object's nearest picture; its sphere is ``center (3,)``, ``radius``."""
     distances = [max(float(np.linalg.norm(camera.position - center)), radius / 8) for camera in cameras]
-    longest_px = max(camera.focal_px * 2 * radius / far for camera, far in zip(cameras, distances, strict=True))
-    return min(MAX_TEXTURE_PX, math.ceil(TEXELS_A_PIXEL * longest_px))
+    return max(camera.focal_px / far for camera, far in zip(cameras, distances, strict=True))
 
 
 @dataclass(frozen=True)

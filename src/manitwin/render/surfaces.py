@@ -6,6 +6,7 @@ Normal maps are left out: SAPIEN takes no tangents with arrays.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -42,19 +43,20 @@ class RenderSurface:
     roughness_map: np.ndarray | None
 
 
-def render_surface(part: trimesh.Trimesh, *, most_texture_px: int = MAX_TEXTURE_PX) -> RenderSurface:
+def render_surface(part: trimesh.Trimesh, *, texels_a_unit: float = math.inf) -> RenderSurface:
     """Read a visual part as ``formats.glb.read_glb`` gives it; raises TypeError for a mesh without a PBRMaterial.
 
-    Textures have at most ``most_texture_px`` a side. Every face comes twice, from either side: SAPIEN culls back faces, and
-    open sheets would vanish from behind.
+    Textures are averaged to about ``texels_a_unit`` of the surface's length, see ``texture_px``. Every face comes twice, from
+    either side: SAPIEN culls back faces, and open sheets would vanish from behind.
     """
     material, uv = material_of(part), uv_of(part)
     factor = np.asarray(material.baseColorFactor)[:3] / 255
     color_map = mask = None
+    most_px = MAX_TEXTURE_PX if uv is None else texture_px(part, uv, texels_a_unit)
     if uv is not None and material.baseColorTexture is not None:
-        color_map = _tinted(shrunk(_rgb(material.baseColorTexture), most_texture_px), factor)
+        color_map = _tinted(shrunk(_rgb(material.baseColorTexture), most_px), factor)
     if uv is not None and material.metallicRoughnessTexture is not None:
-        mask = shrunk(_rgb(material.metallicRoughnessTexture), most_texture_px)
+        mask = shrunk(_rgb(material.metallicRoughnessTexture), most_px)
     metallic, roughness = float(material.metallicFactor), float(material.roughnessFactor)
     vertices, faces, normals = np.asarray(part.vertices), np.asarray(part.faces), np.asarray(part.vertex_normals)
     uv_down = np.zeros((len(vertices), 2)) if uv is None else uv * [1, -1] + [0, 1]
@@ -70,6 +72,20 @@ def render_surface(part: trimesh.Trimesh, *, most_texture_px: int = MAX_TEXTURE_
         roughness=roughness,
         roughness_map=None if mask is None else (mask[..., 1] * roughness).astype(np.uint8),
     )
+
+
+def texture_px(part: trimesh.Trimesh, uv: np.ndarray, texels_a_unit: float) -> int:
+    """Return the side of a texture that has ``texels_a_unit`` in the mean of a surface with coordinates ``uv (V, 2)``.
+
+    A thing may take a small share of a large texture, and a palette a point for each face: these are left as they are.
+    """
+    if math.isinf(texels_a_unit):
+        return MAX_TEXTURE_PX
+    corners = uv[part.faces]
+    along, across = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    share = float(np.abs(along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]).sum()) / 2
+    side = texels_a_unit * math.sqrt(part.area / share) if share > 0 else math.inf
+    return math.ceil(min(side, MAX_TEXTURE_PX))
 
 
 def plain_part(mesh: trimesh.Trimesh, color: tuple[int, int, int], *, roughness: float = 0.6) -> trimesh.Trimesh:

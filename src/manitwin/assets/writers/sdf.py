@@ -108,8 +108,8 @@ def _renamed(twin: TwinContent) -> list[str]:
 
 def joint_names(twin: TwinContent) -> list[str]:
     """Return the names of a twin's joints; one that a link has too ends in ``_joint``: SDFormat has one scope for both."""
-    taken = {link.name for link in twin.record.links} | {joint.name for joint in twin.record.joints}
-    links, names = {link.name for link in twin.record.links}, []
+    links = {link.name for link in twin.record.links}
+    taken, names = links | {joint.name for joint in twin.record.joints}, []
     for joint in twin.record.joints:
         name = joint.name
         while name in links or (name != joint.name and name in taken):
