@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections import defaultdict
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -34,7 +35,7 @@ from manitwin.formats.image_file import read_image
 from manitwin.models.generators.templates.fitting.outline_check import template_outline_check
 from manitwin.models.matting import matte_photo
 from manitwin.models.matting.explained import explained_first
-from manitwin.models.matting.learned import Network, find_network
+from manitwin.models.matting.learned import Network, find_networks
 from manitwin.models.matting.matte import MIN_CONFIDENCE, decided
 from manitwin.models.matting.study import study_photo
 from manitwin.twin.shares import wilson_interval
@@ -58,13 +59,13 @@ class Judged:
 def judged_by_number(part: Part, number: int, variant: Variant, network: str | None, named: bool) -> Judged:
     """Make one composite and cut it out, in whatever process."""
     cv2.setNumThreads(1)
-    return judge(composite(part, number, variant), find_network(network) if network else None, named)
+    return judge(composite(part, number, variant), find_networks(network) if network else (), named)
 
 
-def judge(picture: Composite, network: Network | None, named: bool) -> Judged:
+def judge(picture: Composite, networks: Sequence[Network], named: bool) -> Judged:
     """Cut one composite out; what was rejected is judged too."""
     start = time.process_time()
-    study = study_photo(picture.rgb, network=network)
+    study = study_photo(picture.rgb, networks=networks)
     explains = template_outline_check(picture.category) if named else None
     if explains is not None and study.confidence < MIN_CONFIDENCE:
         study = explained_first(picture.rgb, study, explains, min_confidence=MIN_CONFIDENCE)
@@ -123,7 +124,7 @@ def share(part: int, whole: int) -> str:
     return f"{100 * part / whole:.0f} %" if whole else "none"
 
 
-def photos(folder: Path, network: Network | None, sheet: Path | None) -> None:
+def photos(folder: Path, networks: Sequence[Network], sheet: Path | None) -> None:
     """Cut the photos of a folder out, print what became of each, and draw those accepted beside what was cut out."""
     tiles, costs, count = [], [], 0
     paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in (".jpg", ".jpeg", ".png", ".webp"))
@@ -131,7 +132,7 @@ def photos(folder: Path, network: Network | None, sheet: Path | None) -> None:
         pixels = read_image(path, max_side_px=MattingConfig().photo_side_px).pixels
         start = time.process_time()
         try:
-            matte = matte_photo(pixels, path.name, network=network)
+            matte = matte_photo(pixels, path.name, networks=networks)
         except Rejected as rejection:
             print(f"{path.stem}: {rejection.detail}")
         else:
@@ -174,12 +175,14 @@ def main() -> None:
     )
     parser.add_argument("--named", action="store_true", help="the outline of the template of the name counts")
     parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--network", help="isnet or an ONNX file, as --matting of manitwin build")
+    parser.add_argument(
+        "--network", help="isnet, u2net or an ONNX file, two by a comma, as --matting of manitwin build"
+    )
     parser.add_argument("--photos", type=Path)
     parser.add_argument("--sheet", type=Path)
     given = parser.parse_args()
     cv2.setNumThreads(1)
-    network = find_network(given.network) if given.network else None
+    networks = find_networks(given.network) if given.network else ()
     if given.count:
         with ProcessPoolExecutor(given.jobs, mp_context=get_context("spawn")) as pool:
             work = partial(
@@ -187,7 +190,7 @@ def main() -> None:
             )
             report(list(pool.map(work, range(given.first, given.first + given.count), chunksize=4)))
     if given.photos is not None:
-        photos(given.photos, network, given.sheet)
+        photos(given.photos, networks, given.sheet)
 
 
 if __name__ == "__main__":

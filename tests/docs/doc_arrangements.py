@@ -126,9 +126,9 @@ PAGES: dict[str, Arrangement] = {
     ),
     "docs/photos.md": Arrangement(
         # without weights, which only a person adds, each is refused
-        rewritten={r"^manitwin models add isnet": "manitwin models add isnet --from nothing.tgz"},
+        rewritten={r"^manitwin models add (isnet|u2net)": r"manitwin models add \1 --from nothing.tgz"},
         slow=(r"manitwin review cutouts",),
-        exits={r"^manitwin models add": 2, r"--matting (isnet|my-u2net)": 2} | NOTHING_DOUBTED,
+        exits={r"^manitwin models add": 2, r"--matting (isnet|my-birefnet)": 2} | NOTHING_DOUBTED,
     ),
     "docs/platforms.md": Arrangement(not_run=WHEEL | {r"uv pip compile": NO_NETWORK}, slow=(DOCTOR,)),
     "docs/priors.md": Arrangement(blocks={"melon": "prior kitchen"}),

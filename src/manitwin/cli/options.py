@@ -81,8 +81,8 @@ Grasper = Annotated[
 Matting = Annotated[
     str | None,
     choices.MATTING.option(
-        help="A learned opinion on photos' cut-outs: isnet (manitwin models add isnet), a .onnx file, or none.",
-        metavar="NETWORK",
+        help="Learned opinions on photos' cut-outs: isnet, u2net (manitwin models add), a .onnx file, two by a comma; or none.",
+        metavar="NETWORKS",
     ),
 ]
 MaxCost = Annotated[

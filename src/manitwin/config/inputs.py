@@ -21,8 +21,9 @@ class SourceConfig(Section):
 class MattingConfig(Section):
     """Reading a photo and cutting its object out. ``frame`` chooses a picture of an animation, counted from 0.
 
-    ``network`` is asked besides the built-in one: ``isnet``, once ``manitwin models add isnet`` has fetched it, or an ONNX file
-    of U2-Net, IS-Net or BiRefNet. Below ``min_confidence``, the probability that the cut-out is right, a photo is rejected.
+    ``network`` is asked besides the built-in one: ``isnet`` or ``u2net``, once ``manitwin models add`` has fetched it, or an ONNX
+    file of U2-Net, IS-Net or BiRefNet; two of them by a comma. Below ``min_confidence``, the probability that the cut-out is
+    right, a photo is rejected.
     """
 
     network: str | None = Field(default=None, min_length=1, max_length=4096)

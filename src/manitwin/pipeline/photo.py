@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -14,6 +14,7 @@ from manitwin.engine.stage import Draft
 from manitwin.errors import InputError, Rejected
 from manitwin.formats.image_file import read_image
 from manitwin.models.generators.templates.fitting.outline_check import template_outline_check
+from manitwin.models.matting.candidates import network_makers
 from manitwin.models.matting.learned import Network
 from manitwin.models.matting.matte import DoubtedCutOut, Matte, matte_photo
 from manitwin.models.matting.object_network import built_in_model
@@ -33,12 +34,14 @@ class PhotoStage:
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "matte")
     needs: ClassVar[Resource] = "cpu"
 
-    def __init__(self, settings: MattingConfig, network: Network | None = None):
-        """Take the settings, and the network that they name: it decides by its content, wherever its file is."""
+    def __init__(self, settings: MattingConfig, networks: Sequence[Network] = ()):
+        """Take the settings, and the networks that they name: these decide by their content, wherever their files are."""
         self.settings = settings.model_copy(update={"network": None})
-        self.network = network
+        self.networks = tuple(networks)
         self.backend: str = "rules+network"
-        self.model: str | None = f"{built_in_model() if network is None else network.model}, {outline_model()}"
+        self.model: str | None = ", ".join(
+            [*([each.model for each in networks] or [built_in_model()]), outline_model()]
+        )
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Read and matte; raises InputError, or Rejected where no single object can be told from the background."""
@@ -71,7 +74,7 @@ class PhotoStage:
                 min_confidence=settings.min_confidence,
                 min_area_share=settings.min_area_share,
                 second_object_share=settings.second_object_share,
-                network=self.network,
+                networks=self.networks,
                 explains=template_outline_check(name, photo.focal_mm),
             )
             if given.is_doubted:
@@ -88,10 +91,11 @@ class PhotoStage:
         }
 
     def _network_field(self) -> dict[str, Any]:
-        if self.network is None:
-            return {}
-        network = {name: getattr(self.network, name) for name in ("name", "sha256", "source", "licence")}
-        return {"network": network}
+        told = ("name", "sha256", "source", "licence")
+        return {
+            maker: {name: getattr(network, name) for name in told}
+            for maker, network in zip(network_makers(len(self.networks) + 1), self.networks, strict=False)
+        }
 
 
 class PhotosStage(PhotoStage):

@@ -16,7 +16,7 @@ from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import InputChanged, Rejected, UsageError
 from manitwin.models.annotators.given import KeepsGiven
 from manitwin.models.annotators.protocol import Annotator
-from manitwin.models.matting.learned import Network, find_network, require_working
+from manitwin.models.matting.learned import Network, find_networks, require_working
 from manitwin.models.registry import create, target, without_url
 from manitwin.physics.confirmed_trial import ConfirmedTrial
 from manitwin.pipeline.assembly import assemble, name_hint
@@ -61,8 +61,7 @@ def check_names(config: BuildConfig) -> None:
     grippers = [gripper for gripper, _ in _grippers(config)]
     if config.second_opinion.require_agreement:
         _check_agreement(grippers, config)
-    network = _network(config)
-    if network is not None:
+    for network in _networks(config):
         require_working(network)
 
 
@@ -153,13 +152,13 @@ def _generation(kind: Kind, config: BuildConfig, annotator: Annotator) -> list[S
     photo: list[Stage] = []
     if kind != "text":
         cut_out = PhotosStage if kind == "photos" else PhotoStage
-        photo = [cut_out(config.matting, _network(config)), NameStage(config.naming)]
+        photo = [cut_out(config.matting, _networks(config)), NameStage(config.naming)]
     generator = chosen_generator(config, annotator)
     return [*photo, GenerateStage(config.generate, generator, config.services.submit_again)]
 
 
-def _network(config: BuildConfig) -> Network | None:
-    return None if config.matting.network is None else find_network(config.matting.network)
+def _networks(config: BuildConfig) -> tuple[Network, ...]:
+    return () if config.matting.network is None else find_networks(config.matting.network)
 
 
 def config_sha256(config: BuildConfig) -> str:
@@ -170,11 +169,11 @@ def config_sha256(config: BuildConfig) -> str:
     decides = config.model_dump(mode="json", exclude={"seed", "services", "run"})
     decides["grippers"] = [gripper.sha256 for gripper, _ in _grippers(config)]
     decides |= {kind: without_url(decides[kind]) for kind in ("generator", "annotator", "grasper")}
-    network = _network(config)
-    if network is None:
-        del decides["matting"]["network"]
+    networks = _networks(config)
+    if networks:
+        decides["matting"]["network"] = ",".join(network.sha256 for network in networks)
     else:
-        decides["matting"]["network"] = network.sha256
+        del decides["matting"]["network"]
     if config.source == SourceConfig():  # as before there was a choice
         del decides["source"]
     if config.second_opinion.sample_of_held is None:

@@ -69,7 +69,8 @@ def with_flags(settings: BuildConfig, flags: Flags) -> BuildConfig:
     update: dict[str, Any] = _given(said) | {"services": settings.services.model_copy(update=_given(services))}
     matting = flags.get("matting")
     if matting is not None:
-        network = None if matting == "none" else str(Path(matting).absolute()) if "." in matting else matting
+        names = [str(Path(name).absolute()) if "." in name else name for name in map(str.strip, matting.split(","))]
+        network = None if matting == "none" else ",".join(names)
         update["matting"] = settings.matting.model_copy(update={"network": network})
     if flags.get("link") is not None:
         update["grasps"] = settings.grasps.model_copy(update={"link": flags["link"]})

@@ -12,7 +12,7 @@ import pytest
 from manitwin.errors import UsageError
 from manitwin.formats.isolated import Limits, run_isolated
 from manitwin.models.matting import learned, matte_photo
-from manitwin.models.matting.learned import find_network, learned_alpha, require_working
+from manitwin.models.matting.learned import find_network, find_networks, learned_alpha, require_working
 from manitwin.models.matting.study import study_photo
 from manitwin.models.weights.store import FOLDER
 from tiny_networks import tiny_network
@@ -26,6 +26,7 @@ def forget() -> None:
 
 
 def _network(tmp_path: Path, **more: object) -> str:
+    tmp_path.mkdir(exist_ok=True)
     path = tmp_path / "tiny-isnet.onnx"
     path.write_bytes(tiny_network(**more))  # type: ignore[arg-type]
     return str(path)
@@ -51,7 +52,7 @@ def test_the_share_of_object_of_each_pixel_is_read(tmp_path: Path, logistic: boo
 
 def test_a_network_that_agrees_is_one_of_the_opinions(tmp_path: Path) -> None:
     photo, truth = _photo((220, 30, 30))
-    matte = matte_photo(photo, "x.png", network=find_network(_network(tmp_path, weights=(40.0, -30.0, -30.0))))
+    matte = matte_photo(photo, "x.png", networks=find_networks(_network(tmp_path, weights=(40.0, -30.0, -30.0))))
     assert matte.agreement["network"] > 0.9 and matte.confidence > 0.88
     found = matte.rgba[..., 3] > 127
     assert (found & truth).sum() / (found | truth).sum() > 0.97
@@ -61,11 +62,57 @@ def test_a_network_that_nothing_bears_out_is_outvoted(tmp_path: Path) -> None:
     """It calls the whole picture an object but for the object: rules and the built-in network agree on another."""
     photo, truth = _photo((30, 30, 220))
     network = find_network(_network(tmp_path, weights=(20.0, 20.0, 0.0)))
-    study = study_photo(photo, network=network)
+    study = study_photo(photo, networks=[network])
     assert study.agreement["network"] < 0.2 and study.agreement["built_in_network"] > 0.95
     assert study.judged[0].confidence == pytest.approx(study_photo(photo).judged[0].confidence, abs=0.02)
-    found = matte_photo(photo, "x.png", network=network).rgba[..., 3] > 127
+    found = matte_photo(photo, "x.png", networks=[network]).rgba[..., 3] > 127
     assert (found & truth).sum() / (found | truth).sum() > 0.97
+
+
+def test_what_two_networks_see_alike_is_likelier(tmp_path: Path) -> None:
+    """A third, the built-in one, does not count: it is asked anyway."""
+    photo, truth = _photo((220, 30, 30))
+    alike, other = (
+        _network(tmp_path / name, weights=(share, -30.0, -30.0)) for name, share in (("a", 40.0), ("b", 41.0))
+    )
+    blind = _network(tmp_path / "c", weights=(-30.0, 40.0, 40.0))
+    one, two, differing = (
+        study_photo(photo, networks=find_networks(names)).judged
+        for names in (alike, f"{alike}, {other}", f"{alike},{blind}")
+    )
+    assert not any(each.is_agreed for each in (*one, *differing))
+    agreed = [each for each in two if each.is_agreed]
+    assert {each.candidate.maker for each in agreed} >= {"network", "second_network"}
+    assert all(each.by_itself < each.confidence < 1 for each in agreed)
+    matte = matte_photo(photo, "x.png", networks=find_networks(f"{alike},{other}"))
+    assert set(matte.agreement) == {"rules", "colours", "network", "second_network", "built_in_network"}
+    found = matte.rgba[..., 3] > 127
+    assert (found & truth).sum() / (found | truth).sum() > 0.97
+
+
+def test_that_two_networks_agree_does_not_tell_one_whole_thing(tmp_path: Path) -> None:
+    one, _ = _photo((220, 30, 30))
+    several = one.copy()
+    several[20:60, 20:80] = (220, 30, 30)
+    cut = np.ascontiguousarray(one[:, 150:])
+    networks = find_networks(
+        ",".join(_network(tmp_path / name, weights=(share, -30.0, -30.0)) for name, share in (("a", 40.0), ("b", 41.0)))
+    )
+    for photo, counts in ((one, True), (several, False), (cut, False)):
+        assert any(each.is_agreed for each in study_photo(photo, networks=networks).judged) is counts
+
+
+def test_at_most_two_different_networks_are_asked(tmp_path: Path) -> None:
+    first, second, third = (
+        _network(tmp_path / name, weights=(share, 0.0, 0.0)) for name, share in (("a", 1.0), ("b", 2.0), ("c", 3.0))
+    )
+    assert [network.file for network in find_networks(f"{first}, {second}")] == [Path(first), Path(second)]
+    assert find_networks("none") == ()
+    for names in (f"{first},{first}", f"{first},{second},{third}"):
+        with pytest.raises(UsageError, match="2 different ones at most"):
+            find_networks(names)
+    with pytest.raises(UsageError, match="'none' stands alone"):
+        find_networks(f"none,{first}")
 
 
 def test_networks_are_run_once_before_a_build(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

