@@ -340,3 +340,14 @@ def test_each_object_of_an_mjcf_scene_is_an_asset_with_its_own_name_and_mass(tmp
     assert "--each-object takes them all" in said.output
     with pytest.raises(AssetError, match="3 of its objects are free to move; there is no number 3"):
         read_asset(tmp_path / "scene.xml", number=3)
+
+
+def test_a_box_of_a_description_has_edges(tmp_path: Path) -> None:
+    box = '<visual><geometry><box size="0.1 0.2 0.3"/></geometry></visual>'
+    (tmp_path / "block.urdf").write_text(f'<robot name="block"><link name="l">{box}</link></robot>')
+    _, folder = imported(tmp_path / "block.urdf", tmp_path / "out")
+    (part,) = read_glb(folder / "asset.glb")
+    solid = part.faces[part.area_faces > 0]  # the others close seams
+    across = np.cross(*np.moveaxis(np.diff(part.vertices[solid], axis=1), 1, 0))
+    across /= np.linalg.norm(across, axis=1)[:, None]
+    assert np.allclose(part.vertex_normals[solid], across[:, None], atol=1e-4)

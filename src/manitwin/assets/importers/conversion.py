@@ -13,6 +13,7 @@ from manitwin.assets.read import detect, read_asset
 from manitwin.assets.readers.mjcf import count_objects
 from manitwin.formats.glb import write_glb
 from manitwin.formats.meshes.textures import bake_transform
+from manitwin.formats.meshes.triangles import shaded
 from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH, ImportRecord
 
 MAX_TEXTURE_SIZE = 8192
@@ -26,7 +27,8 @@ def imported_files(asset: Asset) -> tuple[dict[str, bytes], ImportRecord]:
     """
     to_object = asset_to_object(asset)
     record = import_record(asset, to_object)
-    parts = [bake_transform(part, to_object) for part in shown_parts(asset)]
+    # boxes and cylinders of a description have edges, and no normals that say so
+    parts = [shaded(bake_transform(part, to_object)) for part in shown_parts(asset)]
     unsaid = {"articulation"} if record.articulation is None else set()  # as before anything could move
     text = json.dumps(record.model_dump(mode="json", exclude=unsaid), indent=1, sort_keys=True, allow_nan=False) + "\n"
     files = {IMPORTED_MESH: write_glb(parts, max_texture_size=MAX_TEXTURE_SIZE), IMPORT_RECORD: text.encode()}
