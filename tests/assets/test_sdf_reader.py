@@ -349,13 +349,22 @@ def test_a_model_whose_config_is_broken_is_read_without_it_and_said(tmp_path: Pa
     assert asset.name == "m" and len(asset.lenient) == 1 and "model.config" in asset.lenient[0]
 
 
-def test_material_scripts_are_named_and_said_not_to_be_read(tmp_path: Path) -> None:
+def test_material_scripts_that_are_not_there_are_named(tmp_path: Path) -> None:
     uri = "<uri>model://thing/materials/scripts</uri>"
     old = "<script>Gazebo/Old</script>"  # as before SDFormat 1.3
     scripts = [f"<script>{uri}<name>Wood/{n}</name></script>" for n in (1, 1, 2)] + [f"<script>{uri}</script>", old]
     inside = "".join(f'<visual name="v{n}">{BOX}<material>{s}</material></visual>' for n, s in enumerate(scripts))
-    said = "colours and textures of Gazebo's material scripts are not read: 'Wood/1', 'Wood/2', "
+    said = "material scripts are not there, and colours and textures of theirs are missing: 'Wood/1', 'Wood/2', "
     assert read(tmp_path, link("base", inside)).remarks == (f"{said}'model://thing/materials/scripts' and 1 more",)
     assert read(tmp_path, link("base", f'<visual name="v">{BOX}<material>{old}</material></visual>')).remarks == (
-        "colours and textures of Gazebo's material scripts are not read: 'Gazebo/Old'",
+        "material scripts are not there, and colours and textures of theirs are missing: 'Gazebo/Old'",
     )
+
+
+def test_the_folder_of_a_model_may_stand_behind_three_slashes(tmp_path: Path) -> None:
+    trimesh.creation.box([0.1, 0.2, 0.3]).export(tmp_path / "box.stl")
+    seen = '<visual name="v"><geometry><mesh><uri>model:///thing/box.stl</uri></mesh></geometry></visual>'
+    (tmp_path / "thing").mkdir()
+    (tmp_path / "box.stl").rename(tmp_path / "thing/box.stl")
+    asset = read(tmp_path / "thing", link("a", seen))
+    assert np.allclose(asset.visual[0].extents, [0.1, 0.2, 0.3]) and asset.missing_files == ()

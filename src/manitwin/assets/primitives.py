@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
+_END_COSINE, _AT_POLE = 0.9, 1e-9
 _SECTIONS = 48  # a cylinder's volume is 0.3 % short of the round one's
 
 
@@ -30,3 +31,52 @@ def ellipsoid(radii_m: np.ndarray) -> trimesh.Trimesh:
     mesh = sphere(1.0)
     mesh.apply_scale(np.asarray(radii_m, float))
     return mesh
+
+
+def unwrapped(solid: trimesh.Trimesh, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return vertices ``(V, 3)``, faces ``(F, 3)`` and texture coordinates ``(V, 2)`` of a plain solid.
+
+    The origin of the coordinates is at the lower left. A ``cylinder`` has the picture around it as Gazebo lays it: from +Y on
+    clockwise, seen from above, its lower edge at the top; and the whole on each end. A ``sphere``, ``ellipsoid`` or ``capsule``
+    has it as a globe its map; of anything else each side has the whole picture, upright.
+    """
+    triangles = np.asarray(solid.vertices, float)[solid.faces]
+    corners = triangles - solid.bounds.mean(0)
+    half = np.maximum(np.ptp(solid.bounds, axis=0) / 2, np.finfo(float).tiny)
+    if kind == "cylinder":
+        around = _turns(np.arctan2(corners[..., 0], corners[..., 1]))
+        side = np.stack([around, 0.5 - 0.5 * corners[..., 2] / half[2]], axis=-1)
+        is_end = np.abs(solid.face_normals[:, 2]) > _END_COSINE
+        uv = np.where(is_end[:, None, None], _on_each_side(corners, solid.face_normals, half), side)
+    elif kind in ("sphere", "ellipsoid", "capsule"):
+        ways = corners / half
+        ways /= np.maximum(np.linalg.norm(ways, axis=-1, keepdims=True), np.finfo(float).tiny)
+        at_pole = np.abs(ways[..., 2]) > 1 - _AT_POLE
+        around = _turns(np.arctan2(ways[..., 1], ways[..., 0]), at_pole)
+        uv = np.stack([around, 0.5 + np.arcsin(np.clip(ways[..., 2], -1, 1)) / np.pi], axis=-1)
+    else:
+        uv = _on_each_side(corners, solid.face_normals, half)
+    rows = np.column_stack([np.asarray(solid.faces).reshape(-1), np.round(uv.reshape(-1, 2), 9)])
+    _, kept, inverse = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    return triangles.reshape(-1, 3)[kept], inverse.reshape(-1, 3), uv.reshape(-1, 2)[kept]
+
+
+def _turns(angle_rad: np.ndarray, free: np.ndarray | None = None) -> np.ndarray:
+    """Return angles ``(F, 3)`` in turns, those of a triangle on one side of the seam; ``free`` are at a pole, of no angle."""
+    turns = angle_rad / (2 * np.pi) % 1.0
+    held = np.ones_like(turns, dtype=bool) if free is None else ~free
+    low, high = np.where(held, turns, 1.0).min(1), np.where(held, turns, 0.0).max(1)
+    turns = turns + ((high - low > 0.5)[:, None] & (turns < 0.5))
+    mean = (turns * held).sum(1) / np.maximum(held.sum(1), 1)
+    return np.where(held, turns, mean[:, None])
+
+
+def _on_each_side(corners: np.ndarray, normals: np.ndarray, half: np.ndarray) -> np.ndarray:
+    """Return ``(F, 3, 2)`` places of corners ``(F, 3, 3)`` in a picture on the side of the box that each face looks to."""
+    axis = np.abs(normals).argmax(1)
+    outward = np.where(np.take_along_axis(normals, axis[:, None], 1)[:, 0] < 0, -1.0, 1.0)
+    x, y, z = (corners[..., k] / half[k] for k in range(3))
+    sign, flat, along_x = outward[:, None], (axis == 2)[:, None], (axis == 0)[:, None]
+    right = np.where(flat, x, np.where(along_x, sign * y, -sign * x))
+    up = np.where(flat, sign * y, z)
+    return np.asarray(0.5 + 0.5 * np.stack([right, up], axis=-1))

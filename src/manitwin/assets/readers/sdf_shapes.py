@@ -6,27 +6,26 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-import manifold3d
 import numpy as np
 import trimesh
 from lxml import etree  # type: ignore[import-untyped]
 from scipy.spatial.transform import Rotation
 
-from manitwin.assets import primitives
 from manitwin.assets.asset import CollisionShape
-from manitwin.assets.asset_files import MOST_NAMED, AssetFiles, joined
+from manitwin.assets.asset_files import AssetFiles, joined
+from manitwin.assets.primitives import unwrapped
+from manitwin.assets.readers.sdf_materials import ScriptedLooks
+from manitwin.assets.readers.sdf_solids import primitive_of, prism_of
 from manitwin.assets.readers.sdf_terrain import terrain
 from manitwin.assets.readers.upright import Y_UP_FORMATS
 from manitwin.assets.readers.urdf_shapes import candidates, mesh_parts, plain_material
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.read import MeshFile
 from manitwin.formats.meshes.textures import bake_transform, make_part
-from manitwin.formats.xml_file import number, numbers, text_of
+from manitwin.formats.xml_file import numbers, text_of
 from manitwin.geometry.poses import GLTF_TO_OBJECT, transform
 
 MODEL_FRAME = "__model__"
-_SHEET_M = 1e-3
-_MAX_POINTS = 10_000
 
 
 def pose_of(element: etree._Element, what: str) -> np.ndarray:
@@ -106,12 +105,13 @@ class SdfShapes:
     def __init__(self, file: Path, frames: ModelFrames, files: AssetFiles, *, turn_gltf: bool = False):
         self._file, self._frames, self._files, self._turn_gltf = file, frames, files, turn_gltf
         self.owners: list[int] = []
+        self._looks = ScriptedLooks(files, self._candidates)
 
     def all(self, links: Iterable[etree._Element]) -> tuple[list[trimesh.Trimesh], list[CollisionShape]]:
         """Return the visual parts and the collision shapes of links; ``owners`` then has the place of each visual part's link."""
         placed = list(links)
-        self._remark_scripts(placed)
         owned = [(place, part) for place, link in enumerate(placed) for part in self.visual(link)]
+        self._looks.remark_absent()
         self.owners, visual = [place for place, _ in owned], [part for _, part in owned]
         return visual, [shape for link in placed for shape in self.collision(link)]
 
@@ -135,16 +135,6 @@ class SdfShapes:
                 path = self._mesh_path(element)
                 yield CollisionShape(name, *joined(parts), not drawn, path, primitive, as_drawn=drawn)
 
-    def _remark_scripts(self, links: list[etree._Element]) -> None:
-        """Note the material scripts of visuals: they are in the language of OGRE, Gazebo's renderer."""
-        scripts = [script for link in links for script in link.findall("visual/material/script")]
-        told = [text_of(script, "name") or text_of(script, "uri") or text_of(script, ".") for script in scripts]
-        names = [repr(name[:60]) for name in dict.fromkeys(told) if name is not None]
-        if names:
-            more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-            named = ", ".join(names[:MOST_NAMED])
-            self._files.remark(f"colours and textures of Gazebo's material scripts are not read: {named}{more}")
-
     def _elements(self, link: etree._Element, tag: str) -> Iterator[tuple[etree._Element, str]]:
         for element in link.findall(tag):
             yield element, f"{self._file.name}: link {link.get('name')} {tag} {element.get('name')}"
@@ -160,26 +150,42 @@ class SdfShapes:
         shapes = [] if geometry is None else list(geometry.iterchildren(tag="*"))
         if len(shapes) != 1 and {shape.tag for shape in shapes} != {"polyline"}:
             raise AssetError(f"{what}: its <geometry> holds {len(shapes)} shapes, not one")
+        look = self._looks.of(element)
+        parts = self._undressed(element, shapes, what, textured=look is not None and look.is_picture)
+        if look is None:
+            return parts
+        called = (text_of(shapes[0], "uri") or shapes[0].tag).rpartition("/")[2]
+        return [self._looks.dressed(part, look, called) for part in parts]
+
+    def _undressed(
+        self, element: etree._Element, shapes: list[etree._Element], what: str, *, textured: bool
+    ) -> list[trimesh.Trimesh]:
         shape, color = shapes[0], _diffuse(element, what)
         if shape.tag == "polyline":  # several: what lies within two of them is a hole
-            return [self._solid(_polyline(shapes, what), shape, color)]
+            return [self._solid(prism_of(shapes, what), shape, color, textured)]
         if shape.tag == "mesh":
             return self._mesh_parts(shape, color, what)
         if shape.tag == "heightmap":
             uri = text_of(shape, "uri") or ""
             path = self._files.find(uri, self._candidates(uri))
             surface = None if path is None else terrain(shape, path, self._files, what)
-            return [] if surface is None else [self._solid(surface, shape, color)]
-        solid = _primitive(shape, what)
+            return [] if surface is None else [self._solid(surface, shape, color, False)]
+        solid = primitive_of(shape, what)
         if solid is None:
             if shape.tag != "empty":
                 self._files.remark(f"{element.get('name')!r} is <{shape.tag}>, not read as a shape, and was left out")
             return []
-        return [self._solid(solid, shape, color)]
+        return [self._solid(solid, shape, color, textured)]
 
-    def _solid(self, solid: trimesh.Trimesh, shape: etree._Element, color: np.ndarray | None) -> trimesh.Trimesh:
+    def _solid(
+        self, solid: trimesh.Trimesh, shape: etree._Element, color: np.ndarray | None, textured: bool
+    ) -> trimesh.Trimesh:
         self._files.count(len(solid.faces))
-        return make_part(solid.vertices, solid.faces, material=plain_material(color), name=str(shape.tag))
+        name, material = str(shape.tag), plain_material(color)
+        if not textured:
+            return make_part(solid.vertices, solid.faces, material=material, name=name)
+        vertices, faces, uv = unwrapped(solid, name)
+        return make_part(vertices, faces, material=material, name=name, uv=uv)
 
     def _mesh_parts(self, shape: etree._Element, color: np.ndarray | None, what: str) -> list[trimesh.Trimesh]:
         uri = text_of(shape, "uri") or ""
@@ -216,67 +222,6 @@ class SdfShapes:
     def _mesh_path(self, element: etree._Element) -> Path | None:
         uri = text_of(element, "geometry/mesh/uri")
         return None if uri is None else self._files.used_one(uri, self._candidates(uri))
-
-
-def _primitive(shape: etree._Element, what: str) -> trimesh.Trimesh | None:
-    if shape.tag == "box":
-        return trimesh.creation.box(_all_positive(shape, "size", what))
-    if shape.tag == "ellipsoid":
-        return primitives.ellipsoid(_all_positive(shape, "radii", what))
-    if shape.tag == "sphere":
-        return primitives.sphere(_positive(shape, "radius", what))
-    if shape.tag in ("cylinder", "capsule"):
-        build = primitives.cylinder if shape.tag == "cylinder" else primitives.capsule
-        return build(_positive(shape, "radius", what), _positive(shape, "length", what))
-    if shape.tag == "plane":
-        return _plane(shape, what)
-    return None
-
-
-def _plane(shape: etree._Element, what: str) -> trimesh.Trimesh:
-    """Return the rectangle that a plane shows, as a sheet under it; to collide with it has no end."""
-    normal = numbers(text_of(shape, "normal") or "0 0 1", 3, f"{what} normal")
-    length = float(np.linalg.norm(normal))
-    if length == 0:
-        raise AssetError(f"{what} normal: a vector of length 0 has no direction")
-    size = numbers(text_of(shape, "size") or "1 1", 2, f"{what} size")
-    if (size <= 0).any():
-        raise AssetError(f"{what} size: {size.min()} is not above zero")
-    sheet = trimesh.creation.box((*size, _SHEET_M))
-    sheet.apply_translation((0, 0, -_SHEET_M / 2))
-    sheet.apply_transform(trimesh.geometry.align_vectors((0, 0, 1), normal / length))
-    return sheet
-
-
-def _polyline(shapes: list[etree._Element], what: str) -> trimesh.Trimesh:
-    """Return the prism over closed lines of points, from z = 0 to the height of the first."""
-    lines = [
-        [numbers(" ".join((point.text or "").split()), 2, f"{what} point") for point in shape.findall("point")]
-        for shape in shapes
-    ]
-    height = _positive(shapes[0], "height", what)
-    prism = None
-    if all(len(line) >= 3 for line in lines) and sum(map(len, lines)) <= _MAX_POINTS:
-        outline = manifold3d.CrossSection([np.array(line) for line in lines], manifold3d.FillRule.EvenOdd)
-        prism = outline.extrude(height).to_mesh64()
-    if prism is None or not len(prism.tri_verts):
-        said = ", ".join(str(len(line)) for line in lines[:4])
-        raise AssetError(f"{what}: its polyline of {said} points encloses no area; give 3 to {_MAX_POINTS}")
-    return trimesh.Trimesh(prism.vert_properties[:, :3], prism.tri_verts.astype(np.int64), process=False)
-
-
-def _positive(shape: etree._Element, tag: str, what: str) -> float:
-    value = number(text_of(shape, tag), f"{what} {tag}")
-    if value <= 0:
-        raise AssetError(f"{what} {tag}: {value} is not above zero")
-    return value
-
-
-def _all_positive(shape: etree._Element, tag: str, what: str) -> np.ndarray:
-    values = numbers(text_of(shape, tag), 3, f"{what} {tag}")
-    if (values <= 0).any():
-        raise AssetError(f"{what} {tag}: {values.min()} is not above zero")
-    return values
 
 
 def _diffuse(element: etree._Element, what: str) -> np.ndarray | None:

@@ -132,6 +132,7 @@ def candidates(name: str, file: Path, root: Path) -> Iterator[Path]:
     """
     scheme = next((scheme for scheme in _SCHEMES if name.startswith(scheme)), "")
     inside = name.removeprefix(scheme)
+    inside = inside.lstrip("/") if scheme else inside  # Gazebo takes model:///NAME too
     folders = list(upward(file.parent, root))
     if not scheme:
         yield file.parent / inside
