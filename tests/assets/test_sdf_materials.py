@@ -148,3 +148,22 @@ def test_a_ball_has_a_map_without_a_seam_that_shows() -> None:
     vertices, faces, uv = unwrapped(sphere(1.0), "sphere")
     assert np.ptp(uv[faces][..., 0], axis=1).max() < 0.26 and 0 <= uv[:, 1].min() < 1e-9 and uv[:, 1].max() <= 1
     assert np.allclose(uv[np.argmax(vertices[:, 2]), 1], 1)
+
+
+def test_a_meshs_texture_may_lie_in_another_model(tmp_path: Path) -> None:
+    (tmp_path / "wheel/materials/textures").mkdir(parents=True)
+    Image.new("RGB", (4, 4), (0, 0, 255)).save(tmp_path / "wheel/materials/textures/tyre.png")
+    (tmp_path / "cart/meshes").mkdir(parents=True)
+    (tmp_path / "cart/meshes/cart.obj").write_text(
+        "mtllib cart.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
+    )
+    seen = '<visual name="v"><geometry><mesh><uri>model://cart/meshes/cart.obj</uri></mesh></geometry></visual>'
+    for where in ("model://wheel/materials/textures/tyre.png", "model://cart/../wheel/materials/textures/tyre.png"):
+        (tmp_path / "cart/meshes/cart.mtl").write_text(f"newmtl m\nmap_Kd {where}\n")
+        file = model(tmp_path / "cart", seen)
+        asset = read_asset(file, root=tmp_path)
+        assert material_of(asset.visual[0]).baseColorTexture is not None and asset.missing_files == ()
+        alone = read_asset(file, root=tmp_path / "cart")
+        assert material_of(alone.visual[0]).baseColorTexture is None and alone.missing_files == (where,)
+    (tmp_path / "cart/meshes/cart.mtl").write_text("newmtl m\nmap_Kd model://../../../../wheel/tyre.png\n")
+    assert any("lies outside the folder" in each for each in read_asset(file, root=tmp_path).remarks)

@@ -18,6 +18,7 @@ from manitwin.assets.obj_groups import obj_groups
 from manitwin.assets.readers.upright import Y_UP_FORMATS
 from manitwin.assets.root import upward
 from manitwin.formats.meshes.read import MeshFile
+from manitwin.formats.meshes.source import PACKAGE_SCHEMES
 from manitwin.formats.meshes.textures import (
     DEFAULT_COLOR,
     bake_transform,
@@ -29,7 +30,6 @@ from manitwin.formats.meshes.textures import (
 from manitwin.geometry.poses import GLTF_TO_OBJECT, transform_points
 from manitwin.robots.urdf import UrdfTree, geometry_of, origin_of, values_of
 
-_SCHEMES = ("package://", "model://")
 _LOST_LIBRARY = re.compile(r"material library '.+' is not there")
 
 
@@ -130,7 +130,7 @@ def candidates(name: str, file: Path, root: Path) -> Iterator[Path]:
     What names a package or model (``package://NAME/...``) lies in the folder of that name, or in a folder that holds the
     package without being called so. Isaac Gym takes names from the folder that its caller says, which is one above.
     """
-    scheme = next((scheme for scheme in _SCHEMES if name.startswith(scheme)), "")
+    scheme = next((scheme for scheme in PACKAGE_SCHEMES if name.startswith(scheme)), "")
     inside = name.removeprefix(scheme)
     inside = inside.lstrip("/") if scheme else inside  # Gazebo takes model:///NAME too
     folders = list(upward(file.parent, root))

@@ -18,6 +18,7 @@ from manitwin.formats.source_files import inside_folder, is_regular, spellings
 
 Buffer = bytes | memoryview
 
+PACKAGE_SCHEMES = ("package://", "model://")
 _SIMPLIFY = "simplify it, or raise the limit"
 _MESSAGE_CHARACTERS = 400
 _MAX_FINDINGS = 100
@@ -105,9 +106,9 @@ class MeshSource:
         """
         outside = False
         for spelling in spellings(name):
-            named = inside_folder(self.path.parent, spelling, root=self.root)
-            outside = outside or named is None
-            places = [(self.root or self.path.parent, named)]
+            named = list(self._places(spelling))
+            outside = outside or all(place is None for place in named)
+            places = [(self.root or self.path.parent, place) for place in named]
             places += [(folder, inside_folder(folder, spelling.rpartition("/")[2])) for folder in self.texture_folders]
             for inside, found in places:
                 if found is not None and is_regular(found):
@@ -118,6 +119,21 @@ class MeshSource:
         else:
             self.find(f"{what} {_short(name)} is not there; carried on without it")
         return None
+
+    def _places(self, name: str) -> Iterator[Path | None]:
+        """Yield where a file that the mesh names may lie; None for a place that is not below the root.
+
+        What names a package or model (``model://NAME/...``, as materials of Gazebo's do) lies in the folder of that name.
+        """
+        scheme = next((scheme for scheme in PACKAGE_SCHEMES if name.startswith(scheme)), None)
+        if scheme is None or self.root is None:
+            yield inside_folder(self.path.parent, name, root=self.root)
+            return
+        package, _, inside = name.removeprefix(scheme).lstrip("/").partition("/")
+        root, folder = self.root.resolve(), self.path.parent.resolve()
+        above = [each for each in (folder, *folder.parents) if each.is_relative_to(root)]
+        yield from (inside_folder(each, inside, root=root) for each in above if each.name == package)
+        yield from (inside_folder(each, f"{package}/{inside}", root=root) for each in above)
 
     def files(self) -> tuple[Path, ...]:
         """Return the other files that were read, sorted."""
