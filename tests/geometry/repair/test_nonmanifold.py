@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from manitwin.geometry.repair.cascade import repair
 from manitwin.geometry.repair.halfedges import group_edges, is_closed_and_consistent
 from manitwin.geometry.repair.nonmanifold import fins, glue_faces, separate_coincident_edges
 from manitwin.geometry.repair.orientation import wind_consistently
@@ -75,3 +76,16 @@ def test_two_edges_between_the_same_vertices_are_told_apart() -> None:
     started = parted.faces.ravel()
     ended = np.roll(parted.faces, -1, axis=1).ravel()
     assert np.array_equal(started[parted.twin], ended)
+
+
+def test_a_floor_that_a_wall_touches_along_an_edge_is_not_turned_inside_out() -> None:
+    """A bowl whose wall and floor share a ring of edges, its foot wound the other way: no brackets tell the pairs."""
+    floor = trimesh.creation.revolve([(0, 0), (1, 0), (1, 0.2), (0, 0.2)], sections=24)
+    wall = trimesh.creation.revolve([(1, 0.2), (1.5, 0.6), (1.3, 0.65), (1, 0.2)], sections=24)
+    foot = floor.triangles_center[:, 2] < 0.199
+    faces = np.where(foot[:, None], floor.faces[:, ::-1], floor.faces)
+    bowl = trimesh.util.concatenate([trimesh.Trimesh(floor.vertices, faces, process=False), wall])
+    result = repair(bowl)
+    assert result.watertight and result.mesh.volume == pytest.approx(floor.volume + wall.volume, rel=1e-6)
+    up = result.mesh.face_normals[result.mesh.triangles_center[:, 2] < 1e-6, 2]
+    assert len(up) and (up < -0.9).all()

@@ -15,6 +15,7 @@ from manitwin.geometry.repair.halfedges import (
 from manitwin.geometry.repair.surface import Surface
 
 _FOLD_COSINE = -0.5  # an ear folded by more than 60 degrees out of its neighbour's plane is a fin
+_MOST_WEIGHED = 12
 _SAME_WAY_PENALTY = 0.3  # prefers partners that run in opposite directions over slightly flatter ones that do not
 
 
@@ -42,7 +43,7 @@ def glue_faces(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.
     """Glue faces along their edges; returns ``twin (3F,)`` and which half-edges ``(3F,)`` lie on a crowded edge.
 
     Where as many faces run one way along an edge as the other, partners bound one wedge of matter between them (the
-    solids that touch there come apart). Else the flattest pairs are glued and an odd face stays open.
+    solids that touch there come apart). Else the flattest pairs that do not cross are glued and an odd face stays open.
     """
     groups = group_edges(faces, len(vertices))
     twin = twins_of_manifold_edges(groups)
@@ -51,11 +52,12 @@ def glue_faces(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.
         members = groups.members(int(group))
         forward = start[members] < end[members]
         toward_apex = _apex_directions(vertices, faces, members)
+        low, high = sorted((start[members[0]], end[members[0]]))
+        angle = _angles(toward_apex, vertices[high] - vertices[low])
         if 2 * forward.sum() == len(members):
-            low, high = sorted((start[members[0]], end[members[0]]))
-            pairs = _wedges_of_matter(toward_apex, forward, vertices[high] - vertices[low])
+            pairs = _wedges_of_matter(angle, forward)
         else:
-            pairs = _flattest_pairs(toward_apex, forward)
+            pairs = _flattest_pairs(angle, toward_apex, forward)
         for i, j in pairs:
             twin[members[i]], twin[members[j]] = members[j], members[i]
     return twin, groups.uses > 2
@@ -117,15 +119,19 @@ def _apex_directions(vertices: np.ndarray, faces: np.ndarray, halfedges: np.ndar
     return across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
 
 
-def _wedges_of_matter(toward_apex: np.ndarray, forward: np.ndarray, along: np.ndarray) -> list[tuple[int, int]]:
-    """Pair balanced faces around an edge like brackets.
+def _angles(toward_apex: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """Return the angles ``(N,)`` rad of faces around an edge, counter-clockwise about ``along`` from the first."""
+    x = toward_apex[0]
+    y = np.cross(along / max(float(np.linalg.norm(along)), np.finfo(float).tiny), x)
+    return np.asarray(np.round(np.arctan2(toward_apex @ y, toward_apex @ x), 9) % (2 * np.pi))
 
-    Turning counter-clockwise about ``along``, matter begins at a face that runs backward and ends at one that runs
+
+def _wedges_of_matter(angle: np.ndarray, forward: np.ndarray) -> list[tuple[int, int]]:
+    """Pair balanced faces at angles ``(N,)`` around an edge like brackets.
+
+    Turning counter-clockwise about the edge, matter begins at a face that runs backward and ends at one that runs
     forward (its normal, along x apex direction, points on in the direction of turning).
     """
-    x = toward_apex[0]
-    y = np.cross(along / np.linalg.norm(along), x)
-    angle = np.round(np.arctan2(toward_apex @ y, toward_apex @ x), 9) % (2 * np.pi)
     order = np.lexsort((np.arange(len(angle)), forward, angle))
     balance = np.cumsum(np.where(forward[order], -1, 1))
     order = np.roll(order, -(int(balance.argmin()) + 1))
@@ -139,14 +145,42 @@ def _wedges_of_matter(toward_apex: np.ndarray, forward: np.ndarray, along: np.nd
     return pairs
 
 
-def _flattest_pairs(toward_apex: np.ndarray, forward: np.ndarray) -> list[tuple[int, int]]:
-    """Pair faces around an edge greedily, the flattest first; one of an odd number is left over."""
+def _flattest_pairs(angle: np.ndarray, toward_apex: np.ndarray, forward: np.ndarray) -> list[tuple[int, int]]:
+    """Pair faces around an edge so that no two pairs cross there, and are flattest together; one of an odd number is left over.
+
+    Sheets that pass through each other would turn what they bound inside out beyond the edge.
+    """
     fold = toward_apex @ toward_apex.T + _SAME_WAY_PENALTY * (forward[:, None] == forward[None])
-    left = list(range(len(forward)))
-    pairs = []
+    order = np.lexsort((np.arange(len(angle)), angle)).tolist()
+    if len(order) > _MOST_WEIGHED:
+        return _neighbours(order, fold)
+    known: dict[tuple[int, int], tuple[float, list[tuple[int, int]]]] = {}
+
+    def best(first: int, end: int) -> tuple[float, list[tuple[int, int]]]:
+        """Return the least fold of the faces at places ``first`` to ``end`` of the order, and its pairs."""
+        if end - first < 2:
+            return 0.0, []
+        if (first, end) not in known:
+            odd = (end - first) % 2
+            choices = [best(first + 1, end)] if odd else []
+            for place in range(first + 1, end):
+                within, behind = best(first + 1, place), best(place + 1, end)
+                if (place - first - 1) % 2 and (end - place - 1) % 2:
+                    continue  # each of them would leave a face over
+                i, j = sorted((order[first], order[place]))
+                choices.append((float(fold[i, j]) + within[0] + behind[0], [(i, j), *within[1], *behind[1]]))
+            known[first, end] = min(choices)
+        return known[first, end]
+
+    return best(0, len(order))[1]
+
+
+def _neighbours(order: list[int], fold: np.ndarray) -> list[tuple[int, int]]:
+    """Pair faces with those beside them around an edge, the flattest first."""
+    left = list(order)
+    pairs: list[tuple[int, int]] = []
     while len(left) > 1:
-        candidates = [(fold[i, j], i, j) for at, i in enumerate(left) for j in left[at + 1 :]]
-        _, i, j = min(candidates)
-        pairs.append((i, j))
-        left = [k for k in left if k not in (i, j)]
+        beside = [(min(a, b), max(a, b)) for a, b in zip(left, left[1:] + left[:1], strict=True)]
+        pairs.append(min(beside, key=lambda pair: (float(fold[pair]), *pair)))
+        left = [k for k in left if k not in pairs[-1]]
     return pairs
