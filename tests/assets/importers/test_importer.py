@@ -351,3 +351,13 @@ def test_a_box_of_a_description_has_edges(tmp_path: Path) -> None:
     across = np.cross(*np.moveaxis(np.diff(part.vertices[solid], axis=1), 1, 0))
     across /= np.linalg.norm(across, axis=1)[:, None]
     assert np.allclose(part.vertex_normals[solid], across[:, None], atol=1e-4)
+
+
+def test_a_centre_of_mass_that_a_build_refuses_is_not_kept(tmp_path: Path) -> None:
+    box = '<visual><geometry><box size="0.1 0.1 0.02"/></geometry></visual>'
+    for z, kept in ((0.0099, True), (0.01005, True), (0.0104, False)):
+        mass = f'<inertial><origin xyz="0 0 {z}"/><mass value="0.1"/></inertial>'
+        (tmp_path / "tile.urdf").write_text(f'<robot name="tile"><link name="l">{mass}{box}</link></robot>')
+        record, _ = imported(tmp_path / "tile.urdf", tmp_path / f"out_{z}")
+        assert (record.center_of_mass_m is not None) == kept
+        assert any("0.4 mm outside of what is seen" in why for why in record.dropped) != kept

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+import trimesh
+from scipy.spatial import QhullError
+
 from manitwin.assets.asset import Asset, Inertial
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.assets.audit.rules import center_of_mass, inertia
+from manitwin.pipeline.annotated_mass import OUTSIDE_SHARE
 
 CENTER, INERTIA = "centre of mass", "inertia"
 
@@ -30,6 +35,22 @@ def impossible_mass_properties(asset: Asset) -> dict[str, str]:
         if declared is not None and said:
             found[what] = said[0]
     return found
+
+
+def center_off_what_is_seen(center_m: np.ndarray, points_m: np.ndarray) -> str | None:
+    """Return why a centre of mass ``(3,)`` cannot be that of the points ``(N, 3)`` that are seen; None where it can.
+
+    COM002 allows what hulls are rounded by; a build refuses a centre that is farther outside of its solid than for rounding.
+    """
+    try:
+        hull = trimesh.convex.convex_hull(points_m)
+    except QhullError:  # a flat sheet, which has no inside
+        return None
+    beyond_m = float((hull.face_normals * (center_m - hull.triangles[:, 0])).sum(1).max())
+    if beyond_m <= OUTSIDE_SHARE * float(np.ptp(points_m, axis=0).max()):
+        return None
+    place = ", ".join(f"{1000 * value:.3g}" for value in center_m)
+    return f"the centre of mass ({place}) mm lies {1000 * beyond_m:.3g} mm outside of what is seen of the object"
 
 
 def without_placeholder_mass(asset: Asset) -> tuple[Asset, list[str]]:

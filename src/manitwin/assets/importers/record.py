@@ -13,6 +13,7 @@ from manitwin.assets.asset import AnnotatedFrame, AnnotatedGrasps, Asset
 from manitwin.assets.importers.dropped import (
     CENTER,
     INERTIA,
+    center_off_what_is_seen,
     impossible_mass_properties,
     left_out,
     without_placeholder_mass,
@@ -43,8 +44,11 @@ def shown_parts(asset: Asset) -> tuple[trimesh.Trimesh, ...]:
 
 def asset_to_object(asset: Asset) -> np.ndarray:
     """Return the rigid transform ``(4, 4)`` of the asset's axes into the object frame of its visual meshes."""
-    points = np.concatenate([part.vertices[np.unique(part.faces)] for part in shown_parts(asset)])
-    return object_frame(points, _UP_TO_Z[asset.up])
+    return object_frame(_shown_points(asset), _UP_TO_Z[asset.up])
+
+
+def _shown_points(asset: Asset) -> np.ndarray:
+    return np.concatenate([part.vertices[np.unique(part.faces)] for part in shown_parts(asset)])
 
 
 def import_record(asset: Asset, to_object: np.ndarray) -> ImportRecord:
@@ -56,6 +60,9 @@ def import_record(asset: Asset, to_object: np.ndarray) -> ImportRecord:
     numbers, missing, dropped = _numbers(asset)
     dropped = placeholder + dropped
     impossible = impossible_mass_properties(asset)
+    center = None if CENTER in impossible else asset.inertial.center_of_mass_m
+    if center is not None and (why := center_off_what_is_seen(center, _shown_points(asset))) is not None:
+        center, impossible[CENTER] = None, why
     dropped += [f"{what}: {why}" for what, why in impossible.items()]
     functional = [_point(frame, to_object) for frame in asset.frames if frame.kind in ("functional", "target")]
     grasp = [_point(frame, to_object) for frame in asset.frames if frame.kind == "contact"]
@@ -68,7 +75,6 @@ def import_record(asset: Asset, to_object: np.ndarray) -> ImportRecord:
     dropped += wrong_links
     rests, repairs = settled_rests(asset, to_object)
     remarks += repairs
-    center = None if CENTER in impossible else asset.inertial.center_of_mass_m
     inertia = None if INERTIA in impossible else asset.inertial.inertia_kg_m2
     rotation = to_object[:3, :3]
     captions = list(dict.fromkeys(" ".join(text.split())[:_MAX_LETTERS] for text in asset.captions if text.strip()))
