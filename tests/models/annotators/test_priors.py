@@ -212,7 +212,9 @@ def test_what_is_used_or_made_otherwise_is_no_alias(said: str, category: str) ->
     ("said", "category"),
     [
         ("mug_1", "mug"), ("Mug 01", "mug"), ("pitcher blue", "pitcher"), ("ice_guard_pitcher_blue_2", "pitcher"),
-        ("bottle b", "bottle"), ("orange", "orange"), ("orange 2", "orange"),
+        ("bottle b", "bottle"), ("orange", "orange"), ("orange 2", "orange"), ("Wood cube 2.5cm", "building block"),
+        ("Marble 1.5 cm", "marble"), ("wood block 10 x 2.5 x 1 cm", "wood block"), ("screw 3.5x40mm", "screw"),
+        ("bottle 500ml", "bottle"), ("nail 3 inch", "nail"),
     ],
 )  # fmt: skip
 def test_numbers_and_colours_behind_a_thing_say_nothing(said: str, category: str) -> None:
@@ -223,6 +225,22 @@ def test_numbers_and_colours_behind_a_thing_say_nothing(said: str, category: str
 @pytest.mark.parametrize("said", ["obj_000001", "blue", "v2", "1", "mug rack", "mug rack 2"])
 def test_numbers_and_colours_alone_are_no_thing(said: str) -> None:
     assert lookup(said) is None
+
+
+def test_a_number_keeps_its_point_and_a_name_does_not() -> None:
+    assert normalised("No. 2 tube, 1.5 cm") == "no 2 tube" and normalised("Disk 1.5 cm v.2.") == "disk 1.5 cm v 2"
+
+
+def test_a_peg_of_metal_or_for_a_hole_is_no_clothes_peg() -> None:
+    for name, category in (
+        ("metal peg", "dowel"),
+        ("wooden peg", "dowel"),
+        ("peg", "clothespin"),
+        ("wood clothes peg", "clothespin"),
+    ):
+        found = lookup(name)
+        assert found is not None and found.category == category
+    assert [part.label for part in lookup("metal peg").functional] == ["end", "middle", "other end"]
 
 
 def test_form_of_an_alias_is_that_of_its_head_noun() -> None:

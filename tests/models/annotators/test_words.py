@@ -26,6 +26,7 @@ def described(mesh: trimesh.Trimesh, name: str | None, *parts: trimesh.Trimesh, 
     [
         ("mug", "a"), ("apple", "an"), ("orange mug", "an"), ("utensil holder", "a"), ("usb stick", "a"),
         ("umbrella", "an"), ("hourglass", "an"), ("house", "a"), ("ukulele", "a"), ("egg", "an"), ("eraser", "an"),
+        ("u joint", "a"), ("s hook", "an"), ("t-shirt", "a"), ("x-ray", "an"), ("L bracket", "an"),
     ],
 )  # fmt: skip
 def test_article_follows_the_sound(phrase: str, expected: str) -> None:

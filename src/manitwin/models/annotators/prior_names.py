@@ -12,11 +12,14 @@ from manitwin.models.annotators.diacritics import without_diacritics
 from manitwin.models.annotators.prior_records import Prior
 from manitwin.models.annotators.priors import load_priors
 
+_BETWEEN_WORDS = r"(?:[^a-z0-9&+'.]|\.(?!\d)|(?<!\d)\.)+"
+"""A point between two digits is a number's own: 1.5 cm."""
+
 
 def normalised(name: str) -> str:
     """Return a name in lower-case Latin letters without marks, punctuation, articles and what follows a comma or bracket."""
     head = re.split(r"[,(\[;:]", without_diacritics(name), maxsplit=1)[0]
-    words = re.sub(r"[^a-z0-9&+']+", " ", head.replace("’", "'").replace("'s ", " ").replace("'", "")).split()
+    words = re.sub(_BETWEEN_WORDS, " ", head.replace("’", "'").replace("'s ", " ").replace("'", "")).split()
     return " ".join(words[1:] if words[:1] in (["a"], ["an"], ["the"]) and len(words) > 1 else words)
 
 
@@ -65,8 +68,9 @@ def lookup(name: str | None) -> Prior | None:
 
 
 _MOST_WORDS_BEFORE = 6
+_NUMBER = r"\d+(?:\.\d+)?"
 _NO_THING = re.compile(
-    r"[a-z]?\d+[a-z]?|[a-z]|black|white|gr[ae]y|silver|red|green|blue|yellow|orange|brown|pink|purple|beige|small|medium|large"
+    rf"[a-z]?{_NUMBER}[a-z]?|{_NUMBER}(?:x{_NUMBER})*(?:mm|cm|in|inch|ft|ml|cl|oz|kg|lbs?)?|mm|cm|inch|inches|ml|cl|oz|kg|lbs?|[a-z]|black|white|gr[ae]y|silver|red|green|blue|yellow|orange|brown|pink|purple|beige|small|medium|large"
 )
 
 
@@ -85,9 +89,9 @@ def found_by(name: str | None) -> tuple[Prior, str] | None:
     the whole again: each as it is, in the singular, and with words dropped from the front ('red coffee mugs' are coffee mugs,
     which are mugs), and before its last word stands alone with words dropped between ('lego duplo brick' is a lego brick). The
     last word decides what a thing is: a mug rack is no mug. Words are the same written together or apart: a 'waterbottle' is a
-    water bottle, and a 'tooth brush' a toothbrush before it is a brush. Where none is found, numbers and colours at
-    the end say nothing ('mug_1' and 'pitcher blue' are a mug and a pitcher), and what is a toy of anything is a toy, as is
-    a doll's chair. File names are never looked up: they are not evidence.
+    water bottle, and a 'tooth brush' a toothbrush before it is a brush. Where none is found, numbers, measures and colours at the
+    end say nothing ('mug_1', 'cube 5 cm' and 'pitcher blue' are a mug, a cube and a pitcher), and what is a toy of anything is a
+    toy, as is a doll's chair. File names are never looked up: they are not evidence.
     """
     if not name or not (phrase := normalised(name)):
         return None

@@ -20,6 +20,8 @@ UNKNOWN_FUNCTION = "unknown function (no name given that the priors know)"
 _SIZE_WORDS = ((0.03, "tiny"), (0.10, "palm-sized"), (0.20, "hand-sized"), (0.35, "medium-sized"), (np.inf, "large"))
 
 _A_NOT_AN = ("uk", "uni", "usb", "use", "ute", "eu", "one", "once")  # spelt with a vowel, spoken with a consonant
+_LETTERS_FROM_A_VOWEL = "efhilmnorsx"
+"""Letters that stand alone are spoken by their names: an s hook, a u joint."""
 _AN_NOT_A = ("hour", "honest", "heir", "mp3", "x-ray")
 _SINGULAR_ENDS = ("ss", "us", "is", "as", "os", "lens", "series")
 _SHORTEST_PLURAL = 3
@@ -50,6 +52,9 @@ _MADE_OF = {"wooden": "wood", "woollen": "wool", "golden": "gold", "metallic": "
 def article(phrase: str) -> str:
     """Return 'a' or 'an', as the first sound of a phrase asks for."""
     first = phrase.lower()
+    letter = re.match(r"([a-z])(?![a-z0-9'])", first)
+    if letter is not None and letter[1] != "a":  # an article of its own: 'a mug'
+        return "an" if letter[1] in _LETTERS_FROM_A_VOWEL else "a"
     if first.startswith(_AN_NOT_A) or (first[:1] in "aeiou" and not first.startswith(_A_NOT_AN)):
         return "an"
     return "a"
