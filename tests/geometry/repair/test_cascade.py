@@ -105,6 +105,15 @@ def test_wall_inside_a_solid_is_dropped() -> None:
     assert is_solid(result) and result.mesh.volume == pytest.approx(1.0) and result.mesh.area == pytest.approx(6.0)
 
 
+def test_a_body_with_a_hole_that_hangs_on_by_an_edge_is_no_membrane() -> None:
+    for axis in (1, 2):
+        body, nut = trimesh.creation.box((0.2, 1, 1)), trimesh.creation.box((0.2, 0.125, 0.125))
+        nut.apply_translation((0, 0.5625, 0.5625))  # their edges touch
+        nut.update_faces(np.arange(12) != np.flatnonzero(nut.face_normals[:, axis] < -0.9)[1])
+        result = repair(trimesh.util.concatenate([body, nut]))
+        assert result.watertight and result.mesh.volume == pytest.approx(0.2 + 0.2 * 0.125**2, rel=1e-6)
+
+
 def test_outside_of_a_cup_gets_a_wall_and_no_lid() -> None:
     cup = trimesh.creation.cylinder(radius=0.04, height=0.1, sections=96).subdivide().subdivide()
     outside = without(cup, cup.face_normals[:, 2] > 0.99)

@@ -15,11 +15,12 @@ from manitwin.errors import ManiTwinError
 from manitwin.geometry.repair import halfedges, nonmanifold, welding
 from manitwin.geometry.repair.hole_filling import boundary_loops, fill_loops, loop_lengths
 from manitwin.geometry.repair.orientation import face_outward, wind_consistently
-from manitwin.geometry.repair.surface import Surface, signed_volumes
+from manitwin.geometry.repair.surface import Surface, face_cross_products, signed_volumes
 from manitwin.geometry.repair.thickening import lids_of_openings, thicken
 
 _STRAY_AREA_SHARE = 2e-3  # open pieces below this share of the area are debris
 _HANGING_AREA_SHARE = 0.05  # the same for open pieces that hang on by an edge with more than two faces
+_MEMBRANE_SHARE = 0.2  # of a piece's area: what its holes would take to close, below which it is a body and no membrane
 _FLAT_SHARE = 1e-5  # mean thickness over the root of the area: paper of A4 size has 3e-4
 _MOST_ROUNDS = 20  # of dropping fins or strays: each round can free others
 
@@ -168,6 +169,9 @@ def _strays(surface: Surface, crowded: np.ndarray) -> np.ndarray:
     # A face's half-edges may be renumbered by winding, so count crowded edges by face.
     hanging_faces = crowded.reshape(-1, 3).any(1) & open_at.reshape(-1, 3).any(1)
     hanging = np.bincount(labels, hanging_faces, minlength=count) > 0
+    cross = face_cross_products(surface.vertices, surface.faces) / 2
+    unclosed = np.linalg.norm([np.bincount(labels, column, minlength=count) for column in cross.T], axis=0)
+    hanging &= unclosed > _MEMBRANE_SHARE * areas  # a nut that a jaw goes through is nearly closed
     stray = (opened > 0) & ((share < _STRAY_AREA_SHARE) | (hanging & (share < _HANGING_AREA_SHARE)))
     return stray[labels]
 
