@@ -361,3 +361,20 @@ def test_a_centre_of_mass_that_a_build_refuses_is_not_kept(tmp_path: Path) -> No
         record, _ = imported(tmp_path / "tile.urdf", tmp_path / f"out_{z}")
         assert (record.center_of_mass_m is not None) == kept
         assert any("0.4 mm outside of what is seen" in why for why in record.dropped) != kept
+
+
+def test_a_mesh_of_another_model_is_asked_for_with_the_folder_that_holds_it(tmp_path: Path) -> None:
+    seen = '<visual name="v"><geometry><mesh><uri>model://digit/meshes/digit.stl</uri></mesh></geometry></visual>'
+    two = tmp_path / "models" / "two"
+    two.mkdir(parents=True)
+    (two / "model.sdf").write_text(f'<sdf version="1.6"><model name="two"><link name="l">{seen}</link></model></sdf>')
+    (two / "model.config").write_text("<model><name>two</name></model>")
+    (alone,) = import_assets([two], tmp_path / "out")
+    assert alone.error == (
+        "two: no visual mesh to make a twin of (model://digit/meshes/digit.stl is missing);"
+        " give the folder that holds 'digit' too"
+    )
+    (tmp_path / "models/digit/meshes").mkdir(parents=True)
+    mug().export(tmp_path / "models/digit/meshes/digit.stl")
+    (together,) = import_assets([tmp_path / "models"], tmp_path / "out")
+    assert together.error is None

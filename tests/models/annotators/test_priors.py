@@ -231,6 +231,17 @@ def test_a_number_keeps_its_point_and_a_name_does_not() -> None:
     assert normalised("No. 2 tube, 1.5 cm") == "no 2 tube" and normalised("Disk 1.5 cm v.2.") == "disk 1.5 cm v 2"
 
 
+def test_what_stands_behind_a_colon_is_the_thing_where_what_is_before_is_none() -> None:
+    for name, category in (
+        ("DRC Practice: Hand wheel valve", "valve"),
+        ("mug: blue pen", "mug"),
+        ("shop: aisle 3: red mug", "mug"),
+    ):
+        found = lookup(name)
+        assert found is not None and found.category == category
+    assert lookup("shop:") is None
+
+
 def test_a_peg_of_metal_or_for_a_hole_is_no_clothes_peg() -> None:
     for name, category in (
         ("metal peg", "dowel"),

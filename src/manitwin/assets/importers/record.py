@@ -21,6 +21,7 @@ from manitwin.assets.importers.dropped import (
 from manitwin.assets.importers.links import given_articulation
 from manitwin.assets.importers.telling_name import split_words, telling_name
 from manitwin.errors import AssetError
+from manitwin.formats.meshes.source import PACKAGE_SCHEMES
 from manitwin.geometry.canonical_frame import object_frame
 from manitwin.geometry.poses import GLTF_TO_OBJECT, inverse, transform_points
 from manitwin.twin.import_record import MISSING_FILE, GivenGrasps, GivenPoint, ImportRecord
@@ -208,7 +209,14 @@ def _is_digest(word: str) -> bool:
 def _why(asset: Asset) -> str:
     lines: Iterator[str] = iter([*(f"{name} is missing" for name in asset.missing_files), *asset.remarks])
     first = next(lines, None)
-    return f" ({first})" if first else ""
+    elsewhere = next((name for name in asset.missing_files if name.startswith(PACKAGE_SCHEMES)), None)
+    remedy = "" if elsewhere is None else f"; give the folder that holds {_package(elsewhere)!r} too"
+    return f" ({first}){remedy}" if first else ""
+
+
+def _package(name: str) -> str:
+    """Return the package or model that a name with a scheme is of: ``cup`` of model://cup/meshes/cup.dae."""
+    return name.partition("://")[2].lstrip("/").partition("/")[0]
 
 
 def settled_rests(asset: Asset, asset_to_object: np.ndarray) -> tuple[list[np.ndarray], list[str]]:

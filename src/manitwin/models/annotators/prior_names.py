@@ -109,6 +109,10 @@ def found_by(name: str | None) -> tuple[Prior, str] | None:
             if candidate in index and index[candidate].category != "unknown":
                 small = index[candidate].domain == _TOO_LARGE and not _SMALL.isdisjoint(head[:-1])
                 return (index["toy"], " ".join(head)) if small else (index[candidate], candidate)
+    if ":" in name:  # then what stands before it is a collection: 'Practice: hand wheel valve'
+        behind = found_by(name.rpartition(":")[2])
+        if behind is not None:
+            return behind
     imitation = next((_IMITATIONS[word] for word in head[:-1] if word in _IMITATIONS), None)
     return None if imitation is None else (index[imitation], " ".join(head))
 
