@@ -9,6 +9,7 @@ import pytest
 import trimesh
 from PIL import Image
 
+from collada_document import DOCUMENT
 from manitwin.assets.asset import Asset
 from manitwin.assets.audit.check import audit_asset
 from manitwin.assets.audit.rules import RULES
@@ -368,3 +369,26 @@ def test_the_folder_of_a_model_may_stand_behind_three_slashes(tmp_path: Path) ->
     (tmp_path / "box.stl").rename(tmp_path / "thing/box.stl")
     asset = read(tmp_path / "thing", link("a", seen))
     assert np.allclose(asset.visual[0].extents, [0.1, 0.2, 0.3]) and asset.missing_files == ()
+
+
+def test_a_submesh_of_collada_is_what_a_node_of_its_name_shows(tmp_path: Path) -> None:
+    geometry = DOCUMENT[DOCUMENT.index('<geometry id="g">') : DOCUMENT.index("</library_geometries>")]
+    other = geometry.replace('id="g"', 'id="h" name="Rim"')
+    for word in ("p", "pa", "t", "ta", "v"):
+        other = other.replace(f'id="{word}"', f'id="{word}2"').replace(f'"#{word}"', f'"#{word}2"')
+    extra = '<node name="Wheel"><translate>5 0 1</translate><instance_geometry url="#h"/></node>'
+    document = DOCUMENT.format(texture="none.png", nodes="", extra=extra).replace(geometry, geometry + other)
+    (tmp_path / "car.dae").write_text(document)
+    inch = 0.0254
+
+    def shown(name: str, center: str = "false") -> Asset:
+        part = f"<submesh><name>{name}</name><center>{center}</center></submesh><scale>2 1 1</scale>"
+        mesh = f"<geometry><mesh><uri>car.dae</uri>{part}</mesh></geometry>"
+        return read(tmp_path, link("a", f'<visual name="v">{mesh}</visual>'))
+
+    for name in ("Wheel", "Rim", "h"):
+        (wheel,) = shown(name).visual
+        assert np.allclose(wheel.bounds, inch * np.array([[10, 0, 1], [12, 1, 1]]))
+    (centred,) = shown("Wheel", "true").visual
+    assert np.allclose(centred.bounds, inch * np.array([[-1, -0.5, 0], [1, 0.5, 0]]))
+    assert len(shown("Wing", "true").visual) == 2 and "'Wing' could not be taken alone" in shown("Wing").remarks[0]

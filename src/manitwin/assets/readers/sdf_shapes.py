@@ -20,6 +20,7 @@ from manitwin.assets.readers.sdf_terrain import terrain
 from manitwin.assets.readers.upright import Y_UP_FORMATS
 from manitwin.assets.readers.urdf_shapes import candidates, mesh_parts, plain_material
 from manitwin.errors import AssetError
+from manitwin.formats.meshes.dae_nodes import geometries_of_nodes
 from manitwin.formats.meshes.read import MeshFile
 from manitwin.formats.meshes.textures import bake_transform, make_part
 from manitwin.formats.xml_file import numbers, text_of
@@ -106,6 +107,7 @@ class SdfShapes:
         self._file, self._frames, self._files, self._turn_gltf = file, frames, files, turn_gltf
         self.owners: list[int] = []
         self._looks = ScriptedLooks(files, self._candidates)
+        self._nodes: dict[Path, dict[str, frozenset[str]]] = {}
 
     def all(self, links: Iterable[etree._Element]) -> tuple[list[trimesh.Trimesh], list[CollisionShape]]:
         """Return the visual parts and the collision shapes of links; ``owners`` then has the place of each visual part's link."""
@@ -193,7 +195,8 @@ class SdfShapes:
         if path is None or self._files.is_of_unread_format(path):
             return []
         scale = text_of(shape, "scale")
-        mesh = self._submesh(shape, self._files.mesh(path), path)
+        whole = self._files.mesh(path)
+        mesh = self._submesh(shape, whole, path)
         parts = mesh_parts(
             self._files,
             path,
@@ -202,15 +205,24 @@ class SdfShapes:
             turned_note="it was not turned",  # as for URDF: simulators disagree
             scale=None if scale is None else numbers(scale, 3, f"{what} scale"),
         )
+        if mesh is not whole and (text_of(shape, "submesh/center") or "").lower() in ("true", "1"):
+            corners = np.concatenate([part.bounds for part in parts])
+            parts = [bake_transform(p, transform(np.eye(3), -(corners.min(0) + corners.max(0)) / 2)) for p in parts]
         turn = self._turn_gltf and mesh.format in Y_UP_FORMATS
         return [bake_transform(part, GLTF_TO_OBJECT) for part in parts] if turn else parts
 
     def _submesh(self, shape: etree._Element, mesh: MeshFile, path: Path) -> MeshFile:
+        """Return the parts of a mesh that <submesh> names: in COLLADA those that a node of the name shows, as Gazebo has it."""
         name = text_of(shape, "submesh/name")
         if name is None:
             return mesh
-        chosen = [part for part in mesh.parts if part.metadata["name"] == name]
-        if not chosen or (text_of(shape, "submesh/center") or "").lower() in ("true", "1"):
+        names = frozenset({name})
+        if mesh.format == "dae":
+            if path not in self._nodes:
+                self._nodes[path] = geometries_of_nodes(path, self._files.limits.max_bytes, self._files.root)
+            names = self._nodes[path].get(name, names)
+        chosen = [part for part in mesh.parts if part.metadata["name"] in names]
+        if not chosen:
             self._files.remark(f"{path.name}: submesh {name[:60]!r} could not be taken alone; the whole mesh was read")
             return mesh
         return replace(mesh, parts=chosen)

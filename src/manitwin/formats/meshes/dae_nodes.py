@@ -1,0 +1,30 @@
+"""Which geometries of a COLLADA file its nodes show: descriptions name a node, a mesh's parts are named by their geometry."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from pathlib import Path
+
+from manitwin.errors import AssetError
+from manitwin.formats.bounded_file import read_bytes
+from manitwin.formats.xml_file import parse_xml
+
+
+def geometries_of_nodes(path: Path, max_bytes: int, inside: Path) -> dict[str, frozenset[str]]:
+    """Return the ids of the geometries that each node of a name shows; a geometry that no node is called like has its own.
+
+    Gazebo calls the parts of a mesh by their nodes (ColladaLoader, ``currentNodeName``). Raises AssetError where the file cannot
+    be read.
+    """
+    data = read_bytes(path, max_bytes, AssetError, inside=inside)
+    root = parse_xml(data, "COLLADA", path.name, comments=False, max_bytes=None)
+    found: defaultdict[str, set[str]] = defaultdict(set)
+    for node in root.iter("{*}node"):
+        shown = {(each.get("url") or "").removeprefix("#") for each in node.iterfind("{*}instance_geometry")}
+        found[node.get("name") or node.get("id") or ""] |= shown
+    for geometry in root.iter("{*}geometry"):
+        own = geometry.get("id") or ""
+        for name in (geometry.get("name") or own, own):
+            if not found[name]:
+                found[name] = {own}
+    return {name: frozenset(ids) for name, ids in found.items() if name and ids}
