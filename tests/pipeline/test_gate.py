@@ -89,6 +89,15 @@ def test_film_and_inside_out_solid_are_degenerate(tmp_path: Path, flat: bool) ->
     assert _rejection(_draft(tmp_path, mesh), tmp_path).reason == "degenerate"
 
 
+def test_a_film_that_rounding_makes_negative_is_not_said_to_be_inside_out(tmp_path: Path) -> None:
+    sheet = trimesh.Trimesh(
+        [[0, 0, 1e-18], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 3], [1, 2, 3], [0, 3, 2], [0, 2, 1]]
+    )
+    wound = sheet if sheet.volume < 0 else trimesh.Trimesh(sheet.vertices, sheet.faces[:, ::-1], process=False)
+    assert -1e-15 < wound.volume < 0
+    assert "as thin as a film" in _rejection(_draft(tmp_path, wound), tmp_path).detail
+
+
 @pytest.mark.parametrize("side_m", [0.004, 1.2])
 def test_size_is_judged_only_where_it_is_known(tmp_path: Path, side_m: float) -> None:
     draft = _draft(tmp_path, _box(side=side_m))

@@ -34,7 +34,7 @@ class GateStage:
     """
 
     name: ClassVar[str] = "gate"
-    version: ClassVar[str] = "3"
+    version: ClassVar[str] = "4"
     reads: ClassVar[tuple[str, ...]] = (
         "canonical.npz", "canonical.glb", "geometry", "views/", "cameras", "naming?", "photo.png?", "photos/?",
     )  # fmt: skip
@@ -101,7 +101,7 @@ def check_positive_volume(solid: trimesh.Trimesh, min_thickness_share: float) ->
     thickness_m = 2 * float(solid.volume) / float(solid.area) if solid.area > 0 else 0.0
     limit_m = min_thickness_share * float(np.linalg.norm(np.ptp(solid.vertices, axis=0)))
     if thickness_m <= limit_m:
-        what = "inside out" if thickness_m < 0 else "as thin as a film"
+        what = "inside out" if thickness_m < -limit_m else "as thin as a film"  # but for rounding
         detail = (
             f"the solid is {what}: mean thickness {thickness_m:.3g} m, at least {limit_m:.3g} m;"
             " give a mesh that encloses a volume"
