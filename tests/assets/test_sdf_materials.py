@@ -99,6 +99,14 @@ def test_broken_scripts_say_what_can_be_read(text: str) -> None:
     assert set(ogre_materials(text)) <= {"A"}
 
 
+def test_comments_are_passed_over_wherever_they_are() -> None:
+    text = "material A // {\n{ /* // */ technique { pass { diffuse 1 0 /* 1 */ 0\n} } }\n"
+    text += "// /* not open\nmaterial B {\n}\n/* material C {}"
+    found = ogre_materials(text)
+    assert list(found) == ["A", "B"] and found["A"].diffuse == (1.0, 0.0, 0.0, 1.0)
+    assert ogre_materials("/*" * 400_000) == {}, "in the time of one pass"
+
+
 def test_texture_and_colour_of_a_script_are_on_plain_shapes_and_meshes(tmp_path: Path) -> None:
     folder = tmp_path / "cup"
     (folder / "meshes").mkdir(parents=True)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 _TOKEN = re.compile(r'"[^"\n]*"|[{}]|[^\s{}"]+')
-_COMMENT = re.compile(r"/\*.*?\*/|(?<!:)//[^\n]*", re.DOTALL)
+_COMMENT = re.compile(r"/\*|(?<!:)//")
 _MOST_COLORS = 4
 _PLAIN_SECTIONS = frozenset({"technique", "pass", "texture_unit"})
 
@@ -36,7 +36,7 @@ def ogre_materials(text: str) -> dict[str, OgreMaterial]:
     What is broken, or a program's (shaders, variables), is passed over. Source: the OGRE manual, "Material scripts".
     """
     found: dict[str, OgreMaterial] = {}
-    lines = _lines(_COMMENT.sub(" ", text))
+    lines = _lines(_without_comments(text))
     for words in lines:
         opened = _opens(words, lines)
         if words[0] == "material" and len(words) > 1 and opened:
@@ -64,6 +64,18 @@ class _Lines(Iterator[list[str]]):
         there = self._at < len(self._lines) and self._lines[self._at] == ["{"]
         self._at += there
         return there
+
+
+def _without_comments(text: str) -> str:
+    """Return a script without its comments; one that is not closed goes to the end."""
+    kept, at = [], 0
+    while (comment := _COMMENT.search(text, at)) is not None:
+        kept.append(text[at : comment.start()])
+        end = text.find("\n" if comment[0] == "//" else "*/", comment.end())
+        if end < 0:
+            return " ".join(kept)
+        at = end if comment[0] == "//" else end + 2
+    return " ".join([*kept, text[at:]])
 
 
 def _lines(text: str) -> _Lines:
