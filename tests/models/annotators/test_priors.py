@@ -242,6 +242,16 @@ def test_what_stands_behind_a_colon_is_the_thing_where_what_is_before_is_none() 
     assert lookup("shop:") is None
 
 
+def test_a_cone_of_a_road_is_no_geometric_solid() -> None:
+    for name, category in (
+        ("Construction Cone", "traffic cone"),
+        ("orange traffic cone", "traffic cone"),
+        ("cone", "geometric solid"),
+    ):
+        found = lookup(name)
+        assert found is not None and found.category == category
+
+
 def test_a_peg_of_metal_or_for_a_hole_is_no_clothes_peg() -> None:
     for name, category in (
         ("metal peg", "dowel"),
