@@ -91,15 +91,16 @@ def _has_outline(mask: np.ndarray) -> bool:
     return bool(mask.any() and (mask & ~eroded(mask, 1)).any())
 
 
-def completed(share: np.ndarray, found: Segmentation) -> np.ndarray:
+def completed(share: np.ndarray, found: Segmentation, *, exact: bool = False) -> np.ndarray:
     """Return a network's share of object (any size) at the size of the mask that the rules ``found``, filled within its outline.
 
     A large plain or printed surface tells a network little, so what it leaves out within its own outline, as far as that is
     ``ENCLOSING``, is object where the rules say so and the colours are neither the ground's nor its shade's. What is seen
-    through a hole has the ground's colours, and stays out.
+    through a hole has the ground's colours, and stays out. On an ``exact`` ground, of one digital colour, what has such
+    colours is no ground wherever it is, and no outline of the network's has to enclose it: it may see nothing of an apple.
     """
     share = at_size(share, found.mask.shape)
-    within = eroded(ndimage.binary_fill_holes(share > ENCLOSING), 2)
+    within = eroded(found.mask if exact else ndimage.binary_fill_holes(share > ENCLOSING), 2)
     told = opened(within & found.mask & found.colours.certain, 1)
     return np.asarray(np.where(told, 1.0, share), np.float32)
 

@@ -24,7 +24,7 @@ from manitwin.models.matting.fine_outline import fine_outline
 from manitwin.models.matting.learned import Network, learned_alpha
 from manitwin.models.matting.object_network import in_two_looks, object_share
 from manitwin.models.matting.segmentation import Segmentation, segment
-from manitwin.models.matting.trimmed import with_margin
+from manitwin.models.matting.trimmed import exact_ground, with_margin
 
 PLAIN_NOISE_LAB = 4.0
 EXPLAINED_ODDS = 12.0
@@ -123,13 +123,15 @@ def judged_candidates(
     Of two networks the one counts that speaks better for a candidate, of three the second best: two must speak for it. A photo
     smaller than ``working_side_px`` is ``enlarged``, one that was trimmed to the thing is seen ``with_margin``.
     """
+    exact = exact_ground(rgb) is not None
     rgb, _ = with_margin(rgb)
     photo_side_px = max(rgb.shape[:2])
     rgb = enlarged(rgb, working_side_px)
     found = segment(_scaled(rgb, working_side_px))
     if _longest_side(found.mask) < 0.5 * max(found.mask.shape) and max(rgb.shape[:2]) > 1.2 * working_side_px:
         found = segment(_scaled(rgb, 2 * working_side_px))  # a small thing is looked at again, closer
-    shares = [completed(network_share(rgb, max(found.mask.shape), each), found) for each in (*networks, None)]
+    asked = (*networks, None)
+    shares = [completed(network_share(rgb, max(found.mask.shape), each), found, exact=exact) for each in asked]
     agreed = _seen_alike(shares[:-1], found.mask.shape)
     made = candidates(found, shares, zoom=photo_side_px / max(found.mask.shape))
     judged = []

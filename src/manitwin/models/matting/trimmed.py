@@ -12,6 +12,9 @@ MARGIN = 0.08
 """Of the longer side: what is given to every side."""
 MOST_DEVIATION = 2.0
 """Levels by which half of the frame's ground may be off its colour: JPEG's own noise. A wall in a photo is off by 4 and more."""
+EXACT_SHARE = 0.75
+"""Of the frame's ground, within ``MOST_DEVIATION``: where half is, a quarter is off by 4 and more in even light of a camera, and
+by none where somebody filled it."""
 OF_GROUND, LEAST_GROUND = 24.0, 0.5
 """Levels from the ground's colour within which a pixel is ground, and how much of the frame has to be."""
 NEAR = 0.02
@@ -31,13 +34,7 @@ def trimmed_margin(rgb: np.ndarray) -> tuple[int, np.ndarray] | None:
     most of its extent; or near all four.
     """
     height, width = rgb.shape[:2]
-    if min(height, width) <= 4 * FRAME_PX:
-        return None
-    ring = np.concatenate([side.reshape(-1, 3) for side in _sides(rgb)]).astype(np.float32)
-    colour = np.median(ring, axis=0)
-    off = np.abs(ring - colour).max(axis=1)
-    ground = off <= OF_GROUND
-    if ground.mean() < LEAST_GROUND or np.median(off[ground]) > MOST_DEVIATION:
+    if (colour := _ground_of_frame(rgb, 0.5)) is None:
         return None
     thing = np.abs(rgb.astype(np.int16) - np.round(colour).astype(np.int16)).max(axis=2) > OF_GROUND
     rows, columns = np.nonzero(thing.any(axis=1))[0], np.nonzero(thing.any(axis=0))[0]
@@ -59,6 +56,24 @@ def trimmed_margin(rgb: np.ndarray) -> tuple[int, np.ndarray] | None:
     ):
         return None
     return max(1, round(MARGIN * longer)), np.round(colour).astype(np.uint8)
+
+
+def exact_ground(rgb: np.ndarray) -> np.ndarray | None:
+    """Return the one digital colour ``(3,) float32`` that the ground of ``rgb (H, W, 3) uint8`` has, by its frame; else None."""
+    return _ground_of_frame(rgb, EXACT_SHARE)
+
+
+def _ground_of_frame(rgb: np.ndarray, share: float) -> np.ndarray | None:
+    """Return the colour ``(3,) float32`` of a frame that is mostly ground, a ``share`` of which is next to that colour; else None."""
+    if min(rgb.shape[:2]) <= 4 * FRAME_PX:
+        return None
+    ring = np.concatenate([side.reshape(-1, 3) for side in _sides(rgb)]).astype(np.float32)
+    colour = np.asarray(np.median(ring, axis=0), np.float32)
+    off = np.abs(ring - colour).max(axis=1)
+    ground = off <= OF_GROUND
+    if ground.mean() < LEAST_GROUND or np.percentile(off[ground], 100 * share) > MOST_DEVIATION:
+        return None
+    return colour
 
 
 def with_margin(rgb: np.ndarray) -> tuple[np.ndarray, int]:
