@@ -137,6 +137,27 @@ def test_lookup_understands_what_people_say(said: str, category: str) -> None:
     assert prior is not None and prior.category == category
 
 
+@pytest.mark.parametrize(
+    ("said", "category"),
+    [
+        ("Granny Smith", "apple"), ("golden delicious", "apple"), ("d'Anjou", "pear"), ("red beet", "beetroot"),
+        ("leeks", "leek"), ("spring onions", "spring onion"), ("yellow onion", "onion"),
+        ("Arla sour cream", "sour cream cup"), ("crème fraîche", "sour cream cup"), ("whipping cream", "cream carton"),
+        ("Oatly oat drink 1 l", "milk carton"), ("soy drink", "milk carton"), ("drinking yoghurt", "yogurt carton"),
+        ("Alpro vanilla soyghurt", "yogurt cup"), ("yoghurt 500 g", "yogurt cup"),
+        ("Bravo juice 2 litres", "juice carton"), ("Tropicana juice smooth 900ml", "juice carton"),
+    ],
+)  # fmt: skip
+def test_lookup_understands_products_of_a_shop(said: str, category: str) -> None:
+    prior = lookup(said)
+    assert prior is not None and prior.category == category
+
+
+@pytest.mark.parametrize("said", ["natural", "original 500 ml", "cookie cream", "kaiser", "conference", "2 litres"])
+def test_what_is_printed_on_packs_is_no_thing_alone(said: str) -> None:
+    assert lookup(said) is None
+
+
 @pytest.mark.parametrize("said", [None, "", "  ", "mug rack", "flux capacitor", "unknown", "mug_01.obj", "??"])
 def test_lookup_says_nothing_of_what_it_does_not_know(said: str | None) -> None:
     assert lookup(said) is None

@@ -70,7 +70,10 @@ def lookup(name: str | None) -> Prior | None:
 _MOST_WORDS_BEFORE = 6
 _NUMBER = r"\d+(?:\.\d+)?"
 _NO_THING = re.compile(
-    rf"[a-z]?{_NUMBER}[a-z]?|{_NUMBER}(?:x{_NUMBER})*(?:mm|cm|in|inch|ft|ml|cl|oz|kg|lbs?)?|mm|cm|inch|inches|ml|cl|oz|kg|lbs?|[a-z]|black|white|gr[ae]y|silver|red|green|blue|yellow|orange|brown|pink|purple|beige|small|medium|large"
+    rf"[a-z]?{_NUMBER}[a-z]?|{_NUMBER}(?:x{_NUMBER})*(?:mm|cm|in|inch|ft|ml|cl|dl|oz|kg|lbs?)?"
+    r"|mm|cm|inch|inches|ml|cl|dl|oz|kg|lbs?|lit(?:er|re)s?|grams?|kilos?|[a-z]"
+    r"|smooth|original|classic|organic|natural|small|medium|large"
+    r"|black|white|gr[ae]y|silver|red|green|blue|yellow|orange|brown|pink|purple|beige"
 )
 
 
@@ -89,9 +92,10 @@ def found_by(name: str | None) -> tuple[Prior, str] | None:
     the whole again: each as it is, in the singular, and with words dropped from the front ('red coffee mugs' are coffee mugs,
     which are mugs), and before its last word stands alone with words dropped between ('lego duplo brick' is a lego brick). The
     last word decides what a thing is: a mug rack is no mug. Words are the same written together or apart: a 'waterbottle' is a
-    water bottle, and a 'tooth brush' a toothbrush before it is a brush. Where none is found, numbers, measures and colours at the
-    end say nothing ('mug_1', 'cube 5 cm' and 'pitcher blue' are a mug, a cube and a pitcher), and what is a toy of anything is a
-    toy, as is a doll's chair. File names are never looked up: they are not evidence.
+    water bottle, and a 'tooth brush' a toothbrush before it is a brush. Where none is found, numbers, measures, colours and what
+    is printed on most packs say nothing at the end ('mug_1', 'cube 5 cm', 'pitcher blue' and 'juice smooth 500 ml' are a mug, a
+    cube, a pitcher and juice), and what is a toy of anything is a toy, as is a doll's chair. File names are never looked up:
+    they are not evidence.
     """
     if not name or not (phrase := normalised(name)):
         return None

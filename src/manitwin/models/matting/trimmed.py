@@ -64,7 +64,7 @@ def exact_ground(rgb: np.ndarray) -> np.ndarray | None:
 
 
 def _ground_of_frame(rgb: np.ndarray, share: float) -> np.ndarray | None:
-    """Return the colour ``(3,) float32`` of a frame that is mostly ground, a ``share`` of which is next to that colour; else None."""
+    """Return the colour ``(3,) float32`` of a frame that is mostly ground, a ``share`` of it next to that; else None."""
     if min(rgb.shape[:2]) <= 4 * FRAME_PX:
         return None
     ring = np.concatenate([side.reshape(-1, 3) for side in _sides(rgb)]).astype(np.float32)
