@@ -243,8 +243,11 @@ def test_outline_of_a_box_is_no_round_thing_where_the_name_says_that_it_is_not_r
 
 @pytest.mark.parametrize(
     ("name", "category"),
-    [("pink storage tray", "serving tray"), ("storage tray", "serving tray"), ("red ceramic mug", "mug"), ("a", None)],
-)
+    [
+        ("pink storage tray", "serving tray"), ("storage tray", "serving tray"), ("red ceramic mug", "mug"), ("a", None),
+        ("Bravo apple juice", "milk carton"), ("chapstick", "glue stick"), ("comic book", "book"),
+    ],
+)  # fmt: skip
 def test_template_is_that_of_the_last_words_of_a_name(name: str, category: str | None) -> None:
     template = template_for(name)
     assert (None if template is None else template.category) == category

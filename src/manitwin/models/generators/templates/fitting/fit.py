@@ -65,7 +65,7 @@ def template_for(name: str | None) -> Template | None:
         if (last_words := " ".join(each[first:])) in by_name:
             return by_name[last_words]
     prior = named(words) or lookup(words)
-    return None if prior is None else templates.get(prior.category)
+    return None if prior is None else by_name.get(prior.category)
 
 
 def kinds_of(category: str) -> list[str]:
