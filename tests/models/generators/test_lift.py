@@ -75,6 +75,22 @@ def test_rectangle_is_a_box_of_said_depth() -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("name", "width_m", "height_m", "depth_m"),
+    [("cracker box", 0.164, 0.213, 0.072), ("rubik's cube", 0.057, 0.057, 0.057), ("wood block", 0.085, 0.2, 0.085),
+     ("juice carton", 0.07, 0.235, 0.07), ("brick", 0.102, 0.215, 0.065)],
+)  # fmt: skip
+def test_a_box_of_known_sides_is_about_as_deep_as_it_is(
+    name: str, width_m: float, height_m: float, depth_m: float
+) -> None:
+    x, y = 400 * width_m / height_m / 2, 200.0
+    picture = _drawn([(300 - x, 300 - y), (300 + x, 300 - y), (300 + x, 300 + y), (300 - x, 300 + y)])
+    lifted = lift(picture, hint_from_name(name))
+    assert lifted.notes["primitive"] == "box"
+    sides = np.ptp(lifted.surface.vertices, axis=0) * height_m
+    assert sides == pytest.approx([width_m, height_m, depth_m], rel=0.15)
+
+
 @pytest.mark.parametrize(("volume_share", "thick"), [(0.01, 0.02), (0.0001, 0.01), (None, 0.06)])
 def test_a_flat_box_has_the_volume_of_its_category_but_for_a_least_thickness(
     volume_share: float | None, thick: float

@@ -186,22 +186,37 @@ def _in_picture(surface: LiftedSurface, silhouette: Silhouette) -> LiftedSurface
 def boxed(view: View, hint: ShapeHint) -> Made:
     """Return a box whose front is the outline's rectangle."""
     flat = hint.flat or hint.stands is False
-    share = _flat_share(view.silhouette, hint) if flat else DEPTH_SHARE
+    share = _flat_share(view.silhouette, hint) if flat else _deep_share(view.silhouette, hint)
     surface = make_box(view.silhouette, depth_share=share)
     # a box's own axes are those of its rectangle: it is compared by that
     found = Explained(view.silhouette.rectangle_iou)
     if flat:
         return Made(laid(surface), found, {"rests": "lying", "depth_share": round(share, 4)})
-    return Made(surface, found, {"rests": "standing", "depth_share": share})
+    return Made(surface, found, {"rests": "standing", "depth_share": round(share, 4)})
 
 
 def _flat_share(silhouette: Silhouette, hint: ShapeHint) -> float:
     """Return the thickness of a flat box over its shorter side: that of the usual volume of its category, where it is known."""
     if not hint.flat or hint.volume_share is None:
         return _FLAT_BOX_DEPTH_SHARE
+    return float(np.clip(_usual_share(silhouette, hint.volume_share), _LEAST_FLAT_SHARE, DEPTH_SHARE))
+
+
+def _deep_share(silhouette: Silhouette, hint: ShapeHint) -> float:
+    """Return the depth of a box over its shorter side: that of the usual volume of its category, where that makes it deeper.
+
+    A carton and a cube are about as deep as wide, a box of crackers is not: of 17 boxes of known sides (YCB's, cartons, packs)
+    the depth is off by a factor of 1.04 in the median, 1.5 at most; by 1.59 and 2.5 with ``DEPTH_SHARE`` alone.
+    """
+    if not hint.boxy or hint.volume_share is None:
+        return DEPTH_SHARE
+    return float(np.clip(_usual_share(silhouette, hint.volume_share), DEPTH_SHARE, 1.0))
+
+
+def _usual_share(silhouette: Silhouette, volume_share: float) -> float:
+    """Return the depth over the shorter side with which a box with the outline's sides has its category's usual volume."""
     sides = np.linalg.norm(np.diff(silhouette.corners[:3], axis=0), axis=1)
-    long, short = float(sides.max()), float(sides.min())
-    return float(np.clip(hint.volume_share * (long / short) ** 2, _LEAST_FLAT_SHARE, DEPTH_SHARE))
+    return volume_share * float(sides.max() / sides.min()) ** 2
 
 
 def inflated(view: View, hint: ShapeHint) -> Made:
