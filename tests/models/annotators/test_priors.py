@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from manitwin.errors import ManiTwinError
 from manitwin.models.annotators import priors
-from manitwin.models.annotators.prior_names import lookup, named, normalised
+from manitwin.models.annotators.prior_names import found_by, lookup, named, normalised, word_for
 from manitwin.models.annotators.prior_records import Interval
 from manitwin.models.annotators.priors import load_materials, load_priors
 from manitwin.models.generators.lift.hint import hint_from_name
@@ -151,6 +151,16 @@ def test_lookup_understands_what_people_say(said: str, category: str) -> None:
 def test_lookup_understands_products_of_a_shop(said: str, category: str) -> None:
     prior = lookup(said)
     assert prior is not None and prior.category == category
+
+
+@pytest.mark.parametrize(
+    ("said", "word"),
+    [("Granny Smith", "granny smith apple"), ("d'Anjou", "d'anjou pear"), ("ketchup", "ketchup bottle"), ("red beet", "beet"),
+     ("soy drink", "soy drink carton")],
+)  # fmt: skip
+def test_a_kind_and_a_content_are_called_with_what_they_are(said: str, word: str) -> None:
+    found = found_by(said)
+    assert found is not None and word_for(*found) == word
 
 
 @pytest.mark.parametrize("said", ["natural", "original 500 ml", "cookie cream", "kaiser", "conference", "2 litres"])

@@ -134,7 +134,8 @@ def _words_dropped(head: list[str]) -> Iterator[list[str]]:
 def word_for(prior: Prior, said: str) -> str:
     """Return what a person calls a thing that was found by these words: a 'coffee mug' is a mug, a 'pan' no frying pan.
 
-    What it is sold in is called so where the words say only what is in it: 'ketchup' is a ketchup bottle.
+    What it is sold in, or a kind of, is called so where the words do not say it: 'ketchup' is a ketchup bottle, a 'granny smith'
+    a granny smith apple.
     """
     words, category = said.split(), normalised(prior.category).split()
     if words[-len(category) :] == category:
