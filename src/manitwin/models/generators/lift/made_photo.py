@@ -16,6 +16,7 @@ from manitwin.geometry.poses import GLTF_TO_OBJECT
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name, is_cylinder, why_no_cylinder, why_not_round
 from manitwin.models.generators.lift.lifting import DISC_ELLIPSE_IOU, Lifted, lift
+from manitwin.models.generators.lift.lobes import reject_several_round
 from manitwin.models.generators.lift.plain_solids import (
     PRIMITIVES,
     PlainSolids,
@@ -82,8 +83,9 @@ def from_photo(
     lies otherwise than its template does where a box explains it much better (a long speaker). What has no template, or one whose
     fit is not believed, is a plain solid where one explains the photo closely. What has no name has the shape of a template of
     the ``likely`` names, each with its probability, where one explains the photo better.
-    ``focal_mm`` is the lens as 35 mm equivalent, where it is known.
+    ``focal_mm`` is the lens as 35 mm equivalent, where it is known. Several round things that touch are rejected.
     """
+    reject_several_round(rgba[..., 3] > 127, name)
     template = template_for(name)
     hint = hint_from_name(name)
     if template is None and (hint == ShapeHint() or hint.boxy):
