@@ -36,7 +36,7 @@ def test_every_name_is_one_that_the_priors_know_and_no_class_counts_twice() -> N
     assert table.general_members.sum(axis=0).max() == 1
     assert load_limits().keys() == {*table.names, *table.general} and max(load_limits().values()) <= 1
     # what real photos of a folder, a calculator and a pencil box were called, surer than any render
-    for name, wrong in (("envelope", 0.82), ("mobile phone", 0.866), ("remote control", 0.845)):
+    for name, wrong in (("envelope", 0.82), ("mobile phone", 0.866), ("remote control", 0.845), ("compact", 0.76)):
         assert load_limits()[name] >= wrong
     # furniture and what else no hand holds is called by its name, and not by that of the likeliest small thing
     for name, classes in (
