@@ -29,6 +29,7 @@ from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.prior_records import Prior
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import let_go_of_textures, object_name
+from manitwin.pipeline.stated_volume import factor_to_hold, stated_volume_m3
 from manitwin.twin.import_record import ImportRecord, read_import_record
 
 _GENERATED = "generated.glb"
@@ -44,7 +45,7 @@ class MeshStage:
     settings: MeshConfig
 
     name: ClassVar[str] = "mesh"
-    version: ClassVar[str] = "15"
+    version: ClassVar[str] = "16"
     reads: ClassVar[tuple[str, ...]] = (f"{_GENERATED}?", "generation?", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry")
     needs: ClassVar[Resource] = "cpu"
@@ -76,13 +77,15 @@ class MeshStage:
             cause = f"its surface has no depth or precision to make a solid of ({type(error).__name__})"
             raise _degenerate(path, cause) from error
         vertices = trimesh.transform_points(result.mesh.vertices, to_object)
-        larger = _to_stated_size(vertices, draft.payload.longest_side_m)
+        larger, is_stated = _to_stated_size(
+            vertices, result.mesh.faces, draft, prior, may_hold=generated and not unit.metric
+        )
         solid = trimesh.Trimesh(larger * vertices, result.mesh.faces, process=False)
         sized = np.diag([larger, larger, larger, 1.0]) @ to_object
         shown = [bake_transform(part, sized) for part in repaired_parts(parts, result)]
         (folder / "canonical.glb").write_bytes(write_glb(shown, max_texture_size=self.settings.max_texture_size))
         np.savez(folder / "canonical.npz", vertices=np.asarray(solid.vertices), faces=np.asarray(solid.faces, np.int64))
-        if draft.payload.longest_side_m is not None:
+        if is_stated:
             unit = LengthUnit(larger * unit.factor, True, "user", None)
         geometry = _geometry(file, unit, chosen, result, solid, larger)
         known = draft.field("generation").get("known") if generated else None
@@ -153,9 +156,21 @@ def _input_path(draft: Draft[Item], generated: bool) -> Path:
     return Path(draft.payload.file)
 
 
-def _to_stated_size(vertices: np.ndarray, longest_side_m: float | None) -> float:
-    """Return the factor that makes the longest side of a standing thing as long as was stated; 1 where nothing was."""
-    return 1.0 if longest_side_m is None else longest_side_m / float(extents_along_sides(vertices).max())
+def _to_stated_size(
+    vertices: np.ndarray, faces: np.ndarray, draft: Draft[Item], prior: Prior | None, *, may_hold: bool
+) -> tuple[float, bool]:
+    """Return the factor to the size that a person stated, and whether one did: the longest side of a thing as it stands.
+
+    ``may_hold``: else the volume that its name says it holds counts (``stated_volume``); not of a mesh of its own, which may
+    have its walls.
+    """
+    if draft.payload.longest_side_m is not None:
+        return draft.payload.longest_side_m / float(extents_along_sides(vertices).max()), True
+    volume_m3 = stated_volume_m3(object_name(draft), prior) if may_hold else None
+    if volume_m3 is None or prior is None:
+        return 1.0, False
+    factor = factor_to_hold(trimesh.Trimesh(vertices, faces, process=False), volume_m3, prior)
+    return (1.0, False) if factor is None else (factor, True)
 
 
 def _said_up(draft: Draft[Item], generated: bool) -> Literal["y", "z", "auto"]:
