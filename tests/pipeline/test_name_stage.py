@@ -11,7 +11,7 @@ from PIL import Image
 
 from manitwin.config import BuildConfig, NamingConfig
 from manitwin.engine.stage import Draft
-from manitwin.pipeline.guesses import naming_checks, template_checks
+from manitwin.pipeline.guesses import naming_checks, shape_checks, template_checks
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.naming import NameStage, cut_view, known_length_m
 from manitwin.pipeline.object_state import object_name
@@ -85,6 +85,19 @@ def test_words_of_a_text_that_say_nothing_to_its_template_are_a_finding() -> Non
     assert told.passed is False and told.message is not None and "'vintage'" in told.message
     notes["unused_words"] = []
     assert template_checks(made) == []
+
+
+def test_an_outline_that_no_template_of_the_name_has_is_a_finding() -> None:
+    poor = {"category": "yogurt cup", "confidence": 0.007, "residual": {"iou": 0.8685, "outline": 0.016}}
+    made = Draft("t", Item("photo.jpg", name="yoghurt"), seed=0, fields={"generation": {"notes": {"poor_fit": poor}}})
+    (told,) = shape_checks(made)
+    assert told.passed is False and told.value == 0.8685
+    assert (
+        told.message is not None
+        and "no yogurt cup that the template makes has this outline (overlap 0.87)" in told.message
+    )
+    made.fields["generation"] = {"notes": {"primitive": "template:yogurt cup"}}
+    assert shape_checks(made) == [] and shape_checks(Draft("t", Item("mug.glb"), seed=0)) == []
 
 
 @pytest.mark.parametrize(

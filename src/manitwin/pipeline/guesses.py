@@ -112,3 +112,19 @@ def _unused_words_checks(draft: Draft) -> list[Check]:
         return []
     message = f"the template knows nothing of {', '.join(map(repr, unused))}: the thing was made without"
     return [Check(name="text_understood", passed=False, value=float(len(unused)), message=message)]
+
+
+def shape_checks(draft: Draft) -> list[Check]:
+    """Return the failed check of a photo's thing whose outline no template of its name has; none for all others.
+
+    Such a name may be that of what is in it (yogurt in a carton), or of one of several that the photo shows.
+    """
+    poor = (draft.fields.get("generation") or {}).get("notes", {}).get("poor_fit")
+    if poor is None:
+        return []
+    category, overlap = poor["category"], poor["residual"]["iou"]
+    message = (
+        f"no {category} that the template makes has this outline (overlap {overlap:.2f}): the shape is the outline's, but mass,"
+        f" uses and a size that nobody stated are those of a {category}; check the name, and that the photo shows one alone"
+    )
+    return [Check(name="shape_as_named", passed=False, value=overlap, message=message)]
