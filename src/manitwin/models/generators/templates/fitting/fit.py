@@ -20,6 +20,7 @@ from manitwin.models.generators.templates.fitting.shape import Family
 from manitwin.models.generators.templates.fitting.view import View
 from manitwin.models.generators.templates.looks import Look, look_of
 from manitwin.models.generators.templates.made import Made, dressed
+from manitwin.models.generators.templates.other_shapes import KIN_OF_ANOTHER_SHAPE
 from manitwin.models.generators.templates.template import Template
 
 _MOST_KINDS, _SIZE_MARGIN = 6, 1.5
@@ -54,6 +55,7 @@ def template_for(name: str | None) -> Template | None:
     """Return the template of what a thing is called, by its own names and by those of the priors; None where there is none.
 
     Of a longer name its last words count where they are such a name of two words and more: a pink storage tray is a storage tray.
+    Closed packages look like what the priors have them beside: a carton of cream like one of milk.
     """
     templates = load_templates()
     words = " ".join((name or "").lower().replace("_", " ").replace("-", " ").split())
@@ -65,7 +67,10 @@ def template_for(name: str | None) -> Template | None:
         if (last_words := " ".join(each[first:])) in by_name:
             return by_name[last_words]
     prior = named(words) or lookup(words)
-    return None if prior is None else by_name.get(prior.category)
+    if prior is None:
+        return None
+    beside = prior.kin_of if prior.vessel and prior.category not in KIN_OF_ANOTHER_SHAPE else None
+    return by_name.get(prior.category) or templates.get(beside or "")
 
 
 def kinds_of(category: str) -> list[str]:
