@@ -8,11 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from trimesh.visual.material import PBRMaterial
 
 from manitwin.config import MeshConfig
 from manitwin.engine.stage import Draft
 from manitwin.errors import InputError, Rejected
-from manitwin.formats.glb import read_glb
+from manitwin.formats.glb import read_glb, write_glb
+from manitwin.formats.meshes.textures import make_part
+from manitwin.formats.meshes.triangles import with_creased_normals
 from manitwin.geometry.cavity import find_opening
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.known import known_of
@@ -21,6 +24,8 @@ from manitwin.models.generators.templates.text import Wanted
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.mesh import MeshStage
 from manitwin.twin.import_record import FITTED, GivenPoint
+
+GREY = PBRMaterial(baseColorFactor=[160, 160, 160, 255], metallicFactor=0.0, roughnessFactor=0.6)
 
 
 def _run(path: Path, folder: Path, **item: Any) -> tuple[dict[str, Any], trimesh.Trimesh, list[trimesh.Trimesh]]:
@@ -55,6 +60,24 @@ def test_of_a_generated_mesh_the_generator_says_which_axis_is_up(tmp_path: Path)
     draft = Draft("id", Item(None, text="a box"), 0, fields, {"generated.glb": tmp_path / "generated.glb"})
     geometry = MeshStage(MeshConfig()).run(draft, tmp_path)["geometry"]
     assert geometry["up_reason"] == "y is up as the generator says"
+
+
+def test_closed_parts_that_touch_stay_bodies_of_their_own(tmp_path: Path) -> None:
+    """Their vertices are split at creases: welded to each other, walls of a box would share edges of four faces."""
+    walls = {  # an open box: middle and sides
+        "floor": ((0.0, 0.0, 0.003), (0.16, 0.1, 0.006)),
+        "right": ((0.077, 0.0, 0.043), (0.006, 0.1, 0.074)),
+        "left": ((-0.077, 0.0, 0.043), (0.006, 0.1, 0.074)),
+        "back": ((0.0, 0.047, 0.043), (0.148, 0.006, 0.074)),
+        "front": ((0.0, -0.047, 0.043), (0.148, 0.006, 0.074)),
+    }
+    parts = []
+    for name, (middle, sides) in walls.items():
+        box = trimesh.creation.box(sides, transform=trimesh.transformations.translation_matrix(middle))
+        parts.append(with_creased_normals(make_part(box.vertices, box.faces, material=GREY, name=name)))
+    (tmp_path / "box.glb").write_bytes(write_glb(parts))
+    geometry, solid, _ = _run(tmp_path / "box.glb", tmp_path / "out")
+    assert geometry["components"] == 5 and geometry["watertight"] and len(solid.faces) == 60
 
 
 def test_a_game_asset_whose_numbers_are_no_lengths_has_no_scale(tmp_path: Path) -> None:

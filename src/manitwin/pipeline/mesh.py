@@ -25,6 +25,7 @@ from manitwin.geometry.length_unit import LengthUnit, decide_unit
 from manitwin.geometry.poses import OBJECT_TO_GLTF
 from manitwin.geometry.repair.cascade import RepairResult, repair
 from manitwin.geometry.repair.components import connected_parts
+from manitwin.geometry.repair.welding import weld_equal
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.prior_records import Prior
 from manitwin.pipeline.item import Item
@@ -206,7 +207,12 @@ def _unit(file: MeshFile, draft: Draft[Item], generated: bool, prior: Prior | No
 
 
 def _soup(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
-    vertices, faces = trimesh.util.append_faces([part.vertices for part in parts], [part.faces for part in parts])
+    """Return the faces of all parts, in their order, each welded where normals and textures split it.
+
+    Parts that are closed so stay bodies of their own: welded to what they touch, boxes would share edges of four faces.
+    """
+    welded = [weld_equal(np.asarray(part.vertices, float), np.asarray(part.faces)) for part in parts]
+    vertices, faces = trimesh.util.append_faces([each for each, _ in welded], [each for _, each in welded])
     return trimesh.Trimesh(vertices, faces, process=False)
 
 

@@ -227,3 +227,14 @@ def test_damaged_real_meshes_come_back(shared_data: Path, seed: int) -> None:
             solids += is_solid(result)
             errors += error_m(mesh, result.mesh) > 1e-3
     assert solids >= 0.95 * 75 and errors == 0
+
+
+def test_a_solid_whose_seams_are_closed_by_faces_without_area_is_one() -> None:
+    """Bodies that touch stay bodies of their own: what closes seams in a file is no reason to weld them to each other."""
+    touching = [trimesh.creation.box((1.0, 1.0, 1.0)), trimesh.creation.box((1.0, 1.0, 1.0))]
+    touching[1].apply_translation((1.0, 1.0, 0.0))  # they share an edge
+    vertices, faces = trimesh.util.append_faces([box.vertices for box in touching], [box.faces for box in touching])
+    seams = np.array([[0, 0, 1], [8, 9, 9]])
+    result = repair(trimesh.Trimesh(vertices, np.vstack([faces, seams]), process=False))
+    assert result.watertight and result.actions == ["dropped 2 collapsed faces"]
+    assert np.array_equal(result.source_face, np.arange(24)) and np.array_equal(result.mesh.faces, faces)

@@ -64,14 +64,15 @@ def repair(
         raise ManiTwinError("a mesh without faces cannot be repaired; give one with at least four faces")
     if not np.isfinite(vertices[np.unique(faces)]).all():
         raise ManiTwinError("a mesh with vertices that are not finite cannot be repaired; drop their faces first")
-    if is_solid(vertices, faces):
-        return _untouched(mesh, [])
+    if (solid := _as_it_is(mesh, [])) is not None:
+        return solid
     welded_vertices, welded_faces = welding.weld_equal(vertices, faces)
     actions = (
         [f"welded {len(vertices)} vertices to {len(welded_vertices)}"] if len(welded_vertices) < len(vertices) else []
     )
-    if is_solid(welded_vertices, welded_faces):
-        return _untouched(trimesh.Trimesh(welded_vertices, welded_faces, process=False), actions)
+    welded = trimesh.Trimesh(welded_vertices, welded_faces, process=False)
+    if (solid := _as_it_is(welded, actions)) is not None:
+        return solid
     diagonal_m = float(np.linalg.norm(np.ptp(welded_vertices[np.unique(welded_faces)], axis=0)))
     surface = _welded_surface(welded_vertices, welded_faces, weld_tolerance * diagonal_m, actions)
     if not len(surface.faces):
@@ -97,9 +98,17 @@ def is_solid(vertices: np.ndarray, faces: np.ndarray) -> bool:
     return bool((signed_volumes(vertices, faces, labels) > 0).all())
 
 
-def _untouched(mesh: trimesh.Trimesh, actions: list[str]) -> RepairResult:
-    count = len(mesh.faces)
-    return RepairResult(mesh, np.arange(count), np.zeros(count, dtype=bool), actions, True, None)
+def _as_it_is(mesh: trimesh.Trimesh, actions: list[str]) -> RepairResult | None:
+    """Return a mesh that is a solid but for collapsed faces, which close seams in some files; None where it is none."""
+    faces = np.asarray(mesh.faces, dtype=np.int64)
+    kept = ~welding.collapsed_faces(faces)
+    if not is_solid(np.asarray(mesh.vertices, dtype=float), faces[kept]):
+        return None
+    source, collapsed = np.flatnonzero(kept), int((~kept).sum())
+    if collapsed:
+        mesh = trimesh.Trimesh(mesh.vertices, faces[kept], process=False)
+        actions = [*actions, f"dropped {collapsed} collapsed faces"]
+    return RepairResult(mesh, source, np.zeros(len(source), dtype=bool), actions, True, None)
 
 
 def _welded_surface(vertices: np.ndarray, faces: np.ndarray, tolerance_m: float, actions: list[str]) -> Surface:
