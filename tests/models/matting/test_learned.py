@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
-from manitwin.errors import UsageError
+from manitwin.errors import Rejected, UsageError
 from manitwin.formats.isolated import Limits, run_isolated
-from manitwin.models.matting import learned, matte_photo
+from manitwin.models.matting import learned, matte, matte_photo
 from manitwin.models.matting.learned import find_network, find_networks, learned_alpha, require_working
 from manitwin.models.matting.study import study_photo
 from manitwin.models.weights.store import FOLDER
@@ -84,10 +84,31 @@ def test_what_two_networks_see_alike_is_likelier(tmp_path: Path) -> None:
     agreed = [each for each in two if each.is_agreed]
     assert {each.candidate.maker for each in agreed} >= {"network", "second_network"}
     assert all(each.by_itself < each.confidence < 1 for each in agreed)
-    matte = matte_photo(photo, "x.png", networks=find_networks(f"{alike},{other}"))
-    assert set(matte.agreement) == {"rules", "colours", "network", "second_network", "built_in_network"}
-    found = matte.rgba[..., 3] > 127
+    asked = study_photo(photo, networks=find_networks(f"{alike},{other}"))
+    assert set(asked.agreement) == {"rules", "colours", "network", "second_network", "built_in_network"}
+    found = asked.alpha > 127
     assert (found & truth).sum() / (found | truth).sum() > 0.97
+
+
+def test_two_networks_are_asked_only_about_what_is_doubted_without_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    photo, _ = _photo((220, 30, 30))
+    networks = find_networks(
+        ",".join(_network(tmp_path / name, weights=(share, 0.0, 0.0)) for name, share in (("a", 1.0), ("b", 2.0)))
+    )
+    asked: list[int] = []
+
+    def study(rgb: np.ndarray, **more: Any) -> Any:
+        asked.append(len(more["networks"]))
+        return study_photo(rgb, **more)
+
+    monkeypatch.setattr(matte, "study_photo", study)
+    matte_photo(photo, "x.png", networks=networks)
+    assert asked == [0]
+    with pytest.raises(Rejected):
+        matte_photo(photo, "x.png", networks=networks, min_confidence=1.0)
+    assert asked == [0, 0, 2]
 
 
 def test_that_two_networks_agree_does_not_tell_one_whole_thing(tmp_path: Path) -> None:

@@ -74,10 +74,11 @@ def matte_photo(
     """Find the object in ``image`` (H, W, 3 or 4) uint8 upright sRGB; ``name`` is used in messages only.
 
     A real alpha channel (more than 2 % transparent) is believed. Else two ways of looking each propose a mask: rules (smooth
-    surfaces grown from the border, flooded up to the photo's edges, and colours) and the built-in network, and those of the
-    ``networks``, two at most; the likeliest is taken, by its scores and by how far opinions agree with it: ``flat_border`` is the
-    rules' where smooth surfaces explain the border, ``grabcut`` the rules' where they do not, ``network`` a network's. Where none
-    is believed and ``explains`` is given, one that it explains may be (``explained_first``).
+    surfaces grown from the border, flooded up to the photo's edges, and colours) and the built-in network, and one of the
+    ``networks``; two of them are asked only where nothing is believed without them. The likeliest is taken, by its scores and
+    by how far opinions agree with it: ``flat_border`` is the rules' where smooth surfaces explain the border, ``grabcut`` the
+    rules' where they do not, ``network`` a network's. Where none is believed and ``explains`` is given, one that it explains
+    may be (``explained_first``).
 
     Raises Rejected: ``no_object``, ``several_objects``, ``low_confidence_matte``, naming cause and remedy; DoubtedCutOut where
     something was cut out.
@@ -85,7 +86,12 @@ def matte_photo(
     if image.shape[2] == 4 and (image[..., 3] < 250).mean() > TRANSPARENT_SHARE:
         return _given_matte(image, name, min_area_share, second_object_share)
     rgb = np.ascontiguousarray(image[..., :3])
-    study = study_photo(rgb, working_side_px=working_side_px, networks=networks)
+    asked = () if len(networks) > 1 else networks
+    study = study_photo(rgb, working_side_px=working_side_px, networks=asked)
+    if (
+        len(networks) > 1 and study.confidence < min_confidence
+    ):  # thin tools, which are believed without, they see differently
+        study = study_photo(rgb, working_side_px=working_side_px, networks=networks)
     if explains is not None and study.confidence < min_confidence:
         study = explained_first(rgb, study, explains, min_confidence=min_confidence, working_side_px=working_side_px)
     try:
