@@ -37,7 +37,7 @@ from manitwin.models.matting import matte_photo
 from manitwin.models.matting.explained import explained_first
 from manitwin.models.matting.learned import Network, find_networks
 from manitwin.models.matting.matte import MIN_CONFIDENCE, decided
-from manitwin.models.matting.study import study_photo
+from manitwin.models.matting.study import study_in_turn
 from manitwin.twin.shares import wilson_interval
 
 RIGHT_IOU = 0.95
@@ -65,7 +65,7 @@ def judged_by_number(part: Part, number: int, variant: Variant, network: str | N
 def judge(picture: Composite, networks: Sequence[Network], named: bool) -> Judged:
     """Cut one composite out; what was rejected is judged too."""
     start = time.process_time()
-    study = study_photo(picture.rgb, networks=networks)
+    study = study_in_turn(picture.rgb, networks, min_confidence=MIN_CONFIDENCE)
     explains = template_outline_check(picture.category) if named else None
     if explains is not None and study.confidence < MIN_CONFIDENCE:
         study = explained_first(picture.rgb, study, explains, min_confidence=MIN_CONFIDENCE)

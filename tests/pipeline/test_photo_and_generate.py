@@ -15,11 +15,13 @@ from manitwin.engine.stage import Draft
 from manitwin.errors import InputError, Rejected, Unsupported
 from manitwin.formats.glb import read_glb
 from manitwin.models.generators.lift import LiftGenerator
+from manitwin.models.matting.learned import find_networks
 from manitwin.pipeline import photo
 from manitwin.pipeline.generate import GenerateStage
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.photo import PhotoStage
 from manitwin.twin.import_record import ImportRecord
+from tiny_networks import tiny_network
 
 SAMPLE = Path(__file__).resolve().parents[2] / "samples" / "bottle.jpg"
 
@@ -48,6 +50,27 @@ def test_sample_photo_becomes_a_standing_bottle(tmp_path: Path) -> None:
     # modelled: 0.2 m high, radius 0.0325 m, seen from 13 degrees above
     assert part.extents == pytest.approx([0.325, 0.325, 1.0], abs=0.02)
     assert part.volume == pytest.approx(np.pi / 4 * 0.325**2 * 0.80, rel=0.08)
+
+
+def test_named_networks_are_recorded_where_they_were_asked(tmp_path: Path) -> None:
+    """One is asked about every photo, two only about what is doubted without them."""
+    names = []
+    for name, share in (("a", 40.0), ("b", 41.0)):
+        path = tmp_path / f"{name}.onnx"
+        path.write_bytes(tiny_network(weights=(share, -30.0, -30.0)))
+        names.append(str(path))
+    one, two = find_networks(names[0]), find_networks(",".join(names))
+    doubting = MattingConfig(min_confidence=1.0)
+    for networks, settings, recorded in (
+        (one, MattingConfig(), {"network"}),
+        (two, MattingConfig(), set()),
+        (two, doubting, {"network", "second_network"}),
+    ):
+        stage = PhotoStage(settings, networks)
+        assert stage.model is not None and len(stage.model.split(", ")) == len(networks) + 2
+        _, field = stage.cut_out(SAMPLE, None, lambda doubted: doubted.matte)
+        assert {"network", "second_network"} & set(field) == recorded
+        assert all(field[maker]["source"].endswith(".onnx") for maker in recorded)
 
 
 def test_name_that_a_person_gave_speaks_for_a_doubtful_cut_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -39,9 +39,8 @@ class PhotoStage:
         self.settings = settings.model_copy(update={"network": None})
         self.networks = tuple(networks)
         self.backend: str = "rules+network"
-        self.model: str | None = ", ".join(
-            [*([each.model for each in networks] or [built_in_model()]), outline_model()]
-        )
+        models = (*(each.model for each in networks), built_in_model(), outline_model())
+        self.model: str | None = ", ".join(models)
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Read and matte; raises InputError, or Rejected where no single object can be told from the background."""
@@ -53,7 +52,7 @@ class PhotoStage:
             path, draft.payload.name, lambda doubted: confirmed_or_rejected(doubted, path.name, amendment)
         )
         _save(rgba, folder / "photo.png")
-        return {"matte": field | self._network_field()}
+        return {"matte": field}
 
     def cut_out(
         self, path: Path, name: str | None, confirmed: Callable[[DoubtedCutOut], Matte], called: str | None = None
@@ -88,9 +87,13 @@ class PhotoStage:
             "scores": matte.scores,
             "agreement": matte.agreement,
             "focal_mm": photo.focal_mm,
+            **self._networks_asked(matte),
         }
 
-    def _network_field(self) -> dict[str, Any]:
+    def _networks_asked(self, matte: Matte) -> dict[str, Any]:
+        """Return what is recorded of the named networks where they were asked: the built-in one goes by its own name then."""
+        if "built_in_network" not in matte.agreement:
+            return {}
         told = ("name", "sha256", "source", "licence")
         return {
             maker: {name: getattr(network, name) for name in told}
@@ -137,7 +140,9 @@ class PhotosStage(PhotoStage):
             "photos": [field["confidence"] for _, field in kept],
         }
         matte["focals_mm"] = [field["focal_mm"] for _, field in kept]
-        return {"matte": matte | self._network_field()}
+        for _, field in kept:
+            matte |= {maker: field[maker] for maker in network_makers(len(self.networks) + 1) if maker in field}
+        return {"matte": matte}
 
 
 def refused(doubted: DoubtedCutOut) -> Matte:

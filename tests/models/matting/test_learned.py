@@ -11,7 +11,7 @@ import pytest
 
 from manitwin.errors import Rejected, UsageError
 from manitwin.formats.isolated import Limits, run_isolated
-from manitwin.models.matting import learned, matte, matte_photo
+from manitwin.models.matting import learned, matte_photo, study
 from manitwin.models.matting.learned import find_network, find_networks, learned_alpha, require_working
 from manitwin.models.matting.study import study_photo
 from manitwin.models.weights.store import FOLDER
@@ -62,9 +62,9 @@ def test_a_network_that_nothing_bears_out_is_outvoted(tmp_path: Path) -> None:
     """It calls the whole picture an object but for the object: rules and the built-in network agree on another."""
     photo, truth = _photo((30, 30, 220))
     network = find_network(_network(tmp_path, weights=(20.0, 20.0, 0.0)))
-    study = study_photo(photo, networks=[network])
-    assert study.agreement["network"] < 0.2 and study.agreement["built_in_network"] > 0.95
-    assert study.judged[0].confidence == pytest.approx(study_photo(photo).judged[0].confidence, abs=0.02)
+    outvoted = study_photo(photo, networks=[network])
+    assert outvoted.agreement["network"] < 0.2 and outvoted.agreement["built_in_network"] > 0.95
+    assert outvoted.judged[0].confidence == pytest.approx(study_photo(photo).judged[0].confidence, abs=0.02)
     found = matte_photo(photo, "x.png", networks=[network]).rgba[..., 3] > 127
     assert (found & truth).sum() / (found | truth).sum() > 0.97
 
@@ -99,11 +99,11 @@ def test_two_networks_are_asked_only_about_what_is_doubted_without_them(
     )
     asked: list[int] = []
 
-    def study(rgb: np.ndarray, **more: Any) -> Any:
-        asked.append(len(more["networks"]))
+    def study_of(rgb: np.ndarray, **more: Any) -> Any:
+        asked.append(len(more.get("networks", ())))
         return study_photo(rgb, **more)
 
-    monkeypatch.setattr(matte, "study_photo", study)
+    monkeypatch.setattr(study, "study_photo", study_of)
     matte_photo(photo, "x.png", networks=networks)
     assert asked == [0]
     with pytest.raises(Rejected):

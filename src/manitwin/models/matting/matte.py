@@ -18,7 +18,7 @@ from manitwin.models.matting.confidence import border_of
 from manitwin.models.matting.explained import Explains, explained_first
 from manitwin.models.matting.learned import Network
 from manitwin.models.matting.outline import dilated, without_small_holes
-from manitwin.models.matting.study import Judged, Study, largest_piece, study_photo
+from manitwin.models.matting.study import Judged, Study, largest_piece, study_in_turn
 from manitwin.models.matting.trimmed import trimmed_margin
 
 TRANSPARENT_SHARE = 0.02
@@ -86,12 +86,7 @@ def matte_photo(
     if image.shape[2] == 4 and (image[..., 3] < 250).mean() > TRANSPARENT_SHARE:
         return _given_matte(image, name, min_area_share, second_object_share)
     rgb = np.ascontiguousarray(image[..., :3])
-    asked = () if len(networks) > 1 else networks
-    study = study_photo(rgb, working_side_px=working_side_px, networks=asked)
-    if (
-        len(networks) > 1 and study.confidence < min_confidence
-    ):  # thin tools, which are believed without, they see differently
-        study = study_photo(rgb, working_side_px=working_side_px, networks=networks)
+    study = study_in_turn(rgb, networks, min_confidence=min_confidence, working_side_px=working_side_px)
     if explains is not None and study.confidence < min_confidence:
         study = explained_first(rgb, study, explains, min_confidence=min_confidence, working_side_px=working_side_px)
     try:
