@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -14,12 +14,11 @@ from manitwin.dataset.collect.facts import BANDS, GROUPS, UNKNOWN
 from manitwin.dataset.collect.schema import APPLICATION, MIGRATIONS, migrate
 from manitwin.errors import UsageError
 from manitwin.formats.bounded_file import open_regular
-from manitwin.formats.printable import printable_line
-from manitwin.formats.sqlite_schema import has_schema
+from manitwin.formats.sqlite_store import BUSY_S, damaged, errors_named, flaw_in, transaction
 
 Kind = Literal["image", "mesh", "asset", "url"]
 Status = Literal["ready", "listed", "duplicate", "unreadable"]
-BUSY_S = 30.0
+_DAMAGED = "is no catalogue that can be read ({cause}); give another"
 COUNTED = ("group", "status", "licence", "source", "size_band")
 """What the rows are counted by."""
 
@@ -103,11 +102,8 @@ class Catalogue:
                 f"{self.path}: of schema {version}, this version reads up to {len(MIGRATIONS)}; use the version that wrote it"
             )
         migrate(self._connection, version)
-        if not has_schema(self._connection, migrate):
-            raise self._damaged("its tables are not those of a catalogue")
-        (said,) = run("PRAGMA quick_check(1)").fetchone()
-        if said != "ok":
-            raise self._damaged(said)
+        if (flaw := flaw_in(self._connection, migrate, tables_of="a catalogue")) is not None:
+            raise damaged(self.path, flaw, _DAMAGED)
 
     def __enter__(self) -> Catalogue:
         return self
@@ -217,7 +213,7 @@ class Catalogue:
 
     def _require_known(self, group: str, band: str) -> None:
         if group not in (*GROUPS, UNKNOWN) or band not in BANDS:
-            raise self._damaged(f"a row of group {group!r} and size {band!r}")
+            raise damaged(self.path, f"a row of group {group!r} and size {band!r}", _DAMAGED)
 
     def causes(self) -> dict[str, int]:
         """Return how many rows cannot be read, by cause."""
@@ -237,29 +233,11 @@ class Catalogue:
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
-        with self._sound():
-            self._connection.execute("BEGIN IMMEDIATE")
-            try:
-                yield self._connection
-                self._connection.execute("COMMIT")
-            except BaseException:
-                if self._connection.in_transaction:
-                    self._connection.execute("ROLLBACK")
-                raise
+        with self._sound(), transaction(self._connection):
+            yield self._connection
 
-    @contextmanager
-    def _sound(self) -> Iterator[None]:
-        try:
-            yield
-        except sqlite3.OperationalError as error:
-            said = printable_line(str(error), max_characters=120)
-            raise UsageError(f"{self.path}: {said}; mend the disk or its permissions, and try again") from error
-        except (sqlite3.DatabaseError, sqlite3.InterfaceError, UnicodeDecodeError) as error:
-            raise self._damaged(error) from error
-
-    def _damaged(self, cause: object) -> UsageError:
-        said = printable_line(str(cause), max_characters=120)
-        return UsageError(f"{self.path}: is no catalogue that can be read ({said}); give another")
+    def _sound(self) -> AbstractContextManager[None]:
+        return errors_named(self.path, _DAMAGED)
 
 
 def by_each(counts: Iterable[tuple[tuple[str, ...], int]]) -> Mapping[str, dict[str, int]]:

@@ -14,7 +14,7 @@ import statistics
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,12 +27,11 @@ from manitwin.dataset.review.verdicts import Review, reason_of
 from manitwin.errors import UsageError
 from manitwin.formats.bounded_file import open_regular
 from manitwin.formats.json_file import parse_json_object
-from manitwin.formats.printable import printable_line
-from manitwin.formats.sqlite_schema import has_schema
+from manitwin.formats.sqlite_store import BUSY_S, damaged, errors_named, flaw_in, transaction
 from manitwin.twin.dataset_root import DatasetRoot
 
 REVIEWS = "reviews.sqlite"
-BUSY_S = 30.0
+_DAMAGED = "no reviews that can be read ({cause}); put a copy in its place, or move it away"
 _LIVE = "kind = 'review' AND number NOT IN (SELECT undoes FROM events WHERE undoes IS NOT NULL)"
 
 
@@ -73,11 +72,9 @@ class ReviewStore:
                 self._connection.execute("PRAGMA journal_mode = WAL")
                 self._connection.execute("PRAGMA synchronous = FULL")
                 migrate(self._connection, str(path))
-                if not has_schema(self._connection, lambda ours: migrate(ours, ":memory:")):
-                    raise self._damaged("its tables are not those of a store of reviews")
-                (said,) = self._connection.execute("PRAGMA quick_check(1)").fetchone()
-                if said != "ok":
-                    raise self._damaged(said)
+                flaw = flaw_in(self._connection, lambda ours: migrate(ours, ":memory:"), tables_of="a store of reviews")
+                if flaw is not None:
+                    raise damaged(path, flaw, _DAMAGED)
             except BaseException:
                 self._connection.close()
                 raise
@@ -221,7 +218,7 @@ class ReviewStore:
         try:
             return Plan(tuple(said["twins"]), said["seed"], said["overlap"], said["raters"])
         except (KeyError, TypeError) as error:
-            raise self._damaged(f"a sample without {error}") from error
+            raise damaged(self.path, f"a sample without {error}", _DAMAGED) from error
 
     def add_plan(self, plan: Plan) -> None:
         """Append a sample, unless it is the last one already."""
@@ -263,36 +260,16 @@ class ReviewStore:
         try:
             return Review.model_validate_json(body)
         except ValidationError as error:
-            raise self._damaged(f"event {number}: {reason_of(error)}") from error
+            raise damaged(self.path, f"event {number}: {reason_of(error)}", _DAMAGED) from error
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
         """Give a transaction that is on the disk when the block has ended well, and never was otherwise."""
-        with self._lock, self._sound():
-            self._connection.execute("BEGIN IMMEDIATE")
-            try:
-                yield self._connection
-                self._connection.execute("COMMIT")
-            except BaseException:
-                if self._connection.in_transaction:
-                    self._connection.execute("ROLLBACK")
-                raise
+        with self._lock, self._sound(), transaction(self._connection):
+            yield self._connection
 
-    @contextmanager
-    def _sound(self) -> Iterator[None]:
-        try:
-            yield
-        except sqlite3.OperationalError as error:
-            said = printable_line(str(error), max_characters=120)
-            raise UsageError(f"{self.path}: {said}; mend the disk or its permissions, and try again") from error
-        except (sqlite3.DatabaseError, sqlite3.InterfaceError, UnicodeDecodeError) as error:
-            raise self._damaged(error) from error
-
-    def _damaged(self, cause: object) -> UsageError:
-        said = printable_line(str(cause), max_characters=120)
-        return UsageError(
-            f"{self.path}: no reviews that can be read ({said}); put a copy in its place, or move it away"
-        )
+    def _sound(self) -> AbstractContextManager[None]:
+        return errors_named(self.path, _DAMAGED)
 
 
 def _text(review: Review) -> str:

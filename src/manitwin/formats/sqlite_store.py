@@ -1,0 +1,60 @@
+"""What stores that keep one SQLite file do alike: transactions, and errors that name the file."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from manitwin.errors import UsageError
+from manitwin.formats.printable import printable_line
+from manitwin.formats.sqlite_schema import has_schema
+
+BUSY_S = 30.0
+"""How long a store waits for another process that writes to it."""
+MOST_SAID = 120
+"""Characters of what SQLite says that a message repeats."""
+
+
+@contextmanager
+def transaction(connection: sqlite3.Connection) -> Iterator[None]:
+    """Commit what the block does when it has ended well, and nothing of it otherwise.
+
+    The connection is in autocommit mode (``isolation_level=None``).
+    """
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+        connection.execute("COMMIT")
+    except BaseException:
+        if connection.in_transaction:
+            connection.execute("ROLLBACK")
+        raise
+
+
+@contextmanager
+def errors_named(path: Path, remedy: str) -> Iterator[None]:
+    """Raise SQLite's errors in the block as UsageError with the file ``path``; ``remedy`` is that of a damaged file."""
+    try:
+        yield
+    except sqlite3.OperationalError as error:
+        said = printable_line(str(error), max_characters=MOST_SAID)
+        raise UsageError(f"{path}: {said}; mend the disk or its permissions, and try again") from error
+    except (sqlite3.DatabaseError, sqlite3.InterfaceError, UnicodeDecodeError) as error:
+        raise damaged(path, error, remedy) from error
+
+
+def damaged(path: Path, cause: object, remedy: str) -> UsageError:
+    """Return the error of a file that cannot be read: ``remedy`` says what it is not, with {cause} in it, and what to do."""
+    return UsageError(f"{path}: {remedy.format(cause=printable_line(str(cause), max_characters=MOST_SAID))}")
+
+
+def flaw_in(
+    connection: sqlite3.Connection, make: Callable[[sqlite3.Connection], object], *, tables_of: str
+) -> str | None:
+    """Return what is wrong with a database that should be as ``make`` gives an empty one; None where nothing is."""
+    if not has_schema(connection, make):
+        return f"its tables are not those of {tables_of}"
+    (said,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+    return None if said == "ok" else str(said)
