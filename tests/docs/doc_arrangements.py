@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 FOREIGN = "a program of others that is not here; a fake stands for it"
 NO_NETWORK = "fetches from the network"
+CONTAINER = "wants a container engine, and fetches from the network; what is in the container is set up by make setup"
 
 
 NOTHING_DOUBTED = {r"manitwin review cutouts": 2}
@@ -130,7 +131,9 @@ PAGES: dict[str, Arrangement] = {
         slow=(r"manitwin review cutouts",),
         exits={r"^manitwin models add": 2, r"--matting (isnet|my-birefnet)": 2} | NOTHING_DOUBTED,
     ),
-    "docs/platforms.md": Arrangement(not_run=WHEEL | {r"uv pip compile": NO_NETWORK}, slow=(DOCTOR,)),
+    "docs/platforms.md": Arrangement(
+        not_run=WHEEL | {r"uv pip compile": NO_NETWORK, r"^docker ": CONTAINER}, slow=(DOCTOR,)
+    ),
     "docs/priors.md": Arrangement(blocks={"melon": "prior kitchen"}),
     "docs/programs.md": Arrangement(
         not_run={
