@@ -15,6 +15,8 @@ from manitwin.assets.audit.rules import MODULES, RULES
 PAGE = Path(__file__).parent / "audit.md"
 INTRODUCTION = """# Audit: is this asset true?
 
+`manitwin audit` finds what is wrong with assets of any tool: mass, inertia, collision, scale, frames, grasps, files and licences.
+
 ```sh
 manitwin audit PATH...
 manitwin audit ASSETS --select MAS,INE001 --ignore LIC --format sarif > audit.sarif
@@ -26,7 +28,7 @@ manitwin audit ASSETS --engine mujoco --html audit.html
 manitwin audit --explain INE004
 ```
 
-reads every asset at or below the paths (twins, URDF, MJCF, SDF, USD, and folders of RoboTwin, ManiTwin-100K, EmbodiedGen and
+It reads every asset at or below the paths (twins, URDF, MJCF, SDF, USD, and folders of RoboTwin, ManiTwin-100K, EmbodiedGen and
 Google Scanned Objects), holds the rules below against it, and prints what it found: no GPU, no model, nothing is downloaded. Exit
 status: 0 no errors, 1 errors, 2 wrong use.
 

@@ -149,5 +149,5 @@ def test_command_prints_the_table_and_its_document(place: Path, tmp_path: Path) 
     document = json.loads(
         CliRunner().invoke(app, ["evaluate", "annotations", str(place), "--labels", str(path), "--json"]).stdout
     )
-    check_keys(document, "evaluate")
+    check_keys(document, "evaluate annotations")
     assert document["shares"]["category"]["right"] == 0
