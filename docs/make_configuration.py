@@ -15,12 +15,12 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from manitwin.config import BuildConfig
-from manitwin.episodes.settings import PicturesConfig, TrajectoriesConfig
+from manitwin.episodes.settings import PicturesConfig, TasksConfig, TrajectoriesConfig
 from manitwin.scenes.settings import LayoutsConfig
 
 PAGE = Path(__file__).parent / "configuration.md"
 APPLICATIONS: dict[str, type[BaseModel]] = {
-    "layout": LayoutsConfig, "trajectories": TrajectoriesConfig, "render": PicturesConfig
+    "layout": LayoutsConfig, "trajectories": TrajectoriesConfig, "tasks": TasksConfig, "render": PicturesConfig
 }  # fmt: skip
 INTRODUCTION = """# Settings
 
@@ -73,14 +73,17 @@ def _range(field: FieldInfo) -> str:
 
 def page() -> str:
     """Return the whole page."""
-    text = [INTRODUCTION, *_settings(BuildConfig, "## General\n")]
+    text = [INTRODUCTION, *_settings(BuildConfig, "## General\n", told={})]
+    told: dict[object, str] = {}
     for command, model in APPLICATIONS.items():
         words = " ".join((model.__doc__ or "").split()).replace("``", "`")
-        text += _settings(model, f"## Settings of `manitwin {command}`\n\n{words}\n")
+        text += _settings(model, f"## Settings of `manitwin {command}`\n\n{words}\n", told)
+        told |= {field.annotation: command for field in model.model_fields.values()}
     return "\n".join(text)
 
 
-def _settings(kind: type[BaseModel], title: str) -> list[str]:
+def _settings(kind: type[BaseModel], title: str, told: dict[object, str]) -> list[str]:
+    """Return the sections of a configuration; one that another command's has too is ``told`` there, by its name."""
     sections = {
         n: f.annotation
         for n, f in kind.model_fields.items()
@@ -95,6 +98,9 @@ def _settings(kind: type[BaseModel], title: str) -> list[str]:
     ]
     text = [title, "| setting | default | range |", "|---|---|---|", *plain, ""]
     for name, section in sections.items():
+        if section in told:
+            text += [f"`[{name}]` is that of `manitwin {told[section]}`.", ""]
+            continue
         model = cast(type[BaseModel], section)
         table = rows(model)
         level = "##" if kind is BuildConfig else "###"
