@@ -21,6 +21,8 @@ from manitwin.models.generators.templates.text import DIRECTIONS, Wanted
 PAGE = Path(__file__).parent / "templates.md"
 INTRODUCTION = """# Things from a sentence: the templates
 
+Words become twins of everyday things, without a model:
+
 ```sh
 manitwin build --text "a red ceramic mug, 9 cm" --text "a hammer with a yellow handle" --quick -o twins
 ```

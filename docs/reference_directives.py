@@ -46,12 +46,13 @@ def _documented(directive: str, target: str, options: str = "") -> str:
 
 
 def commands_markdown() -> str:
-    """Return the options of every command, as typer's own `utils docs` writes them."""
+    """Return the options of every command that is not hidden, as typer's own `utils docs` writes them."""
     from typer.cli import get_docs_for_click
 
     from manitwin.cli.main import app
 
-    command = typer.main.get_command(app)
+    command: Any = typer.main.get_command(app)
+    command.commands = {name: each for name, each in command.commands.items() if not each.hidden}
     text = get_docs_for_click(obj=command, ctx=typer.Context(command), name="manitwin")
     text = html.unescape(text).replace("```console\n$ ", "```text\n")
     return text.split("\n", 1)[1]  # its title is the page's

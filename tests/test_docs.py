@@ -53,6 +53,47 @@ def test_the_page_of_building_names_every_option_of_the_command() -> None:
     assert "--text" in options and not missing
 
 
+OPPOSITES = {"--lines", "--browser", "--retire"}
+"""Pages name their opposite, ``--no-lines``: these are the default."""
+
+
+def test_every_option_of_every_command_is_named_on_a_page() -> None:
+    said = "\n".join(page.read_text() for page in PAGES)
+    commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    untold = {
+        (name, option)
+        for name, command in commands.items()
+        for parameter in command.params
+        for option in parameter.opts
+        if option.startswith("--") and not command.hidden and option not in {"--help", *OPPOSITES}
+        if not re.search(rf"(?<![\w-]){option}(?![\w-])", said)
+    }
+    assert not untold
+
+
+FROM_OTHER_FILES = {"changelog.md", "contributing.md", "index.md"}
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page.name not in FROM_OTHER_FILES], ids=lambda p: p.name)
+def test_a_page_says_what_it_is_about_and_ends_no_section_with_a_colon(page: Path) -> None:
+    lines = [line for line in page.read_text().splitlines() if line.strip()]
+    assert lines[0].startswith("# ") and re.match(r"[A-Z`*\[]", lines[1]) and not lines[1].startswith("```")
+    pairs = zip(lines, [*lines[1:], "#"], strict=True)
+    unended = [line for line, following in pairs if line.endswith(":") and following.startswith("#")]
+    assert not unended
+
+
+def test_every_page_can_be_reached_from_the_readme() -> None:
+    seen, todo = set[Path](), [ROOT / "README.md"]
+    while todo:
+        page = todo.pop()
+        if page not in seen:
+            seen.add(page)
+            links = re.findall(r"\]\(([^)#\s:]+\.md)", page.read_text())
+            todo += [(page.parent / link).resolve() for link in links]
+    assert {page.name for page in PAGES} - {page.name for page in seen} == FROM_OTHER_FILES
+
+
 def test_readme_make_targets_are_those_that_ci_runs() -> None:
     targets = set(re.findall(r"^make (\w+)", (ROOT / "README.md").read_text(), re.MULTILINE))
     assert targets <= set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.MULTILINE))

@@ -44,7 +44,7 @@ def make_episodes(
     jobs: int | None = None,
     **run: Unpack[RunOptions],
 ) -> EpisodesReport:
-    """Attempt ``count`` pick-and-place episodes with the twins of a data set or in scenes, and keep what succeeded.
+    """Attempt ``count`` episodes of a skill with the twins of a data set or in scenes, and keep what succeeded.
 
     ``out`` gets ``attempts.parquet`` and the data sets of ``formats`` (docs/episodes.md); episodes that are there stay.
     ``twins``: where the twins of scenes are now. ``retire`` marks grasps that fail in their twins' records.

@@ -139,7 +139,7 @@ Turns = Annotated[
 Poses = Annotated[
     Path | None,
     typer.Option(
-        help="Where the cameras of the photos of --views were: a transforms.json (NeRF, instant-ngp), or a COLMAP model's"
+        help="Where the cameras of several photos of a thing were: a transforms.json (NeRF, instant-ngp), or a COLMAP model's"
         " folder.",
         metavar="FILE",
     ),

@@ -53,7 +53,7 @@ def trajectories(
     json: Json = False,
     **run: Any,
 ) -> None:
-    """Plan and execute pick-and-place episodes, and keep what succeeded; run it again to go on where it stopped."""
+    """Plan and execute episodes of a skill, and keep what succeeded; run it again to go on where it stopped."""
     from manitwin.episodes.settings import TrajectoriesConfig
 
     settings = options.read_settings(TrajectoriesConfig, run, {"robot": robot, "skill": skill, "others": others})
