@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import typer
 
+import manitwin
 from manitwin.cli.main import app
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -51,6 +52,14 @@ def test_the_page_of_building_names_every_option_of_the_command() -> None:
     }  # by their short names, or by their opposite
     missing = {name for name in options - told_elsewhere if not re.search(rf"{name}\b", page)}
     assert "--text" in options and not missing
+
+
+def test_the_page_of_a_twin_names_every_field_of_its_schema() -> None:
+    page = re.sub(r"^```.*?^```$", "", (ROOT / "docs" / "twin.md").read_text(), flags=re.MULTILINE | re.DOTALL)
+    named = set(re.findall(r"\w+", " ".join(re.findall(r"`([^`]+)`", page))))
+    schema = manitwin.schema()
+    fields = {field for each in (schema, *schema["$defs"].values()) for field in each.get("properties", {})}
+    assert "scale_applied" in fields and fields - named == set()
 
 
 OPPOSITES = {"--lines", "--browser", "--retire"}
