@@ -93,7 +93,7 @@ RULES = (
         "center-of-mass-at-origin",
         "warning",
         why="EmbodiedGen's URDFs leave the inertial's origin at zero whatever the shape; an object whose origin is at its"
-        " bottom then behaves as if its feet were of lead.",
+        " bottom then behaves as if all of its weight were there.",
         remedy="Write the centroid, or where the matter is.",
         check=left_at_origin,
     ),

@@ -100,8 +100,8 @@ RULES = (
         "FIL001",
         "unreadable",
         "error",
-        why="What cannot be read cannot be used; a set with one such file stops a loader at night. This finding is never left"
-        " out by --select, only by --ignore.",
+        why="What cannot be read cannot be used; one such file stops a program that loads the whole set. This finding is never"
+        " left out by --select, only by --ignore.",
         remedy="The message names the file and the cause.",
         check=unreadable,
     ),
