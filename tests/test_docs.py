@@ -90,6 +90,8 @@ def test_a_page_says_what_it_is_about_and_ends_no_section_with_a_colon(page: Pat
     pairs = zip(lines, [*lines[1:], "#"], strict=True)
     unended = [line for line, following in pairs if line.endswith(":") and following.startswith("#")]
     assert not unended
+    begun = re.findall(r"^```\n\n?([a-z].*)", page.read_text(), re.MULTILINE)
+    assert not begun, "a sentence has no block of code for its subject"
 
 
 def test_every_page_can_be_reached_from_the_readme() -> None:
