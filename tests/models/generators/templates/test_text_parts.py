@@ -113,3 +113,15 @@ def test_what_is_said_of_a_part_behind_a_comma_is_of_that_part() -> None:
     wanted = read("phillips head screwdriver, 15 cm, yellow handle")
     assert wanted.category == "screwdriver" and wanted.lengths_m == {"": 0.15}
     assert wanted.wishes == read("a screwdriver with a yellow handle").wishes
+
+
+def test_a_part_behind_with_is_none_behind_the_comma_before() -> None:
+    wanted = read("a plate, 27 cm, white with blue rim")
+    assert wanted.wishes == read("a white plate, 27 cm, with a blue rim").wishes
+    assert set(wanted.wishes) == {"", "rim"}
+
+
+def test_a_cork_is_the_stopper_of_a_bottle_and_of_cork() -> None:
+    wanted = read("a green glass bottle with a cork, 30 cm")
+    assert wanted.wishes["cap"].material is not None and wanted.wishes["cap"].material.material == "cork"
+    assert wanted.wishes == read("a green glass bottle with a cork cap, 30 cm").wishes

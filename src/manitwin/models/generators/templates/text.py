@@ -47,7 +47,9 @@ _PART_NAMES = {
 _TOOL_HEADS = ("head", "blade")
 _COLORED_MATTER = {"plastic", "rubber"}
 _COMMON_PARTS = ("handle", "lid", "cap", "rim", "blade")
-_PART_BEHIND_COMMA = re.compile(rf" ?, (?=(?:an? )?(?:[a-z]+ ){{0,3}}(?:{'|'.join(_COMMON_PARTS)})s?(?:$| ?,| and\b))")
+_PART_BEHIND_COMMA = re.compile(
+    rf" ?, (?=(?:an? )?(?:(?!with\b)[a-z]+ ){{0,3}}(?:{'|'.join(_COMMON_PARTS)})s?(?:$| ?,| and\b))"
+)
 """'a screwdriver, yellow handle'."""
 _WITH = re.compile(r" (?:with|having|featuring) | and an? (?=.)| (?:that|which) has ")
 
@@ -195,6 +197,10 @@ def _features(text: str, template: Template) -> list[tuple[str, Described]]:
         if not words:
             continue
         names = [at for at, word in enumerate(words) if not is_described(word) or word in template.slots]
+        if not names and _slot_called(words[-1], template) in template.slots:  # 'a cork' is a part, and of cork
+            features.append((_slot_called(words[-1], template), _of_part([*before, *words])))
+            before = []
+            continue
         if not names:
             before += [*words, "and"]  # 'red and white stripes'
             continue
