@@ -11,6 +11,7 @@ from manitwin.geometry.solids.shapes import (
     lathe,
     polygon,
     prism,
+    rounded,
     torus,
     union,
 )
@@ -204,3 +205,32 @@ def coin(*, width_m: float, thick: float) -> Model:
     ]
     model = Model().add("body", lathe(profile))
     return model.point("face", "face", "body", (0.0, 0.0, high - low), (0.0, 0.0, 1.0))
+
+
+@template("bolt")
+def bolt(*, length_m: float, width: float, head: float, shank: float) -> Model:
+    """Build a hexagonal bolt that lies, its head towards -X; ``width`` over the length, ``head`` and ``shank`` over its width."""
+    wide = width * length_m
+    high, thin = head * wide, 0.5 * shank * wide
+    hexagon = (
+        cylinder(0.5 * wide, high, sides=6).rotate((0, 0, 30)).rotate((0, 90, 0)).translate((-0.5 * length_m, 0, 0))
+    )
+    pitch = max(0.22 * thin, 0.0009)
+    z = np.arange(0.0, length_m - high - 0.4 * thin, 0.5 * pitch)
+    ridges = [(thin if row % 2 == 0 else thin - 0.45 * pitch, float(height)) for row, height in enumerate(z)]
+    rod = lathe([*ridges, (0.7 * thin, length_m - high)]).rotate((0, 90, 0)).translate((high - 0.5 * length_m, 0, 0))
+    model = Model().add("head", hexagon).add("thread", rod)
+    model.point("head", "face", "head", (-0.5 * length_m, 0.0, 0.0), (-1.0, 0.0, 0.0))
+    return model.point("tip", "tip", "thread", (0.5 * length_m, 0.0, 0.0), (1.0, 0.0, 0.0)).laid()
+
+
+@template("washer")
+def washer(*, width_m: float, hole: float, thick: float) -> Model:
+    """Build a flat ring that lies; ``hole`` and ``thick`` over its width."""
+    high = thick * width_m
+    edge = 0.2 * high
+    model = Model().add(
+        "body", lathe(rounded([(0.0, 0.0), (0.5 * width_m, 0.0), (0.5 * width_m, high), (0.0, high)], edge))
+    )
+    model.cut("hole", cylinder(0.5 * hole * width_m, 3 * high).translate((0, 0, -high)))
+    return model.point("hole", "hole", "hole", (0.0, 0.0, high), (0.0, 0.0, 1.0))

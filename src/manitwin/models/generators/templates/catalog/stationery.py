@@ -270,3 +270,22 @@ def whiteboard_eraser(*, length_m: float, width: float, height: float, felt: flo
         model.cut("groove", groove.translate((-0.35 * length_m, side * 0.52 * across, soft + 0.42 * high)))
     model.point("felt", "face", "felt", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
     return model.point("grip", "surface", "grip", (0.0, 0.0, high), (0.0, 0.0, 1.0))
+
+
+@template("clipboard")
+def clipboard(*, length_m: float, width: float, thick_m: float, clip: float) -> Model:
+    """Build a board that lies, its clip towards +X; ``width`` and ``clip``, how broad the clip is, over the length."""
+    across, broad = width * length_m, clip * length_m
+    model = Model().add("board", prism(rectangle(length_m, across, radius_m=0.012), thick_m))
+    place = 0.5 * length_m - 0.032
+    plate = box(0.036, broad, 0.0035, radius_m=0.0012).translate((place, 0, thick_m - 0.0005))
+    lever = box(0.024, 0.7 * broad, 0.004, radius_m=0.0015).rotate((0, -24, 0))
+    lever = lever.translate((place + 0.012, 0, thick_m + 0.0045))
+    spring = (
+        cylinder(0.0048, 0.8 * broad, sides=20).rotate((90, 0, 0)).translate((place, 0.4 * broad, thick_m + 0.0045))
+    )
+    model.add("clip", plate, "clip").add("clip", spring, "clip").add("clip", lever, "clip")
+    top = thick_m + 0.0093
+    model.point("clip", "surface", "clip", (place, 0.0, top), (0.0, 0.0, 1.0))
+    model.point("board", "face", "board", (-0.1 * length_m, 0.0, thick_m), (0.0, 0.0, 1.0))
+    return model.point("edge", "edge", "board", (-0.5 * length_m, 0.0, 0.5 * thick_m), (-1.0, 0.0, 0.0))

@@ -250,3 +250,21 @@ def magnifying_glass(*, length_m: float, lens: float, thick_m: float) -> Model:
     return model.point(
         "handle", "surface", "handle", (middle, 0.0, max(0.0075, 0.62 * thick_m)), (0.0, 0.0, 1.0)
     ).laid()
+
+
+@template("mallet")
+def mallet(*, length_m: float, head: float, face_m: float, handle_m: float) -> Model:
+    """Build a mallet that lies, its faces towards -Y and +Y; ``head`` is the head's length over the tool's."""
+    across, at = head * length_m, 0.5 * length_m - 0.5 * face_m
+    profile = rounded(
+        [(0.0, 0.0), (0.46 * face_m, 0.0), (0.5 * face_m, 0.5 * across), (0.46 * face_m, across), (0.0, across)], 0.006
+    )
+    block = lathe(profile).rotate((90, 0, 0)).translate((at, 0.5 * across, 0))
+    model = Model().add("head", block)
+    model.region("face", "head", lambda centers: centers[:, 1] < -0.485 * across)
+    model.region("other face", "head", lambda centers: centers[:, 1] > 0.485 * across)
+    for side, name in ((-1.0, "face"), (1.0, "other face")):
+        model.point("striking face", "face", name, (at, side * 0.5 * across, 0.0), (0.0, side, 0.0))
+    model.add("handle", grip(-0.5 * length_m, at, 0.5 * handle_m, flatten=0.85, swell=0.05), "handle")
+    middle = 0.5 * (-0.5 * length_m + at - 0.5 * face_m)
+    return model.point("handle", "surface", "handle", (middle, 0.0, 0.445 * handle_m), (0.0, 0.0, 1.0)).laid()
