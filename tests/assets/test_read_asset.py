@@ -17,6 +17,9 @@ def write(path: Path, text: str = "{}") -> Path:
     return path
 
 
+POINTER = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n"
+
+
 @pytest.mark.parametrize(
     ("files", "expected"),
     [
@@ -121,6 +124,8 @@ def test_worlds_of_included_models_and_layers_without_a_shape_are_no_assets(
         ("house.world", "<sdf version='1.6'><world name='w'><include/></world></sdf>", "a world of Gazebo"),
         ("bowl.kinbody.xml", "<KinBody name='bowl'/>", "a body of OpenRAVE, which is not read; give its URDF"),
         ("notes.xml", "<notes/>", "no asset of a known format"),
+        ("cup.urdf", POINTER, "a pointer of Git LFS, not the file; fetch it with git lfs pull"),
+        ("cup.usd", POINTER, "cup.usd: holds a pointer of Git LFS, not the file; fetch it with git lfs pull"),
     ],
 )
 def test_what_is_known_and_no_asset_is_told_what_it_is(tmp_path: Path, name: str, text: str, said: str) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from manitwin.errors import AssetError
 from manitwin.formats.bounded_file import open_regular
+from manitwin.formats.sniff import told_of_no_file_itself
 
 _HEAD_BYTES = 1 << 16
 _OPENRAVE = re.compile(rb"<(?:kinbody|environment)[\s>]", re.IGNORECASE)
@@ -15,10 +16,12 @@ _WORLD = re.compile(rb"<world[\s>]")
 
 def why_not_read(file: Path) -> str | None:
     """Return what a file of a known format is that is not read, and what to give for it; None of any other. Raises AssetError."""
-    if file.suffix.lower() not in (".world", ".xml", ".sdf"):
+    if file.suffix.lower() not in (".world", ".xml", ".mjcf", ".sdf", ".urdf"):
         return None
     with open_regular(file, AssetError) as opened:
         head = opened.read(_HEAD_BYTES)
+    if told := told_of_no_file_itself(head):
+        return told
     if _WORLD.search(head):
         return "a world of Gazebo, whose things are the models that it includes; give their folder"
     if file.suffix.lower() == ".xml" and _OPENRAVE.search(head):

@@ -96,14 +96,18 @@ def sniff(path: Path) -> Sniffed:
         return Sniffed("mesh", mesh)
     if not_read is not None:
         raise InputError("wrong_type", f"{called}: {not_read}")
-    for begin, told in _NO_FILE_ITSELF:
-        if begin.match(head):
-            raise InputError("wrong_type", f"{called}: {told}")
+    if told := told_of_no_file_itself(head):
+        raise InputError("wrong_type", f"{called}: {told}")
     raise InputError(
         "wrong_type",
         f"{called}: holds {_describe(head)}, neither an image ({', '.join(IMAGE_FORMATS)})"
         f" nor a mesh ({', '.join(MESH_FORMATS)})",
     )
+
+
+def told_of_no_file_itself(head: bytes) -> str | None:
+    """Return what a file's first bytes are that stand in for it (a pointer of Git LFS, a web page), and what to do; else None."""
+    return next((told for begin, told in _NO_FILE_ITSELF if begin.match(head)), None)
 
 
 def image_format(head: bytes) -> str | None:

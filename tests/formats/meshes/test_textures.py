@@ -1,11 +1,14 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
 from PIL import Image
 
-from manitwin.formats.meshes.textures import bake_transform, color_by_corner, make_part, pbr_material
+from manitwin.formats.meshes.source import MeshLimits, MeshSource
+from manitwin.formats.meshes.textures import bake_transform, color_by_corner, decode_texture, make_part, pbr_material
 from manitwin.formats.meshes.triangles import with_creased_normals
 
 
@@ -69,3 +72,11 @@ def test_baked_shear_keeps_normals_perpendicular_to_the_surface() -> None:
         np.einsum("fkc,fc->fk", baked.vertex_normals[baked.faces], baked.face_normals), 1.0, atol=1e-9
     )
     assert baked.volume == pytest.approx(2.0)
+
+
+def test_a_texture_that_git_has_not_fetched_is_told_so(tmp_path: Path) -> None:
+    source = MeshSource(tmp_path / "mug.obj", MeshLimits())
+    assert (
+        decode_texture(b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n", "mug.png", source) is None
+    )
+    assert source.findings == ["texture 'mug.png' holds a pointer of Git LFS, not the file; fetch it with git lfs pull"]

@@ -22,6 +22,7 @@ from manitwin.assets.within_limits import LIMITS, why_ended
 from manitwin.errors import AssetError, InputError
 from manitwin.formats.isolated import ProcessCrashed, TookTooLong, run_isolated
 from manitwin.formats.meshes.source import MeshLimits, MeshSource
+from manitwin.formats.meshes.usd_errors import broken
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 
 
@@ -52,7 +53,7 @@ def read_here(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LI
     except InputError as error:
         raise AssetError(error.detail) from error
     except Tf.ErrorException as error:
-        raise AssetError(f"{file}: its USD is broken; export it again") from error
+        raise AssetError(f"{file}: {broken(error)}; mend it there, or export it again") from error
     except UnicodeDecodeError as error:
         raise AssetError(f"{file}: a text in it is not UTF-8; export it again") from error
 

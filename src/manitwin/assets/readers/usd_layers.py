@@ -12,13 +12,17 @@ from pathlib import Path
 from pxr import Sdf, Tf, Usd
 
 from manitwin.errors import AssetError
+from manitwin.formats.bounded_file import open_regular
 from manitwin.formats.meshes.source import MeshSource
+from manitwin.formats.meshes.usd_errors import broken
 from manitwin.formats.meshes.usdz_package import UsdzArchive, package_path
+from manitwin.formats.sniff import told_of_no_file_itself
 
 _LAYERS = (".usd", ".usda", ".usdc", ".usdz")
 _MAX_LAYERS = 1_000
 MAX_PRIMS = 100_000
 _MAX_DEPTH = 300
+_HEAD_BYTES = 4096
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,8 @@ class LayerFiles:
 
     def compose(self) -> Usd.Stage:
         """Return the stage. Raises AssetError and InputError ``unreadable``, and Tf.ErrorException for broken USD."""
+        if told := _told_of_no_layer(self._folder / self._source.path.name):
+            raise AssetError(f"{self._source.path}: {told}")
         start = self._inside_package(self._folder / self._source.path.name)
         root = self._open(start)
         if root is None:
@@ -120,10 +126,14 @@ class LayerFiles:
         if not place.file.is_file() or (place.member and place.member not in self._archives[place.file].names):
             self.missing.add(named)
             return None
+        if told := _told_of_no_layer(place.file):
+            self.missing.add(named)
+            self._source.find(f"layer {named[:80]!r} {told}")
+            return None
         try:
             return self._open(place)
-        except Tf.ErrorException:
-            self._source.find(f"layer {named[:80]!r} cannot be read; carried on without it")
+        except Tf.ErrorException as error:
+            self._source.find(f"layer {named[:80]!r} cannot be read: {broken(error)}; carried on without it")
             return None
 
     def _locate(self, base: Place, name: str, what: str) -> Place | None:
@@ -241,6 +251,14 @@ def _children(spec: Sdf.PrimSpec) -> Iterator[Sdf.PrimSpec]:
 
 def _items(edits: Sdf.PathListOp) -> list[Sdf.Reference]:
     return list(edits.GetAddedOrExplicitItems())
+
+
+def _told_of_no_layer(file: Path) -> str | None:
+    """Return what stands in the place of a layer, such as a pointer of Git LFS, and what to do; None of any other file."""
+    if not file.is_file():
+        return None
+    with open_regular(file, AssetError) as stream:
+        return told_of_no_file_itself(stream.read(_HEAD_BYTES))
 
 
 def _resolved(path: Path) -> Path | None:

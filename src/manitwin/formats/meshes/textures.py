@@ -16,6 +16,7 @@ from trimesh.visual.material import PBRMaterial
 from manitwin.errors import InputError
 from manitwin.formats.meshes.ktx2 import KTX2, register_ktx2
 from manitwin.formats.meshes.source import Buffer, MeshSource
+from manitwin.formats.sniff import told_of_no_file_itself
 
 # what real asset packs use; decoders for other formats of Pillow are not reached from untrusted files
 TEXTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF", KTX2)
@@ -25,6 +26,7 @@ DEFAULT_COLOR = (0.8, 0.8, 0.8)
 _MAX_UV = 1e6  # textures may repeat, but not so often
 _MAX_NORMAL = 1e6
 _MAX_ATLAS = 4096
+_HEAD_BYTES = 4096
 _CELL_SIZES = (
     8,
     4,
@@ -60,7 +62,8 @@ def _decoded(data: Buffer, name: str, source: MeshSource) -> Image.Image | None:
     except (InputError, MemoryError):
         raise
     except UnidentifiedImageError:  # whose words name an address in memory
-        source.find(f"texture {name!r} is no picture that is read, and was left out")
+        told = told_of_no_file_itself(bytes(memoryview(data)[:_HEAD_BYTES]))
+        source.find(f"texture {name!r} {told or 'is no picture that is read, and was left out'}")
         return None
     except Exception as error:  # a decoder may raise anything on damaged bytes
         source.find(f"texture {name!r} cannot be decoded and was left out ({' '.join(str(error).split())[:100]})")

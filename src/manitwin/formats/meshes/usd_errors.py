@@ -1,0 +1,31 @@
+"""What USD says of a file that it cannot read, in one line for people."""
+
+from __future__ import annotations
+
+import re
+
+from pxr import Tf
+
+from manitwin.formats.printable import printable_line
+
+_SAID = re.compile(r"at line \d+ in file \S+ : '(.*?)\s*'\s*(?=\n\s*Error in|\Z)", re.DOTALL)
+"""How Tf writes an error: where in USD's own source it was raised, and what was said there."""
+_ITS_OWN_NAMES = re.compile(r"\bpxrInternal\w*::(?:\w+::)*")
+_PLACE = re.compile(r"^\S*:(\d+):\d+: ")
+_CHARACTERS = 160
+
+
+def cause_of(error: Tf.ErrorException) -> str:
+    """Return the first thing that USD said is wrong, with the line of the file where it says one; "" where it said nothing."""
+    said = [_ITS_OWN_NAMES.sub("", " ".join(each.split())) for each in _SAID.findall(str(error))]
+    if not said:
+        return ""
+    placed = next((each for each in said if _PLACE.match(each)), None)
+    line = said[0] if placed is None else _PLACE.sub(r"line \1: ", placed)
+    return printable_line(line, max_characters=_CHARACTERS)
+
+
+def broken(error: Tf.ErrorException) -> str:
+    """Return the cause of a refusal: that the USD is broken, and how."""
+    cause = cause_of(error)
+    return f"its USD is broken ({cause})" if cause else "its USD is broken"
