@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 import trimesh
 from PIL import Image
-from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
+from pxr import Sdf, Usd, UsdGeom, UsdPhysics
 
 from manitwin.assets import primitives
 from manitwin.assets.asset import CollisionShape
@@ -16,10 +17,11 @@ from manitwin.assets.asset_files import MAX_SHAPES
 from manitwin.assets.readers.usd_layers import LayerFiles
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.textures import DEFAULT_COLOR, bake_transform, decode_texture, make_part, pbr_material
+from manitwin.formats.meshes.textures import DEFAULT_COLOR, bake_transform, make_part, pbr_material
 from manitwin.formats.meshes.triangles import triangle_fans
-from manitwin.formats.meshes.usdz import mesh_parts, mesh_polygons
-from manitwin.formats.meshes.usdz_package import PreviewSurfaces, texture_of
+from manitwin.formats.meshes.usd_skin import Skeletons
+from manitwin.formats.meshes.usd_surfaces import PreviewSurfaces, UsdSurface, flat_colored
+from manitwin.formats.meshes.usdz import display_color, mesh_parts, mesh_polygons
 
 _MAX_SIZE_M = 1e6  # what is larger is no object, and its products overflow single precision
 _ALONG = {
@@ -35,6 +37,7 @@ class StageShapes:
     def __init__(self, stage: Usd.Stage, unit_m: float, surfaces: LayeredSurfaces, source: MeshSource):
         self._unit_m, self._surfaces, self._source = unit_m, surfaces, source
         self._transforms = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
+        self._skeletons = Skeletons(stage, source)
         self._faces = 0
         self.prims = self._all_prims(stage)
         self.gprims = [prim for prim in self.prims if self._is_shape(prim)]
@@ -106,8 +109,10 @@ class StageShapes:
 
     def _parts(self, prim: Usd.Prim) -> list[trimesh.Trimesh]:
         if prim.IsA(UsdGeom.Mesh):
-            return mesh_parts(UsdGeom.Mesh(prim), self._surfaces, self._source)
-        return [self._primitive(prim)]
+            return mesh_parts(UsdGeom.Mesh(prim), self._surfaces, self._skeletons, self._source)
+        solid = self._primitive(prim)
+        material = flat_colored(self._surfaces.of(prim), display_color(prim))
+        return [make_part(solid.vertices, solid.faces, material=material, name=prim.GetName())]
 
     def _primitive(self, prim: Usd.Prim) -> trimesh.Trimesh:
         """Return a cube, sphere, cylinder, capsule or cone as a mesh in its own axes and unit."""
@@ -201,19 +206,12 @@ class LayeredSurfaces(PreviewSurfaces):
 
     def __init__(self, layers: LayerFiles, source: MeshSource):
         self._layers, self._source = layers, source
-        self._materials = {}
+        self._materials: dict[str, UsdSurface] = {}
         self._images: dict[str, Image.Image | None] = {}
 
-    def _texture(self, reader: UsdShade.Shader) -> Image.Image | None:
-        named = texture_of(reader)
-        if named is None:
-            return None
-        layer, path = named
+    def _picture(self, layer: Sdf.Layer, path: str) -> Image.Image | None:
         key = f"{layer.identifier}:{path}"
-        if key not in self._images:
-            data = self._layers.texture(layer, path)
-            self._images[key] = None if data is None else decode_texture(data, path, self._source)
-        return self._images[key]
+        return self._decoded(key, path, partial(self._layers.texture, layer, path))
 
 
 def check_types(prim: Usd.Prim, source: MeshSource) -> None:

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 import trimesh
 from pxr import Tf, Usd, UsdGeom, UsdShade
-from trimesh.visual.material import PBRMaterial
 
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import bake_transform, color_by_corner, make_part
 from manitwin.formats.meshes.triangles import triangle_fans
-from manitwin.formats.meshes.usdz_package import PreviewSurfaces, UsdzArchive
+from manitwin.formats.meshes.usd_errors import broken
+from manitwin.formats.meshes.usd_skin import Skeletons, is_bound
+from manitwin.formats.meshes.usd_surfaces import PreviewSurfaces, UsdSurface
+from manitwin.formats.meshes.usdz_package import UsdzArchive
 
 _UV_NAMES = ("st", "st0", "st_0", "UVMap", "uv", "map1", "Texture_uv")
 
@@ -24,8 +26,8 @@ def read_usdz(
     """Read all visible meshes of a USDZ package: parts with transforms baked, unit in metres, up axis 'y' | 'z'.
 
     To be run in a process of its own: what was found, and the bytes that were read, come back too. A stage that does not say
-    its unit is in centimetres (USD's fallback), which is told as None. Raises InputError ``unreadable``, ``animated`` (skinned
-    meshes, value clips).
+    its unit is in centimetres (USD's fallback), which is told as None. Raises InputError ``unreadable``, ``animated`` (value
+    clips).
     """
     archive = UsdzArchive(source)
     if archive.root is None:
@@ -34,7 +36,7 @@ def read_usdz(
     try:
         parts, unit_m, up = _read(Usd.Stage.Open(str(source.path)), archive, source)
     except Tf.ErrorException as error:
-        raise source.unreadable("its USD is broken", "export it again") from error
+        raise source.unreadable(broken(error), "export it again") from error
     return parts, unit_m, up, source.findings, source.bytes_read
 
 
@@ -50,15 +52,11 @@ def _read(
 
 
 def _parts(stage: Usd.Stage, archive: UsdzArchive, source: MeshSource) -> list[trimesh.Trimesh]:
-    surfaces = PreviewSurfaces(archive, source)
+    surfaces, skeletons = PreviewSurfaces(archive, source), Skeletons(stage, source)
     transforms = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
     parts: list[trimesh.Trimesh] = []
     faces = 0
     for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)):
-        if prim.HasAPI("SkelBindingAPI") and prim.IsA(UsdGeom.Mesh):
-            raise source.refused(
-                "animated", "the mesh is bound to a skeleton", "apply the pose and export a still mesh"
-            )
         if not prim.IsA(UsdGeom.Mesh):
             drawn_for_people = UsdGeom.Imageable(prim).ComputePurpose() == UsdGeom.Tokens.guide  # as grasp lines are
             if not drawn_for_people and (prim.IsA(UsdGeom.Gprim) or prim.IsA(UsdGeom.PointInstancer)):
@@ -72,7 +70,7 @@ def _parts(stage: Usd.Stage, archive: UsdzArchive, source: MeshSource) -> list[t
             source.find("hidden, guide or proxy meshes in it were left out")
             continue
         matrix = np.array(transforms.GetLocalToWorldTransform(prim)).T  # USD multiplies rows
-        for part in mesh_parts(UsdGeom.Mesh(prim), surfaces, source):
+        for part in mesh_parts(UsdGeom.Mesh(prim), surfaces, skeletons, source):
             faces += len(part.faces)
             source.check_faces(faces)
             source.check_parts(len(parts) + 1)
@@ -80,12 +78,17 @@ def _parts(stage: Usd.Stage, archive: UsdzArchive, source: MeshSource) -> list[t
     return parts
 
 
-def mesh_parts(mesh: UsdGeom.Mesh, surfaces: PreviewSurfaces, source: MeshSource) -> list[trimesh.Trimesh]:
-    """Return a mesh prim as one part a material subset."""
+def mesh_parts(
+    mesh: UsdGeom.Mesh, surfaces: PreviewSurfaces, skeletons: Skeletons, source: MeshSource
+) -> list[trimesh.Trimesh]:
+    """Return a mesh prim as one part a material subset, as its skeleton holds it where it is bound to one."""
     polygons = mesh_polygons(mesh, source)
     if polygons is None or len(polygons[1]) == 0:
         return []
     points, sizes, indices = polygons
+    if is_bound(mesh.GetPrim()):
+        source.find("it is bound to a skeleton; it was taken in the first pose that the file holds")
+        points = skeletons.posed(mesh.GetPrim(), points)
     for attribute in (mesh.GetPointsAttr(), mesh.GetFaceVertexIndicesAttr()):
         if attribute.ValueMightBeTimeVarying():
             source.find("the file is animated; its first frame was taken")
@@ -93,24 +96,27 @@ def mesh_parts(mesh: UsdGeom.Mesh, surfaces: PreviewSurfaces, source: MeshSource
     corners, owner = triangle_fans(sizes)
     if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         corners = corners[:, ::-1]
-    uv = _uv(mesh, indices, len(points), len(sizes))
     colors = _display_colors(mesh, indices, sizes)
     parts = []
-    for material, chosen in _subsets(mesh, surfaces, len(sizes)):
+    for surface, chosen in _subsets(mesh, surfaces, len(sizes)):
         flat = corners[chosen[owner]].reshape(-1)
         if not len(flat):
             continue
+        uv = _uv(mesh, surface.uv_set, indices, len(points))
+        if uv is not None and surface.uv_change is not None:
+            with np.errstate(all="ignore"):  # what overflows, make_part takes for 0
+                uv = uv @ surface.uv_change[:2, :2].T + surface.uv_change[:2, 2]
         # corners that share a point and a texture coordinate share a vertex
         keys = [indices[flat].astype(np.float64)[:, None]] + ([] if uv is None else [uv[flat]])
         _, first, inverse = np.unique(np.hstack(keys), axis=0, return_index=True, return_inverse=True)
         part = make_part(
             points[indices[flat][first]],
             inverse.reshape(-1, 3),
-            material=material,
+            material=surface.material,
             name=mesh.GetPrim().GetName(),
             uv=None if uv is None else uv[flat][first],
         )
-        if colors is not None and material.name is None:
+        if colors is not None and surface.material.name is None:
             part = color_by_corner(part, colors[flat].reshape(-1, 3, 3), source)
         parts.append(part)
     return parts
@@ -132,8 +138,8 @@ def mesh_polygons(mesh: UsdGeom.Mesh, source: MeshSource) -> tuple[np.ndarray, n
     return points.reshape(-1, 3), sizes, indices
 
 
-def _subsets(mesh: UsdGeom.Mesh, surfaces: PreviewSurfaces, count: int) -> Iterator[tuple[PBRMaterial, np.ndarray]]:
-    """Yield every material of the mesh with a mask ``(count,)`` of its polygons."""
+def _subsets(mesh: UsdGeom.Mesh, surfaces: PreviewSurfaces, count: int) -> Iterator[tuple[UsdSurface, np.ndarray]]:
+    """Yield every surface of the mesh with a mask ``(count,)`` of its polygons."""
     rest = np.ones(count, dtype=bool)
     for subset in UsdGeom.Subset.GetGeomSubsets(mesh, UsdGeom.Tokens.face, UsdShade.Tokens.materialBind):
         chosen = np.zeros(count, dtype=bool)
@@ -145,10 +151,13 @@ def _subsets(mesh: UsdGeom.Mesh, surfaces: PreviewSurfaces, count: int) -> Itera
     yield surfaces.of(mesh.GetPrim()), rest
 
 
-def _uv(mesh: UsdGeom.Mesh, indices: np.ndarray, points: int, polygons: int) -> np.ndarray | None:
-    """Return texture coordinates by corner ``(C, 2)``, origin at the lower left as USD has it."""
+def _uv(mesh: UsdGeom.Mesh, wanted: str | None, indices: np.ndarray, points: int) -> np.ndarray | None:
+    """Return texture coordinates by corner ``(C, 2)``, origin at the lower left as USD has it.
+
+    ``wanted`` is the primvar that the material reads; where the mesh does not have it, the usual ones are looked up.
+    """
     api = UsdGeom.PrimvarsAPI(mesh)
-    named = [api.GetPrimvar(name) for name in _UV_NAMES]
+    named = [api.GetPrimvar(name) for name in (*((wanted,) if wanted else ()), *_UV_NAMES)]
     typed = [
         p for p in api.GetPrimvarsWithValues() if str(p.GetTypeName()) in ("texCoord2f[]", "texCoord2d[]", "float2[]")
     ]
@@ -163,14 +172,21 @@ def _uv(mesh: UsdGeom.Mesh, indices: np.ndarray, points: int, polygons: int) -> 
     return None
 
 
-def _display_colors(mesh: UsdGeom.Mesh, indices: np.ndarray, sizes: np.ndarray) -> np.ndarray | None:
-    """Return displayColor by corner ``(C, 3) uint8`` sRGB, or None."""
-    primvar = mesh.GetDisplayColorPrimvar()
+def display_color(prim: Usd.Prim) -> np.ndarray | None:
+    """Return the displayColor of a shape as ``(N, 3) uint8`` sRGB, None where it has none."""
+    primvar = UsdGeom.Gprim(prim).GetDisplayColorPrimvar()
     given = primvar.ComputeFlattened(Usd.TimeCode.EarliestTime()) if primvar and primvar.HasValue() else None
     linear = _rows(given, 3)
     if linear is None or len(linear) == 0:
         return None
-    colors = np.round(np.asarray(PreviewSurfaces.to_srgb(np.nan_to_num(linear))) * 255).astype(np.uint8)
+    return np.round(np.asarray(PreviewSurfaces.to_srgb(np.nan_to_num(linear))) * 255).astype(np.uint8)
+
+
+def _display_colors(mesh: UsdGeom.Mesh, indices: np.ndarray, sizes: np.ndarray) -> np.ndarray | None:
+    """Return displayColor by corner ``(C, 3) uint8`` sRGB, or None."""
+    primvar, colors = mesh.GetDisplayColorPrimvar(), display_color(mesh.GetPrim())
+    if colors is None:
+        return None
     if len(colors) == 1:
         return np.repeat(colors, len(indices), axis=0)
     if len(colors) == len(indices):
