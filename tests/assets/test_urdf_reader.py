@@ -380,3 +380,13 @@ def test_what_is_soft_in_pybullet_is_said_and_left_out(tmp_path: Path) -> None:
         read_asset(urdf(tmp_path, soft))
     asset = read_asset(urdf(tmp_path, f'{soft}<link name="l"><visual>{BOX_SHAPE}</visual></link>'))
     assert len(asset.visual) == 1 and "left out" in asset.remarks[0]
+
+
+@pytest.mark.parametrize("shape", ['<plane normal="0 0 1"/>', '<cdf filename="box.cdf"/>'])
+def test_collision_shapes_that_pybullet_alone_knows_are_left_out_with_a_remark(tmp_path: Path, shape: str) -> None:
+    seen = '<visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual>'
+    felt = f"<collision><geometry>{shape}</geometry></collision>"
+    (tmp_path / "box.urdf").write_text(f'<robot name="box"><link name="l">{seen}{felt}</link></robot>')
+    asset = read_asset(tmp_path / "box.urdf")
+    assert len(asset.visual) == 1 and not asset.collision
+    assert any("which PyBullet alone knows, and was left out" in each for each in asset.lenient)

@@ -378,3 +378,30 @@ def test_a_mesh_of_another_model_is_asked_for_with_the_folder_that_holds_it(tmp_
     mug().export(tmp_path / "models/digit/meshes/digit.stl")
     (together,) = import_assets([tmp_path / "models"], tmp_path / "out")
     assert together.error is None
+
+
+@pytest.mark.parametrize(
+    ("mass", "why"), [('<mass value="0"/>', "it is that of 0 kg"), ("", "there is no mass that it is of")]
+)
+def test_an_inertia_is_not_kept_without_a_mass(tmp_path: Path, mass: str, why: str) -> None:
+    """A body of 0 kg is PyBullet's for what is fixed, and its inertia a template's."""
+    said = f'<inertial>{mass}<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+    box = '<visual><geometry><box size="0.1 0.1 0.02"/></geometry></visual>'
+    (tmp_path / "tray.urdf").write_text(f'<robot name="tray"><link name="l">{said}{box}</link></robot>')
+    record, _ = imported(tmp_path / "tray.urdf", tmp_path / "out")
+    assert record.inertia_kg_m2 is None and record.mass_kg is None
+    assert f"inertia: {why}" in record.dropped
+
+
+def test_the_package_around_an_asset_is_named_where_its_meshes_are_not_there(tmp_path: Path) -> None:
+    """A package may be called otherwise than its folder, which a person cannot know from the name that is missing."""
+    seen = '<visual><geometry><mesh filename="package://shop_models/cups/cup.stl"/></geometry></visual>'
+    folder = tmp_path / "models" / "cups"
+    folder.mkdir(parents=True)
+    (tmp_path / "models" / "package.xml").write_text("<package><name>shop_models</name></package>")
+    (folder / "cup.urdf").write_text(f'<robot name="cup"><link name="l">{seen}</link></robot>')
+    (one,) = import_assets([folder], tmp_path / "out")
+    assert one.error is not None
+    assert one.error.endswith(
+        f"give the folder that holds 'shop_models' too; the package around it is {(tmp_path / 'models').resolve()}"
+    )

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from manitwin.assets.asset import Asset, Format
+from manitwin.assets.importers.collision_only import shown_by_what_collides
 from manitwin.assets.importers.record import asset_to_object, import_record, shown_parts
 from manitwin.assets.joints import Joints
 from manitwin.assets.read import detect, read_asset
@@ -25,6 +26,7 @@ def imported_files(asset: Asset) -> tuple[dict[str, bytes], ImportRecord]:
 
     ``asset.glb`` has the visual meshes in metres, Y up as glTF is; the same asset gives the same bytes.
     """
+    asset = shown_by_what_collides(asset)
     to_object = asset_to_object(asset)
     record = import_record(asset, to_object)
     # boxes and cylinders of a description have edges, and no normals that say so

@@ -37,6 +37,17 @@ def impossible_mass_properties(asset: Asset) -> dict[str, str]:
     return found
 
 
+def inertia_without_a_mass(inertial: Inertial) -> dict[str, str]:
+    """Return why an inertia is not kept, as ``impossible_mass_properties`` does, where no mass stands behind it.
+
+    A body of 0 kg is how PyBullet says that it is fixed, and its inertia a template's; without a mass, nothing scales one.
+    """
+    mass_kg = inertial.mass_kg
+    if inertial.inertia_kg_m2 is None or (mass_kg is not None and mass_kg > 0):
+        return {}
+    return {INERTIA: "there is no mass that it is of" if mass_kg is None else f"it is that of {mass_kg:g} kg"}
+
+
 def center_off_what_is_seen(center_m: np.ndarray, points_m: np.ndarray) -> str | None:
     """Return why a centre of mass ``(3,)`` cannot be that of the points ``(N, 3)`` that are seen; None where it can.
 

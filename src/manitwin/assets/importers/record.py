@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from typing import Any
 
@@ -15,11 +16,13 @@ from manitwin.assets.importers.dropped import (
     INERTIA,
     center_off_what_is_seen,
     impossible_mass_properties,
+    inertia_without_a_mass,
     left_out,
     without_placeholder_mass,
 )
 from manitwin.assets.importers.links import given_articulation
 from manitwin.assets.importers.telling_name import split_words, telling_name
+from manitwin.assets.root import PACKAGE_MARKS
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.source import PACKAGE_SCHEMES
 from manitwin.geometry.canonical_frame import object_frame
@@ -32,6 +35,7 @@ MAX_FRICTION = 10.0
 _UP_TO_Z = {"z": np.eye(3), "y": GLTF_TO_OBJECT[:3, :3]}
 _HEXADECIMAL = frozenset("0123456789abcdef")
 _MAX_TEXTS, _MAX_LETTERS, _MAX_POINTS = 64, 500, 64
+_MOST_ABOVE = 16
 _OFF_M = 1e-3  # a millimetre above the table an object falls, below it a simulator throws it out
 
 
@@ -60,7 +64,7 @@ def import_record(asset: Asset, to_object: np.ndarray) -> ImportRecord:
     asset, placeholder = without_placeholder_mass(asset)
     numbers, missing, dropped = _numbers(asset)
     dropped = placeholder + dropped
-    impossible = impossible_mass_properties(asset)
+    impossible = impossible_mass_properties(asset) | inertia_without_a_mass(asset.inertial)
     center = None if CENTER in impossible else asset.inertial.center_of_mass_m
     if center is not None and (why := center_off_what_is_seen(center, _shown_points(asset))) is not None:
         center, impossible[CENTER] = None, why
@@ -210,8 +214,18 @@ def _why(asset: Asset) -> str:
     lines: Iterator[str] = iter([*(f"{name} is missing" for name in asset.missing_files), *asset.remarks])
     first = next(lines, None)
     elsewhere = next((name for name in asset.missing_files if name.startswith(PACKAGE_SCHEMES)), None)
-    remedy = "" if elsewhere is None else f"; give the folder that holds {_package(elsewhere)!r} too"
-    return f" ({first}){remedy}" if first else ""
+    if elsewhere is not None:
+        remedy = f"; give the folder that holds {_package(elsewhere)!r} too{_where_a_package_is(asset)}"
+    else:
+        remedy = "; put it where its file says" if asset.missing_files else "; give it a shape that is seen or collides"
+    return f" ({first}){remedy}" if first else remedy
+
+
+def _where_a_package_is(asset: Asset) -> str:
+    """Return in words the nearest folder above an asset that holds a package, which may have another name than its folder."""
+    folders = itertools.islice(asset.path.resolve().parents, _MOST_ABOVE)
+    found = next((folder for folder in folders if any((folder / mark).is_file() for mark in PACKAGE_MARKS)), None)
+    return "" if found is None else f"; the package around it is {found}"
 
 
 def _package(name: str) -> str:

@@ -16,6 +16,7 @@ from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles
 from manitwin.assets.joints import Joints
 from manitwin.assets.licence_text import stated_licence, stated_or_none
 from manitwin.assets.read import is_file_below, only_file
+from manitwin.assets.readers.drake_friction import drake_friction
 from manitwin.assets.readers.joint_elements import sdf_joints
 from manitwin.assets.readers.sdf_links import chosen_links
 from manitwin.assets.readers.sdf_shapes import ModelFrames, SdfShapes, pose_of
@@ -229,11 +230,14 @@ def _of_link(opened: SdfModel, link: etree._Element) -> Inertial:
 
 
 def _declared_contact(opened: SdfModel) -> Contact:
-    """Return the friction of the first collision that says any: ``mu`` and ``mu2`` are two directions of one coefficient."""
+    """Return the friction of the first collision that says any: Drake's, or ``mu``, to which ``mu2`` is another direction."""
+    drake = drake_friction(opened.links, opened.files, opened.file.name)
     surfaces = [surface for link in opened.links for surface in link.findall("collision/surface")]
     said_mu = [(s, text) for s in surfaces if (text := text_of(s, "friction/ode/mu")) is not None]
     bounces = [text for s in surfaces if (text := text_of(s, "bounce/restitution_coefficient")) is not None]
     restitution = number(bounces[0], f"{opened.file.name}: restitution_coefficient") if bounces else None
+    if drake is not None:
+        return Contact(*drake, restitution)
     if not said_mu:  # PyBullet reads its <contact> of URDF in SDF too
         lateral = next((t for link in opened.links if (t := text_of(link, "contact/lateral_friction"))), None)
         friction = None if lateral is None else number(lateral, f"{opened.file.name}: lateral_friction")

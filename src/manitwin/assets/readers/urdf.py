@@ -17,6 +17,7 @@ from manitwin.assets.filled_hulls import filled_hulls
 from manitwin.assets.joints import Joints
 from manitwin.assets.licence_text import stated_licence
 from manitwin.assets.read import only_file
+from manitwin.assets.readers.drake_friction import drake_friction
 from manitwin.assets.readers.joint_elements import urdf_joints
 from manitwin.assets.readers.upright import Shapes, upright_shapes
 from manitwin.assets.readers.urdf_links import Placed, chosen_links
@@ -32,6 +33,8 @@ _TRIPLES = frozenset({"xyz", "rpy", "rgba", "size", "scale"})
 _AXES, _RGBA, _SOFT = 3, 4, "deformable"
 _WORLD = "world"
 """Drake and Gazebo know it without a <link>."""
+
+_OF_PYBULLET = ("plane", "cdf")
 
 _OF_SOME_LOADERS = ("spherical", "ball", "screw", "universal")
 """Joints of PyBullet and MuJoCo (the first) and Drake, which the specification does not have."""
@@ -87,6 +90,7 @@ def _as_loaders_take_it(root: etree._Element, files: AssetFiles, name: str) -> N
         if root.find("link") is None:
             raise AssetError(f"{name}: its only body, {said}, and only rigid ones are read from URDF")
         files.remark(f"{said} and was left out")
+    _leave_out_pybullets_shapes(root, files)
     for geometry in root.iter("geometry"):
         for foreign in [child for child in geometry.iterchildren("*") if etree.QName(child).namespace]:
             geometry.remove(foreign)
@@ -109,6 +113,15 @@ def _as_loaders_take_it(root: etree._Element, files: AssetFiles, name: str) -> N
         for key in _TRIPLES.intersection(element.attrib):  # "0.1, 0, 0.2" is read as three numbers
             element.set(key, element.get(key).replace(",", " "))
     _add_absent_parents(root, files)
+
+
+def _leave_out_pybullets_shapes(root: etree._Element, files: AssetFiles) -> None:
+    """Leave out what only PyBullet collides with: a plane without an end, and a distance field in a file."""
+    for collision in [*root.iter("collision")]:
+        shapes = [shape for name in _OF_PYBULLET for shape in collision.iterfind(f"geometry/{name}")]
+        if shapes:
+            collision.getparent().remove(collision)
+            files.took_leniently(f"a <collision> is <{shapes[0].tag}>, which PyBullet alone knows, and was left out")
 
 
 def _leave_its_namespace(root: etree._Element) -> None:
@@ -222,11 +235,14 @@ def declared_inertial(links: tuple[tuple[etree._Element, np.ndarray], ...]) -> I
 
 
 def _declared_contact(found: UrdfObject) -> Contact:
-    """Return the first of PyBullet's <contact>, a <gazebo> in a collision, and a <gazebo reference>.
+    """Return the first of Drake's friction, PyBullet's <contact>, a <gazebo> in a collision, and a <gazebo reference>.
 
     PyBullet's lateral_friction is the one coefficient of a body, sticking or sliding. Gazebo's mu1 and mu2 are two
     directions of one coefficient (SDF specification, friction/ode): the first is taken, with a remark where they differ.
     """
+    drake = drake_friction((link for link, _ in found.links), found.files, found.file.name)
+    if drake is not None:
+        return Contact(*drake)
     for link, _ in found.links:
         contact = link.find("contact")
         if contact is not None:

@@ -1,0 +1,38 @@
+"""The friction that Drake's elements of collision shapes say, in URDF and SDF."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from lxml import etree  # type: ignore[import-untyped]
+
+from manitwin.assets.asset_files import AssetFiles
+from manitwin.formats.xml_file import number
+
+_STATIC, _DYNAMIC = "mu_static", "mu_dynamic"
+
+
+def drake_friction(links: Iterable[etree._Element], files: AssetFiles, name: str) -> tuple[float, float] | None:
+    """Return the static and the dynamic friction of the first collision of links that says any, None where none does.
+
+    One of the two alone is both. Source: Drake, parsing of ``drake:proximity_properties`` (``drake:mu_static``,
+    ``drake:mu_dynamic``), which go before what else a file says. ``name`` is the file's, for errors.
+    """
+    found: list[tuple[float, float]] = []
+    for collision in (shape for link in links for shape in link.findall("collision")):
+        said = {
+            etree.QName(each).localname: number(
+                each.get("value") or each.text, f"{name}: {etree.QName(each).localname}"
+            )
+            for each in collision.iterfind("{*}proximity_properties/{*}*")
+            if etree.QName(each).localname in (_STATIC, _DYNAMIC)
+        }
+        if said:
+            one = next(iter(said.values()))
+            found.append((said.get(_STATIC, one), said.get(_DYNAMIC, one)))
+    if not found:
+        return None
+    dynamic = [each[1] for each in found]
+    if max(dynamic) > min(dynamic):
+        files.remark(f"its collisions have frictions from {min(dynamic):g} to {max(dynamic):g}; the first was taken")
+    return found[0]
