@@ -382,6 +382,26 @@ def test_what_is_soft_in_pybullet_is_said_and_left_out(tmp_path: Path) -> None:
     assert len(asset.visual) == 1 and "left out" in asset.remarks[0]
 
 
+@pytest.mark.parametrize("turned", [True, False])
+def test_gltf_of_an_arm_stands_as_its_links_collide_and_not_as_its_whole_reach(tmp_path: Path, turned: bool) -> None:
+    """Two rods that collide as they stand, and a third, far out, whose one ball says nothing and makes the whole's box."""
+    rod = trimesh.creation.box([0.1, 0.1, 1.0])  # along Z here, which the file has as Y
+    (tmp_path / "rod.glb").write_bytes(
+        write_glb([make_part(rod.vertices, rod.faces, material=pbr_material(), name="rod")])
+    )
+    seen = '<visual><geometry><mesh filename="rod.glb"/></geometry></visual>'
+    felt = f'<collision><geometry><box size="{"0.1 0.1 1" if turned else "0.1 1 0.1"}"/></geometry></collision>'
+    ball = '<collision><origin xyz="0 0 3"/><geometry><sphere radius="{}"/></geometry></collision>'
+    far = ball.format(0.4) if not turned else ball.format(0.4).replace("0 0 3", "0 3 0")
+    links = f'<link name="a">{seen}{felt}</link><link name="b">{seen}{felt}</link><link name="c">{seen}{far}</link>'
+    joints = "".join(
+        f'<joint name="j{n}" type="fixed"><parent link="{p}"/><child link="{n}"/><origin xyz="1 0 0"/></joint>'
+        for p, n in (("a", "b"), ("b", "c"))
+    )
+    asset = read_asset(urdf(tmp_path, links + joints))
+    assert any("glTF meshes were turned" in remark for remark in asset.remarks) == turned
+
+
 @pytest.mark.parametrize("shape", ['<plane normal="0 0 1"/>', '<cdf filename="box.cdf"/>'])
 def test_collision_shapes_that_pybullet_alone_knows_are_left_out_with_a_remark(tmp_path: Path, shape: str) -> None:
     seen = '<visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual>'

@@ -123,15 +123,16 @@ def _main_files(uri: str, file: Path, files: AssetFiles) -> Iterator[Path]:
 
 def asset_of(opened: SdfModel, path: Path) -> Asset:
     """Return the asset that an SDF's elements describe; raises AssetError."""
-    owners: list[int] = []
 
-    def shapes(turn: bool) -> Shapes:
-        read = SdfShapes(opened.file, opened.frames, opened.files, turn_gltf=turn)
-        visual, collision = read.all(opened.links)
-        owners[:] = read.owners
-        return visual, collision
+    def shapes(turn: bool) -> list[Shapes]:
+        return SdfShapes(opened.file, opened.frames, opened.files, turn_gltf=turn).by_link(opened.links)
 
-    visual, collision = upright_shapes(shapes, opened.files)
+    by_link = upright_shapes(shapes, opened.files)
+    owners = [place for place, (parts, _) in enumerate(by_link) for _ in parts]
+    visual, collision = (
+        [part for parts, _ in by_link for part in parts],
+        [shape for _, some in by_link for shape in some],
+    )
     if not visual and not collision and not opened.files.missing:
         terrain = any(link.find(".//heightmap") is not None for link in opened.links)
         raise AssetError(

@@ -105,17 +105,15 @@ class SdfShapes:
 
     def __init__(self, file: Path, frames: ModelFrames, files: AssetFiles, *, turn_gltf: bool = False):
         self._file, self._frames, self._files, self._turn_gltf = file, frames, files, turn_gltf
-        self.owners: list[int] = []
         self._looks = ScriptedLooks(files, self._candidates)
         self._nodes: dict[Path, dict[str, frozenset[str]]] = {}
 
-    def all(self, links: Iterable[etree._Element]) -> tuple[list[trimesh.Trimesh], list[CollisionShape]]:
-        """Return the visual parts and the collision shapes of links; ``owners`` then has the place of each visual part's link."""
+    def by_link(self, links: Iterable[etree._Element]) -> list[tuple[list[trimesh.Trimesh], list[CollisionShape]]]:
+        """Return the visual parts and the collision shapes of each link."""
         placed = list(links)
-        owned = [(place, part) for place, link in enumerate(placed) for part in self.visual(link)]
+        seen = [list(self.visual(link)) for link in placed]
         self._looks.remark_absent()
-        self.owners, visual = [place for place, _ in owned], [part for _, part in owned]
-        return visual, [shape for link in placed for shape in self.collision(link)]
+        return [(parts, list(self.collision(link))) for link, parts in zip(placed, seen, strict=True)]
 
     def visual(self, link: etree._Element) -> Iterator[trimesh.Trimesh]:
         """Yield a link's visual parts in the model's frame."""

@@ -15,17 +15,18 @@ Y_UP_FORMATS = ("glb", "gltf")
 _SAME_M = 1e-6
 
 
-def upright_shapes(read: Callable[[bool], Shapes], files: AssetFiles) -> Shapes:
-    """Return the visual parts and collision shapes that ``read`` gives, those of glTF files turned where they fit so.
+def upright_shapes(read: Callable[[bool], list[Shapes]], files: AssetFiles) -> list[Shapes]:
+    """Return the visual parts and collision shapes of each link that ``read`` gives, those of glTF turned where they fit so.
 
     ``read`` is told whether to turn them. Drake and Gazebo do, as the format has Y up; SAPIEN does not. What collides tells which
-    of the two a file was made for, where that is no glTF too; else it is turned.
+    of the two a file was made for, where that is no glTF too; else it is turned. Each link is compared for itself: of a robot as
+    a whole, one link that reaches far says all, and its collision shapes may be balls.
     """
     as_written = read(False)
     if not any(file.suffix.lower().lstrip(".") in Y_UP_FORMATS for file in files.used):
         return as_written
     turned = read(True)
-    if _apart_m(*turned) > _apart_m(*as_written) + _SAME_M:
+    if sum(_apart_m(*link) for link in turned) > sum(_apart_m(*link) for link in as_written) + _SAME_M:
         return as_written
     files.remark("its glTF meshes were turned from Y up to Z up, as Drake and Gazebo do and SAPIEN does not")
     return turned

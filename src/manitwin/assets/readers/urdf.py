@@ -158,15 +158,17 @@ def _add_absent_parents(root: etree._Element, files: AssetFiles) -> None:
 
 def asset_of(found: UrdfObject, path: Path, contact: Contact | None = None) -> Asset:
     """Return the asset that a URDF's elements describe; ``contact`` stands in for what they say of friction."""
-    owners: list[int] = []
 
-    def shapes(turn: bool) -> Shapes:
+    def shapes(turn: bool) -> list[Shapes]:
         read = LinkShapes(found.tree, found.file, found.files, turn_gltf=turn)
-        by_link = [read.all([link]) for link in found.links]
-        owners[:] = [place for place, (parts, _) in enumerate(by_link) for _ in parts]
-        return [part for parts, _ in by_link for part in parts], [shape for _, some in by_link for shape in some]
+        return [read.all([link]) for link in found.links]
 
-    visual, collision = upright_shapes(shapes, found.files)
+    by_link = upright_shapes(shapes, found.files)
+    owners = [place for place, (parts, _) in enumerate(by_link) for _ in parts]
+    visual, collision = (
+        [part for parts, _ in by_link for part in parts],
+        [shape for _, some in by_link for shape in some],
+    )
     if not visual and not collision and not found.files.missing:
         raise found.tree.refuse("", "no link of it has a shape", "give it a visual or a collision shape")
     licence, attribution = stated_licence(comments_before(found.tree.element))
