@@ -114,3 +114,32 @@ def test_one_normal_of_what_is_flat_is_kept(tmp_path: Path) -> None:
     (tmp_path / "sheet.obj").write_text("\n".join(lines))
     mesh = read_mesh(tmp_path / "sheet.obj")
     assert mesh.findings == [] and mesh.parts[0].vertex_normals[0][1] > 0.04
+
+
+BROKEN_NUMBERS = ("0 0 0 1 0 0 1 1 0 0 1 0", "0,5 0 0 1 0 0 1 1 0 0 1 0")
+"""Written where a comma is the decimal sign."""
+
+
+def test_a_document_of_broken_shapes_alone_says_what_is_broken(tmp_path: Path) -> None:
+    (tmp_path / "a.dae").write_text(DOCUMENT.format(texture="", nodes="", extra="").replace(*BROKEN_NUMBERS))
+    with pytest.raises(
+        InputError, match=r"no_faces: a\.dae: .*, as its COLLADA is broken \(Corrupted float array\); export"
+    ):
+        read_mesh(tmp_path / "a.dae")
+
+
+def test_broken_shapes_beside_whole_ones_are_told(tmp_path: Path) -> None:
+    whole = DOCUMENT.format(texture="", nodes="", extra='<node id="o"><instance_geometry url="#h"/></node>')
+    geometry = whole[whole.index("<geometry id") : whole.index("</library_geometries>")]
+    other = geometry.replace(*BROKEN_NUMBERS).replace('id="', 'id="h').replace('="#', '="#h').replace('"hg"', '"h"')
+    (tmp_path / "a.dae").write_text(whole.replace("</library_geometries>", f"{other}</library_geometries>"))
+    mesh = read_mesh(tmp_path / "a.dae")
+    assert len(mesh.parts) == 1
+    assert any(each.startswith("broken shapes or nodes in it were left out (") for each in mesh.findings)
+
+
+def test_a_texture_without_a_file_is_told_and_its_material_grey(tmp_path: Path) -> None:
+    (tmp_path / "a.dae").write_text(DOCUMENT.format(texture="", nodes="", extra=""))
+    mesh = read_mesh(tmp_path / "a.dae")
+    assert mesh.findings == ["a material names a texture without a file; carried on without it"]
+    assert mesh.parts[0].visual.material.baseColorTexture is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from functools import partial
 from typing import Any
 
@@ -29,6 +30,12 @@ from manitwin.formats.xml_file import parse_xml
 _REMEDY = "export it again, or as glTF 2.0"
 _MAX_BYTES = 512 << 20
 _MAX_NODES = 8_000_000
+_NOT_FOUND = "Geometry #"
+"""What a node says of a shape that was left out before, whose own cause tells more."""
+_OF_SHAPES = re.compile(
+    r"Corrupted (?!color)|Failed to parse \w+ transform|Geometry #|.*\b(?:triangles|polylist|polygons)\b"
+)
+"""How pycollada tells what it could not read of shapes and nodes, and not of materials, lights and cameras."""
 _END_OF_ARCHIVE = b"PK\x05\x06"
 
 
@@ -48,6 +55,7 @@ def read_dae(source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None, s
         document = _without_broken_materials(_document(data), data, source)
         with np.errstate(all="ignore"):  # what overflows is found where vertices are checked
             parts = _parts(document, source)
+        _tell_of_lost_shapes(document, parts, source)
     except collada.common.DaeError as error:
         raise source.unreadable(f"its COLLADA is broken ({str(error)[:100]})", _REMEDY) from error
     return parts, unit_m, up
@@ -80,6 +88,17 @@ def _without_broken_materials(document: Any, data: bytes, source: MeshSource) ->
         each.getparent().remove(each)
     source.find("materials in it are broken, and what has them is grey")
     return _document(etree.tostring(root))
+
+
+def _tell_of_lost_shapes(document: Any, parts: list[trimesh.Trimesh], source: MeshSource) -> None:
+    """Note the shapes and nodes that pycollada leaves out as broken, with the first cause; raises InputError without any left."""
+    said = [str(each).rpartition(f"{type(each).__name__}: ")[2] for each in document.errors]
+    lost = sorted((each for each in said if _OF_SHAPES.match(each)), key=lambda each: each.startswith(_NOT_FOUND))
+    if lost and not parts:
+        cause = f"it has no faces that can be read, as its COLLADA is broken ({lost[0][:100]})"
+        raise source.refused("no_faces", cause, _REMEDY)
+    if lost:
+        source.find(f"broken shapes or nodes in it were left out ({lost[0][:100]})")
 
 
 def _check_size(data: bytes, source: MeshSource) -> None:
@@ -187,7 +206,10 @@ def _material(material: Any, textures: dict[str, Image.Image | None], source: Me
     texture: Image.Image | None = None
     color: tuple[float, ...] = (1.0, 1.0, 1.0)
     if isinstance(effect.diffuse, collada.material.Map):
-        path = effect.diffuse.sampler.surface.image.path
+        path = effect.diffuse.sampler.surface.image.path or ""
+        if not path:
+            source.find("a material names a texture without a file; carried on without it")
+            textures[path] = None
         if path not in textures:
             data = source.sibling(path.removeprefix("./"), "texture")
             textures[path] = None if data is None else decode_texture(data, path, source)

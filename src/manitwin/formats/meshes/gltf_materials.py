@@ -96,6 +96,12 @@ class GltfMaterials:
         )
 
 
+def texture_coordinates(info: dict[str, Any]) -> Any:
+    """Return the number of the set of texture coordinates that a textureInfo names; KHR_texture_transform may name another."""
+    change = info.get("extensions", {}).get("KHR_texture_transform") or {}
+    return change.get("texCoord", info.get("texCoord", 0))
+
+
 def transformed_uv(uv: np.ndarray, info: dict[str, Any]) -> np.ndarray:
     """Apply KHR_texture_transform to texture coordinates ``(V, 2)`` in glTF's frame (origin at the upper left)."""
     change = info.get("extensions", {}).get("KHR_texture_transform")

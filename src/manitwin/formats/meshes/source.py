@@ -190,7 +190,10 @@ class MeshSource:
         except MemoryError as error:
             raise self.too_large("it asks for more memory than there is") from error
         except _BROKEN as error:
-            cause = f"its {format} is broken ({type(error).__name__}: {str(error)[:80]})"
+            said = f"{type(error).__name__}: {str(error)[:80]}"
+            if isinstance(error, KeyError) and error.args:  # an attribute or an entry that the format wants
+                said = f"{str(error.args[0])[:60]!r} is not there"
+            cause = f"its {format} is broken ({said})"
             raise self.unreadable(cause, "export it again") from error
 
     def _read(self, found: Path, inside: Path) -> bytes:
