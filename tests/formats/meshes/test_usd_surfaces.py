@@ -187,3 +187,22 @@ def test_display_colours_are_linear(tmp_path: Path) -> None:
     shape = 'def Cone "shape"\n{\n color3f[] primvars:displayColor = [(0.25, 0.25, 0.25)]\n}\n'
     shown = 255 * linear_to_srgb(np.array(factor(stage(tmp_path, shape))[:3]) / 255)
     np.testing.assert_allclose(shown, 255 * linear_to_srgb(np.full(3, 0.25)), atol=1.5)
+
+
+@pytest.mark.parametrize("start", ["/home/ada/shop/", "C:\\shop\\", "omniverse://server/shop/"])
+def test_a_texture_of_another_machine_is_read_from_beside_the_layer(tmp_path: Path, start: str) -> None:
+    (tmp_path / "Materials").mkdir()
+    Image.new("RGB", (2, 2), (9, 8, 7)).save(tmp_path / "Materials" / "skin.png")
+    written = f"asset inputs:diffuse_texture = @{start}Materials/skin.png@"
+    asset = stage(tmp_path, SQUARE, OMNI, inputs=written)
+    assert material_of(asset.visual[0]).baseColorTexture.getpixel((0, 0)) == (9, 8, 7)
+    assert "textures are not where it says, and were read from beside it, such as skin.png" in asset.remarks
+    (tmp_path / "Materials" / "skin.png").unlink()
+    asset = stage(tmp_path, SQUARE, OMNI, inputs=written)
+    assert material_of(asset.visual[0]).baseColorTexture is None
+    assert any(each.endswith("lies outside the asset's folder; it was not followed") for each in asset.remarks)
+
+
+def test_a_reference_within_a_layer_is_nothing_to_remark(tmp_path: Path) -> None:
+    asset = stage(tmp_path, 'def Cube "shape"\n{\n}', 'def "other" (\n references = </thing/shape>\n)\n{\n}')
+    assert len(asset.visual) == 2 and not any("not followed" in each for each in asset.remarks)

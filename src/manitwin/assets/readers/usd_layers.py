@@ -23,6 +23,9 @@ _MAX_LAYERS = 1_000
 MAX_PRIMS = 100_000
 _MAX_DEPTH = 300
 _HEAD_BYTES = 4096
+_OF_A_MACHINE = re.compile(r"[/\\~]|\w+:")
+"""How a path begins that leads from the root of a file system, a drive or a server: those of whoever made the file."""
+_MOST_PARTS = 16
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,8 @@ class LayerFiles:
 
     def texture(self, layer: Sdf.Layer, name: str) -> bytes | None:
         """Return the file that ``layer`` names as a texture, or None with a finding."""
-        place = self._locate(self._places[layer.identifier], name, "texture")
+        base = self._places[layer.identifier]
+        place = self._moved(base, name) or self._locate(base, name, "texture")
         if place is None:
             return None
         if place.member is not None:
@@ -113,6 +117,8 @@ class LayerFiles:
         """Point a layer at the copies of those that it names; returns where the new ones are."""
         opened = []
         for named in layer.GetCompositionAssetDependencies():
+            if not named:  # a reference to a prim of this layer
+                continue
             target = self._locate(place, named, "layer")
             known = target in self._layers
             copy = None if target is None else self._open_named(target, named)
@@ -152,9 +158,22 @@ class LayerFiles:
                 and (what != "layer" or file.suffix.lower() in _LAYERS)
             ):
                 return self._inside_package(file) if what == "layer" else Place(file)
-        self._source.find(
-            f"{what} {name[:80]!r} lies outside the asset's folder, or is no USD layer; it was not followed"
-        )
+        kind = ", or is no USD layer" if what == "layer" else ""
+        self._source.find(f"{what} {name[:80]!r} lies outside the asset's folder{kind}; it was not followed")
+        return None
+
+    def _moved(self, base: Place, name: str) -> Place | None:
+        """Return the file that a texture of another machine is here: by as much of its path's end as there is by the layer."""
+        if base.member is not None or _OF_A_MACHINE.match(name) is None:
+            return None
+        parts = [part for part in name.replace("\\", "/").split("/") if part not in ("", ".", "..")][-_MOST_PARTS:]
+        for first in range(len(parts)):
+            file = _resolved(base.file.parent.joinpath(*parts[first:]))
+            if file is not None and file.is_relative_to(self._root) and file.is_file():
+                self._source.find(
+                    f"textures are not where it says, and were read from beside it, such as {file.name[:80]}"
+                )
+                return Place(file)
         return None
 
     def _inside_package(self, file: Path) -> Place:
