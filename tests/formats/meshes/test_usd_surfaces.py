@@ -206,3 +206,25 @@ def test_a_texture_of_another_machine_is_read_from_beside_the_layer(tmp_path: Pa
 def test_a_reference_within_a_layer_is_nothing_to_remark(tmp_path: Path) -> None:
     asset = stage(tmp_path, 'def Cube "shape"\n{\n}', 'def "other" (\n references = </thing/shape>\n)\n{\n}')
     assert len(asset.visual) == 2 and not any("not followed" in each for each in asset.remarks)
+
+
+@pytest.mark.parametrize(
+    "inputs",
+    [
+        'string inputs:diffuse_tint = "red"; string inputs:metallic_constant = "much"; token inputs:texture_scale = "x"',
+        "float inputs:diffuse_color_constant = 1; color3f inputs:opacity_constant = (1, 1, 1); bool inputs:enable_opacity = 1",
+        "color3f inputs:diffuse_color_constant = (nan, inf, 0); float[] inputs:reflection_roughness_constant = []",
+        'string inputs:diffuse_texture = "skin.png"; asset inputs:base_color = @@; matrix4d inputs:diffuse_tint',
+    ],
+)
+def test_inputs_of_a_wrong_type_say_nothing(tmp_path: Path, inputs: str) -> None:
+    (part,) = stage(tmp_path, CUBE, OMNI, inputs=inputs).visual
+    assert np.isfinite(material_of(part).baseColorFactor).all()
+    wrong = 'string inputs:metallic = "x"; float inputs:roughness = nan; token inputs:opacityThreshold = "y"'
+    plain = PREVIEW.replace(
+        "color3f inputs:diffuseColor.connect = </thing/skin/picture.outputs:rgb>", "int inputs:diffuseColor = 1"
+    )
+    material = material_of(stage(tmp_path, CUBE, plain, inputs=wrong).visual[0])
+    assert (material.metallicFactor, material.roughnessFactor) == (0, 0.5)
+    turned = PREVIEW.replace("float2 inputs:scale = (2, 3)", 'string inputs:scale = "2"')
+    assert stage(tmp_path, SQUARE, turned).visual[0].faces.shape == (2, 3)

@@ -33,7 +33,7 @@ class Skeletons:
         """
         try:
             moved = self._moved(prim, points)
-        except (Tf.ErrorException, ValueError) as error:
+        except (Tf.ErrorException, ValueError, TypeError) as error:
             raise self._broken(prim) from error
         if moved is None or moved.shape != points.shape:
             raise self._broken(prim)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import posixpath
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -22,16 +22,25 @@ from manitwin.formats.meshes.textures import (
     pbr_material,
     srgb_to_linear,
 )
+from manitwin.formats.meshes.usd_shaders import (
+    asset_of,
+    first_number,
+    kind_of,
+    numbers_of,
+    placing,
+    same_picture,
+    shaders_of,
+    tint_of,
+    upstream,
+    value_of,
+)
 from manitwin.formats.meshes.usdz_package import UsdzArchive
 
 PREVIEW = "UsdPreviewSurface"
-_CONTEXTS = ("", "mdl", "mtlx")
-"""A material's universal output, and those of renderers, which are looked at where that is not read."""
 _COLORS = ("diffuse_color_constant", "base_color", "diffuseColor", "diffuse_reflection_color", "diffuse_color")
 """Base colours of OmniPBR, of MaterialX's standard_surface, open_pbr_surface and gltf_pbr, its UsdPreviewSurface, OmniSurface."""
 _OMNI_PBR, _OMNI_TEXTURE, _OMNI_COLOR = "OmniPBR", "diffuse_texture", (0.2, 0.2, 0.2)
 """Omniverse's usual material, in MDL: how its kinds begin, the texture of its base colour, and that colour where none is said."""
-_MOST_UPSTREAM = 32
 
 
 @dataclass(frozen=True)
@@ -67,15 +76,15 @@ class PreviewSurfaces:
 
     def _build(self, material: UsdShade.Material) -> UsdSurface:
         name = material.GetPrim().GetName()
-        shaders = [shader for shader in _shaders(material) if shader]
+        shaders = list(shaders_of(material))
         preview = next((shader for shader in shaders if shader.GetIdAttr().Get() == PREVIEW), None)
         if preview is not None:
             return self._preview(name, preview)
         for shader in shaders:
             colors = [shader.GetInput(each) for each in _COLORS if shader.GetInput(each)]
-            if colors or _kind_of(shader).startswith(_OMNI_PBR) or _asset_of(shader.GetInput(_OMNI_TEXTURE)):
+            if colors or kind_of(shader).startswith(_OMNI_PBR) or asset_of(shader.GetInput(_OMNI_TEXTURE)):
                 return self._other(name, shader, colors[0] if colors else None)
-        kinds = ", ".join(kind for shader in shaders if (kind := _kind_of(shader)))
+        kinds = ", ".join(kind for shader in shaders if (kind := kind_of(shader)))
         self._source.find(f"material {name!r} is no UsdPreviewSurface{f' ({kinds})' if kinds else ''}; shown grey")
         return UsdSurface(pbr_material(name, base_color=DEFAULT_COLOR))
 
@@ -87,12 +96,12 @@ class PreviewSurfaces:
         opacity, _, opacity_reader = self._input(shader, "opacity", 1.0, "a")
         packed = _packed(metallic_map, roughness_map, metallic, roughness)
         alpha = float(opacity) if 0 < float(opacity) < 1 else 1.0
-        cut_out = texture is not None and texture.mode == "RGBA" and _same_picture(reader, opacity_reader)
-        threshold = float(_value_of(shader.GetInput("opacityThreshold"), 0.0))
+        cut_out = texture is not None and texture.mode == "RGBA" and same_picture(reader, opacity_reader)
+        threshold = first_number(shader, 0.0, "opacityThreshold")
         see_through = "BLEND" if alpha < 1 else None
         if cut_out:
             see_through = "MASK" if 0 < threshold < 1 else "BLEND"
-        tint = tuple(color) if texture is None else _tint_of(reader)
+        tint = tuple(color) if texture is None else tint_of(reader)
         return UsdSurface(
             pbr_material(
                 name,
@@ -105,7 +114,7 @@ class PreviewSurfaces:
                 alpha_mode=see_through,
                 alpha_cutoff=threshold if see_through == "MASK" else None,
             ),
-            *(_placing(reader) if texture is not None else (None, None)),
+            *(placing(reader) if texture is not None else (None, None)),
         )
 
     def _other(self, name: str, shader: UsdShade.Shader, socket: UsdShade.Input | None) -> UsdSurface:
@@ -114,34 +123,27 @@ class PreviewSurfaces:
         Source: NVIDIA's OmniPBR.mdl: a texture takes the place of the constant colour, a tint goes over both.
         """
         color, texture = (_OMNI_COLOR, None) if socket is None else self._color_of(socket)
-        named = _asset_of(shader.GetInput(_OMNI_TEXTURE))
+        named = asset_of(shader.GetInput(_OMNI_TEXTURE))
         if named is not None:
             texture = self._picture(*named)
             color = (1.0, 1.0, 1.0) if texture is not None else color_of_lost_texture(color)
-        tint = _value_of(shader.GetInput("diffuse_tint"), (1.0, 1.0, 1.0))
-        share = float(_value_of(shader.GetInput("base"), 1.0))  # standard_surface: the weight of its base colour
-        metallic, roughness = (
-            next((value for each in names if (value := _value_of(shader.GetInput(each), None)) is not None), default)
-            for names, default in (
-                (("metallic_constant", "metallic", "metalness", "base_metalness"), 0.0),
-                (("reflection_roughness_constant", "roughness", "specular_roughness"), 0.5),
-            )
-        )
-        scale = np.asarray(_value_of(shader.GetInput("texture_scale"), (1.0, 1.0)), float)
-        shift = np.asarray(_value_of(shader.GetInput("texture_translate"), (0.0, 0.0)), float)
-        if _value_of(shader.GetInput("texture_rotate"), 0.0):
+        tint = numbers_of(value_of(shader.GetInput("diffuse_tint")), (1.0, 1.0, 1.0))
+        share = first_number(shader, 1.0, "base")  # standard_surface: the weight of its base colour
+        scale = numbers_of(value_of(shader.GetInput("texture_scale")), (1.0, 1.0))
+        shift = numbers_of(value_of(shader.GetInput("texture_translate")), (0.0, 0.0))
+        if first_number(shader, 0.0, "texture_rotate"):
             self._source.find(f"material {name!r} turns its texture, which was not followed")
         change = np.array([[scale[0], 0, shift[0]], [0, scale[1], shift[1]], [0, 0, 1.0]])
-        normals = _asset_of(shader.GetInput("normalmap_texture"))
-        clear = _value_of(shader.GetInput("enable_opacity"), False)
-        opacity = float(_value_of(shader.GetInput("opacity_constant"), 1.0)) if clear else 1.0
+        normals = asset_of(shader.GetInput("normalmap_texture"))
+        clear = value_of(shader.GetInput("enable_opacity"))
+        opacity = first_number(shader, 1.0, "opacity_constant") if clear else 1.0
         alpha = opacity if 0 < opacity < 1 else 1.0
         material = pbr_material(
             name,
-            base_color=(*(np.asarray(color, float)[:3] * np.asarray(tint, float)[:3] * share), alpha),
+            base_color=(*(np.array(color[:3]) * np.array(tint) * share), alpha),
             alpha_mode="BLEND" if alpha < 1 else None,
-            metallic=float(metallic),
-            roughness=float(roughness),
+            metallic=first_number(shader, 0.0, "metallic_constant", "metallic", "metalness", "base_metalness"),
+            roughness=first_number(shader, 0.5, "reflection_roughness_constant", "roughness", "specular_roughness"),
             base_color_texture=texture,
             normal_texture=None if normals is None else self._picture(*normals),
         )
@@ -149,11 +151,11 @@ class PreviewSurfaces:
 
     def _color_of(self, socket: UsdShade.Input) -> tuple[tuple[float, ...], Image.Image | None]:
         """Return an input's colour, or the picture that the nodes before it read."""
+        color = numbers_of(value_of(socket), ())
+        if len(color) >= len(DEFAULT_COLOR):
+            return color[: len(DEFAULT_COLOR)], None
         attributes = socket.GetValueProducingAttributes()
-        value = attributes[0].Get() if attributes else None
-        if value is not None and not isinstance(value, Sdf.AssetPath | str):
-            return tuple(float(each) for each in value), None
-        named = next((found for shader in _upstream(attributes) if (found := _asset_of(shader.GetInput("file")))), None)
+        named = next((found for shader in upstream(attributes) if (found := asset_of(shader.GetInput("file")))), None)
         texture = None if named is None else self._picture(*named)
         if texture is None:
             self._source.find(
@@ -179,11 +181,12 @@ class PreviewSurfaces:
                 return default, bands[place] if 0 <= place < len(bands) else bands[0], producer
             lost = image is None and channel == "rgb"
             return (color_of_lost_texture(default) if lost else default), image, producer
-        value = attributes[0].Get() if attributes else socket.Get()
-        return (default if value is None else value), None, None
+        constant = default if isinstance(default, tuple) else (default,)
+        given = numbers_of(value_of(socket), constant)
+        return (given if isinstance(default, tuple) else given[0]), None, None
 
     def _texture(self, reader: UsdShade.Shader) -> Image.Image | None:
-        named = _asset_of(reader.GetInput("file"))
+        named = asset_of(reader.GetInput("file"))
         return None if named is None else self._picture(*named)
 
     def _picture(self, layer: Sdf.Layer, path: str) -> Image.Image | None:
@@ -217,89 +220,6 @@ def flat_colored(surface: UsdSurface, display: np.ndarray | None) -> PBRMaterial
     factor = np.append(srgb_to_linear(mean), 1.0) * np.asarray(material.baseColorFactor, float)
     plain.baseColorFactor = np.round(factor).astype(np.uint8)
     return plain
-
-
-def _shaders(material: UsdShade.Material) -> Iterator[UsdShade.Shader]:
-    """Yield what a material is drawn by: its universal surface, then those of renderers that are known."""
-    for context in _CONTEXTS:
-        shader, _, _ = material.ComputeSurfaceSource(context)
-        if shader:
-            yield shader
-
-
-def _kind_of(shader: UsdShade.Shader) -> str:
-    """Return the name of a shader's kind: its identifier, or that of its MDL."""
-    return str(shader.GetIdAttr().Get() or shader.GetSourceAssetSubIdentifier("mdl") or "")[:60]
-
-
-def _asset_of(socket: UsdShade.Input | None) -> tuple[Sdf.Layer, str] | None:
-    """Return the file that an input names, and the layer that names it; None where it names none."""
-    attributes = socket.GetValueProducingAttributes() if socket else []
-    asset = attributes[0].Get() if attributes else None
-    if not isinstance(asset, Sdf.AssetPath) or not asset.path:
-        return None
-    return attributes[0].GetPropertyStack(Usd.TimeCode.Default())[0].layer, asset.path
-
-
-def _value_of(socket: UsdShade.Input | None, default: Any) -> Any:
-    """Return an input's constant, ``default`` where it has none."""
-    attributes = socket.GetValueProducingAttributes() if socket else []
-    value = attributes[0].Get() if attributes else None
-    return default if value is None else value
-
-
-def _upstream(attributes: list[Usd.Attribute]) -> Iterator[UsdShade.Shader]:
-    """Yield the shaders that attributes belong to, and those that these are connected to, the nearest first."""
-    waiting = [attribute.GetPrim() for attribute in attributes]
-    seen: set[Sdf.Path] = set()
-    while waiting and len(seen) < _MOST_UPSTREAM:
-        prim = waiting.pop(0)
-        shader = UsdShade.Shader(prim)
-        if prim.GetPath() in seen or not shader:
-            continue
-        seen.add(prim.GetPath())
-        yield shader
-        for socket in shader.GetInputs():
-            waiting += [a.GetPrim() for a in socket.GetValueProducingAttributes() if UsdShade.Output.IsOutput(a)]
-
-
-def _same_picture(reader: UsdShade.Shader | None, other: UsdShade.Shader | None) -> bool:
-    if reader is None or other is None:
-        return False
-    return _asset_of(reader.GetInput("file")) == _asset_of(other.GetInput("file"))
-
-
-def _tint_of(reader: UsdShade.Shader | None) -> tuple[float, ...]:
-    """Return what a texture reader multiplies its colours with (UsdUVTexture, ``scale``)."""
-    scale = _value_of(None if reader is None else reader.GetInput("scale"), (1.0, 1.0, 1.0, 1.0))
-    return tuple(float(each) for each in scale)[:3]
-
-
-def _placing(reader: UsdShade.Shader | None) -> tuple[str | None, np.ndarray | None]:
-    """Return the primvar by which a texture lies, and how its coordinates are changed ``(3, 3)``.
-
-    UsdTransform2d scales, turns counter-clockwise in degrees, and moves. Source: the UsdPreviewSurface specification.
-    """
-    change = np.eye(3)
-    socket = None if reader is None else reader.GetInput("st")
-    for _ in range(_MOST_UPSTREAM):
-        attributes = socket.GetValueProducingAttributes() if socket else []
-        node = UsdShade.Shader(attributes[0].GetPrim()) if attributes else None
-        if node is None or not node:
-            break
-        kind = str(node.GetIdAttr().Get())
-        if kind.startswith("UsdPrimvarReader"):
-            name = str(_value_of(node.GetInput("varname"), "")) or None
-            return name, None if np.allclose(change, np.eye(3)) else change
-        if kind != "UsdTransform2d":
-            break
-        angle = np.radians(float(_value_of(node.GetInput("rotation"), 0.0)))
-        across, up = (float(each) for each in _value_of(node.GetInput("scale"), (1.0, 1.0)))
-        right, above = (float(each) for each in _value_of(node.GetInput("translation"), (0.0, 0.0)))
-        cosine, sine = np.cos(angle), np.sin(angle)
-        change = change @ [[cosine * across, -sine * up, right], [sine * across, cosine * up, above], [0, 0, 1]]
-        socket = node.GetInput("in")
-    return None, None if np.allclose(change, np.eye(3)) else change
 
 
 def _packed(
