@@ -319,3 +319,15 @@ def test_mirrored_instances_are_expanded_the_right_way_out(tmp_path: Path) -> No
 def test_folder_without_a_stage_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(AssetError, match="no asset of a known format"):
         read(tmp_path)
+
+
+@pytest.mark.parametrize(("scheme", "said"), [("catmullClark", True), ("loop", True), ("none", False), (None, False)])
+def test_subdivision_surfaces_are_told_to_be_their_control_meshes(
+    tmp_path: Path, scheme: str | None, said: bool
+) -> None:
+    def make(stage: Usd.Stage) -> None:
+        mesh = box_mesh(stage, "/thing/part", (1, 1, 1))
+        if scheme is not None:
+            mesh.CreateSubdivisionSchemeAttr(scheme)
+
+    assert any("subdivision surfaces" in each for each in made(tmp_path, make).remarks) == said

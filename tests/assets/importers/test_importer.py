@@ -405,3 +405,12 @@ def test_the_package_around_an_asset_is_named_where_its_meshes_are_not_there(tmp
     assert one.error.endswith(
         f"give the folder that holds 'shop_models' too; the package around it is {(tmp_path / 'models').resolve()}"
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "told"), [("duck_vhacd", "duck"), ("003_cracker_box_textured", "cracker box"), ("vhacd", "vhacd")]
+)
+def test_the_names_of_tools_are_no_part_of_a_name(tmp_path: Path, name: str, told: str) -> None:
+    box = '<visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual>'
+    (tmp_path / "thing.urdf").write_text(f'<robot name="{name}"><link name="l">{box}</link></robot>')
+    assert imported(tmp_path / "thing.urdf", tmp_path / "out")[0].name == told

@@ -33,6 +33,8 @@ MAX_FRICTION = 10.0
 """Above any coefficient of dry friction: clean metals that seize have about 5."""
 
 _UP_TO_Z = {"z": np.eye(3), "y": GLTF_TO_OBJECT[:3, :3]}
+_OF_TOOLS = frozenset({"vhacd", "coacd", "textured"})
+"""Ends of names that programs write, which decompose a mesh into hulls or paint it."""
 _HEXADECIMAL = frozenset("0123456789abcdef")
 _MAX_TEXTS, _MAX_LETTERS, _MAX_POINTS = 64, 500, 64
 _MOST_ABOVE = 16
@@ -196,14 +198,23 @@ def _unit(vector: np.ndarray) -> list[float] | None:
 
 
 def _words(name: str) -> str:
-    """Return a file's or an element's name as words: no underscores or capitals between them, and no numbers around it."""
+    """Return a file's or an element's name as words: no underscores or capitals between them, and no numbers around it.
+
+    Nor do the names of the tools count that a file was made by, such as V-HACD of ``duck_vhacd``.
+    """
     words = split_words(name).replace("_", " ").replace("-", " ").split()
     first, last = 0, len(words)
     while first < last - 1 and words[first].isdecimal():
         first += 1
-    while last > first + 1 and (words[last - 1].isdecimal() or _is_digest(words[last - 1])):
+    while last > first + 1 and (
+        words[last - 1].isdecimal() or _is_digest(words[last - 1]) or _is_of_a_tool(words[last - 1])
+    ):
         last -= 1
     return " ".join(words[first:last])
+
+
+def _is_of_a_tool(word: str) -> bool:
+    return word.lower() in _OF_TOOLS
 
 
 def _is_digest(word: str) -> bool:

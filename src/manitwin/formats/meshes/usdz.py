@@ -86,6 +86,8 @@ def mesh_parts(
     if polygons is None or len(polygons[1]) == 0:
         return []
     points, sizes, indices = polygons
+    if _is_subdivided(mesh):
+        source.find("subdivision surfaces in it were read as the meshes that control them, which are a little larger")
     if is_bound(mesh.GetPrim()):
         source.find("it is bound to a skeleton; it was taken in the first pose that the file holds")
         points = skeletons.posed(mesh.GetPrim(), points)
@@ -120,6 +122,13 @@ def mesh_parts(
             part = color_by_corner(part, colors[flat].reshape(-1, 3, 3), source)
         parts.append(part)
     return parts
+
+
+def _is_subdivided(mesh: UsdGeom.Mesh) -> bool:
+    """Tell whether a mesh says that it is drawn subdivided; where it says nothing, what wrote it mostly meant its polygons."""
+    scheme = mesh.GetSubdivisionSchemeAttr()
+    smooth = (UsdGeom.Tokens.catmullClark, UsdGeom.Tokens.loop)
+    return bool(scheme.HasAuthoredValue() and scheme.Get() in smooth)
 
 
 def mesh_polygons(mesh: UsdGeom.Mesh, source: MeshSource) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
