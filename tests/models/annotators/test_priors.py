@@ -421,3 +421,32 @@ def test_a_crate_is_no_round_bin_and_food_that_has_a_base_stands_on_it() -> None
         found = lookup(name)
         assert found is not None and (found.category, found.stands) == (category, stands)
     assert (phone := lookup("desk phone")) is not None and phone.category == "telephone"
+
+
+NOT_POURED = (
+    *(
+        "ashtray",
+        "battery",
+        "camera lens",
+        "candle",
+        "cap",
+        "deodorant",
+        "fire extinguisher",
+        "glue stick",
+        "hat",
+        "helmet",
+    ),
+    *("hockey puck", "lip balm", "mortar", "play dough", "speaker", "stacking cup", "trumpet"),
+)
+
+
+@pytest.mark.parametrize("category", NOT_POURED)
+def test_what_holds_no_drink_is_not_poured(category: str) -> None:
+    prior = load_priors()[category]
+    words = " ".join([*(part.description for part in prior.functional), *(part.scenario for part in prior.grasp)])
+    assert not re.search(r"pour|drink|food|contents", words)
+
+
+def test_only_a_vase_among_cups_is_filled_with_flowers() -> None:
+    assert "flowers" in load_priors()["vase"].functional[0].description
+    assert "drink" in load_priors()["cup"].functional[0].description
