@@ -79,6 +79,9 @@ stands for its kinds: a can may be a drink can where that explains the photo bet
   shape of a template of its likeliest names (from a tenth on) where that explains the photo closely, and much better than a body
   of revolution: a cup that may be a mug or a bucket is hollow in either case, and is called neither. What none explains is
   lifted, and is rejected where the outline is an ellipse: a disc seen at an angle has it as well as an egg.
+- **From the end** nothing of a length is seen: what is tall or long by its name, is seen from above or along its length, and
+  has an outline that an ellipse explains much better than the template, is rejected (of a glass or a jar the rim alone). Take
+  the photo from the side.
 - **Texture**: the photo on what it shows. Unseen places get quiet colours of their own part: those of the same ring where it
   is turned, else of the nearest seen places, as a median that keeps no letters.
 - **What it cannot do**: walls thinner than a pixel keep the usual thickness; a box seen at one face alone has the usual

@@ -450,3 +450,7 @@ def test_what_holds_no_drink_is_not_poured(category: str) -> None:
 def test_only_a_vase_among_cups_is_filled_with_flowers() -> None:
     assert "flowers" in load_priors()["vase"].functional[0].description
     assert "drink" in load_priors()["cup"].functional[0].description
+
+
+def test_what_goes_on_the_head_is_hollow_from_below() -> None:
+    assert {category for category in load_priors() if hint_from_name(category).hollow_below} == {"hat", "cap", "helmet"}

@@ -366,3 +366,9 @@ def test_what_is_round_by_its_name_has_a_round_things_sides(
     name: str | None, extents: list[float], refused: bool
 ) -> None:
     assert (why_not_round(name, np.array(extents)) is not None) == refused
+
+
+def test_a_helmet_is_no_solid_dome() -> None:
+    outline = [(140 + 160 * (1 - math.cos(at)), 380 - 170 * math.sin(at)) for at in np.linspace(0, math.pi, 60)]
+    with pytest.raises(Rejected, match="hollow from below"):
+        from_photo(_drawn(outline), "hard hat")

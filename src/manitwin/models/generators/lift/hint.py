@@ -20,7 +20,8 @@ _NO_BALLS = frozenset({"rugby ball"})
 
 @dataclass(frozen=True)
 class ShapeHint:
-    """``stands``: put down upright (None: unknown); ``container``: open at the top; the others describe its shape.
+    """``stands``: put down upright (None: unknown); ``container``: open at the top; ``hollow_below``: open at the bottom; the
+    others describe its shape.
 
     ``volume_share`` is the usual volume of its matter over the cube of the usual longest side.
     """
@@ -30,6 +31,7 @@ class ShapeHint:
     round: bool = False
     boxy: bool = False
     flat: bool = False
+    hollow_below: bool = False
     volume_share: float | None = None
 
 
@@ -45,6 +47,7 @@ def hint_from_name(name: str | None) -> ShapeHint:
         round=bool({"cylindrical", "round", "bottle", "bowl"} & set(words)),
         boxy=bool({"box", "rectangular", "block"} & set(words)),
         flat=bool({"flat", "shallow"} & set(words)),
+        hollow_below="bowl" in words and not prior.container,
         volume_share=_volume_share(prior),
     )
 

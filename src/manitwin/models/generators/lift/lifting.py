@@ -18,6 +18,7 @@ from manitwin.models.generators.lift.candidates import (
     standing_turned,
     turned_about,
 )
+from manitwin.models.generators.lift.end_on import DISC_ELLIPSE_IOU
 from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name
 from manitwin.models.generators.lift.primitives import profile
 from manitwin.models.generators.lift.residual import Explained
@@ -31,8 +32,8 @@ Primitive = Literal["revolution", "box", "inflation"]
 LEAST_IOU = 0.8
 """Overlap with the outline below which a solid does not explain it; set on rendered templates, which reach 0.93 and more."""
 
-DISC_ELLIPSE_IOU, DISC_ELONGATION = 0.965, 1.15
-"""From here on an outline is an ellipse that is no circle: of rendered templates all that have one are discs seen at an angle."""
+DISC_ELONGATION = 1.15
+"""Of an ellipse (``DISC_ELLIPSE_IOU``) that is no circle."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +54,8 @@ class Lifted:
 def lift(rgba: np.ndarray, hint: ShapeHint) -> Lifted:
     """Lift the object in ``rgba`` (H, W, 4) uint8, whose alpha is its mask, to a solid.
 
-    Raises Rejected ``generator_failed`` for an open container whose hollow cannot be told, where no solid explains the
-    outline, and where nothing is known of a thing whose outline is an ellipse.
+    Raises Rejected ``generator_failed`` for what is hollow from below, for an open container whose hollow cannot be told, where
+    no solid explains the outline, and where nothing is known of a thing whose outline is an ellipse.
     """
     crop = crop_object(rgba, CROP_SIDE_PX)
     height, width = crop.mask.shape
@@ -78,6 +79,13 @@ def lift(rgba: np.ndarray, hint: ShapeHint) -> Lifted:
 
 def _explaining(view: View, hint: ShapeHint) -> tuple[Primitive, Made]:
     """Return the simplest solid that explains the outline; raises Rejected where none does."""
+    if hint.hollow_below:
+        raise Rejected(
+            "generator_failed",
+            "lift cannot make this: such a thing is hollow from below, of which one outline says nothing; choose another"
+            " generator, or give a mesh",
+            "generate",
+        )
     if hint == ShapeHint() and _is_ellipse(view.silhouette):
         raise Rejected(
             "generator_failed",

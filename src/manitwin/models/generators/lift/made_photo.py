@@ -14,8 +14,10 @@ from manitwin.errors import Rejected
 from manitwin.formats.glb import write_glb
 from manitwin.geometry.poses import GLTF_TO_OBJECT
 from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.words import article
+from manitwin.models.generators.lift.end_on import CLEARLY_LESS, DISC_ELLIPSE_IOU, reject_end_on
 from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name, is_cylinder, why_no_cylinder, why_not_round
-from manitwin.models.generators.lift.lifting import DISC_ELLIPSE_IOU, Lifted, lift
+from manitwin.models.generators.lift.lifting import Lifted, lift
 from manitwin.models.generators.lift.lobes import reject_several_round
 from manitwin.models.generators.lift.plain_solids import (
     PRIMITIVES,
@@ -24,6 +26,7 @@ from manitwin.models.generators.lift.plain_solids import (
     is_rather,
     plain_solids,
 )
+from manitwin.models.generators.lift.roundness import is_round, is_round_along
 from manitwin.models.generators.lift.seen_corners import box_from_corner
 from manitwin.models.generators.lift.surface import unseen_share
 from manitwin.models.generators.lift.texture import beside
@@ -47,15 +50,10 @@ from manitwin.models.generators.templates.fitting.generated import (
 )
 from manitwin.twin.import_record import ImportRecord
 
-ROUND_SHARE = 0.02
-"""Of the larger of both: what is as wide as deep but for this is a body of revolution without a handle."""
 LEAST_LIKELY = 0.1
 """Probability of a name below which its shape is not tried."""
 NAMELESS_IOU, NAMELESS_OUTLINE = 0.92, 0.0045
 """A name that is only likely has to explain more than one that a person says (``LEAST_IOU``, ``MOST_OUTLINE``)."""
-CLEARLY_LESS = 0.5
-"""Of what a simpler solid leaves unexplained of an outline, a body of revolution, a box or, where that is what it is, an
-ellipse: a can has nearly the outline of a bucket, and a plate that of a pan with its handle behind it."""
 OF_LIKELY_NAMES = "template of a likely name fitted to the photo"
 
 
@@ -111,9 +109,14 @@ def from_photo(
 def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) -> Job:
     """Return a fit that explains the photo ``rgba (H, W, 4) uint8``, else the photo lifted; raises Rejected for neither."""
     if fitted is not None and fitted.confidence >= LEAST_CONFIDENCE:
+        extents, toward_camera = np.ptp(fitted.made.mesh.vertices, axis=0), fitted.view.object_to_camera[2]
+        reject_end_on(extents, toward_camera, fitted.residual.iou, rgba, name or fitted.category)
         return from_fit(fitted, rgba, name)
+    hint = hint_from_name(name)
+    if fitted is not None and hint.hollow_below and fitted.confidence >= LEAST_AGAINST_INFLATION:
+        return from_fit(fitted, rgba, name)  # no outline that is lifted has its hollow
     try:
-        lifted = lift(rgba, hint_from_name(name))
+        lifted = lift(rgba, hint)
     except Rejected as error:
         if fitted is None:
             raise
@@ -123,17 +126,17 @@ def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) 
             " check the name and the cut-out",
             error.stage,
         ) from error
-    if fitted is not None and lifted.notes.get("handles") and _is_round(fitted):
+    if fitted is not None and lifted.notes.get("handles") and is_round(fitted):
         raise Rejected(
             "generator_failed",
             f"something sticks out beside the body, which no {fitted.category} has, and no {fitted.category} that the template"
             " makes has this outline; check the name and the cut-out, or take the photo from the side",
             "generate",
         )
-    if fitted is not None and _merely_as_wide(lifted) and not _is_round(fitted):
+    if fitted is not None and _merely_as_wide(lifted) and not (is_round(fitted) or is_round_along(fitted)):
         raise Rejected(
             "generator_failed",
-            f"a round thing would have its outline, but a {fitted.category} is not round, and no {fitted.category} that the"
+            f"a round thing would have its outline, but {_one(fitted)} is not round, and no {fitted.category} that the"
             " template makes has it; check the name and the cut-out, or take the photo from higher up",
             "generate",
         )
@@ -146,13 +149,17 @@ def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) 
             f"{odd}; check the name and the cut-out, or take the photo from another side",
             "generate",
         )
+    if lifted.notes.get("elevation_deg"):  # about the upright axis, from above
+        above = np.radians(lifted.notes["elevation_deg"])
+        extents, toward_camera = np.ptp(lifted.surface.vertices, axis=0), np.array([0.0, np.sin(above), np.cos(above)])
+        reject_end_on(extents, toward_camera, lifted.explained.silhouette_iou, rgba, name or "thing")
     flat = lifted.notes["primitive"] == "inflation"  # knows nothing of the back
     if fitted is not None and flat and fitted.confidence >= LEAST_AGAINST_INFLATION:
         return from_fit(fitted, rgba, name)
-    if fitted is not None and flat and _is_round(fitted) and is_cylinder(name):
+    if fitted is not None and flat and is_round(fitted) and is_cylinder(name):
         raise Rejected(
             "generator_failed",
-            f"a {fitted.category} is a cylinder, and none has this outline from any side: {_how_far(fitted)};"
+            f"{_one(fitted)} is a cylinder, and none has this outline from any side: {_how_far(fitted)};"
             " check the name and the cut-out",
             "generate",
         )
@@ -178,10 +185,8 @@ def _merely_as_wide(lifted: Lifted) -> bool:
     return _from_the_side(lifted) and not lifted.notes.get("handles")
 
 
-def _is_round(fitted: Fitted) -> bool:
-    """Whether what the template makes is as wide as it is deep, so that it has no handle."""
-    width_m, depth_m, _ = np.ptp(fitted.made.mesh.vertices, axis=0)
-    return bool(abs(width_m - depth_m) <= ROUND_SHARE * max(width_m, depth_m))
+def _one(fitted: Fitted) -> str:
+    return f"{article(fitted.category)} {fitted.category}"
 
 
 def from_fit(fitted: Fitted, rgba: np.ndarray, name: str | None) -> Job:
