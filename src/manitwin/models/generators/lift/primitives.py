@@ -13,6 +13,7 @@ _RINGS = 56
 _BROAD_BASE = 0.85  # a base nearly as wide as the body is cut where a cut of 6 % of the length reaches it
 _EDGE = 0.97  # texture is taken no nearer to the outline than this share of the radius
 DEPTH_SHARE = 0.4  # of the shorter side: nothing in one photo says how deep a box seen from the front is
+_AT_AXIS_PX = 1.5  # a needle is a pixel or two wide
 _STEPS = 24
 _INSET = 0.02
 
@@ -20,13 +21,23 @@ _INSET = 0.02
 def profile(silhouette: Silhouette) -> tuple[np.ndarray, np.ndarray]:
     """Return the rows (K,) of the upright mask and the radius (K,) at each, top to bottom, in pixels."""
     turned = turned_upright(silhouette.mask, silhouette.axis_tilt_deg)
-    rows = np.nonzero(turned.any(axis=1))[0]
+    rows = rows_on_axis(turned, silhouette.axis_column_px)
     body = turned[rows[0] : rows[-1] + 1]
     column = round(silhouette.axis_column_px)
     left, right = body[:, :column].sum(axis=1), body[:, column:].sum(axis=1)
     # where the halves disagree the narrower one is believed: what sticks out on one side only is no part of the solid
     radii = np.where(np.abs(left - right) > 0.15 * (left + right), np.minimum(left, right), (left + right) / 2.0)
     return np.arange(rows[0], rows[-1] + 1, dtype=float), gaussian_filter1d(radii, 1.2, mode="nearest")
+
+
+def rows_on_axis(mask: np.ndarray, column_px: float) -> np.ndarray:
+    """Return the rows (K,) of a mask (H, W) from the first to the last that has something at an upright axis in this column.
+
+    A corner or an ear that rises beside the axis is no part of a body about it, and would be a needle on its end.
+    """
+    columns = np.arange(mask.shape[1])
+    at_axis = np.nonzero(mask[:, np.abs(columns - column_px) <= _AT_AXIS_PX].any(axis=1))[0]
+    return np.arange(at_axis[0], at_axis[-1] + 1)
 
 
 def trim_caps(

@@ -22,7 +22,7 @@ from scipy.ndimage import gaussian_filter1d, grey_opening, label, median_filter
 
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.solids.shapes import lathe, union
-from manitwin.models.generators.lift.primitives import trim_caps
+from manitwin.models.generators.lift.primitives import rows_on_axis, trim_caps
 from manitwin.models.generators.lift.residual import Explained, explained, parallel_camera
 from manitwin.models.generators.lift.surface import LiftedSurface, bare_mesh, from_manifold, to_manifold
 
@@ -84,11 +84,9 @@ def half_widths(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
         if both.sum() > best[0]:
             apart = np.abs(left - right) > 0.08 * (left + right) + 1.5
             best = (float(both.sum()), float(column), np.where(apart | (both == 0), both, (left + right) / 2))
-    return (
-        rows.astype(float),
-        gaussian_filter1d(median_filter(best[2], 5, mode="nearest"), 0.8, mode="nearest"),
-        best[1],
-    )
+    kept = np.isin(rows, rows_on_axis(mask, best[1]))
+    widths = gaussian_filter1d(median_filter(best[2][kept], 5, mode="nearest"), 0.8, mode="nearest")
+    return rows[kept].astype(float), widths, best[1]
 
 
 def without_collars(widths: np.ndarray) -> np.ndarray:
