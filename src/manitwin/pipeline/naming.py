@@ -26,7 +26,7 @@ class NameStage:
     """Write the field ``naming``: what a classifier takes an unnamed thing for; None where a person has said it."""
 
     name: ClassVar[str] = "name"
-    version: ClassVar[str] = "6"
+    version: ClassVar[str] = "7"
     reads: ClassVar[tuple[str, ...]] = ("photo.png?", "photos/?", "views/?", "canonical.npz?", "geometry?")
     writes: ClassVar[tuple[str, ...]] = ("naming",)
     needs: ClassVar[Resource] = "cpu"
