@@ -89,8 +89,8 @@ def test_interval_goes_on_beyond_the_answer_where_size_and_volume_contradict_eac
 def test_a_volume_by_a_guessed_size_says_less_than_one_by_a_known_one() -> None:
     prior = lookup("drill")
     assert prior.bulk_density_kg_m3 is not None
-    side_m = (0.5 * prior.mass_kg.typical / prior.bulk_density_kg_m3.typical / prior.longest_axis_m.typical) ** 0.5
-    light = trimesh.creation.box([prior.longest_axis_m.typical, side_m, side_m])  # as long as usual, of half the matter
+    side_m = (0.7 * prior.mass_kg.typical / prior.bulk_density_kg_m3.typical / prior.longest_axis_m.typical) ** 0.5
+    light = trimesh.creation.box([prior.longest_axis_m.typical, side_m, side_m])  # as long as usual, of less matter
     known, guessed = mass(light, "drill"), mass(light, "drill", metric=False)
     assert known.value < guessed.value < prior.mass_kg.typical < guessed.high
     # log-normal: the mean of both by their inverse variances, that of the volume with nine times the size's
@@ -103,8 +103,21 @@ def test_a_volume_by_a_guessed_size_says_less_than_one_by_a_known_one() -> None:
         )
     }
     by_size, by_volume = (0.6 * spread["mass"]) ** -2, 1 / (spread["density"] ** 2 + (3 * spread["size"]) ** 2)
-    halved = 0.5 ** (by_volume / (by_size + by_volume))
-    assert guessed.value == pytest.approx(halved * prior.mass_kg.typical)
+    lessened = 0.7 ** (by_volume / (by_size + by_volume))
+    assert guessed.value == pytest.approx(lessened * prior.mass_kg.typical)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 2.5])
+def test_by_a_guessed_size_no_thing_is_denser_than_such_things_are(share: float) -> None:
+    prior = lookup("pliers")
+    bulk = prior.bulk_density_kg_m3
+    assert bulk is not None
+    length_m = prior.longest_axis_m.typical
+    side_m = (share * prior.mass_kg.typical / bulk.typical / length_m) ** 0.5
+    slender = trimesh.creation.box([length_m, side_m, side_m])
+    guessed = mass(slender, "pliers", metric=False)
+    assert bulk.low <= guessed.value / slender.volume <= bulk.high * (1 + 1e-9)
+    assert guessed.low <= guessed.value <= guessed.high and guessed.high > 0.9 * prior.mass_kg.typical
 
 
 @pytest.mark.parametrize("name", ["drill", "pliers", "serving tray"])

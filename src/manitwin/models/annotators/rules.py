@@ -135,6 +135,7 @@ def _mass(
     Both are taken as log-normal. A volume is as unsure as the size that it was scaled by, ``size_spread`` in natural logs, three
     times over (0: the size is known). The answer stays in the category's interval; its own interval is what the volume leaves
     open, and reaches at least as far beyond the answer as both together are unsure: an answer at its end is not sure of itself.
+    By a guessed size it is also no denser and no lighter than such things are, which a thing of unusual proportions would be.
     ``full``: it is what a full vessel weighs; the lower halves of the intervals, which are of vessels that are not full, say
     nothing of which of the two is narrower.
     """
@@ -152,7 +153,8 @@ def _mass(
         np.exp(DEVIATIONS_ACROSS / 2 * _mass_spread(_SAME_SIZE_SPREAD * spread_at_size, spread_at_volume, size_spread))
     )
     open_to = Interval(low=min(by_volume.low, value / beyond), typical=value, high=max(by_volume.high, value * beyond))
-    return _clamped(value, open_to, prior.mass_kg, source)
+    possible = min(max(value, by_volume.low), by_volume.high) if size_spread else value
+    return _clamped(possible, open_to, prior.mass_kg, source if possible == value else "density*volume")
 
 
 def _mass_spread(spread_at_size: float, spread_at_volume: float, size_spread: float) -> float:
