@@ -29,7 +29,7 @@ class PhotoStage:
     """Write ``photo.png`` (RGBA, upright, alpha is the matte) and the field ``matte``."""
 
     name: ClassVar[str] = "photo"
-    version: ClassVar[str] = "21"
+    version: ClassVar[str] = "22"
     reads: ClassVar[tuple[str, ...]] = ()
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "matte")
     needs: ClassVar[Resource] = "cpu"
@@ -107,7 +107,7 @@ class PhotosStage(PhotoStage):
     One that cannot be cut out is left out, with a finding; the field ``matte`` is that of the least sure of the others.
     """
 
-    version: ClassVar[str] = "14"
+    version: ClassVar[str] = "15"
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "photos/", "matte")
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import pytest
 
 from manitwin.models.matting.belief import BEST, FEATURES, doubts_of
 from manitwin.models.matting.candidates import Candidate
-from manitwin.models.matting.causes import CAUSES, cause_of, told
+from manitwin.models.matting.causes import CAUSES, HOLES, cause_of, told
 from manitwin.models.matting.confidence import MatteScores, frame_cause, score
 from manitwin.models.matting.segmentation import segment
 from manitwin.models.matting.study import study_photo
@@ -103,3 +103,13 @@ def test_the_remedy_of_a_thin_thing_is_what_can_make_its_picture_larger() -> Non
         said = told(Candidate("rules", found, score(found), zoom=photo.shape[1] / 512), thin)
         assert CAUSES["bulk"] in said
         assert [way for way in ("larger photo", "closer") if way in said] == list(ways)
+
+
+def test_a_mask_that_is_thin_by_its_holes_may_have_lost_parts_of_the_grounds_colour() -> None:
+    """A bottle as pale as its ground is a frame to the rules; so is a picture frame, which looks no other way."""
+    photo = _photo([(150, 80, 350, 310)])
+    photo[86:304, 156:344] = photo[20:238, 20:208]
+    found = segment(photo)
+    frame = replace(found, mask=photo.mean(2) < 150)
+    said = told(Candidate("rules", frame, score(frame)), _with(bulk=-1.0))
+    assert f"{CAUSES['bulk']}, {HOLES};" in said and said.endswith("or photograph it on a surface of another colour")

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import asdict
 
 import numpy as np
+from scipy.ndimage import binary_fill_holes
 
 from manitwin.models.matting.belief import FEATURES, LEAST_DIFFERENCE, OPINIONS, doubts_of
 from manitwin.models.matting.candidates import Candidate
 from manitwin.models.matting.confidence import LOW_SCORE, MOST_ZOOM, MatteScores, border_of, frame_cause
+from manitwin.models.matting.outline import eroded
 from manitwin.models.matting.study import largest_piece
 
 CAUSES = {
@@ -36,6 +38,10 @@ CAUSES = {
 """By score or feature; of equally low scores the first is told."""
 REMEDY = "photograph it whole on a plain surface of another colour, or give an image with an alpha channel"
 CROP = "crop that away if it is another thing, or give an image with an alpha channel"
+THIN = ("bulk", "thick")
+HOLES = "or parts of it with the background's colour are taken for holes"
+BULKIER = 2.0
+"""Times the area for its outline that a mask has with its holes filled where these are what makes it thin."""
 AGAINST = ("network_beyond", "network_within")
 ALIKE = 0.9
 """Likeness of two masks from which on the opinions agree on what the thing is, and differ about a part of it at most."""
@@ -53,6 +59,8 @@ def told(candidate: Candidate, features: np.ndarray) -> str:
         cause = cause_of(features, candidate.scores)
     if cause in ("uncut", "whole") and _is_beside(candidate.found.mask):
         cause = "beside"
+    if cause in THIN and _is_thin_by_its_holes(candidate.found.mask):
+        return f"{CAUSES[cause]}, {HOLES}; {_remedy(cause, candidate)}, or photograph it on a surface of another colour"
     return f"{CAUSES[cause]}; {_remedy(cause, candidate)}"
 
 
@@ -88,10 +96,19 @@ def _is_beside(mask: np.ndarray) -> bool:
     return bool((mask & border).any() and not (thing & border).any())
 
 
+def _is_thin_by_its_holes(mask: np.ndarray) -> bool:
+    """Tell whether a mask (H, W) is far bulkier once its holes are filled: a bracelet, or a bottle as pale as its ground."""
+    return _bulk_px(np.asarray(binary_fill_holes(mask))) > BULKIER * _bulk_px(mask)
+
+
+def _bulk_px(mask: np.ndarray) -> float:
+    return float(mask.sum() / max(int((mask & ~eroded(mask, 1)).sum()), 1))
+
+
 def _remedy(cause: str, candidate: Candidate) -> str:
     if cause == "beside":
         return CROP
-    if cause not in ("bulk", "thick"):
+    if cause not in THIN:
         return REMEDY
     rows, columns = np.nonzero(candidate.found.mask)
     length = max(np.ptp(rows), np.ptp(columns)) + 1
