@@ -49,6 +49,27 @@ def test_a_lens_may_be_an_angle_and_each_frame_may_have_its_own(tmp_path: Path) 
     assert read_camera_poses(_written(tmp_path, fisheye)).cameras[0].lens.distortion == (0.1, 0, 0, 0)
 
 
+def test_a_focal_length_of_a_frame_takes_the_place_of_all_that_the_file_says_of_one(tmp_path: Path) -> None:
+    document = transforms_document(POSES, fl_x=300, fl_y=400)
+    document["frames"][0] |= {"fl_x": 200}
+    document["frames"][1] |= {"camera_angle_x": 0.8}
+    lenses = [
+        camera.lens.of_picture(WIDTH, HEIGHT) for camera in read_camera_poses(_written(tmp_path, document)).cameras
+    ]
+    assert [lens.focal for lens in lenses] == [
+        (200, 200),
+        pytest.approx((WIDTH / 2 / np.tan(0.4),) * 2),
+        (300, 400),
+    ]
+
+
+def test_a_mask_is_one_below_the_folder_of_the_file(tmp_path: Path) -> None:
+    document = transforms_document(POSES)
+    document["frames"][1]["mask_path"] = "./masks\\1.png"
+    cameras = read_camera_poses(_written(tmp_path, document)).cameras
+    assert [camera.mask for camera in cameras] == [None, tmp_path / "masks" / "1.png", None]
+
+
 def _with_matrix(matrix: np.ndarray) -> dict[str, Any]:
     return transforms_document([matrix])
 
@@ -68,6 +89,23 @@ _BROKEN: list[tuple[Any, str]] = [
     (transforms_document(POSES, units="parsec"), "units is parsec"),
     (transforms_document(POSES, camera_model="EQUIRECTANGULAR"), "EQUIRECTANGULAR is not read"),
     ({"frames": transforms_document(POSES)["frames"]}, "no lens"),
+    *(
+        (
+            {
+                **transforms_document(POSES[:1]),
+                "frames": [{**transforms_document(POSES)["frames"][0], "mask_path": said}],
+            },
+            told,
+        )
+        for said, told in (
+            ("../masks/0.png", "leads out of the folder"),
+            ("/etc/0.png", "leads out of the folder"),
+            ("C:\\masks\\0.png", "leads out of the folder"),
+            (7, "names no file"),
+            (" ", "names no file"),
+            ("./", "names no file"),
+        )
+    ),
 ]
 
 

@@ -41,17 +41,20 @@ def photo_names(paths: Sequence[Path]) -> list[str]:
     return [f"photo_{number:02d}{path.suffix.lower()}" for number, path in enumerate(paths)]
 
 
+def mask_names(paths: Sequence[Path]) -> list[str]:
+    """Return what the masks of photos are called in that archive."""
+    return [f"mask_{number:02d}{path.suffix.lower()}" for number, path in enumerate(paths)]
+
+
 def pack_photos(
-    paths: Sequence[Path], folder: Path, *, keep: bool = True, beside: Path | None = None
+    paths: Sequence[Path], folder: Path, *, keep: bool = True, beside: Mapping[str, Path] | None = None
 ) -> tuple[str, str]:
     """Write photos of one thing into a folder as ``source.zip``, numbered in their order; return its name and sha256.
 
-    ``beside`` is a further file, which is kept under its own name. Of more than ``MAX_KEPT_BYTES``, or without ``keep``, a text
+    ``beside`` are further files, by what they are called there. Of more than ``MAX_KEPT_BYTES``, or without ``keep``, a text
     stands for them as for other inputs. Raises InputError ``unreadable`` for a file that is gone.
     """
-    files = dict(zip(photo_names(paths), paths, strict=True))
-    if beside is not None:
-        files[beside.name] = beside
+    files = dict(zip(photo_names(paths), paths, strict=True)) | dict(beside or {})
     return _packed(files, folder, None, keep)
 
 

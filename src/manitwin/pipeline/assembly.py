@@ -18,7 +18,7 @@ from manitwin.errors import InputError, Rejected
 from manitwin.formats.camera_poses.transforms_json import transforms_of
 from manitwin.formats.installation import installed_version
 from manitwin.formats.npy_file import labels_to_npy
-from manitwin.formats.packed_source import pack_photos, pack_source, photo_names
+from manitwin.formats.packed_source import mask_names, pack_photos, pack_source, photo_names
 from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.pipeline.grasps import GRASP_POINTS
@@ -136,17 +136,20 @@ def _write_source(draft: Draft[Item], kind: str, folder: Path, keep: bool) -> di
         (folder / name).write_bytes(content)
         sha256 = hashlib.sha256(content).hexdigest()
     elif item.views:
-        paths = [Path(file) for file in item.files]
+        paths, beside = [Path(file) for file in item.files], {}
         poses = _readable_poses(item)
         with TemporaryDirectory() as place:
             cameras = None if poses is None else Path(place) / "transforms.json"
             if poses is not None and cameras is not None:
-                stated = transforms_of(poses.cameras, photo_names(paths), poses.unit_m)
+                masks = list(dict.fromkeys(camera.mask for camera in poses.cameras if camera.mask is not None))
+                kept = dict(zip(masks, mask_names(masks), strict=True))
+                stated = transforms_of(poses.cameras, photo_names(paths), poses.unit_m, kept)
                 cameras.write_text(canonical_json(stated), encoding="utf-8")
-            name, sha256 = pack_photos(paths, folder, keep=keep, beside=cameras)
+                beside = {cameras.name: cameras} | {called: mask for mask, called in kept.items()}
+            name, sha256 = pack_photos(paths, folder, keep=keep, beside=beside)
     else:
-        beside = [] if item.given is None else [Path(item.given)]
-        name, sha256 = pack_source(Path(item.file), folder, beside, keep=keep)
+        given = [] if item.given is None else [Path(item.given)]
+        name, sha256 = pack_source(Path(item.file), folder, given, keep=keep)
     return {
         "kind": kind,
         "file": name,

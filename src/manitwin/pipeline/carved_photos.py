@@ -65,7 +65,8 @@ def carve_photos(
     """
     _check(paths, turns_deg, poses)
     stated = None if poses is None else _stated(paths, poses, up, units)
-    cut = _cut_out(paths, name)
+    masks = [None] * len(paths) if stated is None else [camera.mask for camera in stated.cameras]
+    cut = _cut_out(paths, name, masks)
     turns = list(turns_deg or ()) if stated is None else list(stated.turns_deg)
     photos, turns = list(cut.photos.values()), [turns[number] for number in cut.photos]
     if stated is not None:
@@ -109,14 +110,14 @@ def _stated(paths: Sequence[Path], poses: Path, up: str, units: str) -> StatedPo
         raise UsageError(f"--poses: {error.detail}") from error
 
 
-def _cut_out(paths: Sequence[Path], name: str | None) -> _CutOut:
+def _cut_out(paths: Sequence[Path], name: str | None, masks: Sequence[Path | None]) -> _CutOut:
     """Cut photos out as a build does; raises Rejected where fewer than two are left."""
     stage, names = PhotoStage(MattingConfig()), told_apart([str(path.resolve()) for path in paths])
     found = _CutOut({}, [], copies_told([str(path.resolve()) for path in paths]))
     reasons = []
-    for number, (path, called) in enumerate(zip(paths, names, strict=True)):
+    for number, (path, called, mask) in enumerate(zip(paths, names, masks, strict=True)):
         try:
-            rgba, field = stage.cut_out(path, name, refused, called)
+            rgba, field = stage.cut_out(path, name, refused, called, mask)
         except InputError:
             raise
         except Rejected as doubt:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from manitwin.formats.image_file import MIN_SIDE_PX
+from manitwin.formats.outline_mask import read_mask
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.matting.matte import TRANSPARENT_SHARE, DoubtedCutOut, Matte
 
@@ -45,6 +47,18 @@ def as_given(pixels: np.ndarray, name: str | None) -> Given:
     if rectangular is False:
         return Given(framed, (*findings, FRAMED))
     return Given(pixels, findings, is_doubted=rectangular is None)
+
+
+def as_masked(pixels: np.ndarray, mask: Path, orientation: int) -> Given:
+    """Return a picture ``(H, W, 3 or 4) uint8`` cut out as the file ``mask`` says, and as its own alpha channel does too.
+
+    ``orientation`` is that of the photo's EXIF. Raises InputError as ``read_mask`` does.
+    """
+    pixels, findings = usable(pixels)
+    alpha = read_mask(mask, pixels.shape[:2], orientation)
+    if pixels.shape[2] == 4:
+        alpha = np.minimum(alpha, pixels[..., 3])
+    return Given(np.dstack([pixels[..., :3], alpha]), (*findings, f"cut out as its mask says, {mask.name}"))
 
 
 def usable(pixels: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:

@@ -18,7 +18,7 @@ from manitwin.formats.packed_source import MAX_KEPT_BYTES
 from manitwin.formats.printable import printable_line
 from manitwin.formats.source_files import side_files
 from manitwin.geometry.length_unit import StatedUnit
-from manitwin.pipeline.photo_cameras import poses_identity
+from manitwin.pipeline.photo_cameras import masks_of_photos, poses_identity, read_poses
 from manitwin.twin.import_record import IMPORTED_MESH
 from manitwin.twin.store import sha256_of_json
 
@@ -80,7 +80,7 @@ class Item(Payload):
     def modified_at(self) -> float | None:
         """When its files were last changed (st_ctime, which nobody sets), None where it has none now."""
         try:
-            beside = () if self.poses is None else (self.poses,)
+            beside = () if self.poses is None else (self.poses, *_named_masks(Path(self.poses)))
             return max((os.stat(file).st_ctime for file in (*self.files, *beside)), default=None)
         except (OSError, ValueError):
             return None
@@ -106,8 +106,8 @@ class Item(Payload):
 def twin_id(item: Item) -> str:
     """Return the id of the twin that an item makes: a hash of the input's bytes, name, size, units and up axis, of nothing else.
 
-    Of several photos of one thing it covers all, in their order, and the stated turns or poses. What another tool says of an
-    imported mesh is part of the input. Another configuration is another revision of the same twin. Raises InputError
+    Of several photos of one thing it covers all, in their order, and the stated turns, or poses and masks. What another tool
+    says of an imported mesh is part of the input. Another configuration is another revision of the same twin. Raises InputError
     ``unreadable`` where a file has gone since the input was listed, or is no regular one now.
     """
     if item.file is None:
@@ -116,7 +116,11 @@ def twin_id(item: Item) -> str:
         photos = [{"suffix": Path(file).suffix.lower(), "sha256": file_sha256(Path(file))} for file in item.files]
         content = {"photos": photos, "turns_deg": list(item.turns_deg)}
         if item.poses is not None:
-            content |= {"poses": poses_identity([Path(file) for file in item.files], Path(item.poses))}
+            taken, poses = [Path(file) for file in item.files], Path(item.poses)
+            content |= {"poses": poses_identity(taken, poses)}
+            masks = masks_of_photos(taken, poses)
+            if any(masks):
+                content |= {"masks": [None if mask is None else file_sha256(mask) for mask in masks]}
     else:
         path = Path(item.file)
         digest, root = file_sha256(path), path.parent.resolve()
@@ -130,6 +134,15 @@ def twin_id(item: Item) -> str:
     if item.longest_side_m is not None:
         identity["longest_side_m"] = item.longest_side_m
     return sha256_of_json(identity)[:ID_DIGITS]
+
+
+def _named_masks(poses: Path) -> list[str]:
+    """Return the masks that a file of poses names and that are there; none where it is not read."""
+    try:
+        cameras = read_poses(poses).cameras
+    except InputError:
+        return []
+    return [str(camera.mask) for camera in cameras if camera.mask is not None and camera.mask.is_file()]
 
 
 def require_readable_size(path: Path) -> None:

@@ -12,7 +12,7 @@ from PIL import Image
 from manitwin.config import MattingConfig, Resource
 from manitwin.engine.stage import Draft
 from manitwin.errors import InputError, Rejected
-from manitwin.formats.image_file import read_image
+from manitwin.formats.image_file import full_size, read_image
 from manitwin.models.generators.templates.fitting.outline_check import template_outline_check
 from manitwin.models.matting.candidates import network_makers
 from manitwin.models.matting.learned import Network
@@ -20,9 +20,10 @@ from manitwin.models.matting.matte import DoubtedCutOut, Matte, matte_photo
 from manitwin.models.matting.object_network import built_in_model
 from manitwin.models.matting.outline_network import outline_model
 from manitwin.pipeline.cutout import confirmed_or_rejected
-from manitwin.pipeline.given_alpha import as_given, doubted_rectangle
+from manitwin.pipeline.given_alpha import as_given, as_masked, doubted_rectangle
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.photo_groups import copies_told, told_apart
+from manitwin.pipeline.stated_poses import poses_of
 
 
 class PhotoStage:
@@ -55,16 +56,21 @@ class PhotoStage:
         return {"matte": field}
 
     def cut_out(
-        self, path: Path, name: str | None, confirmed: Callable[[DoubtedCutOut], Matte], called: str | None = None
+        self,
+        path: Path,
+        name: str | None,
+        confirmed: Callable[[DoubtedCutOut], Matte],
+        called: str | None = None,
+        mask: Path | None = None,
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Return a photo ``(H, W, 4) uint8`` of what a person called ``name`` with its matte, and what is known of that.
 
         ``called`` is what messages call the file: its name by default. ``confirmed`` returns the matte of a doubted cut-out
-        that is right all the same, or raises. Raises InputError, Rejected.
+        that is right all the same, or raises. ``mask`` is a picture of its outline. Raises InputError, Rejected.
         """
         settings, file = self.settings, called or path.name
         photo = read_image(path, frame=settings.frame, max_side_px=settings.photo_side_px)
-        given = as_given(photo.pixels, name)
+        given = as_given(photo.pixels, name) if mask is None else as_masked(photo.pixels, mask, full_size(path)[2])
         try:
             matte = matte_photo(
                 given.pixels,
@@ -115,10 +121,11 @@ class PhotosStage(PhotoStage):
         (folder / "photos").mkdir()
         kept: list[tuple[str, dict[str, Any]]] = []
         doubts: list[Rejected] = []
-        names = told_apart(draft.payload.files)
-        for number, (file, called) in enumerate(zip(draft.payload.files, names, strict=True)):
+        files, poses = draft.payload.files, poses_of(draft.payload)
+        masks = [None] * len(files) if poses is None else [camera.mask for camera in poses.cameras]
+        for number, (file, called, mask) in enumerate(zip(files, told_apart(files), masks, strict=True)):
             try:
-                rgba, field = self.cut_out(Path(file), draft.payload.name, refused, called)
+                rgba, field = self.cut_out(Path(file), draft.payload.name, refused, called, mask)
             except InputError:  # no photo: what was given is not what was meant
                 raise
             except Rejected as answer:

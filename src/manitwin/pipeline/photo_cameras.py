@@ -13,6 +13,7 @@ from manitwin.formats.camera_poses.matching import cameras_of
 from manitwin.formats.camera_poses.posed_camera import PosedCamera, turned_upright
 from manitwin.formats.camera_poses.read import CameraPoses, read_camera_poses
 from manitwin.formats.image_file import full_size
+from manitwin.formats.outline_mask import require_mask
 from manitwin.formats.printable import printable_line
 
 _ROUNDED_PX, _ROUNDED_SHARE = 1.0, 0.005  # by which the sides of a scaled picture are off its shape
@@ -48,6 +49,11 @@ def poses_identity(photos: Sequence[Path], poses: Path) -> list[object]:
     return [found.format, found.unit_m, cameras]
 
 
+def masks_of_photos(photos: Sequence[Path], poses: Path) -> list[Path | None]:
+    """Return the mask that a file of poses names for each photo; raises InputError as ``cameras_of_photos`` does."""
+    return [camera.mask for camera in cameras_of_photos(photos, read_poses(poses))]
+
+
 def read_poses(poses: Path) -> CameraPoses:
     """Read a file of poses once for all that ask; it is read again where it was changed. Raises InputError."""
     files = sorted(file for file in poses.glob("*") if file.is_file()) if poses.is_dir() else [poses]
@@ -64,7 +70,11 @@ def _read_as(poses: Path, changed: tuple[tuple[str, int, int], ...]) -> CameraPo
 
 
 def cameras_of_photos(photos: Sequence[Path], found: CameraPoses) -> list[PosedCamera]:
-    """Return the camera of each photo; raises InputError for one without a pose, or of another shape than its pose is of."""
+    """Return the camera of each photo.
+
+    Raises InputError for a photo without a pose, or of another shape than its pose is of, and for a mask that is not there or
+    not as large as its photo.
+    """
     file = called(found)
     cameras = cameras_of(photos, found.cameras, file)
     missing = [photo.name for photo, camera in zip(photos, cameras, strict=True) if camera is None]
@@ -80,7 +90,7 @@ def cameras_of_photos(photos: Sequence[Path], found: CameraPoses) -> list[PosedC
     for photo, camera in zip(photos, cameras, strict=True):
         _require_own(photo, camera, found)
     return [
-        _of_upright(photo, camera, file) for photo, camera in zip(photos, cameras, strict=True) if camera is not None
+        _of_upright(photo, camera, found) for photo, camera in zip(photos, cameras, strict=True) if camera is not None
     ]
 
 
@@ -109,12 +119,15 @@ def _require_own(photo: Path, camera: PosedCamera | None, found: CameraPoses) ->
         )
 
 
-def _of_upright(photo: Path, camera: PosedCamera, file: str) -> PosedCamera:
+def _of_upright(photo: Path, camera: PosedCamera, found: CameraPoses) -> PosedCamera:
     """Return the camera for a photo as it is upright; raises InputError where the pose is of a picture of another shape.
 
     Programs that estimate poses look at the picture as it is stored, or as its EXIF turns it: its shape tells which.
     """
     width, height, orientation = full_size(photo)
+    file = called(found)
+    if camera.mask is not None:
+        require_mask(camera.mask, found.file.parent, (width, height), orientation)
     whole = replace(camera, lens=camera.lens.of_picture(width, height))
     stated = camera.lens.size_px
     name = printable_line(photo.name, max_characters=120)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -51,13 +52,14 @@ class PosedCamera:
     """A camera that took the picture ``file`` (as the file of poses calls it).
 
     ``world_to_camera (3, 4)`` takes points of a world to the camera's frame: x right, y down, z forward. Where that world was
-    turned since, ``as_read (3, 4)`` is that of the file's own.
+    turned since, ``as_read (3, 4)`` is that of the file's own. ``mask`` is the outline's picture that the file names.
     """
 
     file: str
     world_to_camera: np.ndarray
     lens: Lens
     as_read: np.ndarray | None = None
+    mask: Path | None = None
 
 
 def turned_upright(camera: PosedCamera, orientation: int) -> PosedCamera:

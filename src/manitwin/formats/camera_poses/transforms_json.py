@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ _PINHOLE = frozenset({"OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "R
 _FISHEYE = frozenset({"OPENCV_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "FISHEYE"})
 _PINHOLE_NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 _FISHEYE_NAMES = ("k1", "k2", "k3", "k4")
+_FOCAL = ("fl_x", "fl_y", "camera_angle_x", "camera_angle_y")
 _SHOWN = 80
 
 _refused = partial(InputError, "unreadable")
@@ -35,7 +36,8 @@ _refused = partial(InputError, "unreadable")
 def read_transforms(path: Path) -> tuple[list[PosedCamera], float | None]:
     """Return the cameras of a file in its order, and how many metres its unit is, None where it does not say.
 
-    What a frame says of its lens goes before what the file says. Raises InputError with one line.
+    What a frame says of its lens goes before what the file says. A frame's ``mask_path`` is one below the file's folder; whether
+    it is there is not asked. Raises InputError with one line.
     """
     document = read_json_object(path, _refused)
     frames = document.get("frames")
@@ -51,13 +53,18 @@ def read_transforms(path: Path) -> tuple[list[PosedCamera], float | None]:
         raise _refused(f"{_name(path)}: {error}; mend the file") from error
 
 
-def transforms_of(cameras: Sequence[PosedCamera], names: Sequence[str], unit_m: float | None) -> dict[str, Any]:
-    """Return the content of a transforms.json for photos called ``names``; each lens is one of ``Lens.of_picture``."""
+def transforms_of(
+    cameras: Sequence[PosedCamera], names: Sequence[str], unit_m: float | None, masks: Mapping[Path, str]
+) -> dict[str, Any]:
+    """Return the content of a transforms.json for photos called ``names``; each lens is one of ``Lens.of_picture``.
+
+    ``masks`` says what the masks of the cameras are called.
+    """
     document: dict[str, Any] = {} if unit_m is None else {"units": next(k for k, v in UNITS.items() if v == unit_m)}
-    return document | {"frames": [_frame(camera, name) for camera, name in zip(cameras, names, strict=True)]}
+    return document | {"frames": [_frame(camera, name, masks) for camera, name in zip(cameras, names, strict=True)]}
 
 
-def _frame(camera: PosedCamera, name: str) -> dict[str, Any]:
+def _frame(camera: PosedCamera, name: str, masks: Mapping[Path, str]) -> dict[str, Any]:
     lens, pose = camera.lens, np.eye(4)
     turn = camera.world_to_camera[:, :3].T
     pose[:3, :3], pose[:3, 3] = turn @ OPENGL_TO_OPENCV, -turn @ camera.world_to_camera[:, 3]
@@ -74,6 +81,7 @@ def _frame(camera: PosedCamera, name: str) -> dict[str, Any]:
         "w": size[0],
         "h": size[1],
         **distortion,
+        **({} if camera.mask is None else {"mask_path": masks[camera.mask]}),
     }
 
 
@@ -84,7 +92,28 @@ def _camera(path: Path, number: int, frame: Any, document: Mapping[str, Any]) ->
     to_world = rigid(_matrix(frame.get("transform_matrix"), told), f"{told}: transform_matrix")
     turn = OPENGL_TO_OPENCV @ to_world[:, :3].T
     pose = np.column_stack([turn, -turn @ to_world[:, 3]])
-    return PosedCamera(frame["file_path"], pose, _lens({**document, **frame}, told))
+    lens = _lens(_said_of_lens(document, frame), told)
+    return PosedCamera(frame["file_path"], pose, lens, mask=_mask(path, frame.get("mask_path"), told))
+
+
+def _said_of_lens(document: Mapping[str, Any], frame: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what is said of a frame's lens: a focal length of its own takes the place of all that the file says of one."""
+    own = any(frame.get(key) is not None for key in _FOCAL)
+    return {**{key: value for key, value in document.items() if not (own and key in _FOCAL)}, **frame}
+
+
+def _mask(path: Path, said: Any, told: str) -> Path | None:
+    if said is None:
+        return None
+    relative = PurePosixPath(said.strip().replace("\\", "/")) if isinstance(said, str) else PurePosixPath()
+    if not relative.parts or "\0" in str(relative):
+        raise _refused(
+            f"{told}: mask_path names no file; give a path below the folder of {_name(path)}, or leave it out"
+        )
+    if relative.is_absolute() or relative.parts[0].endswith(":") or ".." in relative.parts:
+        shown = printable_line(said, max_characters=_SHOWN)
+        raise _refused(f"{told}: mask_path {shown} leads out of the folder of {_name(path)}; keep the masks below it")
+    return path.parent / relative
 
 
 def _matrix(value: Any, told: str) -> np.ndarray:

@@ -1,0 +1,86 @@
+"""Read the picture of a thing's outline beside a photo: white, or opaque, where the thing is."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from manitwin.errors import InputError
+from manitwin.formats.image_file import full_size, read_image
+from manitwin.formats.printable import printable_line
+
+MOST_TINT = 64
+"""By which the channels of a grey picture differ at most, of 255: what compresses with losses tints it."""
+LEAST_LEFT_OUT = 0.02
+"""Of a picture, what the mask of a thing leaves out at least: less is no cut-out (as of an alpha channel)."""
+_HALF = 0.5
+_TURNED = {6: -1, 8: 1}  # quarter turns, counter-clockwise, that show a stored picture upright
+
+_refused = partial(InputError, "unreadable")
+
+
+def require_mask(path: Path, folder: Path, size_px: tuple[int, int], orientation: int) -> None:
+    """Raise InputError for a mask that is not there, lies outside ``folder``, or is not as large as its photo.
+
+    ``size_px`` is the photo's width and height, upright; a mask of the photo as it is stored is one, too, where its EXIF
+    ``orientation`` turns it by a right angle. Only the header is read.
+    """
+    called = _called(path)
+    try:
+        is_inside, is_there = path.resolve().is_relative_to(folder.resolve()), path.is_file()
+    except (OSError, RuntimeError, ValueError):  # a name that no file can have, or a loop of links
+        is_inside, is_there = True, False
+    if not is_inside:
+        raise _refused(f"{called}: a link that leads out of the folder of the poses; keep the masks below it")
+    if not is_there:
+        raise _refused(f"{called}: the mask that mask_path names is not there; put it there, or leave mask_path out")
+    width, height, _ = full_size(path)
+    if (width, height) != size_px and not (orientation in _TURNED and (height, width) == size_px):
+        raise _refused(
+            f"{called}: a mask of {width} x {height} pixels, and its photo has {size_px[0]} x {size_px[1]}; give the mask at the"
+            " photo's size, or leave mask_path out"
+        )
+
+
+def read_mask(path: Path, shape: tuple[int, int], orientation: int = 1) -> np.ndarray:
+    """Return how far each pixel of a photo of ``shape`` (rows, columns), upright, is the thing's: ``(H, W) uint8``, 255 wholly.
+
+    An alpha channel that differs within the picture is the mask, else its grey, stretched until the highest is 255.
+    ``orientation`` is that of the photo's EXIF: a mask of the other shape is turned as the photo is. Raises InputError for a
+    picture that is no outline: one with colours, one that is the same nearly everywhere, and one that has most of the border
+    (it says what to leave out of a scene).
+    """
+    pixels, called = read_image(path).pixels, _called(path)
+    if pixels.shape[2] == 4 and np.ptp(pixels[..., 3]):
+        mask = pixels[..., 3]
+    else:
+        if int(np.ptp(pixels[..., :3].astype(np.int16), axis=2).max()) > MOST_TINT:
+            raise _refused(
+                f"{called}: a mask with colours; give one that is white where the thing is and black elsewhere"
+            )
+        mask = pixels[..., 1]
+    if orientation in _TURNED and (mask.shape[0] > mask.shape[1]) != (shape[0] > shape[1]):
+        mask = np.rot90(mask, _TURNED[orientation])
+    highest = int(mask.max())
+    if not highest:
+        raise _refused(
+            f"{called}: a mask that is black everywhere; make it white where the thing is, or leave mask_path out"
+        )
+    mask = np.rint(mask * (255 / highest)).astype(np.uint8)
+    taken = mask > 127
+    border = np.concatenate([taken[0], taken[-1], taken[:, 0], taken[:, -1]])
+    if (~taken).mean() < LEAST_LEFT_OUT or border.mean() > _HALF:
+        raise _refused(
+            f"{called}: a mask that keeps the border of the picture: it says what to leave out of a scene, and not where the"
+            " thing is; make it black around the thing, or leave mask_path out"
+        )
+    if mask.shape != shape:
+        mask = np.asarray(Image.fromarray(mask).resize(shape[::-1], Image.Resampling.BOX))
+    return np.ascontiguousarray(mask)
+
+
+def _called(path: Path) -> str:
+    return printable_line("/".join(path.parts[-2:]), max_characters=120)
