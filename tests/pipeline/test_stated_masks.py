@@ -53,12 +53,15 @@ def _item(photos: list[Path]) -> Item:
     return item
 
 
-@pytest.mark.parametrize("kind", ["grey", "ones", "alpha"])
-def test_photos_on_any_ground_are_cut_out_by_their_masks(tmp_path: Path, kind: str) -> None:
-    photos = _write(tmp_path, kind, units="m")
-    made = carve_photos(photos, None, poses=tmp_path / "transforms.json")
+def test_carve_takes_the_masks(tmp_path: Path) -> None:
+    made = carve_photos(_write(tmp_path, units="m"), None, poses=tmp_path / "transforms.json")
     assert made.metric and np.ptp(made.part.vertices[:, 2]) == pytest.approx(0.104, abs=0.004)
     assert "0.png: cut out as its mask says, 0.png" in made.findings
+
+
+@pytest.mark.parametrize("kind", ["grey", "ones", "alpha"])
+def test_photos_on_any_ground_are_cut_out_by_their_masks(tmp_path: Path, kind: str) -> None:
+    photos = _write(tmp_path, kind)
     stage, folder = PhotosStage(MattingConfig()), tmp_path / "draft"
     folder.mkdir()
     field = stage.run(Draft("t", _item(photos), seed=0), folder)["matte"]

@@ -17,9 +17,9 @@ from manitwin.models.generators.lift.carving import are_crossing, carve, power_o
 from manitwin.models.generators.lift.hint import hint_from_name
 from manitwin.models.generators.lift.posed_carving import carve_posed
 from manitwin.models.generators.lift.posed_views import scaled_part
-from manitwin.models.generators.protocol import MOST_PHOTOS
 from manitwin.pipeline.photo import PhotoStage, refused
 from manitwin.pipeline.photo_groups import copies_told, given_twice, told_apart
+from manitwin.pipeline.photo_thinning import MOST_GIVEN, kept_photos, thinned_words
 from manitwin.pipeline.stated_poses import StatedPoses, stated_poses
 
 EXAMPLE = "such as --turns 0,90,180"
@@ -64,9 +64,13 @@ def carve_photos(
     where fewer than two photos can be cut out, and naming the photo that does not go with the others.
     """
     _check(paths, turns_deg, poses)
+    given = len(paths)
+    paths, turns_deg = _thinned(paths, turns_deg, poses)
     stated = None if poses is None else _stated(paths, poses, up, units)
     masks = [None] * len(paths) if stated is None else [camera.mask for camera in stated.cameras]
     cut = _cut_out(paths, name, masks)
+    if len(paths) < given:
+        cut.findings.insert(0, thinned_words(len(paths), given))
     turns = list(turns_deg or ()) if stated is None else list(stated.turns_deg)
     photos, turns = list(cut.photos.values()), [turns[number] for number in cut.photos]
     if stated is not None:
@@ -88,9 +92,9 @@ def _check(paths: Sequence[Path], turns_deg: Sequence[float] | None, poses: Path
     if (turns_deg is None) == (poses is None):
         raise UsageError(f"say where the camera was: {EXAMPLE}, or --poses transforms.json; one of them")
     turns = len(paths) if turns_deg is None else len(turns_deg)
-    if not 2 <= len(paths) <= MOST_PHOTOS or turns != len(paths):
+    if not 2 <= len(paths) <= MOST_GIVEN or turns != len(paths):
         raise UsageError(
-            f"photos: {len(paths)}, turns: {turns}; give 2 to {MOST_PHOTOS} photos and a turn of each, {EXAMPLE}"
+            f"photos: {len(paths)}, turns: {turns}; give 2 to {MOST_GIVEN} photos and a turn of each, {EXAMPLE}"
         )
     twice = given_twice([str(path.resolve()) for path in paths])
     if twice is not None:
@@ -101,6 +105,17 @@ def _check(paths: Sequence[Path], turns_deg: Sequence[float] | None, poses: Path
         raise UsageError(
             "all photos are from one direction or its opposite: give one from the side, such as 90 degrees"
         )
+
+
+def _thinned(
+    paths: Sequence[Path], turns_deg: Sequence[float] | None, poses: Path | None
+) -> tuple[Sequence[Path], Sequence[float] | None]:
+    """Return as many photos as are used, and their turns."""
+    try:
+        kept = kept_photos(paths, turns_deg or (), poses)
+    except InputError as error:
+        raise UsageError(f"--poses: {error.detail}") from error
+    return [paths[number] for number in kept], None if turns_deg is None else [turns_deg[number] for number in kept]
 
 
 def _stated(paths: Sequence[Path], poses: Path, up: str, units: str) -> StatedPoses:

@@ -39,7 +39,8 @@ class Item(Payload):
     made of one text: each is drawn from a seed of its own. ``views`` are the absolute paths of further photos of the thing that
     the photo ``file`` shows; ``turns_deg`` is the camera's turn about the vertical in each photo, counter-clockwise seen from
     above, that of the first 0; empty where nobody states them. ``poses`` is the absolute path of a file, or of the folder of a
-    COLMAP model, that states the cameras of the photos.
+    COLMAP model, that states the cameras of the photos. ``photos_given`` is how many photos there were where they were thinned
+    out; None where all are here.
     """
 
     file: str | None
@@ -55,6 +56,7 @@ class Item(Payload):
     turns_deg: tuple[float, ...] = ()
     longest_side_m: float | None = None
     poses: str | None = None
+    photos_given: int | None = None
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -91,6 +93,7 @@ class Item(Payload):
         later = {"given": self.given is None, "variation": not self.variation}
         later |= {"views": not self.views, "turns_deg": not self.turns_deg}
         later |= {"longest_side_m": self.longest_side_m is None, "poses": self.poses is None}
+        later |= {"photos_given": self.photos_given is None}
         kept = {name: value for name, value in fields.items() if not later.get(name, False)}
         return {name: list(value) if isinstance(value, tuple) else value for name, value in kept.items()}
 
@@ -115,6 +118,8 @@ def twin_id(item: Item) -> str:
     elif item.views:
         photos = [{"suffix": Path(file).suffix.lower(), "sha256": file_sha256(Path(file))} for file in item.files]
         content = {"photos": photos, "turns_deg": list(item.turns_deg)}
+        if item.photos_given is not None:
+            content |= {"photos_given": item.photos_given}
         if item.poses is not None:
             taken, poses = [Path(file) for file in item.files], Path(item.poses)
             content |= {"poses": poses_identity(taken, poses)}

@@ -24,6 +24,7 @@ from manitwin.pipeline.inspection import imported
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.manifest_rows import manifest_rows
 from manitwin.pipeline.photo_groups import PhotoGroups, one_of_photos
+from manitwin.pipeline.photo_thinning import thinned_words
 from manitwin.pipeline.stated_size import COLUMN as COLUMN_OF_SIZE
 from manitwin.pipeline.stated_size import MEANT, stated_size_m, with_defaults
 from manitwin.pipeline.view_inputs import in_order, no_pose_told
@@ -139,7 +140,13 @@ def _one_of_views(
             notes.remarks.extend(no_pose_told(without, poses))
         items += own
     turns = turns_deg(len(items)) if callable(turns_deg) else turns_deg
-    yield one_of_photos(items, turns, "--views", None if poses is None else str(poses))
+    item = one_of_photos(items, turns, "--views", None if poses is None else str(poses))
+    notes.remarks.extend(_thinned(item, "--views"))
+    yield item
+
+
+def _thinned(item: Item, where: str) -> list[str]:
+    return [] if item.photos_given is None else [f"{where}: {thinned_words(len(item.files), item.photos_given)}"]
 
 
 def _given_items(
@@ -217,6 +224,7 @@ def _manifest_items(
         if not groups.takes(line, row):
             yield from _allowed([_item(row, path.parent, defaults, where, unknown)], where, refusal)
     for item, where in groups.items(lambda row, where: _item(row, path.parent, defaults, where, unknown)):
+        notes.remarks.extend(_thinned(item, where))
         yield from _allowed([item], where, refusal)
     if line is None:
         raise UsageError(

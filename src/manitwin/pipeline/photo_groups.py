@@ -15,6 +15,7 @@ from manitwin.formats.printable import printable_line
 from manitwin.formats.source_files import MESH_SUFFIXES
 from manitwin.models.generators.protocol import MOST_PHOTOS
 from manitwin.pipeline.item import Item, file_sha256
+from manitwin.pipeline.photo_thinning import MOST_GIVEN, kept_photos
 from manitwin.pipeline.stated_poses import poses_of
 
 OF_THE_THING = ("name", "units", "up", "longest_side_m", "license", "attribution", "poses")
@@ -31,8 +32,9 @@ def one_of_photos(
     """Return the item of one thing that the photos of ``items`` show, in their order.
 
     ``turns_deg`` is the camera's turn in each photo; kept relative to the first, in 0..360. ``poses`` is a file that states their
-    cameras. One photo is an item of its own. Raises UsageError for meshes, texts, a photo that is given twice, too many photos,
-    turns that are not one a photo, and poses that are not read or not those of the photos.
+    cameras. Where either is given, too many photos are thinned out evenly. One photo is an item of its own. Raises UsageError
+    for meshes, texts, a photo that is given twice, too many photos, turns that are not one a photo, and poses that are not
+    read or not those of the photos.
     """
     meshes = [item.title for item in items if item.file is not None and _is_mesh(item)]
     if meshes or any(item.file is None for item in items):
@@ -42,9 +44,12 @@ def one_of_photos(
     twice = given_twice(files)
     if twice is not None:
         raise UsageError(f"{where}: {Path(twice).name} is given twice; give each photo once")
-    if len(items) > MOST_PHOTOS:
+    unsaid = turns_deg is None and poses is None
+    if len(items) > (MOST_PHOTOS if unsaid else MOST_GIVEN):
+        told = ", or say where the camera was, to have them thinned out" if unsaid else ""
+        most = MOST_PHOTOS if unsaid else MOST_GIVEN
         raise UsageError(
-            f"{where}: {len(items)} photos of one thing; give at most {MOST_PHOTOS}, spread over the directions"
+            f"{where}: {len(items)} photos of one thing; give at most {most}, spread over the directions{told}"
         )
     turns = [] if turns_deg is None else list(turns_deg)
     if turns and (len(turns) != len(items) or not all(map(isfinite, turns))):
@@ -52,17 +57,24 @@ def one_of_photos(
             f"{where}: {len(items)} photos and the turns {', '.join(f'{turn:g}' for turn in turns)}: give one a photo, in"
             " degrees, counter-clockwise seen from above, such as 0,90,180"
         )
+    if turns and poses is not None:
+        raise UsageError(f"{where}: turns and poses both say where the camera was; give one of them")
+    try:
+        kept = kept_photos([Path(file) for file in files], turns, None if poses is None else Path(poses))
+    except InputError as error:
+        raise UsageError(f"{where}: {error.detail}") from error
+    given = None if len(kept) == len(items) else len(items)
+    items, turns = [items[number] for number in kept], [turns[number] for number in kept] if turns else []
     if poses is not None:
-        return _posed(items, turns, poses, where)
+        return replace(_posed(items, poses, where), photos_given=given)
     if len(items) == 1:
         return items[0]
     relative = tuple(round((turn - turns[0]) % 360.0, 6) % 360.0 for turn in turns)
-    return replace(items[0], views=tuple(files[1:]), turns_deg=relative)
+    views = tuple(str(item.file) for item in items[1:])
+    return replace(items[0], views=views, turns_deg=relative, photos_given=given)
 
 
-def _posed(items: Sequence[Item], turns: Sequence[float], poses: str, where: str) -> Item:
-    if turns:
-        raise UsageError(f"{where}: turns and poses both say where the camera was; give one of them")
+def _posed(items: Sequence[Item], poses: str, where: str) -> Item:
     if len(items) == 1:
         raise UsageError(f"{where}: poses are those of several photos of one thing, and this is one; give more photos")
     item = replace(items[0], views=tuple(str(each.file) for each in items[1:]), poses=os.path.realpath(poses))

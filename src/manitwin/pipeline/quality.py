@@ -10,6 +10,7 @@ from manitwin.engine.stage import Draft
 from manitwin.formats.printable import printable_line
 from manitwin.pipeline.grasps import GRASP_POINTS
 from manitwin.pipeline.guesses import OF_NO_NAME, naming_checks, shape_checks, size_checks, template_checks
+from manitwin.pipeline.photo_thinning import thinned_words
 from manitwin.twin.import_record import read_import_record
 from manitwin.twin.record_values import Check
 from manitwin.twin.shares import wilson_interval
@@ -112,6 +113,8 @@ def photos_checks(draft: Draft) -> list[Check]:
             f"the generator {generation['generator']} takes one photo, the first: the others are not in the mesh"
         )
     passed = not said
+    before = draft.payload.photos_given
+    said += [] if before is None else [thinned_words(given, before)]
     said += _turns_told(generation["notes"])
     return [
         Check(name="every_photo_used", passed=passed, value=float(used), limit=float(given), message="; ".join(said))

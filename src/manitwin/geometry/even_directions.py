@@ -1,0 +1,41 @@
+"""Choose some of many directions so that they are spread as evenly as the others allow."""
+
+from __future__ import annotations
+
+import numpy as np
+
+_DIGITS = 5  # of distances between unit vectors: what rounds otherwise on another processor decides nothing
+
+
+def evenly_spread(directions: np.ndarray, count: int) -> np.ndarray:
+    """Return which ``count`` of unit vectors ``(N, 3)`` are kept: their numbers, in order; the first is one of them.
+
+    Of the two that lie closest together the one with the closer next neighbour goes, until ``count`` are left. It takes
+    ``4 N N`` bytes.
+    """
+    left = np.ones(len(directions), dtype=bool)
+    apart = _distances(directions)
+    nearest = apart.argmin(axis=1)
+    for _ in range(len(directions) - count):
+        shortest = np.where(left, apart[np.arange(len(apart)), nearest], np.inf)
+        one = int(shortest.argmin())
+        other = int(nearest[one])
+        gone = max(one, other) if 0 in (one, other) else _more_crowded(apart, one, other)
+        left[gone] = False
+        apart[gone], apart[:, gone] = np.inf, np.inf
+        moved = np.flatnonzero(nearest == gone)
+        nearest[moved] = apart[moved].argmin(axis=1)
+    return np.flatnonzero(left)
+
+
+def _distances(directions: np.ndarray) -> np.ndarray:
+    cosines = (directions @ directions.T).clip(-1.0, 1.0)
+    apart = np.round(np.sqrt(2.0 - 2.0 * cosines), _DIGITS).astype(np.float32)
+    np.fill_diagonal(apart, np.inf)
+    return apart
+
+
+def _more_crowded(apart: np.ndarray, one: int, other: int) -> int:
+    next_of_one = np.delete(apart[one], other).min()
+    next_of_other = np.delete(apart[other], one).min()
+    return one if next_of_one < next_of_other else other

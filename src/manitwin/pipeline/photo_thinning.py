@@ -1,0 +1,44 @@
+"""Which of very many photos of one thing are used: those from directions that are spread evenly over all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from manitwin.formats.camera_poses.matching import cameras_of
+from manitwin.geometry.even_directions import evenly_spread
+from manitwin.models.generators.protocol import MOST_PHOTOS
+from manitwin.pipeline.photo_cameras import called, read_poses
+
+MOST_GIVEN = 4096
+"""Of one thing: the frames of a film of two minutes; each is looked at."""
+
+
+def kept_photos(photos: Sequence[Path], turns_deg: Sequence[float], poses: Path | None) -> list[int]:
+    """Return the numbers of the photos that are used, in order: all of ``MOST_PHOTOS``, of more as many spread evenly.
+
+    Where a photo was taken from say ``turns_deg``, one a photo, or the file ``poses``; where neither does, or a photo has no
+    pose, all are returned. The first photo is one of them. Raises InputError for poses that are not read.
+    """
+    every = list(range(len(photos)))
+    if len(photos) <= MOST_PHOTOS:
+        return every
+    if poses is not None:
+        found = read_poses(poses)
+        cameras = cameras_of(photos, found.cameras, called(found))
+        directions = [camera.world_to_camera[2, :3] for camera in cameras if camera is not None]
+        if len(directions) < len(photos):
+            return every
+    elif turns_deg:
+        turns = np.deg2rad(turns_deg)
+        directions = list(np.column_stack([np.cos(turns), np.sin(turns), np.zeros(len(turns))]))
+    else:
+        return every
+    return [int(number) for number in evenly_spread(np.array(directions), MOST_PHOTOS)]
+
+
+def thinned_words(used: int, given: int) -> str:
+    """Say that not all photos of a thing are used."""
+    return f"{used} of {given} photos used, spread evenly over the directions: more say nothing new of the shape"
