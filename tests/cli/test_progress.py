@@ -43,6 +43,14 @@ def test_line_counts_what_ended_and_names_the_stages_at_work() -> None:
     assert progress.line() == "3 of 10 batches; 1 rejected; under way: 2 films, 1 assemble"
 
 
+def test_what_is_prepared_is_said_until_the_run_begins() -> None:
+    said = iter(["", "7 files found in scans"])
+    progress = RunProgress("inputs", Clock(), lambda: next(said))
+    assert [progress.line(), progress.line()] == ["preparing", "preparing: 7 files found in scans"]
+    progress.start(3)
+    assert progress.line() == "0 of 3 inputs"
+
+
 def test_time_left_is_that_of_the_rate_and_said_only_after_three_items() -> None:
     clock = Clock()
     progress = RunProgress("items", clock)

@@ -13,8 +13,10 @@ import pytest
 from PIL import Image
 
 from manitwin.formats.isolated import Limits, ProcessCrashed, iterate_isolated, run_isolated
+from manitwin.formats.source_files import named_file
 from manitwin.pipeline import inspection
 from manitwin.pipeline.folder_listing import FolderListing, list_folder
+from manitwin.pipeline.manifest import Notes, iterate_items
 
 OBJ = "mtllib mug.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
@@ -252,6 +254,51 @@ def test_meshes_are_not_opened_where_nothing_could_be_a_part_of_them(
     put(tmp_path, {"a.obj": OBJ, "b.gltf": "{}", "README.md": "x", "LICENSE": "x"})
     monkeypatch.setattr("manitwin.pipeline.folder_listing.names_of", lambda paths: pytest.fail("meshes were opened"))
     assert names(tmp_path, listed(tmp_path).inputs) == ["a.obj", "b.gltf"]
+
+
+def test_a_listing_says_how_far_it_is(tmp_path: Path) -> None:
+    root = put(tmp_path / "scans", {f"{k}/{k}.obj": "mtllib m.mtl\n" for k in range(3)} | {"0/m.mtl": "map_Kd t.png\n"})
+    put(root, {"0/t.png": b"x"})
+    said: list[str] = []
+    list_folder(root, said.append)
+    assert said[0] == "0 files found in scans" and "files found in scans" in said[3]
+    assert said[-1] == "3 of 3 meshes of scans looked at for the files that they name"
+    notes = Notes()
+    list(iterate_items([root], {}, notes))
+    assert notes.under_way == said[-1]
+
+
+def test_files_beside_a_mesh_are_its_parts_without_being_resolved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A link, a folder above, or another spelling is still looked for on the disk."""
+    put(
+        tmp_path,
+        {"plain/a.obj": "mtllib a.mtl\n", "plain/a.mtl": "map_Kd maps/t%201.png\n", "plain/maps/t%201.png": b"x"},
+    )
+    put(
+        tmp_path,
+        {"plain/maps/t 1.png": b"x", "up/b.obj": "mtllib x/../b.mtl\n", "up/b.mtl": "newmtl b\n", "up/x/y.jpg": b"x"},
+    )
+    put(tmp_path, {"link/c.obj": "mtllib c.mtl\n", "link/d.mtl": "newmtl c\n"})
+    (tmp_path / "link" / "c.mtl").symlink_to("d.mtl")
+    asked: list[str] = []
+
+    def found(folder: Path, name: str) -> Path | None:
+        asked.append(name)
+        return named_file(folder, name)
+
+    monkeypatch.setattr("manitwin.pipeline.folder_listing.named_file", found)
+    parts = {str(k.relative_to(tmp_path)): str(v.relative_to(tmp_path)) for k, v in list_folder(tmp_path).parts.items()}
+    assert parts == {
+        "plain/a.mtl": "plain/a.obj",
+        "plain/maps/t%201.png": "plain/a.obj",
+        "plain/maps/t 1.png": "plain/a.obj",
+        "up/b.mtl": "up/b.obj",
+        "link/c.mtl": "link/c.obj",
+        "link/d.mtl": "link/c.obj",
+    }
+    assert asked == ["c.mtl", "x/../b.mtl"]
 
 
 def hostile_texts() -> dict[str, str]:

@@ -42,11 +42,16 @@ BAR_WIDTH = 24
 class RunProgress:
     """The state of a run, from its events, which may come from several threads.
 
-    ``what`` names the items in the plural. ``clock`` gives seconds.
+    ``what`` names the items in the plural. ``clock`` gives seconds. ``preparing`` says how far a run is that has not begun.
     """
 
-    def __init__(self, what: str = "items", clock: Callable[[], float] = time.monotonic):
-        self.what, self._clock = what, clock
+    def __init__(
+        self,
+        what: str = "items",
+        clock: Callable[[], float] = time.monotonic,
+        preparing: Callable[[], str] = lambda: "",
+    ):
+        self.what, self._clock, self._preparing = what, clock, preparing
         self._lock = threading.Lock()
         self.total = self.before = 0
         self.counts: Counter[str] = Counter()
@@ -125,7 +130,7 @@ class RunProgress:
     def line(self) -> str:
         """Return all of it in one line."""
         if self._started_at is None:
-            return "preparing"
+            return ": ".join(filter(None, ("preparing", self._preparing())))
         with self._lock:
             counts = ", ".join(f"{number} {state}" for state, number in self.counts.items())
             stages = self._stages()
@@ -234,11 +239,11 @@ class ShownProgress:
 class WatchedRun(ShownProgress):
     """The progress of a run below ``place`` on the consoles of this command; its log lies there unless ``--log`` says otherwise.
 
-    ``what`` names the items in the plural.
+    ``what`` names the items in the plural; ``preparing`` says how far the run is that has not begun.
     """
 
-    def __init__(self, what: str, place: str | Path):
-        super().__init__(RunProgress(what), out_console, err_console)
+    def __init__(self, what: str, place: str | Path, preparing: Callable[[], str] = lambda: ""):
+        super().__init__(RunProgress(what, preparing=preparing), out_console, err_console)
         self._place = place
         self._waits = ShownWaits(err_console)
 

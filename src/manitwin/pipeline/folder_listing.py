@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import posixpath
 from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from stat import S_ISDIR, S_ISREG
@@ -14,6 +15,8 @@ from manitwin.pipeline.inspection import NotInspected, are_imported, are_twins, 
 from manitwin.pipeline.listing_remarks import listing_remarks
 from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH
 
+Told = Callable[[str], None]
+"""Takes a few words on how far a listing is."""
 TWIN_RECORD = "twin.json"
 _NEVER_NAMED = frozenset({"", ".txt", ".md", ".pdf", ".csv", ".jsonl", ".html", ".py", ".sh", ".log"})
 """What no mesh names: a folder of meshes and such files alone is listed without opening a mesh."""
@@ -66,19 +69,20 @@ class _Found:
     links: dict[str, str] = field(default_factory=dict)
 
 
-def list_folder(folder: Path) -> FolderListing:
+def list_folder(folder: Path, told: Told = lambda said: None) -> FolderListing:
     """List a folder for a build, everything sorted by path; links to folders are not followed.
 
     An image is a part of a mesh where the mesh names it and the reader finds it there; one that no mesh names is an input.
+    ``told`` hears how far it is.
     """
-    found = _walk(folder)
+    found = _walk(folder, told)
     meshes = sorted(name for name in found.open if _suffix(name) in MESH_SUFFIXES)
     others = [name for name in found.open if _suffix(name) not in MESH_SUFFIXES]
     parts: dict[str, str] = {}
     elsewhere: set[str] = set()
     unknown: dict[str, str] = {}
     if any(_suffix(name) not in _NEVER_NAMED for name in (*others, *found.closed)):
-        parts, elsewhere, unknown = _named_parts(folder, meshes, found)
+        parts, elsewhere, unknown = _named_parts(folder, meshes, found, told)
     left = {name: reason for name, reason in found.closed.items() if name not in parts} | unknown
     inputs = [*found.assets, *(mesh for mesh in meshes if mesh not in unknown)]
     mesh_folders = {posixpath.dirname(name) for name in meshes}
@@ -117,7 +121,7 @@ class _Folder:
     asset: str | None = None
 
 
-def _walk(folder: Path) -> _Found:
+def _walk(folder: Path, told: Told) -> _Found:
     """Find all files, the folders of one depth after those of another: their records are inspected together."""
     found = _Found()
     level = [_Folder("")]
@@ -125,6 +129,7 @@ def _walk(folder: Path) -> _Found:
         scanned = [(each, entries) for each in level if (entries := _scanned(folder, each, found)) is not None]
         level = []
         for below, entries in _told_apart(folder, scanned, found):
+            told(f"{len(found.open):,} files found in {folder.name}")
             for entry in entries:
                 name = posixpath.join(below.name, entry.name)
                 reason = "hidden" if below.closed is None and entry.name.startswith(".") else below.closed
@@ -193,20 +198,32 @@ def _no_file(entry: os.DirEntry[str]) -> str | None:
     return None if S_ISREG(mode) else "no regular file"
 
 
-def _named_parts(folder: Path, meshes: list[str], found: _Found) -> tuple[dict[str, str], set[str], dict[str, str]]:
+def _named_parts(
+    folder: Path, meshes: list[str], found: _Found, told: Told
+) -> tuple[dict[str, str], set[str], dict[str, str]]:
     """Return what meshes name and the reader finds, with the mesh; the names of what it does not find there; and the meshes
     that could not be inspected, with the reason.
     """
     root = folder.resolve()
     known = {*found.open, *found.closed} - set(meshes)
+    plain = set(found.open) - found.links.keys()
     parts: dict[str, str] = {}
     elsewhere: set[str] = set()
     unknown: dict[str, str] = {}
-    for mesh, names in zip(meshes, names_of(folder / mesh for mesh in meshes), strict=True):
+    answers = zip(meshes, names_of(folder / mesh for mesh in meshes), strict=True)
+    for number, (mesh, names) in enumerate(answers, 1):
+        told(f"{number:,} of {len(meshes):,} meshes of {folder.name} looked at for the files that they name")
         if isinstance(names, NotInspected):
             unknown[mesh] = str(names)
             continue
         for name in names:
+            below = _below(mesh, name)
+            if (
+                below and below[0] in plain
+            ):  # no link on the way: the disk, which 100,000 files keep busy, need not be asked
+                for path in known.intersection(below):
+                    parts.setdefault(path, mesh)
+                continue
             file = named_file((folder / mesh).parent, name)
             paths = [] if file is None else _listed(file, root, mesh, name)
             if file is None:
@@ -215,6 +232,14 @@ def _named_parts(folder: Path, meshes: list[str], found: _Found) -> tuple[dict[s
                 if path in known:
                     parts.setdefault(path, mesh)
     return parts, elsewhere, unknown
+
+
+def _below(mesh: str, name: str) -> list[str]:
+    """Return the paths below the root that a name in a mesh may mean, the likelier first; none where it may lead elsewhere."""
+    spelled = spellings(name)
+    if any(each.startswith(("/", "~")) or ":" in each or ".." in each.split("/") for each in spelled):
+        return []
+    return [posixpath.normpath(posixpath.join(posixpath.dirname(mesh), each)) for each in spelled]
 
 
 def _listed(file: Path, root: Path, mesh: str, name: str) -> list[str]:

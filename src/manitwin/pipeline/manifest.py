@@ -61,10 +61,18 @@ Turns = Sequence[float] | Callable[[int], Sequence[float]]
 
 @dataclass
 class Notes:
-    """Collect what a user should be told of the inputs: ``remarks`` are lines, ``folders`` say what became of each file."""
+    """Collect what a user should be told of the inputs: ``remarks`` are lines, ``folders`` say what became of each file.
+
+    ``under_way`` says how far they are read: a folder of 100,000 files takes a while.
+    """
 
     remarks: list[str] = field(default_factory=list)
     folders: list[FolderListing] = field(default_factory=list)
+    under_way: str = ""
+
+    def tell(self, under_way: str) -> None:
+        """Note how far the inputs are read."""
+        self.under_way = under_way
 
 
 def require_inputs(root: DatasetRoot, inputs: Sequence[str | Path], texts: Sequence[str]) -> None:
@@ -195,7 +203,7 @@ def _allowed(items: Iterable[Item], where: str, refusal: Refusal) -> Iterator[It
 
 
 def _folder_items(folder: Path, given: str, defaults: dict[str, Any], notes: Notes) -> Iterator[Item]:
-    listing = list_folder(folder)
+    listing = list_folder(folder, notes.tell)
     if not listing.inputs:
         left = "".join(f"; {line.removeprefix(f'{folder}: ')}" for line in listing.remarks()[1:])
         known = ", ".join(sorted(MESH_SUFFIXES | IMAGE_SUFFIXES))
@@ -220,6 +228,7 @@ def _manifest_items(
             unknown[column] = f"{shown!r} (did you mean {near[0]!r}?)" if near else repr(shown)
             if strict:
                 raise UsageError(f"{path}: unknown column {unknown[column]}; valid: {', '.join(COLUMNS)}")
+        notes.tell(f"row {line:,} of {path.name}")
         where = f"{path}:{line}"
         if not groups.takes(line, row):
             yield from _allowed([_item(row, path.parent, defaults, where, unknown)], where, refusal)

@@ -163,8 +163,9 @@ def _watched_build(request: BuildRequest, *, lines: bool, executor: ExecutorName
             _print_result(result)
 
     forked = forked_workers(OF_WORKERS, [WATCH]) if executor == "local" else nullcontext()
+    watch = WatchedRun("inputs", request.out, lambda: request.notes.under_way)
     # pandas is 30 MB in each worker that Arrow takes where it finds it; forked before threads show how far it is
-    with left_out("pandas"), looked_for_once(), forked, WatchedRun("inputs", request.out) as watched:
+    with left_out("pandas"), looked_for_once(), forked, watch as watched:
         return build_requested(
             request, executor=executor, address=address, on_estimate=print_estimate, on_start=watched.start, on_stage=staged,
             on_result=ended,
