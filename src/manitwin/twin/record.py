@@ -207,6 +207,11 @@ class Physical(Record):
             raise ValueError("inertia_kg_m2 is larger than that of any object")
         return self
 
+    @property
+    def longest_m(self) -> float:
+        """The longest side of the oriented box: a turn of the thing in its frame changes nothing, as it does of ``extents_m``."""
+        return max(self.obb.extents_m)
+
 
 class Language(Record):
     """Words: the paper's six attributes, a sentence, and more sentences."""

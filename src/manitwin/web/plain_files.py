@@ -170,7 +170,7 @@ def _row(twin: Twin) -> dict[str, Any]:
         "name": record.name,
         "category": record.language.category,
         "material": record.language.material,
-        "longest_m": max(record.physical.extents_m),
+        "longest_m": record.physical.longest_m,
         "mass_kg": record.physical.mass_kg.value,
         "simulated": record.grasps.simulated,
         "verified": record.grasps.verified,

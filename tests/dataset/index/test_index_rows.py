@@ -37,6 +37,22 @@ def test_page_names_every_column() -> None:
         assert set(schema.names[:3] if table == "grasps" else schema.names) <= words
 
 
+def test_the_longest_side_is_that_of_the_oriented_box(tmp_path: Path) -> None:
+    """Of a thing turned by 45 degrees in its frame: along the axes a long one is too short, a square one too long."""
+    folder = tmp_path / twin_name(write_accepted(tmp_path, 3))
+    document = json.loads((folder / "twin.json").read_text())
+    turn = np.eye(4)
+    turn[:2, :2] = np.sqrt(0.5) * np.array([[1, -1], [1, 1]])
+    for sides in ((0.3, 0.02, 0.01), (0.2, 0.2, 0.05)):
+        along = float((sides[0] + sides[1]) * np.sqrt(0.5))
+        document["physical"] |= {"extents_m": [along, along, sides[2]]}
+        document["physical"]["obb"] |= {"extents_m": list(sides), "obb_to_object": turn.tolist()}
+        (folder / "twin.json").write_text(json.dumps(document))
+        (row,) = rows_of(folder)["twins"].to_pylist()
+        assert (row["longest_m"], row["extent_x_m"]) == (sides[0], along)
+        assert read_record(folder).physical.longest_m == sides[0]  # type: ignore[union-attr]
+
+
 def test_accepted_twin_says_in_its_row_what_its_record_says(tmp_path: Path) -> None:
     folder = tmp_path / twin_name(write_accepted(tmp_path, 3, category="bowl", mass_kg=0.25, grasps=12))
     record, rows = read_record(folder), rows_of(folder)

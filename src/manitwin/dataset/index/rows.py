@@ -122,7 +122,7 @@ def _twin(record: TwinRecord, costs: dict[str, StageCost], descriptor: ShapeDesc
         "extent_x_m": x,
         "extent_y_m": y,
         "extent_z_m": z,
-        "longest_m": max(x, y, z),
+        "longest_m": physical.longest_m,
         "radius_of_gyration_m": descriptor.radius_of_gyration_m,
         "volume_m3": mesh.volume_m3,
         "area_m2": mesh.area_m2,

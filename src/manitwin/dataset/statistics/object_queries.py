@@ -177,7 +177,7 @@ GROUP BY ALL ORDER BY twins DESC, category""",
             Column("mass_inside", "mass inside", "share"),
             Column("size_inside", "size inside", "share"),
         ),
-        "A prior's interval is meant to hold about 19 of 20 such things. It is of the longest side of the oriented box, "
-        "held here against the longest side of the axis-aligned one. The built-in annotator takes masses from these same "
+        "A prior's interval is meant to hold about 19 of 20 such things. It is of the longest extent as a thing stands, "
+        "held here against the longest side of the oriented box. The built-in annotator takes masses from these same "
         "priors: for it, a share inside is no evidence. Categories without a prior are left out.",
     )
