@@ -10,7 +10,10 @@ import pytest
 import trimesh
 from written_mjcf import mjcf
 
+from manitwin.assets.importers.conversion import imported_files
+from manitwin.assets.importers.record import asset_to_object, import_record
 from manitwin.assets.read import read_asset
+from manitwin.twin.import_record import IMPORT_RECORD
 
 
 def test_inertial_is_what_the_file_says(tmp_path: Path) -> None:
@@ -36,6 +39,32 @@ def test_mass_of_a_written_density_is_declared_and_said(tmp_path: Path) -> None:
     assert np.allclose(asset.inertial.inertia_kg_m2, 0.4 * mass_kg * 0.05**2 * np.eye(3), rtol=1e-9)
     assert asset.contact.friction_static == asset.contact.friction_dynamic == 0.8
     assert any("density" in remark for remark in asset.remarks)
+
+
+def test_of_several_frictions_that_of_the_most_area_is_the_twins_and_the_others_are_its_interval(
+    tmp_path: Path,
+) -> None:
+    grip = '<geom type="box" size="0.01 0.01 0.01" pos="0 0 0.1" friction="1.4"/>'
+    shank = '<geom name="shank" type="box" size="0.02 0.02 0.1" pos="0 0 0.3" friction="0.3"/>'
+    file = mjcf(tmp_path, f'<body><freejoint/>{grip}{shank}<geom name="tip" size="0.005" friction="0.5"/></body>')
+    asset = read_asset(file)
+    assert asset.contact.friction_static == asset.contact.friction_dynamic == 0.3
+    assert asset.contact.friction_range == (0.3, 1.4)
+    assert any(
+        "frictions from 0.3 to 1.4; a twin has one: 0.3, that of the most area" in line for line in asset.remarks
+    )
+    record = import_record(asset, asset_to_object(asset))
+    assert (record.friction_static, record.friction_range) == (0.3, (0.3, 1.4))
+    same = read_asset(mjcf(tmp_path, f"<body><freejoint/>{shank}</body>"))
+    assert same.contact.friction_range is None
+    files, _ = imported_files(same)
+    assert b"friction_range" not in files[IMPORT_RECORD]  # what had one friction before keeps its identity
+
+
+def test_contacts_of_pairs_are_told(tmp_path: Path) -> None:
+    body = '<geom name="floor" type="plane" size="1 1 1"/><body><freejoint/><geom name="a" size="0.1" friction="0.4"/></body>'
+    file = mjcf(tmp_path, body, '<contact><pair geom1="floor" geom2="a" friction="2 2 0.1 0.1 0.1"/></contact>')
+    assert any("<pair> says of its contact with other geoms (1)" in line for line in read_asset(file).remarks)
 
 
 def test_a_mass_of_geoms_in_several_bodies_is_combined_as_mujoco_has_it(tmp_path: Path) -> None:

@@ -60,7 +60,8 @@ class Inertial:
 class Contact:
     """Surface properties as declared; ``material`` is a word for it.
 
-    ``of_others``: bodies of the file that were left out declare a friction, and this one does not.
+    ``of_others``: bodies of the file that were left out declare a friction, and this one does not. ``friction_range`` is the
+    least and the most of its surfaces, where they differ.
     """
 
     friction_static: float | None = None
@@ -68,6 +69,7 @@ class Contact:
     restitution: float | None = None
     material: str | None = None
     of_others: bool = False
+    friction_range: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

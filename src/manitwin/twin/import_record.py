@@ -66,7 +66,7 @@ class ImportRecord(Record):
 
     ``asset_to_object`` is what brought the asset's own axes there. ``missing`` says in words what it does not give,
     ``dropped`` what it gives and was not taken over, and why. ``articulation``: what moves in it; the rest is of all of it as it
-    stands.
+    stands. ``friction_range`` is the least and the most static friction of its surfaces, where they differ.
     """
 
     import_version: Literal[1] = 1
@@ -94,6 +94,7 @@ class ImportRecord(Record):
     dropped: list[str] = Field(default_factory=list)
     parts: GivenParts | None = None
     articulation: Articulation | None = None
+    friction_range: tuple[Positive, Positive] | None = None
 
     @property
     def source(self) -> str:

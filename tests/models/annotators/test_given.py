@@ -43,6 +43,15 @@ def test_given_numbers_are_kept_with_their_source_and_the_rest_is_asked() -> Non
     assert answer.friction_dynamic.value <= answer.friction_static.value
 
 
+def test_frictions_of_several_surfaces_are_the_interval_of_the_given_one() -> None:
+    given = given_subject(friction_static=0.3, friction_dynamic=0.3, friction_range=(0.3, 1.4))
+    answer = KeepsGiven(RulesAnnotator()).estimate_physical(given)
+    for found in (answer.friction_static, answer.friction_dynamic):
+        assert (found.value, found.low, found.high, found.source) == (0.3, 0.3, 1.4, "imported:robotwin")
+    answer = KeepsGiven(RulesAnnotator()).estimate_physical(replace(given, given=given_record(friction_static=0.3)))
+    assert (answer.friction_static.low, answer.friction_static.high) == (0.3, 0.3)
+
+
 def test_given_mass_that_contradicts_the_prior_is_a_finding() -> None:
     answer = KeepsGiven(RulesAnnotator()).estimate_physical(given_subject(mass_kg=0.016))
     assert answer.findings is not None and any("mass 0.016 kg (imported:robotwin)" in text for text in answer.findings)

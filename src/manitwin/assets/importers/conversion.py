@@ -31,7 +31,8 @@ def imported_files(asset: Asset) -> tuple[dict[str, bytes], ImportRecord]:
     record = import_record(asset, to_object)
     # boxes and cylinders of a description have edges, and no normals that say so
     parts = [shaded(bake_transform(part, to_object)) for part in shown_parts(asset)]
-    unsaid = {"articulation"} if record.articulation is None else set()  # as before anything could move
+    # as before anything could move, or had several frictions
+    unsaid = {name for name in ("articulation", "friction_range") if getattr(record, name) is None}
     text = json.dumps(record.model_dump(mode="json", exclude=unsaid), indent=1, sort_keys=True, allow_nan=False) + "\n"
     files = {IMPORTED_MESH: write_glb(parts, max_texture_size=MAX_TEXTURE_SIZE), IMPORT_RECORD: text.encode()}
     return files, record

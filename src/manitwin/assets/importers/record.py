@@ -125,6 +125,7 @@ def import_record(asset: Asset, to_object: np.ndarray) -> ImportRecord:
             "dropped": [*dropped, *left_out(asset)],
             "remarks": list(dict.fromkeys(remarks)),
             "articulation": articulation,
+            "friction_range": _friction_range(asset, numbers["friction_static"]),
             **numbers,
         },
     )
@@ -164,6 +165,14 @@ def _numbers(asset: Asset) -> tuple[dict[str, float | None], list[str], list[str
         missing.append(f"dynamic friction (declared as {dynamic:g}, above the static {static:g})")
         dropped.append(f"dynamic friction: {dynamic:g} is above the static {static:g}")
     return numbers, missing, dropped
+
+
+def _friction_range(asset: Asset, static: float | None) -> tuple[float, float] | None:
+    """Return the frictions of the asset's surfaces where they differ and its own can be true; one that cannot bounds nothing."""
+    if static is None or asset.contact.friction_range is None:
+        return None
+    low, high = asset.contact.friction_range
+    return (low if low > 0 else static), (high if high <= MAX_FRICTION else static)
 
 
 def _point(frame: AnnotatedFrame, to_object: np.ndarray) -> GivenPoint:

@@ -84,7 +84,7 @@ def read(
         up="z",
         unit_m=1.0,
         inertial=masses.of(bodies),
-        contact=_declared_contact(source, model, shapes.colliding(bodies), files),
+        contact=_declared_contact(source, model, shapes, bodies, files),
         static=ground or _stands_fast(model, bodies[0][0]),  # MuJoCo lets no plane move
         license=licence,
         attribution=attribution,
@@ -247,11 +247,30 @@ def _is_free(model: Any, body: int) -> bool:
     return first >= 0 and int(model.jnt_type[first]) == int(mujoco.mjtJoint.mjJNT_FREE)
 
 
-def _declared_contact(source: MjcfSource, model: Any, geoms: list[int], files: AssetFiles) -> Contact:
-    """Return the sliding friction (MuJoCo has one coefficient, sticking or sliding) where the file writes any."""
+def _declared_contact(
+    source: MjcfSource, model: Any, shapes: BodyShapes, bodies: list[tuple[int, np.ndarray]], files: AssetFiles
+) -> Contact:
+    """Return the sliding friction (MuJoCo has one coefficient, sticking or sliding) where the file writes any.
+
+    A twin has one for its whole surface: that of the largest share of the area of its geoms, the others are its interval.
+    """
+    geoms = shapes.colliding(bodies)
     if not geoms or not source.writes(("friction",)):
         return Contact()
-    sliding = [float(model.geom_friction[geom, 0]) for geom in geoms]
-    if max(sliding) > min(sliding):
-        files.remark(f"its geoms have frictions from {min(sliding):g} to {max(sliding):g}; the first was taken")
-    return Contact(sliding[0], sliding[0])
+    named = {model.geom(geom).name for geom in geoms} - {""}
+    if paired := sum(bool(pair & named) for pair in source.paired):
+        files.remark(
+            f"what <pair> says of its contact with other geoms ({paired}) was left out: a twin has one friction"
+        )
+    areas_m2: dict[float, float] = {}
+    for geom in geoms:
+        sliding = float(model.geom_friction[geom, 0])
+        areas_m2[sliding] = areas_m2.get(sliding, 0.0) + shapes.areas_m2.get(geom, 0.0)
+    most = max(areas_m2, key=lambda sliding: areas_m2[sliding])  # of equal areas that of the first
+    low, high = min(areas_m2), max(areas_m2)
+    if low == high:
+        return Contact(most, most)
+    files.remark(
+        f"its geoms have frictions from {low:g} to {high:g}; a twin has one: {most:g}, that of the most area, between these"
+    )
+    return Contact(most, most, friction_range=(low, high))

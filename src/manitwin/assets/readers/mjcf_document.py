@@ -35,8 +35,8 @@ class MjcfSource:
     where it should be, and the name below the compiler's folder; ``homes`` where else, from the folder of the included document
     that names it. ``soft``: bodies that are not rigid were left out, or are read with ``soft_files`` by the names that the XML
     has for them. ``acting``: sections that act on joints, and are left out. ``apart`` are the pairs of bodies that the main
-    document excludes from contact, ``keys`` the positions of its keyframes, ``total_mass_kg`` what all bodies together are
-    scaled to.
+    document excludes from contact, ``paired`` those of geoms that it gives a contact of their own, ``keys`` the positions of
+    its keyframes, ``total_mass_kg`` what all bodies together are scaled to.
     """
 
     file: Path
@@ -49,6 +49,7 @@ class MjcfSource:
     acting: set[str] = field(default_factory=set)
     soft_files: dict[str, bytes] = field(default_factory=dict)
     apart: set[frozenset[str]] = field(default_factory=set)
+    paired: set[frozenset[str]] = field(default_factory=set)
     keys: list[np.ndarray] = field(default_factory=list)
     total_mass_kg: float | None = None
 
@@ -104,6 +105,8 @@ class _Composition:
             self._source.total_mass_kg = _total_mass_kg(root)
             pairs = root.iterfind("contact/exclude")
             self._source.apart |= {frozenset((pair.get("body1") or "", pair.get("body2") or "")) for pair in pairs}
+            pairs = root.iterfind("contact/pair")
+            self._source.paired |= {frozenset((pair.get("geom1") or "", pair.get("geom2") or "")) for pair in pairs}
             self._source.keys += [key for each in root.iterfind("keyframe/key") if (key := _position(each)) is not None]
         sizes = self._take_models(file, root, above)
         self._source.acting |= {section.tag for section in root if section.tag in ACTING and len(section)}

@@ -7,6 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import trimesh
+from trimesh import triangles
 from trimesh.visual.material import PBRMaterial
 
 from manitwin.assets import primitives
@@ -49,6 +50,7 @@ class BodyShapes:
 
     def __init__(self, compiled: CompiledMjcf, files: AssetFiles, *, planes: bool = False):
         self._compiled, self._model, self._files, self._planes = compiled, compiled.model, files, planes
+        self.areas_m2: dict[int, float] = {}  # of the colliding geoms that were read
 
     def of(
         self, bodies: list[tuple[int, np.ndarray]]
@@ -67,6 +69,7 @@ class BodyShapes:
             if geom in colliding and parts:
                 vertices, faces = joined(parts)
                 name = self._model.geom(geom).name or f"geom_{geom:02d}"
+                self.areas_m2[geom] = float(triangles.area(vertices[faces]).sum())
                 primitive = int(self._model.geom_type[geom]) not in _MESH_KINDS
                 collision.append(CollisionShape(name, vertices, faces, True, primitive=primitive))
             if self._model.geom_group[geom] < SHOWN_GROUPS:

@@ -247,12 +247,13 @@ def _declared_contact(opened: SdfModel) -> Contact:
     values = [number(text, f"{opened.file.name}: mu") for _, text in said_mu]
     if max(values) > min(values):
         opened.files.remark(
-            f"its collisions have frictions from {min(values):g} to {max(values):g}; the first was taken"
+            f"its collisions have frictions from {min(values):g} to {max(values):g}; a twin has one: the first, between these"
         )
     second = text_of(said_mu[0][0], "friction/ode/mu2")
     if second is not None and number(second, f"{opened.file.name}: mu2") != values[0]:
         opened.files.remark(f"mu {values[0]:g} and mu2 {second} are two directions; the first was taken")
-    return Contact(values[0], None, restitution)
+    spread = (min(values), max(values)) if max(values) > min(values) else None
+    return Contact(values[0], None, restitution, friction_range=spread)
 
 
 def _licence(opened: SdfModel) -> tuple[str | None, str | None]:

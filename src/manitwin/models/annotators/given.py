@@ -152,9 +152,9 @@ def _filled(given: list[Point], others: tuple[Point, ...], least: int, letter: s
 class KeepsGiven:
     """Answer with what is given of the subject (source ``imported:FORMAT``) and with the inner annotator's answers.
 
-    A given number has no interval: its low and high are the value. It is held against what the inner annotator says, and
-    what contradicts it is a finding; the plausibility checks of the physical stage hold for it as for an estimate. For a
-    subject of which nothing is given, the answers are the inner annotator's own.
+    A given number has no interval: its low and high are the value, but of a friction whose surfaces differ. It is held
+    against what the inner annotator says, and what contradicts it is a finding; the plausibility checks of the physical stage
+    hold for it as for an estimate. For a subject of which nothing is given, the answers are the inner annotator's own.
     """
 
     def __init__(self, inner: Annotator):
@@ -219,9 +219,10 @@ def _with_given(answer: PhysicalEstimates, given: ImportRecord) -> PhysicalEstim
         findings += _contradiction("mass", given.mass_kg, answer.mass_kg, "kg", source)
     if given.friction_static is not None:
         findings += _contradiction("static friction", given.friction_static, static, "", source)
-        static = exactly(given.friction_static, source)
+        static = _within(given.friction_static, given.friction_range, source)
     if given.friction_dynamic is not None:
-        dynamic = exactly(given.friction_dynamic, source)
+        same = given.friction_dynamic == given.friction_static
+        dynamic = _within(given.friction_dynamic, given.friction_range if same else None, source)
     elif given.friction_static is not None and dynamic.value > static.value:
         dynamic = exactly(static.value, source)  # nothing slides harder than it sticks
     if given.friction_static is None and static.value < dynamic.value:
@@ -242,6 +243,11 @@ def _with_given(answer: PhysicalEstimates, given: ImportRecord) -> PhysicalEstim
 def exactly(value: float, source: str) -> Estimate:
     """Return a number that was given without an interval."""
     return Estimate(value=value, low=value, high=value, source=source)
+
+
+def _within(value: float, between: tuple[float, float] | None, source: str) -> Estimate:
+    low, high = between or (value, value)
+    return Estimate(value=value, low=min(low, value), high=max(high, value), source=source)
 
 
 def _contradiction(what: str, value: float, other: Estimate, unit: str, source: str) -> list[str]:
