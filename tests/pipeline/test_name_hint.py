@@ -92,7 +92,12 @@ def test_the_result_line_says_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "told"), [("muug", "did you mean 'mug'"), ("zorbling", "say what kind of thing it is")]
+    ("name", "told"),
+    [
+        ("muug", "did you mean 'mug'"),
+        ("beer", "did you mean 'beer bottle', 'beer can' or 'beer glass'?"),
+        ("zorbling", "say what kind of thing it is with --name, in English"),
+    ],
 )
 def test_a_name_that_the_priors_do_not_know_is_said_in_the_result_line(tmp_path: Path, name: str, told: str) -> None:
     known_by_none = ending_of(accepted(tmp_path, name, UNKNOWN))

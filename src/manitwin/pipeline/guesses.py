@@ -7,7 +7,7 @@ from typing import Any, cast
 
 from manitwin.engine.stage import Draft
 from manitwin.models.annotators.likely_names import OF_LIKELY_NAMES
-from manitwin.models.annotators.prior_names import normalised
+from manitwin.models.annotators.prior_names import names_with, normalised
 from manitwin.models.annotators.priors import load_priors
 from manitwin.twin.record_values import Check
 
@@ -25,6 +25,8 @@ LIKE_IT = " that looks like it"
 """And what it adds where a classifier has guesses."""
 SPELT_ALIKE = 0.8
 """Of two names, from where one may be meant by the other (``difflib``'s ratio)."""
+MOST_NAMES = 3
+"""Of those that a name is a word of, what is shown."""
 
 
 def naming_checks(draft: Draft) -> list[Check]:
@@ -75,10 +77,12 @@ def unsaid_size_words(draft: Draft) -> str | None:
 
 
 def unknown_name_words(name: str) -> str:
-    """Say that a name is not among the priors', and the names that are spelt like it."""
+    """Say that a name is not among the priors', and the names that it is a word of, else those that are spelt like it."""
     known = sorted({word for prior in load_priors().values() for word in (prior.category, *prior.aliases)})
-    near = get_close_matches(normalised(name), known, n=2, cutoff=SPELT_ALIKE)
-    asked = f"; did you mean {' or '.join(map(repr, near))}?" if near else "; say what kind of thing it is with --name"
+    near = names_with(name)[:MOST_NAMES] or get_close_matches(normalised(name), known, n=2, cutoff=SPELT_ALIKE)
+    *others, last = map(repr, near) if near else ("",)
+    meant = f"{', '.join(others)} or {last}" if others else last
+    asked = f"; did you mean {meant}?" if near else "; say what kind of thing it is with --name, in English"
     return f"the priors (docs/priors.md) know no {name!r}: mass and friction are those of any object{asked}"
 
 

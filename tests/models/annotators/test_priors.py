@@ -10,9 +10,17 @@ from pydantic import ValidationError
 
 from manitwin.errors import ManiTwinError
 from manitwin.models.annotators import priors
-from manitwin.models.annotators.prior_names import found_by, lookup, named, normalised, word_for
+from manitwin.models.annotators.prior_names import (
+    _found_in_english,
+    found_by,
+    lookup,
+    named,
+    names_with,
+    normalised,
+    word_for,
+)
 from manitwin.models.annotators.prior_records import Interval
-from manitwin.models.annotators.priors import load_materials, load_priors
+from manitwin.models.annotators.priors import load_materials, load_names_abroad, load_priors
 from manitwin.models.generators.lift.hint import hint_from_name
 
 # Calli et al. 2015, "The YCB Object and Model Set", and its list of object masses: kg.
@@ -454,3 +462,48 @@ def test_only_a_vase_among_cups_is_filled_with_flowers() -> None:
 
 def test_what_goes_on_the_head_is_hollow_from_below() -> None:
     assert {category for category in load_priors() if hint_from_name(category).hollow_below} == {"hat", "cap", "helmet"}
+
+
+def test_names_in_other_languages_are_those_of_one_thing_and_of_nothing_in_english() -> None:
+    abroad = load_names_abroad()
+    assert {"de", "fr", "es", "it", "zh", "ja"} == {language for words in abroad.values() for language in words}
+    for category, by_language in abroad.items():
+        for word in (word for words in by_language.values() for word in words):
+            assert _found_in_english(word) is None, word
+            prior = lookup(word)
+            assert prior is not None and prior.category == category, word
+
+
+def test_the_whole_name_in_another_language_is_found_and_called_so_in_english() -> None:
+    for name in ("Tasse", "eine Tasse", "taza", "Una taza", "tazza", "杯子", "コーヒーカップ", "ｶｯﾌﾟ"):
+        found = found_by(name)
+        assert found is not None and word_for(*found) == "cup"
+    assert named("Tasse") is None and lookup("Tasse Kaffee") is None and lookup("Tassenschrank") is None
+    assert lookup("L'assiette") is lookup("plate") and lookup("大象") is None
+    assert lookup("mug") is not None and word_for(*(found_by("coffee mug") or pytest.fail())) == "mug"
+
+
+def test_large_things_of_the_road_and_of_walls_are_themselves_and_their_toys_are_toys() -> None:
+    for name, category in (
+        ("cinder block", "cinder block"),
+        ("stop sign", "road sign"),
+        ("tyre", "car tire"),
+        ("tires", "car tire"),
+        ("toy tire", "toy"),
+        ("toy stop sign", "toy"),
+        ("sign", "desk sign"),
+        ("brick", "brick"),
+        ("serviette", "napkin"),
+        ("shelves", "shelf"),
+        ("loaves", "bread"),
+        ("knives", "knife"),
+        ("scarves", "scarf"),
+    ):
+        prior = lookup(name)
+        assert prior is not None and prior.category == category, name
+
+
+def test_names_that_a_name_is_a_word_of_are_told() -> None:
+    assert names_with("beer")[:2] == ["beer bottle", "beer can"] and names_with("Cola 500 ml") == ["cola can"]
+    assert names_with("Gear part")[0] == "gear" and lookup("Gear part") is None
+    assert names_with("thingamajig") == names_with("500 ml") == names_with("大象") == []

@@ -9,6 +9,7 @@ from itertools import combinations
 
 from manitwin.errors import ManiTwinError
 from manitwin.models.annotators.diacritics import without_diacritics
+from manitwin.models.annotators.names_abroad import category_abroad
 from manitwin.models.annotators.prior_records import Prior
 from manitwin.models.annotators.priors import load_priors
 
@@ -26,7 +27,7 @@ def normalised(name: str) -> str:
 def singulars(phrase: str) -> Iterator[str]:
     """Yield the phrase, and what its last word may be the plural of."""
     yield phrase
-    for plural, singular in (("ives", "ife"), ("aves", "af"), ("ies", "y"), ("oes", "o"), ("s", ""), ("es", "")):
+    for plural, singular in (("ives", "ife"), ("ves", "f"), ("ies", "y"), ("oes", "o"), ("s", ""), ("es", "")):
         if phrase.endswith(plural) and len(phrase) > len(plural) + 1:
             yield phrase.removesuffix(plural) + singular
 
@@ -95,9 +96,18 @@ def found_by(name: str | None) -> tuple[Prior, str] | None:
     water bottle, and a 'tooth brush' a toothbrush before it is a brush. Where none is found, numbers, measures, colours and what
     is printed on most packs say nothing at the end ('mug_1', 'cube 5 cm', 'pitcher blue' and 'juice smooth 500 ml' are a mug, a
     cube, a pitcher and juice), and what is a toy of anything is a toy, as is a doll's chair. File names are never looked up:
-    they are not evidence.
+    they are not evidence. What English has no such thing for, and is the whole name of one in another language, is that.
     """
-    if not name or not (phrase := normalised(name)):
+    return (_found_in_english(name) or _found_abroad(name)) if name else None
+
+
+def _found_abroad(name: str) -> tuple[Prior, str] | None:
+    category = category_abroad(name)
+    return None if category is None else (_index()[normalised(category)], normalised(category))
+
+
+def _found_in_english(name: str) -> tuple[Prior, str] | None:
+    if not (phrase := normalised(name)):
         return None
     head = re.split(r" (?:made |full )?(?:of|with|for|in|on|without|no|from) ", phrase, maxsplit=1)[0].split()
     words = phrase.split()
@@ -119,6 +129,23 @@ def found_by(name: str | None) -> tuple[Prior, str] | None:
             return behind
     imitation = next((_IMITATIONS[word] for word in head[:-1] if word in _IMITATIONS), None)
     return None if imitation is None else (index[imitation], " ".join(head))
+
+
+_OF_A_THING = frozenset({"part", "piece", "model", "mesh", "object", "asset"})
+"""Last words that say that a name is of a part, or of a file: of which thing, the word before may say."""
+
+
+def names_with(name: str) -> list[str]:
+    """Return the names that have the last word of a name which says anything, the shortest first.
+
+    Of 'beer' these are beer bottle, beer can and others, of 'gear part' gear.
+    """
+    words = normalised(name).split()
+    while words and (words[-1] in _OF_A_THING or _NO_THING.fullmatch(words[-1])):
+        words.pop()
+    last = set(singulars(words[-1])) if words else set()
+    found = (key for key in _index() if last.intersection(key.split()))
+    return sorted(found, key=lambda key: (len(key.split()), key))
 
 
 def _words_dropped(head: list[str]) -> Iterator[list[str]]:

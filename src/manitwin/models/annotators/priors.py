@@ -1,8 +1,8 @@
 """The priors: a table of usual sizes, masses, parts and uses of things by category.
 
 The table is ``prior_tables/*.toml`` beside this module: ``materials.toml`` (friction, restitution), ``forms.toml`` (shape, parts
-and how they are used, shared by many categories) and one file a domain with the categories. docs/priors.md says how it
-was made.
+and how they are used, shared by many categories), ``languages.toml`` (names in other languages) and one file a domain with the
+categories. docs/priors.md says how it was made.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from manitwin.formats.toml_file import parse_toml
 from manitwin.models.annotators.prior_records import Material, Prior
 
 TABLES = resources.files("manitwin.models.annotators") / "prior_tables"
-VOCABULARY_FILES = ("materials", "forms")
+VOCABULARY_FILES = ("materials", "forms", "languages")
 """The files of the folder that are not a domain."""
 
 
@@ -97,6 +97,12 @@ def _kin_row(category: str, row: dict[str, Any], own: dict[str, Any]) -> dict[st
     said = {key: value for key, value in row.items() if key not in ("aliases", "measured", "sources")}
     borrowed = {} if own.keys() >= _NUMBERS else {"sources": [f"as a {category}"], "like": category}
     return {**said, **borrowed, **own, "kin_of": category}
+
+
+@cache
+def load_names_abroad() -> dict[str, dict[str, list[str]]]:
+    """Return what categories are called in other languages, by category and language (ISO 639-1)."""
+    return _read("languages")
 
 
 @cache
