@@ -6,8 +6,9 @@
 
 One row a twin that can be used so, its partners drawn; with ``--attempts`` one row a skill, over its twins in turn. A negative
 control is the same episode, judged against what was asked for, gone about wrongly (``wrong_goals.CONTROLS``): of each kind so
-many are judged with a skill, over its twins in turn, or as many as four times as many attempts give; none may be kept. CPU
-seconds are those of an attempt, setting and planning included.
+many are judged with a skill, over its twins in turn, or as many as four times as many attempts give; none may be kept. ``--mass``
+takes twins as so heavy, to see up to what weight a hand does it, whatever their grasps were tried with. CPU seconds are those
+of an attempt, setting and planning included.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ import argparse
 import time
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from twin_bench import EXECUTED, TwinBench
@@ -29,7 +32,8 @@ from manitwin.episodes.setting import table_setting
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.registry import load_skill
 from manitwin.episodes.target_grasps import shuffled, usable_grasps
-from manitwin.scenes.layouts.pool import PoolTwin
+from manitwin.geometry.rigid_body import RigidBody
+from manitwin.scenes.layouts.pool import Pool, PoolTwin
 from manitwin.scenes.loaded_scene import furniture_boxes
 
 JUDGED = {
@@ -43,9 +47,11 @@ JUDGED = {
 class Bench(TwinBench):
     """Episodes of one robot with the twins of one data set."""
 
-    def __init__(self, dataset: str, robot: str):
-        """Read the pool."""
+    def __init__(self, dataset: str, robot: str, mass_kg: float | None = None):
+        """Read the pool; with ``mass_kg`` its twins weigh so much, spread as they are."""
         super().__init__(dataset, robot)
+        if mass_kg is not None:
+            self.pool = Pool(self.pool.twins, partial(weighed, self.pool, mass_kg))
         self.planner = PickPlacePlanner(self.robot)
 
     def attempt(self, skill_name: str, target: PoolTwin, seed: int, wrong: str = "") -> tuple[str, float]:
@@ -103,6 +109,12 @@ class Bench(TwinBench):
         return [self.attempt(skill_name, twin, first + number) for number, twin in enumerate(order[:count])]
 
 
+def weighed(pool: Pool, mass_kg: float, twin_id: str) -> RigidBody:
+    """Return a twin's body as if it weighed ``mass_kg``."""
+    body = pool.body(twin_id).body
+    return replace(body, mass_kg=mass_kg, inertia_kg_m2=body.inertia_kg_m2 * (mass_kg / body.mass_kg))
+
+
 def row(name: str, ran: Sequence[tuple[str, float]]) -> str:
     """Return a row: attempts, executed, kept, and what became of the others."""
     outcomes = Counter(outcome for outcome, _ in ran)
@@ -125,8 +137,9 @@ def main() -> None:
     parser.add_argument("--kinds", default="", help="only controls of these kinds, as empty,turned")
     parser.add_argument("--categories", default="", help="only twins of these")
     parser.add_argument("--robot", default="panda")
+    parser.add_argument("--mass", type=float, help="kg that each twin weighs, instead of its own mass")
     asked = parser.parse_args()
-    bench = Bench(asked.dataset, asked.robot)
+    bench = Bench(asked.dataset, asked.robot, asked.mass)
     for name in CONTROLS if asked.skills == "all" else asked.skills.split(","):
         twins = bench.twins_of(name, asked.categories.split(",") if asked.categories else [])
         if asked.attempts and twins:
