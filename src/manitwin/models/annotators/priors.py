@@ -60,10 +60,12 @@ def _prior(category: str, row: dict[str, Any], domain: str, defaults: dict[str, 
     }  # fmt: skip
     if "functional" in row:
         merged["parts"] = row.get("parts")  # places of its own: the form's rule is of others
+    own = {place["label"]: place for place in row.get("functional", ())}
     for key in ("with_handle", "with_bail"):
         form = merged.pop(key, None)
-        if form is not None and "functional" not in row:
-            told = {each: _worded(forms[form][each], category) for each in ("functional", "grasp")}
+        if form is not None and (not own or row.get("parts") == forms[form_name]["parts"]):
+            places = [own.get(place["label"], place) for place in forms[form]["functional"]]
+            told = {"functional": _worded(places, category), "grasp": _worded(forms[form]["grasp"], category)}
             merged[key] = {"parts": forms[form]["parts"], **told}
     for key in ("functional", "grasp"):
         merged[key] = _worded(merged[key], category)

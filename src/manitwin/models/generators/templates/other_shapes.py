@@ -15,14 +15,15 @@ def _listed(names: str) -> frozenset[str]:
 
 KIN_OF_ANOTHER_SHAPE = _listed(
     """
-    kettlebell, muffin tin, cake pan, roasting pan, stone, pulley, bearing, gavel, toy hammer, set square, protractor, doorbell, potted
-    plant, awl, file, poker chip, earring, plantain, lime, grapefruit, apricot, parsnip, radish, garlic, shallot, sweet
-    potato, beetroot, turnip, leek, spring onion, squash, raspberry, blackberry, cracker, snack bar, basketball,
-    volleyball, rugby ball, handball, cricket ball, squash ball, bocce ball, steel ball, bead, mahjong
-    tile, rattle, teether, spinning top, fidget spinner, tractor, toy bus, toy truck, toy train, impact driver, pocket
-    knife, multitool, vise, lint roller, garden fork, zester, corkscrew, scoop, nail, hacksaw, bar clamp, sieve,
-    pocket watch, lantern, night light, security camera, action camera, infrared thermometer, insulin pen, trunk,
-    briefcase, postcard, door handle, trophy, medal, safety pin, thumbtack, hairpin, book stand, chalk, ink bottle
+    kettlebell, muffin tin, cake pan, roasting pan, stone, pulley, bearing, gavel, toy hammer, set square, protractor,
+    doorbell, potted plant, awl, file, poker chip, earring, plantain, lime, grapefruit, apricot, parsnip, radish,
+    garlic, shallot, sweet potato, beetroot, turnip, leek, spring onion, squash, raspberry, blackberry, cracker, snack
+    bar, basketball, volleyball, rugby ball, handball, cricket ball, squash ball, bocce ball, steel ball, bead,
+    mahjong tile, rattle, teether, spinning top, fidget spinner, tractor, toy bus, toy truck, toy train, impact
+    driver, pocket knife, multitool, vise, lint roller, garden fork, zester, corkscrew, scoop, nail, hacksaw, bar
+    clamp, sieve, pocket watch, lantern, night light, security camera, action camera, infrared thermometer, insulin
+    pen, trunk, briefcase, postcard, door handle, trophy, medal, safety pin, thumbtack, hairpin, book stand, chalk,
+    ink bottle
     """
 )
 """Kin in the priors of what a template makes, of another shape or look: a kettlebell is no dumbbell, a lime no lemon."""
