@@ -105,7 +105,8 @@ class Template:
     ``of_plate``: what is of metal has the wall that is stated, and none of sheet. ``length_of`` is the part that a length
     without a direction is of: a pan of 24 cm has that diameter, without its handle; '' for the whole. What has
     ``any_proportions``, a box, is as long, wide and high as is said; other things keep near their intervals. What has
-    ``any_front``, an apple, has no side that is its front: of a photo it is the side that is seen.
+    ``any_front``, an apple, has no side that is its front: of a photo it is the side that is seen. What is ``told_in_full`` is
+    not meant by the last word of its name alone: who says bottle means no perfume bottle.
     """
 
     category: str
@@ -120,6 +121,7 @@ class Template:
     length_of: str = ""
     any_proportions: bool = False
     any_front: bool = False
+    told_in_full: bool = False
 
     def drawn(self, rng: np.random.Generator) -> dict[str, float]:
         """Draw all measures."""

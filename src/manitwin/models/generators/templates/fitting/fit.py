@@ -86,6 +86,7 @@ def kinds_of(category: str) -> list[str]:
         kinds = [last] if last in templates else []
     else:
         kinds = [other for other in templates if other != category and last in _heads(templates[other])]
+        kinds = [other for other in kinds if not templates[other].told_in_full]
         kinds = [other for other in kinds if said is not None and load_priors()[other].container == said.container]
     return [other for other in kinds if said is not None and _about_as_large(lookup(other), said)][:_MOST_KINDS]
 
