@@ -29,6 +29,12 @@ def test_usds_own_names_of_its_parser_are_left_out(tmp_path: Path) -> None:
     assert cause.startswith("line ") and "pxrInternal" not in cause and "\n" not in cause
 
 
+def test_bytes_that_are_no_text_are_told_too(tmp_path: Path) -> None:
+    (tmp_path / "bytes.usda").write_bytes(b'#usda 1.0\ndef Mesh "a"\n{\n int[] face\x80Counts = [4]\n}\n')
+    with pytest.raises(AssetError, match=r"its USD is broken \(line 4: "):
+        read_here(tmp_path / "bytes.usda")
+
+
 def test_a_broken_stage_is_refused_with_the_cause_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "box.usda").write_text(BROKEN)
     with pytest.raises(AssetError, match=r"its USD is broken \(line 3: invalid value .*; mend it there") as caught:

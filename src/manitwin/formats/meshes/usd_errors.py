@@ -17,7 +17,7 @@ _CHARACTERS = 160
 
 def cause_of(error: Tf.ErrorException) -> str:
     """Return the first thing that USD said is wrong, with the line of the file where it says one; "" where it said nothing."""
-    said = [_ITS_OWN_NAMES.sub("", " ".join(each.split())) for each in _SAID.findall(str(error))]
+    said = [_ITS_OWN_NAMES.sub("", " ".join(each.split())) for each in _SAID.findall(_text_of(error))]
     if not said:
         return ""
     placed = next((each for each in said if _PLACE.match(each)), None)
@@ -29,3 +29,11 @@ def broken(error: Tf.ErrorException) -> str:
     """Return the cause of a refusal: that the USD is broken, and how."""
     cause = cause_of(error)
     return f"its USD is broken ({cause})" if cause else "its USD is broken"
+
+
+def _text_of(error: Tf.ErrorException) -> str:
+    """Return all that USD said; it repeats bytes of the file, which may be no text."""
+    try:
+        return str(error)
+    except UnicodeDecodeError as undecoded:
+        return undecoded.object.decode("utf-8", "replace")
