@@ -31,14 +31,15 @@ _BODIES = (
 PARTS_OF: dict[str, tuple[str, ...]] = {
     "opening": ("rim", "mouth"), "inside": ("inside",), "rim": ("rim",), "cooking surface": ("inside",),
     "surface": ("top", "inside"), "handle": ("handle", "knob", "grips", "pull handle"), "handles": ("handle",),
-    "handle end": ("handle",), "base": ("base", "foot"), "foot": ("foot",), "stem": ("stem",), "cap": ("cap",),
+    "handle end": ("handle",), "base": ("base", "foot"), "foot": ("foot",), "stem": ("stem",), "cap": ("cap",), "teat": ("teat",),
     "neck": ("neck", "collar", "stem"), "lid": ("cap", "lid", "top", "tab"), "spout": ("spout",),
     "blade": ("blade", "edge"), "wick": ("wick",), "tip": ("tip", "lead", "tines"), "bristles": ("bristles",),
     "jaw": ("jaw", "jaws", "mouth"), "jaws": ("jaw", "jaws", "mouth"), "joint": ("joint",), "spring joint": ("spring",),
-    "striking face": ("face", "edge"), "blade edge": ("edge",), "tines": ("tines",), "grip": ("handle", "switch"),
+    "striking face": ("face", "other face", "edge"), "blade edge": ("edge",), "tines": ("tines",), "grip": ("handle", "switch"),
     "housing": ("body",), "shoulder": ("shoulders",),
     "head": (
         "head", "face", "claw", "blade", "bowl", "jaw", "pan", "edge", "wires", "tines", "neck", "glass", "frame", "channel",
+        "forehand", "backhand",
     ),
     "working end": ("outlet",), "ear cup": ("cups",), "headband": ("band",), "core": ("core",), "outside": ("body",),
     "inner side": ("bore", "hole"), "barrel": ("barrel", "sleeve"), "lens": ("lens", "glass"), "switch": ("switch",),
