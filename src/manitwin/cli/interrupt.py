@@ -18,7 +18,7 @@ from types import FrameType
 from typing import NoReturn
 
 RESUMABLE = frozenset(
-    {"build", "run", "layout", "trajectories", "render", "publish", "import", "collect add", "collect draw"}
+    {"build", "run", "layout", "tasks", "trajectories", "render", "publish", "import", "collect add", "collect draw"}
 )
 """Commands that go on where they stopped."""
 RESUMABLE_STATUS = 4

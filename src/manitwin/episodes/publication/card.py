@@ -70,10 +70,9 @@ def _introduction(facts: EpisodesCard) -> list[str]:
     return [
         f"# {markdown_escaped(facts.name)}",
         "",
-        f"{info['total_episodes']:,} simulated pick-and-place episodes of the robot {markdown_escaped(info['robot_type'])}, as a "
+        f"{info['total_episodes']:,} simulated episodes of the robot {markdown_escaped(info['robot_type'])}, as a "
         "[LeRobotDataset v3.0](https://huggingface.co/docs/lerobot/lerobot-dataset-v3). Each was planned from a grasp that was "
-        "verified in physics, executed in SAPIEN, and kept where the object ended at its goal and nothing else was "
-        "touched.",
+        "verified in physics, executed in SAPIEN, and kept where an evaluator found its goal reached.",
         "",
         "```python",
         "from lerobot.datasets.lerobot_dataset import LeRobotDataset",
