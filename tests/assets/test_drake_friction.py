@@ -40,14 +40,21 @@ def test_urdf_has_drakes_friction_before_others(tmp_path: Path, said: str, stati
     assert (contact.friction_static, contact.friction_dynamic) == (static, dynamic)
 
 
-@pytest.mark.parametrize(("second", "differ"), [("0.3", False), ("0.6", True)])
-def test_sdf_has_that_of_the_first_collision_and_says_where_others_differ(
-    tmp_path: Path, second: str, differ: bool
+@pytest.mark.parametrize(("second", "spread"), [("0.3", (0.3, 0.4)), ("0.4", None), ("0.6", (0.4, 0.6))])
+def test_sdf_has_that_of_the_first_collision_and_the_range_where_others_differ(
+    tmp_path: Path, second: str, spread: tuple[float, float] | None
 ) -> None:
     (tmp_path / "cup.sdf").write_text(SDF.format(second=second))
     asset = read_asset(tmp_path / "cup.sdf")
     assert (asset.contact.friction_static, asset.contact.friction_dynamic) == (0.4, 0.3)
-    assert ("its collisions have frictions from 0.3 to 0.6; the first was taken" in asset.remarks) == differ
+    assert asset.contact.friction_range == spread
+    told = [remark for remark in asset.remarks if remark.startswith("its collisions have frictions")]
+    low, high = spread or (0.0, 0.0)
+    assert told == (
+        []
+        if spread is None
+        else [f"its collisions have frictions from {low} to {high}; a twin has one: the first, between these"]
+    )
 
 
 def test_what_is_no_number_is_named(tmp_path: Path) -> None:

@@ -34,20 +34,20 @@ def transaction(connection: sqlite3.Connection) -> Iterator[None]:
 
 
 @contextmanager
-def errors_named(path: Path, remedy: str) -> Iterator[None]:
-    """Raise SQLite's errors in the block as UsageError with the file ``path``; ``remedy`` is that of a damaged file."""
+def errors_named(path: Path, refusal: str) -> Iterator[None]:
+    """Raise SQLite's errors in the block as UsageError that names the file; ``refusal`` is as for ``damaged``."""
     try:
         yield
     except sqlite3.OperationalError as error:
         said = printable_line(str(error), max_characters=MOST_SAID)
         raise UsageError(f"{path}: {said}; mend the disk or its permissions, and try again") from error
     except (sqlite3.DatabaseError, sqlite3.InterfaceError, UnicodeDecodeError) as error:
-        raise damaged(path, error, remedy) from error
+        raise damaged(path, error, refusal) from error
 
 
-def damaged(path: Path, cause: object, remedy: str) -> UsageError:
-    """Return the error of a file that cannot be read: ``remedy`` says what it is not, with {cause} in it, and what to do."""
-    return UsageError(f"{path}: {remedy.format(cause=printable_line(str(cause), max_characters=MOST_SAID))}")
+def damaged(path: Path, cause: object, refusal: str) -> UsageError:
+    """Return the error of a file that cannot be read; ``refusal`` is its message, in which {cause} stands for the cause."""
+    return UsageError(f"{path}: {refusal.format(cause=printable_line(str(cause), max_characters=MOST_SAID))}")
 
 
 def flaw_in(

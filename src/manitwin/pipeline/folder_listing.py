@@ -218,9 +218,7 @@ def _named_parts(
             continue
         for name in names:
             below = _below(mesh, name)
-            if (
-                below and below[0] in plain
-            ):  # no link on the way: the disk, which 100,000 files keep busy, need not be asked
+            if below and below[0] in plain:  # no link on the way: the disk need not be asked, 100,000 times
                 for path in known.intersection(below):
                     parts.setdefault(path, mesh)
                 continue

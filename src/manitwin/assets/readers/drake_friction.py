@@ -6,14 +6,15 @@ from collections.abc import Iterable
 
 from lxml import etree  # type: ignore[import-untyped]
 
+from manitwin.assets.asset import Contact
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.formats.xml_file import number
 
 _STATIC, _DYNAMIC = "mu_static", "mu_dynamic"
 
 
-def drake_friction(links: Iterable[etree._Element], files: AssetFiles, name: str) -> tuple[float, float] | None:
-    """Return the static and the dynamic friction of the first collision of links that says any, None where none does.
+def drake_contact(links: Iterable[etree._Element], files: AssetFiles, name: str) -> Contact | None:
+    """Return the friction of the first collision of links that says any, with the range of all; None where none does.
 
     One of the two alone is both. Source: Drake, parsing of ``drake:proximity_properties`` (``drake:mu_static``,
     ``drake:mu_dynamic``), which go before what else a file says. ``name`` is the file's, for errors.
@@ -32,7 +33,8 @@ def drake_friction(links: Iterable[etree._Element], files: AssetFiles, name: str
             found.append((said.get(_STATIC, one), said.get(_DYNAMIC, one)))
     if not found:
         return None
-    dynamic = [each[1] for each in found]
-    if max(dynamic) > min(dynamic):
-        files.remark(f"its collisions have frictions from {min(dynamic):g} to {max(dynamic):g}; the first was taken")
-    return found[0]
+    low, high = min(static for static, _ in found), max(static for static, _ in found)
+    if low == high:
+        return Contact(*found[0])
+    files.remark(f"its collisions have frictions from {low:g} to {high:g}; a twin has one: the first, between these")
+    return Contact(*found[0], friction_range=(low, high))

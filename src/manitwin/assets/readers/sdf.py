@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +16,11 @@ from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles
 from manitwin.assets.joints import Joints
 from manitwin.assets.licence_text import stated_licence, stated_or_none
 from manitwin.assets.read import is_file_below, only_file
-from manitwin.assets.readers.drake_friction import drake_friction
+from manitwin.assets.readers.drake_friction import drake_contact
 from manitwin.assets.readers.joint_elements import sdf_joints
 from manitwin.assets.readers.sdf_links import chosen_links
 from manitwin.assets.readers.sdf_shapes import ModelFrames, SdfShapes, pose_of
-from manitwin.assets.readers.upright import Shapes, upright_shapes
+from manitwin.assets.readers.upright import Shapes, joined, upright_shapes
 from manitwin.assets.readers.urdf_shapes import candidates
 from manitwin.assets.root import root_of
 from manitwin.errors import AssetError
@@ -128,11 +128,7 @@ def asset_of(opened: SdfModel, path: Path) -> Asset:
         return SdfShapes(opened.file, opened.frames, opened.files, turn_gltf=turn).by_link(opened.links)
 
     by_link = upright_shapes(shapes, opened.files)
-    owners = [place for place, (parts, _) in enumerate(by_link) for _ in parts]
-    visual, collision = (
-        [part for parts, _ in by_link for part in parts],
-        [shape for _, some in by_link for shape in some],
-    )
+    visual, collision, owners = joined(by_link)
     if not visual and not collision and not opened.files.missing:
         terrain = any(link.find(".//heightmap") is not None for link in opened.links)
         raise AssetError(
@@ -232,13 +228,13 @@ def _of_link(opened: SdfModel, link: etree._Element) -> Inertial:
 
 def _declared_contact(opened: SdfModel) -> Contact:
     """Return the friction of the first collision that says any: Drake's, or ``mu``, to which ``mu2`` is another direction."""
-    drake = drake_friction(opened.links, opened.files, opened.file.name)
+    drake = drake_contact(opened.links, opened.files, opened.file.name)
     surfaces = [surface for link in opened.links for surface in link.findall("collision/surface")]
     said_mu = [(s, text) for s in surfaces if (text := text_of(s, "friction/ode/mu")) is not None]
     bounces = [text for s in surfaces if (text := text_of(s, "bounce/restitution_coefficient")) is not None]
     restitution = number(bounces[0], f"{opened.file.name}: restitution_coefficient") if bounces else None
     if drake is not None:
-        return Contact(*drake, restitution)
+        return replace(drake, restitution=restitution)
     if not said_mu:  # PyBullet reads its <contact> of URDF in SDF too
         lateral = next((t for link in opened.links if (t := text_of(link, "contact/lateral_friction"))), None)
         friction = None if lateral is None else number(lateral, f"{opened.file.name}: lateral_friction")

@@ -32,6 +32,13 @@ def upright_shapes(read: Callable[[bool], list[Shapes]], files: AssetFiles) -> l
     return turned
 
 
+def joined(by_link: list[Shapes]) -> tuple[list[trimesh.Trimesh], list[CollisionShape], list[int]]:
+    """Return the visual parts and the collision shapes of all links, and for each visual part the number of its link."""
+    visual = [part for parts, _ in by_link for part in parts]
+    collision = [shape for _, shapes in by_link for shape in shapes]
+    return visual, collision, [number for number, (parts, _) in enumerate(by_link) for _ in parts]
+
+
 def _apart_m(visual: list[trimesh.Trimesh], collision: list[CollisionShape]) -> float:
     """Return how far a side of the collision's box is from the visual's; 0 where one of them has none."""
     seen = [np.asarray(part.vertices) for part in visual if len(part.vertices)]

@@ -17,9 +17,9 @@ from manitwin.assets.filled_hulls import filled_hulls
 from manitwin.assets.joints import Joints
 from manitwin.assets.licence_text import stated_licence
 from manitwin.assets.read import only_file
-from manitwin.assets.readers.drake_friction import drake_friction
+from manitwin.assets.readers.drake_friction import drake_contact
 from manitwin.assets.readers.joint_elements import urdf_joints
-from manitwin.assets.readers.upright import Shapes, upright_shapes
+from manitwin.assets.readers.upright import Shapes, joined, upright_shapes
 from manitwin.assets.readers.urdf_links import Placed, chosen_links
 from manitwin.assets.readers.urdf_shapes import LinkShapes
 from manitwin.assets.root import root_of
@@ -164,11 +164,7 @@ def asset_of(found: UrdfObject, path: Path, contact: Contact | None = None) -> A
         return [read.all([link]) for link in found.links]
 
     by_link = upright_shapes(shapes, found.files)
-    owners = [place for place, (parts, _) in enumerate(by_link) for _ in parts]
-    visual, collision = (
-        [part for parts, _ in by_link for part in parts],
-        [shape for _, some in by_link for shape in some],
-    )
+    visual, collision, owners = joined(by_link)
     if not visual and not collision and not found.files.missing:
         raise found.tree.refuse("", "no link of it has a shape", "give it a visual or a collision shape")
     licence, attribution = stated_licence(comments_before(found.tree.element))
@@ -242,9 +238,9 @@ def _declared_contact(found: UrdfObject) -> Contact:
     PyBullet's lateral_friction is the one coefficient of a body, sticking or sliding. Gazebo's mu1 and mu2 are two
     directions of one coefficient (SDF specification, friction/ode): the first is taken, with a remark where they differ.
     """
-    drake = drake_friction((link for link, _ in found.links), found.files, found.file.name)
+    drake = drake_contact((link for link, _ in found.links), found.files, found.file.name)
     if drake is not None:
-        return Contact(*drake)
+        return drake
     for link, _ in found.links:
         contact = link.find("contact")
         if contact is not None:

@@ -76,10 +76,8 @@ def _scene_parts(source: MeshSource, binary: bool, data: bytes) -> list[trimesh.
         if "skin" in node:
             source.find("it is bound to a skeleton; it was taken in the pose that the file holds")
             joints = joint_matrices(tree, node["skin"], placed, accessors, source)
-            found, matrix = (
-                reader.posed_parts(node["mesh"], joints, weights),
-                np.eye(4),
-            )  # its own node does not move it
+            found = reader.posed_parts(node["mesh"], joints, weights)
+            matrix = np.eye(4)  # its own node does not move it
         elif weights:
             found = reader.posed_parts(node["mesh"], None, weights)
         else:

@@ -27,7 +27,7 @@ FAMILIES = (
     "food", "groceries", "balls", "toys",
     "cutting_tools", "workshop", "kitchen_tools", "cookware",
     "computing", "instruments", "appliances", "packages", "accessories", "clothing", "stationery", "homeware",
-    "drinkware", "trays", "cosmetics", "sports",
+    "drinkware", "cosmetics",
 )  # fmt: skip
 
 

@@ -248,3 +248,20 @@ def tea_infuser(*, length_m: float, ball_m: float) -> Model:
     model.cut("holes", union(holes).rotate((0, 90, 0)).translate((at, 0, 0)), "ball")
     model.point("ball", "surface", "ball", (at, 0.0, r), (0.0, 0.0, 1.0))
     return model.point("handle", "surface", "handle", (-0.5 * end, 0.0, 0.0065), (0.0, 0.0, 1.0)).laid()
+
+
+@template("baking tray")
+def baking_tray(*, length_m: float, width: float, height: float, lip: float) -> Model:
+    """Build a tray of sheet with flaring walls and a flat ``lip`` all around, a share of the length."""
+    sheet, flare, across, high, edge = 0.0012, 0.9, width * length_m, height * length_m, lip * length_m
+    long, wide = length_m - 2 * edge, across - 2 * edge
+    corner, top = 0.06 * wide, high - 1.5 * sheet
+    outer = prism(rectangle(flare * long, flare * wide, radius_m=corner), high, top=1 / flare)
+    inner = prism(rectangle(flare * long - 2 * sheet, flare * wide - 2 * sheet, radius_m=corner), high, top=1 / flare)
+    rim = prism(rectangle(length_m, across, radius_m=corner + edge), 1.5 * sheet).translate((0, 0, top))
+    model = Model().add("body", outer).add("rim", rim).cut("inside", inner.translate((0, 0, sheet)))
+    model.region("base", "body", lambda centers: centers[:, 2] < 0.1 * sheet)
+    model.point("inside", "face", "inside", (0.0, 0.0, sheet), (0.0, 0.0, 1.0))
+    for side in (-0.5, 0.5):
+        model.point("rim", "edge", "rim", (side * length_m, 0.0, top + 0.75 * sheet), (2 * side, 0.0, 0.0))
+    return model.point("base", "face", "base", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))

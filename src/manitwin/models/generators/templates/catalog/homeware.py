@@ -5,8 +5,20 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
+from manifold3d import CrossSection
 
-from manitwin.geometry.solids.shapes import box, cylinder, ellipsoid, lathe, rounded, union
+from manitwin.geometry.solids.shapes import (
+    SIDES,
+    box,
+    chords,
+    cylinder,
+    ellipsoid,
+    lathe,
+    polygon,
+    prism,
+    rounded,
+    union,
+)
 from manitwin.geometry.solids.sweep import arc, tube
 from manitwin.models.generators.templates.template import Model, template
 
@@ -137,3 +149,33 @@ def paper_towel(*, height_m: float, width: float, core_m: float) -> Model:
     model.point("core", "hole", "core", (0.0, 0.0, height_m), (0.0, 0.0, 1.0))
     model.point("sheet", "edge", "sheet", (1.12 * r, 0.1 * r, 0.5 * height_m), (0.2, 0.98, 0.0))
     return model.point("outside", "surface", "body", (-r, 0.0, 0.5 * height_m), (-1.0, 0.0, 0.0))
+
+
+def _oval(x_m: float, y_m: float) -> CrossSection:
+    """Return a rectangle whose shorter sides are half circles."""
+    turn = np.linspace(-0.5 * np.pi, 0.5 * np.pi, chords(SIDES) // 2)
+    right = np.stack([0.5 * (x_m - y_m) + 0.5 * y_m * np.cos(turn), 0.5 * y_m * np.sin(turn)], axis=1)
+    return polygon(np.concatenate([right, -right]))
+
+
+@template("soap dish")
+def soap_dish(*, length_m: float, width: float, height: float, wall_m: float) -> Model:
+    """Build an oval dish with ribs on its floor and holes that water runs off through."""
+    across, high = width * length_m, height * length_m
+    outline, hollow = _oval(length_m, across), _oval(length_m - 2 * wall_m, across - 2 * wall_m)
+    floor = 1.6 * wall_m
+    model = Model().add("body", prism(outline, high, radius_m=0.25 * wall_m))
+    model.cut("inside", prism(hollow, high).translate((0, 0, floor)))
+    for place in np.linspace(-0.26, 0.26, 5):
+        rib = box(0.004, 0.66 * across, 0.3 * high, radius_m=0.0015).translate(
+            (float(place) * length_m, 0, floor - 0.001)
+        )
+        model.add("ribs", rib)
+    for place in np.linspace(-0.195, 0.195, 4):
+        hole = box(0.004, 0.4 * across, 0.1, radius_m=0.0015).translate((float(place) * length_m, 0, -0.05))
+        model.cut("holes", hole)
+    for part in ("body", "inside"):
+        model.region("rim", part, lambda centers: centers[:, 2] > 0.97 * high)
+    model.region("base", "body", lambda centers: centers[:, 2] < 0.02 * high)
+    model.point("ribs", "face", "ribs", (0.0, 0.0, floor - 0.001 + 0.3 * high), (0.0, 0.0, 1.0))
+    return model.point("base", "face", "base", (0.3 * length_m, 0.0, 0.0), (0.0, 0.0, -1.0))
