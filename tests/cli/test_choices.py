@@ -22,7 +22,7 @@ from manitwin.geometry.length_unit import StatedUnit
 from manitwin.models.fakes.catalog import REHEARSALS
 from manitwin.models.registry import backends
 from manitwin.models.weights.catalog import KNOWN_WEIGHTS
-from manitwin.pipeline.manifest import Up
+from manitwin.pipeline.manifest_item import Up
 from manitwin.robots.grippers.gripper import shipped_grippers
 from manitwin.robots.load import load_robot, shipped_robots, shipped_two_arms
 from manitwin.scenes.perception.segmentation import FORMATS as SEGMENTATIONS

@@ -15,7 +15,8 @@ from typer.testing import CliRunner
 from manitwin.cli.machine_limits import of_machine, too_little_memory
 from manitwin.cli.main import app
 from manitwin.errors import UsageError
-from manitwin.pipeline.manifest import LONGEST, Notes, iterate_items
+from manitwin.pipeline.manifest import Notes, iterate_items
+from manitwin.pipeline.manifest_item import LONGEST
 
 MIB = 1 << 20
 

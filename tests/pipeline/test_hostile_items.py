@@ -11,7 +11,8 @@ import pytest
 from manitwin.engine.ledger.ledger import Ledger
 from manitwin.errors import UsageError
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.manifest import LONGEST, Notes, iterate_items
+from manitwin.pipeline.manifest import Notes, iterate_items
+from manitwin.pipeline.manifest_item import LONGEST
 
 BOX = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 

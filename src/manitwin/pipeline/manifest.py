@@ -3,57 +3,34 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
-from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal, cast, get_args
+from typing import Any
 
 from manitwin.engine.ledger.ledger import LEDGER
 from manitwin.engine.ledger.location import CONFIG
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import UsageError
 from manitwin.formats.missing_path import not_there
 from manitwin.formats.output_folder import require_writable_folder
 from manitwin.formats.printable import printable_line
 from manitwin.formats.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES
-from manitwin.geometry.length_unit import StatedUnit
 from manitwin.pipeline.folder_listing import FolderListing, list_folder
-from manitwin.pipeline.inspection import imported
 from manitwin.pipeline.item import Item
+from manitwin.pipeline.manifest_item import COLUMNS, forget_folders, item_of, listed_columns, shortened
 from manitwin.pipeline.manifest_rows import manifest_rows
 from manitwin.pipeline.photo_groups import PhotoGroups, one_of_photos
 from manitwin.pipeline.photo_thinning import thinned_words
 from manitwin.pipeline.stated_size import COLUMN as COLUMN_OF_SIZE
-from manitwin.pipeline.stated_size import MEANT, stated_size_m, with_defaults
+from manitwin.pipeline.stated_size import MEANT
 from manitwin.pipeline.view_inputs import in_order, no_pose_told
 from manitwin.twin.dataset_root import DatasetRoot
-from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH, is_imported
 
 MANIFEST_SUFFIXES = frozenset({".csv", ".jsonl"})
-_SHOWN_CHARACTERS, _COLUMNS_SHOWN = 60, 20
-LONGEST = {"name": 200, "text": 4000, "license": 200, "attribution": 4000, "file": 4095, "poses": 4095}
-"""Characters of a column: a longer name is none, and a longer text is taken by no generator."""
-_CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
-"""What changes a terminal or the order of what is read, and lone surrogates; a tab and an end of line do not."""
-_LINES = re.compile(r"[\r\n\t\u2028\u2029]")
-COLUMNS = (
-    "file",
-    "text",
-    "name",
-    "units",
-    "up",
-    "longest_side_m",
-    "license",
-    "attribution",
-    "group",
-    "turn_deg",
-    "poses",
-)
+_SHOWN_CHARACTERS = 60
 _KNOWN = frozenset(COLUMNS)
 
-Up = Literal["y", "z", "auto"]
 Refusal = Callable[[Item], str | None]
 Turns = Sequence[float] | Callable[[int], Sequence[float]]
 """The turns of photos, or what makes them of their number, which a folder tells only once it is listed."""
@@ -187,11 +164,11 @@ def _given_items(
         elif path.suffix.lower() in MANIFEST_SUFFIXES:
             yield from _manifest_items(path, defaults, notes, strict, refusal)
         else:
-            yield from _allowed([_item({"file": str(path)}, Path.cwd(), defaults, str(path))], str(given), refusal)
+            yield from _allowed([item_of({"file": str(path)}, Path.cwd(), defaults, str(path))], str(given), refusal)
     for text in texts:
         if not text.strip():
             raise UsageError("an empty text; say what to make, such as 'a red mug'")
-        yield from _allowed([_item({"text": text}, Path.cwd(), defaults, text)], "--text", refusal)
+        yield from _allowed([item_of({"text": text}, Path.cwd(), defaults, text)], "--text", refusal)
 
 
 def _allowed(items: Iterable[Item], where: str, refusal: Refusal) -> Iterator[Item]:
@@ -208,7 +185,7 @@ def _folder_items(folder: Path, given: str, defaults: dict[str, Any], notes: Not
         left = "".join(f"; {line.removeprefix(f'{folder}: ')}" for line in listing.remarks()[1:])
         known = ", ".join(sorted(MESH_SUFFIXES | IMAGE_SUFFIXES))
         raise UsageError(f"{given}: no image or mesh in this folder{left}; known: {known}")
-    yield from (_item({"file": str(p)}, Path.cwd(), defaults, str(folder)) for p in listing.inputs)
+    yield from (item_of({"file": str(p)}, Path.cwd(), defaults, str(folder)) for p in listing.inputs)
     notes.folders.append(listing)
     notes.remarks.extend(listing.remarks())
 
@@ -218,7 +195,7 @@ def _manifest_items(
 ) -> Iterator[Item]:
     unknown: dict[str, str] = {}
     groups = PhotoGroups(path)
-    _real_folder.cache_clear()  # a link may lead elsewhere than at the last reading
+    forget_folders()  # a link may lead elsewhere than at the last reading
     line = None
     for line, row in manifest_rows(path, COLUMNS):
         for column in sorted(map(str, row.keys() - _KNOWN - unknown.keys())):
@@ -231,8 +208,8 @@ def _manifest_items(
         notes.tell(f"row {line:,} of {path.name}")
         where = f"{path}:{line}"
         if not groups.takes(line, row):
-            yield from _allowed([_item(row, path.parent, defaults, where, unknown)], where, refusal)
-    for item, where in groups.items(lambda row, where: _item(row, path.parent, defaults, where, unknown)):
+            yield from _allowed([item_of(row, path.parent, defaults, where, unknown)], where, refusal)
+    for item, where in groups.items(lambda row, where: item_of(row, path.parent, defaults, where, unknown)):
         notes.remarks.extend(_thinned(item, where))
         yield from _allowed([item], where, refusal)
     if line is None:
@@ -240,96 +217,4 @@ def _manifest_items(
             f"{path}: no rows; a manifest has a column 'file' or 'text', and optionally {', '.join(COLUMNS[2:])}"
         )
     if unknown:
-        notes.remarks.append(f"{path}: columns not used: {_listed(unknown)}")
-
-
-def _listed(unknown: dict[str, str]) -> str:
-    """Name the unknown columns, of many the first."""
-    named = [unknown[column] for column in sorted(unknown)[:_COLUMNS_SHOWN]]
-    return ", ".join([*named, "..."] if len(unknown) > _COLUMNS_SHOWN else named)
-
-
-def _item(
-    row: dict[str, Any], folder: Path, defaults: dict[str, Any], where: str, unknown: dict[str, str] | None = None
-) -> Item:
-    said = {key: str(value).strip() for key, value in row.items() if key in COLUMNS and value not in (None, "")}
-    values = with_defaults(said, defaults)
-    for key, value in values.items():
-        if isinstance(value, str) and (why := unusable(key, value)):
-            raise UsageError(f"{where}: {key}: {why}")
-    file, text = values.get("file"), values.get("text")
-    if (file is None) == (text is None):
-        columns = f"; the first line names the columns, unknown: {_listed(unknown)}" if unknown else ""
-        raise UsageError(f"{where}: a row has either 'file' or 'text'{columns}")
-    if file is not None:
-        path = os.path.join(folder, file.rstrip("/") or file)
-        if not os.path.isfile(path):
-            if os.path.isdir(path) and is_imported(Path(path)):
-                return _imported_item(Path(path).resolve(), values, where)
-            what = "no file" if os.path.exists(path) else not_there(file)
-            raise UsageError(f"{where}: {shortened(path)} is {what}; paths are absolute or relative to the manifest")
-        file = _resolved(path)
-    for key, kind in (("units", StatedUnit), ("up", Up)):
-        if values[key] not in get_args(kind):
-            raise UsageError(f"{where}: {choose_from(key, str(values[key]), get_args(kind))}")
-    return Item(
-        file=file,
-        text=text,
-        name=values["name"] or None,
-        units=cast(StatedUnit, values["units"]),
-        up=cast(Up, values["up"]),
-        license=values["license"],
-        attribution=values["attribution"],
-        longest_side_m=stated_size_m(values, where),
-    )
-
-
-def _resolved(path: str) -> str:
-    """Return the real path of a file: that of its folder is asked for once, since a manifest names many in few folders.
-
-    A link to a file of another ending stays: stores of content, such as the cache of Hugging Face, keep ``mug.obj`` as a link to
-    a file that is named by its digest, beside which nothing lies that the mesh names.
-    """
-    place = os.path.join(_real_folder(os.path.dirname(path)), os.path.basename(path))
-    if not os.path.islink(place):
-        return place
-    real = os.path.realpath(place)
-    return real if os.path.splitext(real)[1].lower() == os.path.splitext(place)[1].lower() else place
-
-
-@lru_cache(maxsize=4096)
-def _real_folder(path: str) -> str:
-    return os.path.realpath(path)
-
-
-def unusable(key: str, value: str) -> str | None:
-    """Return why a value of a column cannot be used, None where it can; a file may have any name that there is."""
-    most = LONGEST.get(key, LONGEST["name"])
-    if len(value) > most:
-        return f"{len(value)} characters; give at most {most}"
-    if key in ("file", "poses"):
-        return "has a NUL character in it; check the path" if "\0" in value else None
-    if _CONTROLS.search(value) or (key in ("name", "license") and _LINES.search(value)):
-        return f"{printable_line(value, max_characters=60)!r} has control characters; give plain words"
-    return None
-
-
-def shortened(path: str) -> str:
-    """Return a path for a message: its beginning and end."""
-    return printable_line(path, max_characters=200)
-
-
-def _imported_item(folder: Path, values: dict[str, Any], where: str) -> Item:
-    """Return the item of an imported asset; unit and axes are those that the import wrote, whatever the user says."""
-    if values["longest_side_m"]:
-        raise UsageError(f"{where}: longest_side_m: an imported asset has a size of its own; leave it out")
-    name, license_, attribution = imported(folder / IMPORT_RECORD)
-    return Item(
-        file=str(folder / IMPORTED_MESH),
-        name=values["name"] or name,
-        units="m",
-        up="y",
-        license=values["license"] or license_,
-        attribution=values["attribution"] or attribution,
-        given=str(folder / IMPORT_RECORD),
-    )
+        notes.remarks.append(f"{path}: columns not used: {listed_columns(unknown)}")

@@ -40,7 +40,7 @@ def carve(
     from manitwin.errors import UsageError
     from manitwin.formats.glb import write_glb
     from manitwin.pipeline.carved_photos import carve_photos
-    from manitwin.pipeline.manifest import unusable
+    from manitwin.pipeline.manifest_item import unusable
     from manitwin.pipeline.view_inputs import listed_views
     from manitwin.twin.store import write_bytes_atomically
 

@@ -25,7 +25,7 @@ from manitwin.formats.bounded_file import open_regular
 from manitwin.formats.printable import printable_line
 from manitwin.formats.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES
 from manitwin.pipeline.folder_listing import list_folder
-from manitwin.pipeline.manifest import unusable
+from manitwin.pipeline.manifest_item import unusable
 from manitwin.twin.import_record import IMPORTED_MESH
 
 MAX_INPUT_BYTES = 1 << 30

@@ -15,7 +15,7 @@ from manitwin.errors import UsageError
 from manitwin.formats.csv_file import read_csv, read_lines
 from manitwin.formats.json_file import parse_json
 from manitwin.formats.printable import printable_line
-from manitwin.pipeline.manifest import unusable
+from manitwin.pipeline.manifest_item import unusable
 
 COLUMNS = ("file", "url", "name", "source", "license", "attribution", "size_m")
 """What is read of a row; ``path``, ``category`` and ``licence`` are other names of file, name and license."""
