@@ -56,6 +56,13 @@ picture.save(out)
 
 GROUPED = ("mug_front", "mug_side", "spoon")
 
+COCO = {
+    "images": [{"id": 7, "file_name": "photo.jpg"}],
+    "categories": [{"id": 1, "name": "bottle"}],
+    "annotations": [{"id": 1, "image_id": 7, "category_id": 1, "bbox": [193.0, 150.0, 94.0, 294.0]}],
+}
+"""The labels of a data set of one photo."""
+
 
 class Folders:
     """Folders that take long to make, each made at its first use and copied to every page that names it."""
@@ -121,6 +128,12 @@ class Folders:
         (page / "run.toml").write_text(SMALL)
         for name in ("mug.jpg", "photo.jpg", "photos/bottle.jpg", *(f"photos/{name}.jpg" for name in GROUPED)):
             _copied(ROOT / "samples" / "bottle.jpg", page / name)
+        if "photo_mask.png" in said:
+            mask = np.zeros((640, 480), np.uint8)
+            mask[150:444, 193:287] = 255
+            Image.fromarray(mask).save(page / "photo_mask.png")
+        if "annotations.json" in said:
+            (page / "annotations.json").write_text(json.dumps(COCO))
         _copied(ROOT / "samples" / "mug.glb", page / "mug.glb")
         for name in ("front.png", "side.png", "back.png"):
             photo = np.zeros((300, 300, 4), np.uint8)

@@ -87,7 +87,7 @@ def test_a_mask_that_is_none_is_refused_in_one_line(tmp_path: Path) -> None:
     photos = _write(tmp_path)
     mask = tmp_path / "masks" / "1.png"
     mask.unlink()
-    with pytest.raises(UsageError, match=r"masks/1\.png: the mask that mask_path names is not there"):
+    with pytest.raises(UsageError, match=r"masks/1\.png: no mask is there"):
         _item(photos)
     Image.new("L", (WIDTH // 2, HEIGHT // 2)).save(mask)
     with pytest.raises(UsageError, match=r"masks/1\.png: a mask of 160 x 120 pixels, and its photo has 320 x 240"):

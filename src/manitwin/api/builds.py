@@ -23,6 +23,8 @@ def build(
     units: str = "auto",
     up: str = "auto",
     longest_side_m: float | None = None,
+    mask: str | Path | None = None,
+    box_px: Sequence[float] | None = None,
     license: str | None = None,
     attribution: str | None = None,
     count: int = 1,
@@ -47,12 +49,13 @@ def build(
     it changes.
 
     ``name``, ``units`` m|cm|mm|none|auto, ``up`` y|z|auto, ``longest_side_m`` (of length, width and height as it stands),
-    ``license`` and ``attribution`` hold for all inputs whose manifest row does not say otherwise; of each text ``count``
-    variations are made, which differ in what it leaves open. With ``views`` the inputs are photos of one thing, which becomes
-    one twin; ``turns_deg`` is the camera's turn about the vertical in each, counter-clockwise seen from above, or ``poses`` a
-    transforms.json or the folder of a COLMAP model that states their cameras, whose unit and up axis are then ``units`` and
-    ``up``. With ``strict`` a manifest's column that nobody knows is an error. ``config`` None: what the data set was built with,
-    else the defaults.
+    ``license`` and ``attribution`` hold for all inputs whose manifest row does not say otherwise. Of one photo ``mask`` is a
+    picture of the thing's outline, white where it is, and ``box_px`` where it is: left, top, right, bottom. Of each text
+    ``count`` variations are made, which differ in what it leaves open. With ``views`` the inputs are photos of one thing, which
+    becomes one twin; ``turns_deg`` is the camera's turn about the vertical in each, counter-clockwise seen from above, or
+    ``poses`` a transforms.json or the folder of a COLMAP model that states their cameras, whose unit and up axis are then
+    ``units`` and ``up``. With ``strict`` a manifest's column that nobody knows is an error. ``config`` None: what the data set
+    was built with, else the defaults.
     ``flags`` are said on top of it: ``seed``; ``grippers``, names or .toml files, the first one's grasps are the twin's own;
     ``vlm``, ``generator`` and ``grasper`` choose backends (docs/backends.md); once services
     have charged ``max_cost_usd``, items that would cost more are left unfinished; ``record`` is a file that a VLM's answers are
@@ -71,6 +74,8 @@ def build(
         "units": units,
         "up": up,
         "longest_side_m": longest_side_m,
+        "mask": mask,
+        "box_px": box_px,
         "license": license,
         "attribution": attribution,
     }

@@ -23,8 +23,10 @@ REMEDIES = {
     "no_faces": "export it with faces: points and curves have no surface",
     "not_finite": "export it again: some of its numbers are none",
     "no_object": "photograph the object whole and larger, on a plain surface of another colour",
-    "several_objects": "one object an input: crop the photo, or give each object in a file of its own",
-    "low_confidence_matte": "photograph it whole on a plain surface of another colour, or give an image with an alpha channel;"
+    "several_objects": "one object an input: say where one is in the photo (--box, or a column box_px), or give each object in a"
+    " file of its own",
+    "low_confidence_matte": "photograph it whole on a plain surface of another colour, or give a mask of it (--mask, or a column"
+    " mask) or an image with an alpha channel;"
     " where a cutout.webp lies beside a photo's twin.json and is right, `manitwin review cutouts DATASET --accept ID` builds it",
     "generator_failed": "another photo, another generator (--generator, see docs/generators.md), or a mesh",
     "not_watertight": "close the holes of the mesh in a modeller",
@@ -75,6 +77,8 @@ _TRIES = re.compile(r"^\S+ failed \d+ times: ")
 _OWN_ERROR = re.compile(rf"^(?:{_OWN_ERRORS}): ")
 _LINE_OF_CODE = re.compile(r" \(\w+\.py:\d+\)$")
 _QUOTED = r"(?<!\w)(?:'[^']*'|\"[^\"]*\")(?!\w)"  # an apostrophe begins no quotation
+_OF_PLACE = re.compile(r": (?:the box|a mask|no mask) ")
+"""What is wrong with is where in a photo the thing is said to be, and not with the photo."""
 _SEMICOLON = re.compile(rf"{_QUOTED}|; ")
 _VARIES = (
     (re.compile(_QUOTED), "'...'"),
@@ -142,7 +146,9 @@ def _cause(first: Unaccepted, count: int) -> Cause:
         remedy = of_size if of_size in (NAME_IT, AS_SCENERY) else f"{of_size}; else {remedy}"
     if first.reason:
         message = message.removeprefix(f"{first.reason}: ")
-    if remedy is None and _is_own(first.message):
+    if (first.reason == "unreadable" and _OF_PLACE.search(first.message)) or (
+        remedy is None and _is_own(first.message)
+    ):
         message, remedy = _without_remedy(message)
     elif remedy is not None:
         message = message.removesuffix(f"; {remedy}")  # some messages end with the same words

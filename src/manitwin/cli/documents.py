@@ -183,7 +183,8 @@ def plan_document(plan: Plan, place: str) -> Document:
                 "text": planned.item.text,
                 "name": planned.item.name, "kind": planned.kind,
                 "units": planned.item.units, "up": planned.item.up,
-                "longest_side_m": planned.item.longest_side_m, "twin_id": planned.twin_id, "state": planned.state,
+                "longest_side_m": planned.item.longest_side_m, "masks": list(planned.item.masks),
+                "box_px": list(planned.item.box_px) or None, "twin_id": planned.twin_id, "state": planned.state,
                 "detail": planned.detail,
             }
             for planned in plan.items

@@ -35,6 +35,22 @@ LongestSide = Annotated[
         callback=choices.amount_of("--longest-side", choices.LARGEST_SIDE_M),
     ),
 ]
+Mask = Annotated[
+    Path | None,
+    typer.Option(
+        "--mask",
+        help="A picture of the thing's outline in the photo, as large as it: white where the thing is.",
+        metavar="FILE",
+    ),
+]
+Box = Annotated[
+    str | None,
+    typer.Option(
+        "--box",
+        help="Where in the photo the thing is: left,top,right,bottom in pixels of the upright photo.",
+        metavar="120,80,410,395",
+    ),
+]
 License = Annotated[str | None, typer.Option(help="Licence of the inputs (SPDX).")]
 Attribution = Annotated[str | None, typer.Option(help="Whom to credit for the inputs.")]
 Strict = Annotated[bool, typer.Option("--strict", help="A manifest column that nobody knows is an error.")]
@@ -151,6 +167,7 @@ DryRun = Annotated[
 
 OF_INPUTS: dict[str, tuple[Any, Any]] = {
     "name": (Name, None), "units": (Units, "auto"), "up": (Up, "auto"), "longest_side_m": (LongestSide, None),
+    "mask": (Mask, None), "box_px": (Box, None),
     "license": (License, None), "attribution": (Attribution, None),
 }  # fmt: skip
 """What holds for all inputs of a build, by the names of ``manitwin.build``: annotation and default."""

@@ -17,31 +17,36 @@ MOST_TINT = 64
 LEAST_LEFT_OUT = 0.02
 """Of a picture, what the mask of a thing leaves out at least: less is no cut-out (as of an alpha channel)."""
 _HALF = 0.5
+LEAST_OF_LEVEL = 0.05
+"""Of what is not black, the share of one level that is no smooth edge."""
+LOSSES, FEW = 0.1, 16
+"""By which levels are off where a picture is compressed with losses, of the highest; below ``FEW`` none is."""
 _TURNED = {6: -1, 8: 1}  # quarter turns, counter-clockwise, that show a stored picture upright
 
 _refused = partial(InputError, "unreadable")
 
 
-def require_mask(path: Path, folder: Path, size_px: tuple[int, int], orientation: int) -> None:
-    """Raise InputError for a mask that is not there, lies outside ``folder``, or is not as large as its photo.
+def require_mask(path: Path, folder: Path | None, size_px: tuple[int, int], orientation: int) -> None:
+    """Raise InputError for a mask that is not there, lies outside a ``folder``, or is not as large as its photo.
 
     ``size_px`` is the photo's width and height, upright; a mask of the photo as it is stored is one, too, where its EXIF
     ``orientation`` turns it by a right angle. Only the header is read.
     """
     called = _called(path)
     try:
-        is_inside, is_there = path.resolve().is_relative_to(folder.resolve()), path.is_file()
+        is_inside = folder is None or path.resolve().is_relative_to(folder.resolve())
+        is_there = path.is_file()
     except (OSError, RuntimeError, ValueError):  # a name that no file can have, or a loop of links
         is_inside, is_there = True, False
     if not is_inside:
         raise _refused(f"{called}: a link that leads out of the folder of the poses; keep the masks below it")
     if not is_there:
-        raise _refused(f"{called}: the mask that mask_path names is not there; put it there, or leave mask_path out")
+        raise _refused(f"{called}: no mask is there; put it there, or leave the mask out")
     width, height, _ = full_size(path)
     if (width, height) != size_px and not (orientation in _TURNED and (height, width) == size_px):
         raise _refused(
             f"{called}: a mask of {width} x {height} pixels, and its photo has {size_px[0]} x {size_px[1]}; give the mask at the"
-            " photo's size, or leave mask_path out"
+            " photo's size, or leave the mask out"
         )
 
 
@@ -50,8 +55,8 @@ def read_mask(path: Path, shape: tuple[int, int], orientation: int = 1) -> np.nd
 
     An alpha channel that differs within the picture is the mask, else its grey, stretched until the highest is 255.
     ``orientation`` is that of the photo's EXIF: a mask of the other shape is turned as the photo is. Raises InputError for a
-    picture that is no outline: one with colours, one that is the same nearly everywhere, and one that has most of the border
-    (it says what to leave out of a scene).
+    picture that is no outline: one with colours, one that numbers several things, one that is the same nearly everywhere, and
+    one that has most of the border (it says what to leave out of a scene).
     """
     pixels, called = read_image(path).pixels, _called(path)
     if pixels.shape[2] == 4 and np.ptp(pixels[..., 3]):
@@ -62,12 +67,13 @@ def read_mask(path: Path, shape: tuple[int, int], orientation: int = 1) -> np.nd
                 f"{called}: a mask with colours; give one that is white where the thing is and black elsewhere"
             )
         mask = pixels[..., 1]
+        _require_one_thing(mask, called)
     if orientation in _TURNED and (mask.shape[0] > mask.shape[1]) != (shape[0] > shape[1]):
         mask = np.rot90(mask, _TURNED[orientation])
     highest = int(mask.max())
     if not highest:
         raise _refused(
-            f"{called}: a mask that is black everywhere; make it white where the thing is, or leave mask_path out"
+            f"{called}: a mask that is black everywhere; make it white where the thing is, or leave the mask out"
         )
     mask = np.rint(mask * (255 / highest)).astype(np.uint8)
     taken = mask > 127
@@ -75,11 +81,26 @@ def read_mask(path: Path, shape: tuple[int, int], orientation: int = 1) -> np.nd
     if (~taken).mean() < LEAST_LEFT_OUT or border.mean() > _HALF:
         raise _refused(
             f"{called}: a mask that keeps the border of the picture: it says what to leave out of a scene, and not where the"
-            " thing is; make it black around the thing, or leave mask_path out"
+            " thing is; make it black around the thing, or leave the mask out"
         )
     if mask.shape != shape:
         mask = np.asarray(Image.fromarray(mask).resize(shape[::-1], Image.Resampling.BOX))
     return np.ascontiguousarray(mask)
+
+
+def _require_one_thing(mask: np.ndarray, called: str) -> None:
+    """Raise InputError for a picture of which several levels each cover an area: a map of several things, numbered."""
+    levels, counts = np.unique(mask[mask > 0], return_counts=True)
+    if not len(levels):
+        return
+    highest = int(levels[-1])
+    is_other = (levels != highest) if highest < FEW else (levels > LOSSES * 255) & (levels < (1 - LOSSES) * highest)
+    if (counts[is_other] > LEAST_OF_LEVEL * counts.sum()).any():
+        shown = ", ".join(str(level) for level in levels[:8]) + (", ..." if len(levels) > 8 else "")
+        raise _refused(
+            f"{called}: a mask of several levels ({shown}), as where things are numbered; give one that is white where this thing"
+            " is and black elsewhere"
+        )
 
 
 def _called(path: Path) -> str:

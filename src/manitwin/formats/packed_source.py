@@ -46,6 +46,19 @@ def mask_names(paths: Sequence[Path]) -> list[str]:
     return [f"mask_{number:02d}{path.suffix.lower()}" for number, path in enumerate(paths)]
 
 
+def masks_beside(masks: Sequence[str]) -> dict[str, Path]:
+    """Return the masks of photos, one a photo, '' where it has none, by what they are called there: mask_02 is photo_02's."""
+    return {f"mask_{number:02d}{Path(mask).suffix.lower()}": Path(mask) for number, mask in enumerate(masks) if mask}
+
+
+def pack_mask(mask: Path, folder: Path) -> str:
+    """Write the mask of one photo beside it, byte for byte, and return its name. Raises InputError ``unreadable``."""
+    name = f"source_mask{mask.suffix.lower()}"
+    with _opened(mask) as stream, (folder / name).open("wb") as kept:
+        shutil.copyfileobj(stream, kept, _BLOCK_BYTES)
+    return name
+
+
 def pack_photos(
     paths: Sequence[Path], folder: Path, *, keep: bool = True, beside: Mapping[str, Path] | None = None
 ) -> tuple[str, str]:

@@ -18,7 +18,7 @@ from manitwin.errors import InputError, Rejected
 from manitwin.formats.camera_poses.transforms_json import transforms_of
 from manitwin.formats.installation import installed_version
 from manitwin.formats.npy_file import labels_to_npy
-from manitwin.formats.packed_source import mask_names, pack_photos, pack_source, photo_names
+from manitwin.formats.packed_source import mask_names, masks_beside, pack_mask, pack_photos, pack_source, photo_names
 from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.pipeline.grasps import GRASP_POINTS
@@ -130,15 +130,16 @@ def _model(stage: Stage, draft: Draft[Item]) -> str | None:
 
 
 def _write_source(draft: Draft[Item], kind: str, folder: Path, keep: bool) -> dict[str, Any]:
-    item, poses = draft.payload, None
+    item, poses, mask = draft.payload, None, None
     if item.file is None:
         name, content = "prompt.txt", (item.text or "").encode()
         (folder / name).write_bytes(content)
         sha256 = hashlib.sha256(content).hexdigest()
     elif item.views:
-        paths, beside = [Path(file) for file in item.files], {}
+        paths = [Path(file) for file in item.files]
         poses = _readable_poses(item)
         with TemporaryDirectory() as place:
+            beside = masks_beside(item.masks)
             cameras = None if poses is None else Path(place) / "transforms.json"
             if poses is not None and cameras is not None:
                 masks = list(dict.fromkeys(camera.mask for camera in poses.cameras if camera.mask is not None))
@@ -150,6 +151,7 @@ def _write_source(draft: Draft[Item], kind: str, folder: Path, keep: bool) -> di
     else:
         given = [] if item.given is None else [Path(item.given)]
         name, sha256 = pack_source(Path(item.file), folder, given, keep=keep)
+        mask = pack_mask(Path(item.masks[0]), folder) if item.masks and keep else None
     return {
         "kind": kind,
         "file": name,
@@ -158,6 +160,8 @@ def _write_source(draft: Draft[Item], kind: str, folder: Path, keep: bool) -> di
         "variation": item.variation,
         "turns_deg": list(item.turns_deg) or None,
         "poses": None if poses is None else poses.to_json(),
+        "mask": mask,
+        "box_px": list(item.box_px) or None,
         "license": item.license or "unknown",
         "attribution": item.attribution,
     }

@@ -40,7 +40,8 @@ class Item(Payload):
     the photo ``file`` shows; ``turns_deg`` is the camera's turn about the vertical in each photo, counter-clockwise seen from
     above, that of the first 0; empty where nobody states them. ``poses`` is the absolute path of a file, or of the folder of a
     COLMAP model, that states the cameras of the photos. ``photos_given`` is how many photos there were where they were thinned
-    out; None where all are here.
+    out; None where all are here. ``masks`` are the absolute paths of pictures of the thing's outline, one a photo, '' where a
+    photo has none; empty where nobody gives one. ``box_px`` is where the thing is in the one photo: left, top, right, bottom.
     """
 
     file: str | None
@@ -57,6 +58,8 @@ class Item(Payload):
     longest_side_m: float | None = None
     poses: str | None = None
     photos_given: int | None = None
+    masks: tuple[str, ...] = ()
+    box_px: tuple[float, ...] = ()
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -83,6 +86,7 @@ class Item(Payload):
         """When its files were last changed (st_ctime, which nobody sets), None where it has none now."""
         try:
             beside = () if self.poses is None else (self.poses, *_named_masks(Path(self.poses)))
+            beside = (*beside, *filter(None, self.masks))
             return max((os.stat(file).st_ctime for file in (*self.files, *beside)), default=None)
         except (OSError, ValueError):
             return None
@@ -93,7 +97,7 @@ class Item(Payload):
         later = {"given": self.given is None, "variation": not self.variation}
         later |= {"views": not self.views, "turns_deg": not self.turns_deg}
         later |= {"longest_side_m": self.longest_side_m is None, "poses": self.poses is None}
-        later |= {"photos_given": self.photos_given is None}
+        later |= {"photos_given": self.photos_given is None, "masks": not self.masks, "box_px": not self.box_px}
         kept = {name: value for name, value in fields.items() if not later.get(name, False)}
         return {name: list(value) if isinstance(value, tuple) else value for name, value in kept.items()}
 
@@ -109,36 +113,50 @@ class Item(Payload):
 def twin_id(item: Item) -> str:
     """Return the id of the twin that an item makes: a hash of the input's bytes, name, size, units and up axis, of nothing else.
 
-    Of several photos of one thing it covers all, in their order, and the stated turns, or poses and masks. What another tool
-    says of an imported mesh is part of the input. Another configuration is another revision of the same twin. Raises InputError
-    ``unreadable`` where a file has gone since the input was listed, or is no regular one now.
+    Of several photos of one thing it covers all, in their order, and the stated turns, or poses and masks; of one its mask and
+    box. What another tool says of an imported mesh is part of the input. Another configuration is another revision of the same
+    twin. Raises InputError ``unreadable`` where a file has gone since the input was listed, or is no regular one now.
     """
     if item.file is None:
-        content: object = {"text": item.text}
+        content: dict[str, object] = {"text": item.text}
     elif item.views:
         photos = [{"suffix": Path(file).suffix.lower(), "sha256": file_sha256(Path(file))} for file in item.files]
         content = {"photos": photos, "turns_deg": list(item.turns_deg)}
         if item.photos_given is not None:
             content |= {"photos_given": item.photos_given}
         if item.poses is not None:
-            taken, poses = [Path(file) for file in item.files], Path(item.poses)
-            content |= {"poses": poses_identity(taken, poses)}
-            masks = masks_of_photos(taken, poses)
-            if any(masks):
-                content |= {"masks": [None if mask is None else file_sha256(mask) for mask in masks]}
+            content |= {"poses": poses_identity([Path(file) for file in item.files], Path(item.poses))}
+        masks = masks_of(item)
+        if any(masks):
+            content |= {"masks": [None if mask is None else file_sha256(mask) for mask in masks]}
     else:
         path = Path(item.file)
         digest, root = file_sha256(path), path.parent.resolve()
         sides = {p.relative_to(root).as_posix(): file_sha256(p) for p in side_files(path)}
         content = {"suffix": path.suffix.lower(), "sha256": digest, "side_files": sides}
+        if item.masks:
+            content["mask"] = file_sha256(Path(item.masks[0]))
+        if item.box_px:
+            content["box_px"] = list(item.box_px)
     if item.given is not None:
         content = {"mesh": content, "given": file_sha256(Path(item.given))}
     if item.variation:
         content = {"content": content, "variation": item.variation}
-    identity = {"content": content, "name": item.name, "units": item.units, "up": item.up}
+    identity: dict[str, object] = {"content": content, "name": item.name, "units": item.units, "up": item.up}
     if item.longest_side_m is not None:
         identity["longest_side_m"] = item.longest_side_m
     return sha256_of_json(identity)[:ID_DIGITS]
+
+
+def masks_of(item: Item) -> list[Path | None]:
+    """Return the mask of each photo: the one that is given of it, else the one that the file of poses names, else None.
+
+    Raises InputError as ``cameras_of_photos`` does.
+    """
+    files = [Path(file) for file in item.files]
+    named = [None] * len(files) if item.poses is None else masks_of_photos(files, Path(item.poses))
+    given = item.masks or ("",) * len(files)
+    return [Path(own) if own else mask for own, mask in zip(given, named, strict=True)]
 
 
 def _named_masks(poses: Path) -> list[str]:

@@ -22,6 +22,7 @@ from manitwin.pipeline.manifest_item import COLUMNS, forget_folders, item_of, li
 from manitwin.pipeline.manifest_rows import manifest_rows
 from manitwin.pipeline.photo_groups import PhotoGroups, one_of_photos
 from manitwin.pipeline.photo_thinning import thinned_words
+from manitwin.pipeline.stated_place import BOX, MASK, require_one_photo
 from manitwin.pipeline.stated_size import COLUMN as COLUMN_OF_SIZE
 from manitwin.pipeline.stated_size import MEANT
 from manitwin.pipeline.view_inputs import in_order, no_pose_told
@@ -29,6 +30,7 @@ from manitwin.twin.dataset_root import DatasetRoot
 
 MANIFEST_SUFFIXES = frozenset({".csv", ".jsonl"})
 _SHOWN_CHARACTERS = 60
+SHORT = 4
 _KNOWN = frozenset(COLUMNS)
 
 Refusal = Callable[[Item], str | None]
@@ -83,9 +85,13 @@ def iterate_items(
     """Yield as ``_given_items`` does, of each text ``count`` variations; with ``views`` one item of all photos.
 
     Photos of a folder of ``views`` are in natural order (2 before 10). ``poses`` is a file that states their cameras; those of
-    a folder of which it has none are left out and noted. Raises UsageError as it does, for a photo or a mesh where more than
+    a folder of which it has none are left out and noted. A mask or a box among the ``defaults`` is of one photo.
+    Raises UsageError as it does, for a photo or a mesh where more than
     one is asked for, and for views that are not all photos.
     """
+    if any(defaults.get(column) is not None for column in (MASK, BOX)):
+        inputs, texts = list(inputs), list(texts)
+        require_one_photo(inputs, texts, views=views)
     if views:
         if texts := list(texts):
             raise UsageError("--views: a text; name the photos of one thing, such as --views front.jpg side.jpg")
@@ -200,7 +206,7 @@ def _manifest_items(
     for line, row in manifest_rows(path, COLUMNS):
         for column in sorted(map(str, row.keys() - _KNOWN - unknown.keys())):
             shown = printable_line(column, max_characters=_SHOWN_CHARACTERS)
-            near = get_close_matches(shown.lower().strip(), COLUMNS, n=1, cutoff=0.6)
+            near = _nearest(shown.lower().strip())
             near = [COLUMN_OF_SIZE] if shown.lower().strip() in MEANT else near
             unknown[column] = f"{shown!r} (did you mean {near[0]!r}?)" if near else repr(shown)
             if strict:
@@ -218,3 +224,9 @@ def _manifest_items(
         )
     if unknown:
         notes.remarks.append(f"{path}: columns not used: {listed_columns(unknown)}")
+
+
+def _nearest(column: str) -> list[str]:
+    """Return the column that one may be meant for, if any; a short name is like much (a mask like mass_kg)."""
+    near = get_close_matches(column, COLUMNS, n=1, cutoff=0.6)
+    return get_close_matches(column, near, cutoff=0.75) if near and len(near[0]) <= SHORT else near

@@ -14,11 +14,12 @@ from manitwin.formats.printable import printable_line
 from manitwin.geometry.length_unit import StatedUnit
 from manitwin.pipeline.inspection import imported
 from manitwin.pipeline.item import Item
+from manitwin.pipeline.stated_place import BOX, MASK, require_of_photo, stated_box_px, stated_mask
 from manitwin.pipeline.stated_size import stated_size_m, with_defaults
 from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH, is_imported
 
 _COLUMNS_SHOWN = 20
-LONGEST = {"name": 200, "text": 4000, "license": 200, "attribution": 4000, "file": 4095, "poses": 4095}
+LONGEST = {"name": 200, "text": 4000, "license": 200, "attribution": 4000, "file": 4095, "poses": 4095, "mask": 4095}
 """Characters of a column: a longer name is none, and a longer text is taken by no generator."""
 _CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 """What changes a terminal or the order of what is read, and lone surrogates; a tab and an end of line do not."""
@@ -30,6 +31,8 @@ COLUMNS = (
     "units",
     "up",
     "longest_side_m",
+    "mask",
+    "box_px",
     "license",
     "attribution",
     "group",
@@ -66,6 +69,8 @@ def item_of(
     for key, kind in (("units", StatedUnit), ("up", Up)):
         if values[key] not in get_args(kind):
             raise UsageError(f"{where}: {choose_from(key, str(values[key]), get_args(kind))}")
+    require_of_photo(values, file, where)
+    mask, box_px = stated_mask(values.get(MASK), folder, where), stated_box_px(values.get(BOX), where)
     return Item(
         file=file,
         text=text,
@@ -75,6 +80,8 @@ def item_of(
         license=values["license"],
         attribution=values["attribution"],
         longest_side_m=stated_size_m(values, where),
+        masks=() if mask is None else (mask,),
+        box_px=box_px or (),
     )
 
 
@@ -112,7 +119,7 @@ def unusable(key: str, value: str) -> str | None:
     most = LONGEST.get(key, LONGEST["name"])
     if len(value) > most:
         return f"{len(value)} characters; give at most {most}"
-    if key in ("file", "poses"):
+    if key in ("file", "poses", "mask"):
         return "has a NUL character in it; check the path" if "\0" in value else None
     if _CONTROLS.search(value) or (key in ("name", "license") and _LINES.search(value)):
         return f"{printable_line(value, max_characters=60)!r} has control characters; give plain words"
@@ -128,6 +135,7 @@ def _imported_item(folder: Path, values: dict[str, Any], where: str) -> Item:
     """Return the item of an imported asset; unit and axes are those that the import wrote, whatever the user says."""
     if values["longest_side_m"]:
         raise UsageError(f"{where}: longest_side_m: an imported asset has a size of its own; leave it out")
+    require_of_photo(values, str(folder / IMPORTED_MESH), where)
     name, license_, attribution = imported(folder / IMPORT_RECORD)
     return Item(
         file=str(folder / IMPORTED_MESH),

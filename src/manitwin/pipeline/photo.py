@@ -12,25 +12,26 @@ from PIL import Image
 from manitwin.config import MattingConfig, Resource
 from manitwin.engine.stage import Draft
 from manitwin.errors import InputError, Rejected
-from manitwin.formats.image_file import full_size, read_image
 from manitwin.models.generators.templates.fitting.outline_check import template_outline_check
 from manitwin.models.matting.candidates import network_makers
 from manitwin.models.matting.learned import Network
 from manitwin.models.matting.matte import DoubtedCutOut, Matte, matte_photo
 from manitwin.models.matting.object_network import built_in_model
 from manitwin.models.matting.outline_network import outline_model
+from manitwin.pipeline.box_check import require_in_box
 from manitwin.pipeline.cutout import confirmed_or_rejected
-from manitwin.pipeline.given_alpha import as_given, as_masked, doubted_rectangle
-from manitwin.pipeline.item import Item
+from manitwin.pipeline.given_alpha import doubted_rectangle
+from manitwin.pipeline.item import Item, masks_of
 from manitwin.pipeline.photo_groups import copies_told, told_apart
-from manitwin.pipeline.stated_poses import poses_of
+from manitwin.pipeline.photo_pixels import pixels_of_photo
+from manitwin.pipeline.stated_place import Box, as_box
 
 
 class PhotoStage:
     """Write ``photo.png`` (RGBA, upright, alpha is the matte) and the field ``matte``."""
 
     name: ClassVar[str] = "photo"
-    version: ClassVar[str] = "22"
+    version: ClassVar[str] = "23"
     reads: ClassVar[tuple[str, ...]] = ()
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "matte")
     needs: ClassVar[Resource] = "cpu"
@@ -50,7 +51,11 @@ class PhotoStage:
         amendment = draft.amendments.get(self.name, {})
         path = Path(draft.payload.file)
         rgba, field = self.cut_out(
-            path, draft.payload.name, lambda doubted: confirmed_or_rejected(doubted, path.name, amendment)
+            path,
+            draft.payload.name,
+            lambda doubted: confirmed_or_rejected(doubted, path.name, amendment),
+            mask=next(iter(masks_of(draft.payload))),
+            box_px=as_box(draft.payload.box_px),
         )
         _save(rgba, folder / "photo.png")
         return {"matte": field}
@@ -62,15 +67,17 @@ class PhotoStage:
         confirmed: Callable[[DoubtedCutOut], Matte],
         called: str | None = None,
         mask: Path | None = None,
+        box_px: Box | None = None,
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Return a photo ``(H, W, 4) uint8`` of what a person called ``name`` with its matte, and what is known of that.
 
         ``called`` is what messages call the file: its name by default. ``confirmed`` returns the matte of a doubted cut-out
-        that is right all the same, or raises. ``mask`` is a picture of its outline. Raises InputError, Rejected.
+        that is right all the same, or raises. ``mask`` is a picture of its outline, ``box_px`` where in the photo the thing is:
+        what is returned is the photo around that. Raises InputError, Rejected.
         """
         settings, file = self.settings, called or path.name
-        photo = read_image(path, frame=settings.frame, max_side_px=settings.photo_side_px)
-        given = as_given(photo.pixels, name) if mask is None else as_masked(photo.pixels, mask, full_size(path)[2])
+        photo = pixels_of_photo(path, name, settings, mask=mask, box_px=box_px)
+        given = photo.given
         try:
             matte = matte_photo(
                 given.pixels,
@@ -84,6 +91,8 @@ class PhotoStage:
             )
             if given.is_doubted:
                 raise doubted_rectangle(matte, file, name)
+            if photo.box_px is not None:
+                require_in_box(matte, photo.box_px, file)
         except DoubtedCutOut as doubted:
             matte = confirmed(doubted)
         return np.ascontiguousarray(matte.rgba), {
@@ -113,7 +122,7 @@ class PhotosStage(PhotoStage):
     One that cannot be cut out is left out, with a finding; the field ``matte`` is that of the least sure of the others.
     """
 
-    version: ClassVar[str] = "15"
+    version: ClassVar[str] = "16"
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "photos/", "matte")
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
@@ -121,8 +130,7 @@ class PhotosStage(PhotoStage):
         (folder / "photos").mkdir()
         kept: list[tuple[str, dict[str, Any]]] = []
         doubts: list[Rejected] = []
-        files, poses = draft.payload.files, poses_of(draft.payload)
-        masks = [None] * len(files) if poses is None else [camera.mask for camera in poses.cameras]
+        files, masks = draft.payload.files, masks_of(draft.payload)
         for number, (file, called, mask) in enumerate(zip(files, told_apart(files), masks, strict=True)):
             try:
                 rgba, field = self.cut_out(Path(file), draft.payload.name, refused, called, mask)

@@ -16,6 +16,7 @@ from manitwin.formats.source_files import MESH_SUFFIXES
 from manitwin.models.generators.protocol import MOST_PHOTOS
 from manitwin.pipeline.item import Item, file_sha256
 from manitwin.pipeline.photo_thinning import MOST_GIVEN, kept_photos
+from manitwin.pipeline.stated_place import BOX
 from manitwin.pipeline.stated_poses import poses_of
 
 OF_THE_THING = ("name", "units", "up", "longest_side_m", "license", "attribution", "poses")
@@ -65,19 +66,24 @@ def one_of_photos(
         raise UsageError(f"{where}: {error.detail}") from error
     given = None if len(kept) == len(items) else len(items)
     items, turns = [items[number] for number in kept], [turns[number] for number in kept] if turns else []
+    if any(item.box_px for item in items) and len(items) > 1:
+        raise UsageError(f"{where}: {BOX} is of a photo by itself; of several photos of one thing give masks")
+    masks = tuple(item.masks[0] if item.masks else "" for item in items)
+    masks = masks if any(masks) else ()
     if poses is not None:
-        return replace(_posed(items, poses, where), photos_given=given)
+        return replace(_posed(items, masks, poses, where), photos_given=given)
     if len(items) == 1:
         return items[0]
     relative = tuple(round((turn - turns[0]) % 360.0, 6) % 360.0 for turn in turns)
     views = tuple(str(item.file) for item in items[1:])
-    return replace(items[0], views=views, turns_deg=relative, photos_given=given)
+    return replace(items[0], views=views, turns_deg=relative, photos_given=given, masks=masks)
 
 
-def _posed(items: Sequence[Item], poses: str, where: str) -> Item:
+def _posed(items: Sequence[Item], masks: tuple[str, ...], poses: str, where: str) -> Item:
     if len(items) == 1:
         raise UsageError(f"{where}: poses are those of several photos of one thing, and this is one; give more photos")
-    item = replace(items[0], views=tuple(str(each.file) for each in items[1:]), poses=os.path.realpath(poses))
+    views = tuple(str(each.file) for each in items[1:])
+    item = replace(items[0], views=views, poses=os.path.realpath(poses), masks=masks)
     try:
         poses_of(item)
     except InputError as error:

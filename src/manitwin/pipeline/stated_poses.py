@@ -14,7 +14,7 @@ from manitwin.formats.camera_poses.read import CameraPoses
 from manitwin.geometry.camera_up import MOST_ROLL_DEG, UpTold, azimuth_deg, up_as_stated, up_of_cameras
 from manitwin.geometry.length_unit import UNITS_M
 from manitwin.geometry.poses import rotation_between
-from manitwin.pipeline.item import Item
+from manitwin.pipeline.item import Item, masks_of
 from manitwin.pipeline.photo_cameras import called, cameras_of_photos, read_poses
 
 USUAL_UP = {"transforms.json": "z", "colmap": None}
@@ -55,10 +55,14 @@ class StatedPoses:
 
 
 def poses_of(item: Item) -> StatedPoses | None:
-    """Return the cameras that are stated for the photos of an item; None where none are. Raises InputError."""
+    """Return the cameras that are stated for the photos of an item, with their masks; None where none are. Raises InputError."""
     if item.poses is None:
         return None
-    return stated_poses([Path(file) for file in item.files], Path(item.poses), item.up, item.units)
+    stated = stated_poses([Path(file) for file in item.files], Path(item.poses), item.up, item.units)
+    if not item.masks:
+        return stated
+    cameras = [replace(camera, mask=mask) for camera, mask in zip(stated.cameras, masks_of(item), strict=True)]
+    return replace(stated, cameras=tuple(cameras))
 
 
 def stated_poses(photos: Sequence[Path], poses: Path, up: str = "auto", units: str = "auto") -> StatedPoses:

@@ -81,7 +81,8 @@ class Source(Record):
     """The input that the twin was made of; ``variation`` counts the things made of one text.
 
     ``photos``: several photos of one thing, in the archive ``file`` in their order; ``turns_deg`` is the camera's turn about the
-    vertical in each, counter-clockwise seen from above, where they were stated; ``poses`` who stated the cameras.
+    vertical in each, counter-clockwise seen from above, where they were stated; ``poses`` who stated the cameras. ``mask`` is
+    the picture of the thing's outline that was given with one photo, ``box_px`` its stated box there: left, top, right, bottom.
     """
 
     kind: Literal["image", "photos", "text", "mesh"]
@@ -91,6 +92,8 @@ class Source(Record):
     variation: int = 0
     turns_deg: list[float] | None = None
     poses: StatedCameras | None = None
+    mask: FileBelow | None = None
+    box_px: list[float] | None = None
     license: str
     attribution: str | None = None
 

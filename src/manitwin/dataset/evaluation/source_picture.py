@@ -11,11 +11,11 @@ import numpy as np
 from manitwin.config import MattingConfig
 from manitwin.dataset.evaluation.thirty_views import SIDE_PX, WHITE, View
 from manitwin.errors import InputError, Rejected
-from manitwin.formats.image_file import read_image
 from manitwin.models.classifiers.efficientnet_lite import features
 from manitwin.models.embedders.looks import MARGIN, NETWORK, centered
 from manitwin.models.matting import matte_photo
-from manitwin.pipeline.given_alpha import as_given
+from manitwin.pipeline.photo_pixels import pixels_of_photo
+from manitwin.pipeline.stated_place import as_box
 from manitwin.twin.loaded_twin import Twin
 
 OUTLINE_PX, OUTLINE_RADIUS = 96, 20.0
@@ -69,9 +69,14 @@ def source_of(twin: Twin) -> Source | None:
         return None
     settings = MattingConfig()
     try:
-        photo = read_image(twin.folder / source.file, max_side_px=settings.photo_side_px)
-        given = as_given(photo.pixels, None if twin.record.naming else twin.record.name)
-        rgba = matte_photo(given.pixels, source.file, working_side_px=settings.working_side_px).rgba
+        photo = pixels_of_photo(
+            twin.folder / source.file,
+            None if twin.record.naming else twin.record.name,
+            settings,
+            mask=None if source.mask is None else twin.folder / source.mask,
+            box_px=as_box(source.box_px or ()),
+        )
+        rgba = matte_photo(photo.given.pixels, source.file, working_side_px=settings.working_side_px).rgba
     except (Rejected, InputError) as error:
         return Source("image", source.sha256, left_out=f"its photo cannot be cut out by default settings: {error}")
     return Source("image", source.sha256, rgb=rgba[..., :3], mask=rgba[..., 3].astype(np.float32) / 255)

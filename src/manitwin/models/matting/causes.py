@@ -36,8 +36,9 @@ CAUSES = {
     "colours": "colours alone do not tell a part of it from the background",
 }
 """By score or feature; of equally low scores the first is told."""
-REMEDY = "photograph it whole on a plain surface of another colour, or give an image with an alpha channel"
-CROP = "crop that away if it is another thing, or give an image with an alpha channel"
+OR_MASK = "give a mask of it (--mask) or an image with an alpha channel"
+REMEDY = f"photograph it whole on a plain surface of another colour, or {OR_MASK}"
+CROP = "say where it is (--box) or crop that away if it is another thing, or give a mask of it (--mask)"
 THIN = ("bulk", "thick")
 HOLES = "or parts of it with the background's colour are taken for holes"
 BULKIER = 2.0
@@ -114,4 +115,4 @@ def _remedy(cause: str, candidate: Candidate) -> str:
     length = max(np.ptp(rows), np.ptp(columns)) + 1
     ways = ["give a larger photo"] if candidate.zoom < MOST_ZOOM else []
     ways += ["take it from closer"] if length < FILLING * max(candidate.found.mask.shape) else []
-    return ", or ".join([*ways, "give an image with an alpha channel"])
+    return ", or ".join([*ways, OR_MASK])

@@ -185,7 +185,9 @@ def _reject_several(name: str, mask: np.ndarray, second_object_share: float) -> 
     count = int((areas >= second_object_share * areas.max()).sum())
     if count > 1:
         raise Rejected(
-            "several_objects", f"{name}: {count} separate objects; crop the photo to one of them", "generate"
+            "several_objects",
+            f"{name}: {count} separate objects; say where one is (--box), or crop the photo to one of them",
+            "generate",
         )
 
 

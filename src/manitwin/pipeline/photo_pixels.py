@@ -1,0 +1,69 @@
+"""What of a photo is looked at: its pixels as its alpha channel, a mask beside it and the box of the thing say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from manitwin.config import MattingConfig
+from manitwin.formats.image_file import Photo, full_size, read_image
+from manitwin.formats.outline_mask import require_mask
+from manitwin.pipeline.given_alpha import Given, as_given, as_masked
+from manitwin.pipeline.stated_place import Box, window_of
+
+CROPPED = "looked at within the box that was stated of it"
+
+
+@dataclass(frozen=True)
+class PhotoPixels:
+    """What is cut out, ``given``, the lens as 35 mm equivalent for a picture of that size, and the thing's box in its pixels."""
+
+    given: Given
+    findings: tuple[str, ...]
+    focal_mm: float | None
+    box_px: Box | None = None
+
+
+def pixels_of_photo(
+    path: Path, name: str | None, settings: MattingConfig, *, mask: Path | None = None, box_px: Box | None = None
+) -> PhotoPixels:
+    """Read a photo of what a person calls ``name``; ``mask`` is a picture of its outline, ``box_px`` where the thing is.
+
+    Of a photo with a box only what lies around that is read at its full size. Raises InputError.
+    """
+    photo = read_image(path, frame=settings.frame, max_side_px=settings.photo_side_px if box_px is None else None)
+    orientation = full_size(path)[2]
+    if mask is not None:
+        require_mask(mask, None, full_size(path)[:2], orientation)
+    if box_px is None:
+        given = as_given(photo.pixels, name) if mask is None else as_masked(photo.pixels, mask, orientation)
+        return PhotoPixels(given, photo.findings, photo.focal_mm)
+    masked = None if mask is None else as_masked(photo.pixels, mask, orientation)
+    window = window_of(box_px, (photo.pixels.shape[1], photo.pixels.shape[0]), path.name)
+    left, top, right, bottom = window
+    cropped = (photo.pixels if masked is None else masked.pixels)[top:bottom, left:right]
+    scale = min(1.0, settings.photo_side_px / max(cropped.shape[:2]))
+    pixels = _scaled(cropped, scale)
+    given = as_given(pixels, name) if masked is None else Given(pixels, masked.findings)
+    within = tuple(scale * (edge - start) for edge, start in zip(box_px, (left, top, left, top), strict=True))
+    return PhotoPixels(
+        given, (*photo.findings, CROPPED), _focal_of_window(photo, window), (within[0], within[1], within[2], within[3])
+    )
+
+
+def _scaled(pixels: np.ndarray, scale: float) -> np.ndarray:
+    if scale < 1:
+        size = max(1, round(pixels.shape[1] * scale)), max(1, round(pixels.shape[0] * scale))
+        return np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.BOX))
+    return np.ascontiguousarray(pixels)
+
+
+def _focal_of_window(photo: Photo, window: tuple[int, int, int, int]) -> float | None:
+    """Return the lens that a picture of the window's size would have: the same angle of view a pixel."""
+    if photo.focal_mm is None:
+        return None
+    left, top, right, bottom = window
+    return photo.focal_mm * float(np.hypot(*photo.pixels.shape[:2]) / np.hypot(right - left, bottom - top))

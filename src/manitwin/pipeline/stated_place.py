@@ -1,0 +1,113 @@
+"""Where in a photo the thing is, as a person or a data set states it: its box in pixels, or a picture of its outline."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from manitwin.errors import InputError, UsageError
+from manitwin.formats.image_file import MIN_SIDE_PX
+from manitwin.formats.printable import printable_line
+from manitwin.formats.source_files import MESH_SUFFIXES
+
+MASK, BOX = "mask", "box_px"
+"""The columns of a manifest."""
+MARGIN = 0.15
+"""Of the box's longer side, what of the photo around it is looked at too: the ground, and how the thing ends."""
+LEAST_MARGIN_PX = 8.0
+OUTSIDE_PX = 1.0
+"""By which a box may lie outside its photo: programs count pixels from 0 or from 1."""
+_EXAMPLE = "left,top,right,bottom in pixels, such as 120,80,410,395"
+_SHOWN = 60
+
+Box = tuple[float, float, float, float]
+"""Left, top, right and bottom, in pixels of the upright photo at its own size: x to the right, y down, from its corner."""
+
+
+def stated_box_px(said: object, where: str) -> Box | None:
+    """Return the box that is said of a thing, None where none is; a text of four numbers, or a sequence of them.
+
+    Raises UsageError for what is no box.
+    """
+    if said is None or said == "":
+        return None
+    words = re.split(r"[\s,;]+", said.strip(" ()[]")) if isinstance(said, str) else said
+    try:
+        numbers = [float(number) for number in words] if isinstance(words, Sequence) else []
+    except (TypeError, ValueError):
+        numbers = []
+    shown = printable_line(str(said), max_characters=_SHOWN)
+    if len(numbers) != 4 or not all(map(math.isfinite, numbers)):
+        raise UsageError(f"{where}: {BOX} is {shown}; give {_EXAMPLE}")
+    left, top, right, bottom = numbers
+    if left >= right or top >= bottom:
+        raise UsageError(
+            f"{where}: {BOX} is {shown}: its right and bottom edges are not beyond its left and top ones; give {_EXAMPLE} (not a"
+            " width and a height)"
+        )
+    return left, top, right, bottom
+
+
+def stated_mask(said: object, folder: Path, where: str) -> str | None:
+    """Return the absolute path of the mask that is said of a photo, None where none is; raises UsageError where none is there."""
+    if said is None or said == "":
+        return None
+    path = os.path.realpath(os.path.join(folder, str(said)))
+    if not os.path.isfile(path):
+        shown = printable_line(path, max_characters=200)
+        raise UsageError(f"{where}: {MASK}: {shown} is no file; paths are absolute or relative to the manifest")
+    return path
+
+
+def require_of_photo(values: Mapping[str, Any], file: str | None, where: str) -> None:
+    """Raise UsageError where a mask or a box is said of what is no photo."""
+    said = [column for column in (MASK, BOX) if values.get(column) not in (None, "", ())]
+    if said and (file is None or Path(file).suffix.lower() in MESH_SUFFIXES):
+        what = "a text" if file is None else "a mesh"
+        raise UsageError(f"{where}: {said[0]}: says where in a photo the thing is, and this is {what}; leave it out")
+
+
+def require_one_photo(inputs: Sequence[str | Path], texts: Sequence[str], *, views: bool) -> None:
+    """Raise UsageError where a mask or box is said of other inputs than one file: rows of a manifest have their own."""
+    one = len(inputs) == 1 and not texts and not views
+    if not one or os.path.isdir(inputs[0]) or Path(inputs[0]).suffix.lower() in (".csv", ".jsonl"):
+        raise UsageError(
+            f"a mask or a box is of one photo; of several write a manifest with the columns {MASK} and {BOX}"
+        )
+
+
+def window_of(box_px: Box, size_px: tuple[int, int], name: str) -> tuple[int, int, int, int]:
+    """Return what of a photo of ``size_px`` (width, height) is looked at: left, top, right, bottom, whole pixels.
+
+    Raises InputError for a box that is not inside the photo, or too small to show anything.
+    """
+    (left, top, right, bottom), (width, height) = box_px, size_px
+    told = f"{left:g},{top:g},{right:g},{bottom:g}"
+    if min(left, top) < -OUTSIDE_PX or right > width + OUTSIDE_PX or bottom > height + OUTSIDE_PX:
+        raise InputError(
+            "unreadable",
+            f"{name}: the box {told} lies outside the photo, which is {width} x {height} pixels as it stands upright; give"
+            f" {_EXAMPLE}",
+        )
+    if min(right - left, bottom - top) < MIN_SIDE_PX / 4 or max(right - left, bottom - top) < MIN_SIDE_PX:
+        raise InputError(
+            "too_small",
+            f"{name}: the box {told} has {right - left:g} x {bottom - top:g} pixels, its longer side must have at least"
+            f" {MIN_SIDE_PX}; give a larger photo",
+        )
+    margin = max(LEAST_MARGIN_PX, MARGIN * max(right - left, bottom - top))
+    return (
+        max(0, math.floor(left - margin)),
+        max(0, math.floor(top - margin)),
+        min(width, math.ceil(right + margin)),
+        min(height, math.ceil(bottom + margin)),
+    )
+
+
+def as_box(numbers: Sequence[float]) -> Box | None:
+    """Return the four numbers of an item as a box; None where it has none."""
+    return (numbers[0], numbers[1], numbers[2], numbers[3]) if numbers else None
