@@ -118,7 +118,8 @@ def _picture(value: Any) -> np.ndarray:
         (_picture(0), "black everywhere"),
         (_picture(255), "keeps the border"),
         (255 - posed_photo(POSES[0])[..., 3], "keeps the border"),
-        (np.dstack([_picture(200), _picture(20), _picture(20)]), "with colours"),
+        (np.dstack([_picture(200), _picture(20), _picture(20)]), "keeps the border"),
+        (np.dstack([_picture(200), _picture(20), np.triu(_picture(200))]), "with several colours"),
     ],
 )
 def test_a_picture_that_is_no_outline_is_refused_in_one_line(tmp_path: Path, pixels: np.ndarray, told: str) -> None:

@@ -165,6 +165,19 @@ def test_a_mask_that_numbers_things(tmp_path: Path) -> None:
         _cut(Item(str(photo), masks=(str(tmp_path / "numbers.png"),)), tmp_path / "cut")
 
 
+def test_a_mask_of_one_colour_is_one(tmp_path: Path) -> None:
+    red = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+    red[_disc(*RED)] = 192, 0, 0
+    smooth = Image.fromarray(red).resize((2 * WIDTH, 2 * HEIGHT), Image.Resampling.BICUBIC)
+    smooth.save(tmp_path / "red.png")
+    mask = read_mask(tmp_path / "red.png", (2 * HEIGHT, 2 * WIDTH))
+    assert (mask > 127).sum() == pytest.approx(4 * _disc(*RED).sum(), rel=0.01)
+    red[_disc(*BLUE)] = 0, 0, 128
+    Image.fromarray(red).save(tmp_path / "both.png")
+    with pytest.raises(InputError, match=r"both\.png: a mask with several colours; give one that is white"):
+        read_mask(tmp_path / "both.png", (HEIGHT, WIDTH))
+
+
 @pytest.mark.parametrize("quality", [30, 75, 95])
 def test_a_mask_with_losses_and_smooth_edges_is_one(tmp_path: Path, quality: int) -> None:
     smooth = Image.fromarray((255 * _disc(*RED)).astype(np.uint8)).resize(

@@ -13,14 +13,14 @@ from manitwin.formats.image_file import full_size, read_image
 from manitwin.formats.printable import printable_line
 
 MOST_TINT = 64
-"""By which the channels of a grey picture differ at most, of 255: what compresses with losses tints it."""
+"""By which the colour of what is not black differs within a mask at most, of 255: what compresses with losses tints it."""
 LEAST_LEFT_OUT = 0.02
 """Of a picture, what the mask of a thing leaves out at least: less is no cut-out (as of an alpha channel)."""
 _HALF = 0.5
 LEAST_OF_LEVEL = 0.05
 """Of what is not black, the share of one level that is no smooth edge."""
 LOSSES, FEW = 0.1, 16
-"""By which levels are off where a picture is compressed with losses, of the highest; below ``FEW`` none is."""
+"""By which levels are off where a picture is scaled or compressed with losses, of the main one; below ``FEW`` none is."""
 _TURNED = {6: -1, 8: 1}  # quarter turns, counter-clockwise, that show a stored picture upright
 
 _refused = partial(InputError, "unreadable")
@@ -53,20 +53,22 @@ def require_mask(path: Path, folder: Path | None, size_px: tuple[int, int], orie
 def read_mask(path: Path, shape: tuple[int, int], orientation: int = 1) -> np.ndarray:
     """Return how far each pixel of a photo of ``shape`` (rows, columns), upright, is the thing's: ``(H, W) uint8``, 255 wholly.
 
-    An alpha channel that differs within the picture is the mask, else its grey, stretched until the highest is 255.
+    An alpha channel that differs within the picture is the mask, else its brightest channel, stretched until the highest is 255.
     ``orientation`` is that of the photo's EXIF: a mask of the other shape is turned as the photo is. Raises InputError for a
-    picture that is no outline: one with colours, one that numbers several things, one that is the same nearly everywhere, and
-    one that has most of the border (it says what to leave out of a scene).
+    picture that is no outline: one with several colours, one that numbers several things, one that is the same nearly
+    everywhere, and one that has most of the border (it says what to leave out of a scene).
     """
     pixels, called = read_image(path).pixels, _called(path)
     if pixels.shape[2] == 4 and np.ptp(pixels[..., 3]):
         mask = pixels[..., 3]
     else:
-        if int(np.ptp(pixels[..., :3].astype(np.int16), axis=2).max()) > MOST_TINT:
+        mask = pixels[..., :3].max(axis=2)
+        bright = mask > mask.max() * _HALF
+        hues = pixels[bright][:, :3] * (255 / mask[bright].astype(float)[:, None])
+        if len(hues) and np.ptp(hues, axis=0).max() > MOST_TINT:
             raise _refused(
-                f"{called}: a mask with colours; give one that is white where the thing is and black elsewhere"
+                f"{called}: a mask with several colours; give one that is white where the thing is and black elsewhere"
             )
-        mask = pixels[..., 1]
         _require_one_thing(mask, called)
     if orientation in _TURNED and (mask.shape[0] > mask.shape[1]) != (shape[0] > shape[1]):
         mask = np.rot90(mask, _TURNED[orientation])
@@ -93,8 +95,10 @@ def _require_one_thing(mask: np.ndarray, called: str) -> None:
     levels, counts = np.unique(mask[mask > 0], return_counts=True)
     if not len(levels):
         return
-    highest = int(levels[-1])
-    is_other = (levels != highest) if highest < FEW else (levels > LOSSES * 255) & (levels < (1 - LOSSES) * highest)
+    main = float(levels[np.argmax(counts)])
+    is_other = (
+        (levels != main) if levels[-1] < FEW else (levels > LOSSES * 255) & (np.abs(levels - main) > LOSSES * main)
+    )
     if (counts[is_other] > LEAST_OF_LEVEL * counts.sum()).any():
         shown = ", ".join(str(level) for level in levels[:8]) + (", ..." if len(levels) > 8 else "")
         raise _refused(
