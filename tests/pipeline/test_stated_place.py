@@ -101,7 +101,8 @@ def test_a_box_of_next_to_nothing(box: tuple[float, float, float, float]) -> Non
 
 def test_a_box_chooses_one_of_two_things(tmp_path: Path) -> None:
     photo = _two_things(tmp_path)
-    with pytest.raises(Rejected, match=r"say where one is \(--box\)"):
+    told = r"2 separate objects; say where one is \(--box \d+,\d+,\d+,28\d or --box 3\d\d,.*\), or crop"
+    with pytest.raises(Rejected, match=told):
         _cut(Item(str(photo)), tmp_path / "both")
     for number, (disc, box) in enumerate(((RED, _around(*RED)), (BLUE, _around(*BLUE)))):
         rgba, field = _cut(Item(str(photo), box_px=box), tmp_path / str(number))

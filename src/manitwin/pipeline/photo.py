@@ -88,6 +88,7 @@ class PhotoStage:
                 second_object_share=settings.second_object_share,
                 networks=self.networks,
                 explains=template_outline_check(name, photo.focal_mm),
+                window_px=photo.window_px,
             )
             if given.is_doubted:
                 raise doubted_rectangle(matte, file, name)

@@ -19,12 +19,16 @@ CROPPED = "looked at within the box that was stated of it"
 
 @dataclass(frozen=True)
 class PhotoPixels:
-    """What is cut out, ``given``, the lens as 35 mm equivalent for a picture of that size, and the thing's box in its pixels."""
+    """What is cut out, ``given``, the lens as 35 mm equivalent for a picture of that size, and the thing's box in its pixels.
+
+    ``window_px`` is what of the whole photo it shows, in the photo's pixels; None where a frame around the picture was cut off.
+    """
 
     given: Given
     findings: tuple[str, ...]
     focal_mm: float | None
     box_px: Box | None = None
+    window_px: Box | None = None
 
 
 def pixels_of_photo(
@@ -35,12 +39,13 @@ def pixels_of_photo(
     Of a photo with a box only what lies around that is read at its full size. Raises InputError.
     """
     photo = read_image(path, frame=settings.frame, max_side_px=settings.photo_side_px if box_px is None else None)
-    orientation = full_size(path)[2]
+    width, height, orientation = full_size(path)
     if mask is not None:
-        require_mask(mask, None, full_size(path)[:2], orientation)
+        require_mask(mask, None, (width, height), orientation)
     if box_px is None:
         given = as_given(photo.pixels, name) if mask is None else as_masked(photo.pixels, mask, orientation)
-        return PhotoPixels(given, photo.findings, photo.focal_mm)
+        whole = (0.0, 0.0, float(width), float(height)) if given.pixels.shape[:2] == photo.pixels.shape[:2] else None
+        return PhotoPixels(given, photo.findings, photo.focal_mm, window_px=whole)
     masked = None if mask is None else as_masked(photo.pixels, mask, orientation)
     window = window_of(box_px, (photo.pixels.shape[1], photo.pixels.shape[0]), path.name)
     left, top, right, bottom = window
@@ -49,8 +54,15 @@ def pixels_of_photo(
     pixels = _scaled(cropped, scale)
     given = as_given(pixels, name) if masked is None else Given(pixels, masked.findings)
     within = tuple(scale * (edge - start) for edge, start in zip(box_px, (left, top, left, top), strict=True))
+    shown = (
+        (float(left), float(top), float(right), float(bottom)) if given.pixels.shape[:2] == pixels.shape[:2] else None
+    )
     return PhotoPixels(
-        given, (*photo.findings, CROPPED), _focal_of_window(photo, window), (within[0], within[1], within[2], within[3])
+        given,
+        (*photo.findings, CROPPED),
+        _focal_of_window(photo, window),
+        (within[0], within[1], within[2], within[3]),
+        shown,
     )
 
 

@@ -30,6 +30,10 @@ LEFT_OUT_SHARE = 0.002
 """Of what an alpha channel shows: less is dust."""
 TRIMMED = "the image border touches the object, which is taken to end there: the photo was trimmed to it"
 MIN_CONFIDENCE = MattingConfig().min_confidence
+MOST_BOXES = 6
+"""Of the boxes of separate objects, so many are told."""
+Box = tuple[float, float, float, float]
+"""Left, top, right and bottom, in pixels."""
 LIKELY = 0.5  # that pieces are things: the photo is rejected in any case, and that is the cause
 
 
@@ -70,6 +74,7 @@ def matte_photo(
     second_object_share: float = 0.12,
     networks: Sequence[Network] = (),
     explains: Explains | None = None,
+    window_px: Box | None = None,
 ) -> Matte:
     """Find the object in ``image`` (H, W, 3 or 4) uint8 upright sRGB; ``name`` is used in messages only.
 
@@ -78,13 +83,14 @@ def matte_photo(
     ``networks``; two of them are asked only where nothing is believed without them. The likeliest is taken, by its scores and
     by how far opinions agree with it: ``flat_border`` is the rules' where smooth surfaces explain the border, ``grabcut`` the
     rules' where they do not, ``network`` a network's. Where none is believed and ``explains`` is given, one that it explains
-    may be (``explained_first``).
+    may be (``explained_first``). ``window_px`` is what of the whole photo ``image`` shows, in its pixels: with it separate
+    objects are told with their boxes there.
 
     Raises Rejected: ``no_object``, ``several_objects``, ``low_confidence_matte``, naming cause and remedy; DoubtedCutOut where
     something was cut out.
     """
     if image.shape[2] == 4 and (image[..., 3] < 250).mean() > TRANSPARENT_SHARE:
-        return _given_matte(image, name, min_area_share, second_object_share)
+        return _given_matte(image, name, min_area_share, second_object_share, window_px)
     rgb = np.ascontiguousarray(image[..., :3])
     study = study_in_turn(rgb, networks, min_confidence=min_confidence, working_side_px=working_side_px)
     if explains is not None and study.confidence < min_confidence:
@@ -96,6 +102,7 @@ def matte_photo(
             min_confidence=min_confidence,
             min_area_share=min_area_share,
             second_object_share=second_object_share,
+            window_px=None if trimmed_margin(rgb) is not None else window_px,
         )
     except Rejected as answer:
         if answer.reason == "no_object" or not study.judged:
@@ -124,6 +131,7 @@ def decided(
     min_confidence: float = MIN_CONFIDENCE,
     min_area_share: float = 0.002,
     second_object_share: float = 0.12,
+    window_px: Box | None = None,
 ) -> Judged:
     """Return the candidate of a study that is believed; raises Rejected as ``matte_photo`` where none is."""
     if not study.judged or study.judged[0].candidate.found.mask.mean() < min_area_share:
@@ -134,15 +142,17 @@ def decided(
         raise Rejected(
             "no_object", f"{name}: nothing stands out of the background; photograph the object larger", "generate"
         )
-    _reject_doubtful(name, study.judged[0], min_confidence, second_object_share)
+    _reject_doubtful(name, study.judged[0], min_confidence, second_object_share, window_px)
     return study.judged[0]
 
 
-def _given_matte(image: np.ndarray, name: str, min_area_share: float, second_object_share: float) -> Matte:
+def _given_matte(
+    image: np.ndarray, name: str, min_area_share: float, second_object_share: float, window_px: Box | None
+) -> Matte:
     mask = image[..., 3] > 127
     if mask.mean() < min_area_share:
         raise Rejected("no_object", f"{name}: its alpha channel is empty; export it with the object opaque", "generate")
-    _reject_several(name, mask, second_object_share)
+    _reject_several(name, mask, second_object_share, window_px)
     # specular pixels that a cut-out tool took for background are holes
     closed = largest_piece(without_small_holes(mask))
     alpha = np.where(closed & ~mask, 255, np.where(dilated(closed, 2), image[..., 3], 0)).astype(np.uint8)
@@ -166,10 +176,12 @@ def _rounded_down(confidence: float) -> float:
     return math.floor(100 * confidence) / 100
 
 
-def _reject_doubtful(name: str, judged: Judged, min_confidence: float, second_object_share: float) -> None:
+def _reject_doubtful(
+    name: str, judged: Judged, min_confidence: float, second_object_share: float, window_px: Box | None
+) -> None:
     found = judged.candidate.found
     if judged.of_pieces >= min(min_confidence, LIKELY):
-        _reject_several(name, found.mask, second_object_share)
+        _reject_several(name, found.mask, second_object_share, window_px)
     if judged.confidence < min_confidence:
         raise Rejected(
             "low_confidence_matte",
@@ -179,16 +191,30 @@ def _reject_doubtful(name: str, judged: Judged, min_confidence: float, second_ob
         )
 
 
-def _reject_several(name: str, mask: np.ndarray, second_object_share: float) -> None:
+def _reject_several(name: str, mask: np.ndarray, second_object_share: float, window_px: Box | None) -> None:
     _, _, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     areas = stats[1:, cv2.CC_STAT_AREA]
-    count = int((areas >= second_object_share * areas.max()).sum())
-    if count > 1:
+    large = stats[1:][areas >= second_object_share * areas.max()]
+    large = large[np.argsort(large[:, cv2.CC_STAT_LEFT], kind="stable")]
+    if len(large) > 1:
+        boxes = [] if window_px is None else [_in_photo(piece, mask.shape, window_px) for piece in large]
+        shown = " or ".join(f"--box {box}" for box in boxes[:MOST_BOXES]) + (
+            " or ..." if len(boxes) > MOST_BOXES else ""
+        )
         raise Rejected(
             "several_objects",
-            f"{name}: {count} separate objects; say where one is (--box), or crop the photo to one of them",
+            f"{name}: {len(large)} separate objects; say where one is ({shown or '--box'}), or crop the photo to one of them",
             "generate",
         )
+
+
+def _in_photo(piece: np.ndarray, shape: tuple[int, ...], window_px: Box) -> str:
+    """Return the box of a piece in the photo's pixels; ``piece`` is x, y, width and height in a mask of this ``shape``."""
+    left, top, right, bottom = window_px
+    scale_x, scale_y = (right - left) / shape[1], (bottom - top) / shape[0]
+    x, y, width, height = (float(piece[i]) for i in range(4))
+    edges = left + scale_x * x, top + scale_y * y, left + scale_x * (x + width), top + scale_y * (y + height)
+    return ",".join(f"{edge:.0f}" for edge in edges)
 
 
 def _findings(chosen: Judged) -> list[str]:
