@@ -23,8 +23,8 @@ from manitwin.render.cameras import framing_camera
 from manitwin.render.renderer import BACKDROP, shared_renderer
 
 PICTURE = Path(__file__).resolve().parent / "photo_sheet.png"
-TILE_PX, COLUMNS, EDGE_PX = 140, 3, 3
-COLORS = 160
+TILE_PX, COLUMNS, EDGE_PX = 104, 5, 3
+COLORS = 128
 POOR_IOU = 0.6
 GOOD, POOR = (150, 190, 150), (214, 60, 50)
 LIMIT_BYTES = 300_000
