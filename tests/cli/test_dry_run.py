@@ -14,7 +14,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from json_documents import check_keys
-from manitwin.cli.dry_run import own_rate
+from manitwin.cli.build_plan import own_rate
 from manitwin.cli.main import app
 from manitwin.cli.measured_rates import (
     CHAIN_CPU_S,

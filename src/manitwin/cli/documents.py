@@ -13,8 +13,8 @@ from manitwin.cli.console import out_console, write_json
 
 if TYPE_CHECKING:
     from manitwin.api import EpisodesReport, TasksReport
+    from manitwin.cli.build_plan import Plan
     from manitwin.cli.causes import Cause
-    from manitwin.cli.dry_run import Plan
     from manitwin.dataset.evaluation.annotations import AnnotationReport
     from manitwin.engine.drive import RunReport
     from manitwin.engine.ledger.progress import ItemStory, Progress
@@ -173,7 +173,7 @@ def show_document(twin: Twin) -> Document:
 
 def plan_document(plan: Plan, place: str) -> Document:
     """Return what a dry run says."""
-    from manitwin.cli.dry_run import PLANNED_STATES
+    from manitwin.cli.build_plan import PLANNED_STATES
 
     return {
         "out": place,

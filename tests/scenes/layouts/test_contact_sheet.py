@@ -9,7 +9,7 @@ from PIL import Image
 from manitwin.errors import UsageError
 from manitwin.render.contact_sheet import CAPTION_PX, GAP_PX, TILE_PX, contact_sheet
 from manitwin.scenes.layouts.layouts_run import CONTACT_SHEET, make_layouts
-from manitwin.scenes.layouts.previews import write_contact_sheet
+from manitwin.scenes.layouts.scenes_sheet import write_contact_sheet
 from manitwin.scenes.settings import LayoutsConfig, LayoutSettings
 from scene_twins import slab, write_things
 

@@ -106,7 +106,8 @@ def _print_dry_run(
     inputs: list[Path], out: str, arguments: dict[str, Any], said: dict[str, Any], *, as_json: bool
 ) -> None:
     request = _request(inputs, out, arguments, said)
-    from manitwin.cli.dry_run import plan_build, print_plan  # after what is put off
+    from manitwin.cli.build_plan import plan_build  # after what is put off
+    from manitwin.cli.dry_run import print_plan
 
     print_plan(plan_build(request.items, request.root, request.settings, request.notes.remarks), out, as_json=as_json)
 

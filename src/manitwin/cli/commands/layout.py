@@ -77,7 +77,7 @@ def layout(
         out_console.print(said)
     _print_totals(totals)
     if sheet and totals.accepted:
-        from manitwin.scenes.layouts.previews import write_contact_sheet
+        from manitwin.scenes.layouts.scenes_sheet import write_contact_sheet
 
         shown = write_contact_sheet(dataset, out)
         out_console.print(f"{shown} of {totals.accepted} scenes in {out}/{CONTACT_SHEET}")
