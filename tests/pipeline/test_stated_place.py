@@ -208,6 +208,11 @@ def test_rows_say_masks_and_boxes(tmp_path: Path) -> None:
     assert [item.box_px for item in items] == [(70, 86, 270, 286), (370, 90, 530, 250), (), ()]
     assert [item.masks for item in items] == [(), (), (str(tmp_path / "red.png"),), ()]
     assert len({twin_id(item) for item in items}) == 4
+    assert [item.title for item in items[:3]] == [
+        "two.png (box 70,86,270,286)",
+        "two.png (box 370,90,530,250)",
+        "two.png",
+    ]
     assert [Item.from_json(json.loads(json.dumps(item.to_json()))) for item in items] == items
     assert "box_px" not in items[3].to_json() and "masks" not in items[3].to_json()
 

@@ -70,6 +70,8 @@ class Item(Payload):
     def title(self) -> str:
         """The name of the file and the number of further photos, or the begin of the text, with the number of a variation.
 
+        Of a photo with a box that too: others of its things may be inputs.
+
         The mesh of every imported asset has the same name: it is told by its folder.
         """
         if self.file:
@@ -77,6 +79,7 @@ class Item(Payload):
             if self.given is not None and path.name == IMPORTED_MESH:
                 return path.parent.name or path.name
             more = f" and {len(self.views)} more" if self.views else ""
+            more += f" (box {','.join(f'{edge:g}' for edge in self.box_px)})" if self.box_px else ""
             return f"{path.name}{more}"
         number = f" ({self.variation + 1})" if self.variation else ""
         return f"'{(self.text or '')[:40]}'{number}"
