@@ -13,6 +13,7 @@ from stat import S_ISDIR, S_ISREG
 from manitwin.formats.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES, named_file, spellings
 from manitwin.pipeline.inspection import NotInspected, are_imported, are_twins, names_of, why_no_inputs
 from manitwin.pipeline.listing_remarks import listing_remarks
+from manitwin.pipeline.masks_beside import masks_beside
 from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH
 
 Told = Callable[[str], None]
@@ -39,7 +40,8 @@ class FolderListing:
     """All files below a folder: each is in one of ``inputs``, ``parts`` and ``left``.
 
     An imported asset's input is its folder, which stands for the mesh in it. ``parts`` gives the input that a file is a part
-    of, ``left`` the reason why one is left alone. ``beside_meshes`` are the images among the inputs in a folder with a mesh.
+    of, of a mask its photo, ``left`` the reason why one is left alone. ``beside_meshes`` are the images among the inputs in a
+    folder with a mesh.
     """
 
     folder: Path
@@ -52,6 +54,11 @@ class FolderListing:
     def files(self) -> int:
         """The number of files of the folder, in all folders below it."""
         return len(self.inputs) + len(self.parts) + len(self.left)
+
+    @property
+    def masks(self) -> dict[Path, Path]:
+        """The masks among the parts, by their photo."""
+        return {whole: part for part, whole in self.parts.items() if whole.suffix.lower() in IMAGE_SUFFIXES}
 
     def remarks(self) -> list[str]:
         """Return what a person is told of the folder, a line each; none where every file is an input."""
@@ -72,7 +79,8 @@ class _Found:
 def list_folder(folder: Path, told: Told = lambda said: None) -> FolderListing:
     """List a folder for a build, everything sorted by path; links to folders are not followed.
 
-    An image is a part of a mesh where the mesh names it and the reader finds it there; one that no mesh names is an input.
+    An image is a part of a mesh where the mesh names it and the reader finds it there; one that no mesh names is an input, or
+    by its name the mask of one (``masks_beside``).
     ``told`` hears how far it is.
     """
     found = _walk(folder, told)
@@ -90,8 +98,12 @@ def list_folder(folder: Path, told: Told = lambda said: None) -> FolderListing:
     others = [name for name in others if name not in parts]
     odd = [name for name in others if _suffix(name) not in IMAGE_SUFFIXES]
     no_image = dict(zip(odd, why_no_inputs([folder / name for name in odd]), strict=True))
+    masks = masks_beside([name for name in others if name not in no_image and not _has_mesh_above(name, mesh_folders)])
+    parts |= masks
     for name in others:
         reason = no_image.get(name) or _why_texture(name, elsewhere, mesh_folders)
+        if name in masks:
+            continue
         if reason is None:
             inputs.append(name)
             beside += [name] if posixpath.dirname(name) in mesh_folders else []

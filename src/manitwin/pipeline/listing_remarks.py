@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from manitwin.formats.sniff import ASSET_DESCRIPTION
-from manitwin.formats.source_files import MESH_SUFFIXES
+from manitwin.formats.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES
 
 _NAMES_SHOWN = 3
 
@@ -22,15 +22,20 @@ def listing_remarks(
     """Return a line of counts that add up to all files, then one a reason; none where every file is an input of its own."""
     if not (parts or left or beside_meshes):
         return []
-    assets = {whole for whole in parts.values() if whole.suffix.lower() not in MESH_SUFFIXES}
+    masks = [part for part, whole in parts.items() if whole.suffix.lower() in IMAGE_SUFFIXES]
+    assets = {whole for whole in parts.values() if whole.suffix.lower() not in MESH_SUFFIXES | IMAGE_SUFFIXES}
     of_assets = sum(whole in assets for whole in parts.values())
-    of_meshes = len(set(parts.values()) - assets)
+    of_meshes = len({whole for whole in parts.values() if whole.suffix.lower() in MESH_SUFFIXES})
     counts = [f"{_counted(len(inputs), 'input')}{_kinds(inputs, assets)}"]
     if of_meshes:
-        textures = _counted(len(parts) - of_assets, "texture and material file", "textures and material files")
+        textures = _counted(
+            len(parts) - of_assets - len(masks), "texture and material file", "textures and material files"
+        )
         counts.append(f"{textures} of {_counted(of_meshes, 'mesh', 'meshes')}")
     if assets:
         counts.append(f"{_counted(of_assets, 'file')} of {_counted(len(assets), 'imported asset')}")
+    if masks:
+        counts.append(f"{_counted(len(masks), 'mask')} of the photo{'s' if len(masks) > 1 else ''} beside")
     if left:
         counts.append(f"{len(left)} left alone")
     total = _counted(len(inputs) + len(parts) + len(left), "file")

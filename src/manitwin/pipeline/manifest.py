@@ -191,7 +191,10 @@ def _folder_items(folder: Path, given: str, defaults: dict[str, Any], notes: Not
         left = "".join(f"; {line.removeprefix(f'{folder}: ')}" for line in listing.remarks()[1:])
         known = ", ".join(sorted(MESH_SUFFIXES | IMAGE_SUFFIXES))
         raise UsageError(f"{given}: no image or mesh in this folder{left}; known: {known}")
-    yield from (item_of({"file": str(p)}, Path.cwd(), defaults, str(folder)) for p in listing.inputs)
+    masks = {str(photo): str(mask) for photo, mask in listing.masks.items()}
+    for path in map(str, listing.inputs):
+        row = {"file": path, "mask": masks[path]} if path in masks else {"file": path}
+        yield item_of(row, Path.cwd(), defaults, str(folder))
     notes.folders.append(listing)
     notes.remarks.extend(listing.remarks())
 
