@@ -64,12 +64,21 @@ def test_card_shows_the_photo_or_the_prompt_in_the_first_column() -> None:
 
 
 def test_photo_keeps_its_shape_and_its_matte() -> None:
-    photo = np.zeros((100, 50, 4), dtype=np.uint8)
-    photo[:50] = (255, 0, 0, 255)
+    photo = np.zeros((1000, 500, 4), dtype=np.uint8)
+    photo[300:500, 200:300] = (255, 0, 0, 255)
+    panel = input_panel(photo, 248)
+    red = (panel == (255, 0, 0)).all(2)
+    assert red[26:222, 76:172].all() and not (
+        red[:22].any() or red[226:].any() or red[:, :72].any() or red[:, 176:].any()
+    )
+    assert (panel[5, 100] == BACKDROP).all() and (panel[100, 20] == BACKDROP).all()
+
+
+def test_what_is_cut_out_at_the_edge_has_the_margin_that_there_is() -> None:
+    photo = np.zeros((100, 100, 4), dtype=np.uint8)
+    photo[:, :50] = (255, 0, 0, 255)
     panel = input_panel(photo, 200)
-    assert (panel[50, 100] == (255, 0, 0)).all()
-    assert (panel[150, 100] == BACKDROP).all()
-    assert (panel[50, 20] == BACKDROP).all()
+    assert (panel[100, 90] == (255, 0, 0)).all() and (panel[100, 185] == BACKDROP).all()
 
 
 def test_diverse_grasps_come_from_all_clusters() -> None:

@@ -33,6 +33,7 @@ HULL_COLORS = (
     (252, 205, 229), (255, 237, 111), (188, 128, 189), (204, 235, 197), (217, 217, 217), (255, 255, 179),
 )  # fmt: skip
 DRAWN_GRASPS = 12
+INPUT_MARGIN = 0.12  # of the longer side of what is cut out of a photo: about what the thing as rendered has
 FRAME_SHARE = 0.16  # of the longest side: the length of a drawn frame's Z
 
 Boxes = Sequence[tuple[np.ndarray, np.ndarray]]
@@ -120,7 +121,9 @@ def grasp_panel(
 
 
 def input_panel(picture: np.ndarray, size_px: int) -> np.ndarray:
-    """Fit a photo ``(H, W, 3 or 4) uint8`` into the panel, whole, over the backdrop."""
+    """Fit a photo ``(H, W, 3 or 4) uint8`` into the panel over the backdrop: whole, or what of it is cut out and a margin."""
+    if picture.shape[2] == 4 and (picture[..., 3] > 127).any():
+        picture = picture[_around(picture[..., 3] > 127)]
     scale = size_px / max(picture.shape[:2])
     width, height = (max(1, round(side * scale)) for side in picture.shape[1::-1])
     fitted = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC)
@@ -132,6 +135,14 @@ def input_panel(picture: np.ndarray, size_px: int) -> np.ndarray:
     over = fitted[..., :3] * alpha + np.array(BACKDROP, dtype=np.float32) * (1 - alpha)
     panel[top : top + height, left : left + width] = np.rint(over).astype(np.uint8)
     return panel
+
+
+def _around(seen: np.ndarray) -> tuple[slice, slice]:
+    """Return the rows and columns of what is seen ``(H, W) bool``, with a margin as far as the picture goes."""
+    spans = [np.flatnonzero(seen.any(axis=axis)) for axis in (1, 0)]
+    margin = round(INPUT_MARGIN * max(int(span[-1] - span[0] + 1) for span in spans))
+    rows, columns = (slice(max(0, int(span[0]) - margin), int(span[-1]) + 1 + margin) for span in spans)
+    return rows, columns
 
 
 def diverse(gripper_to_object: np.ndarray, count: int) -> np.ndarray:
