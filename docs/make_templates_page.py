@@ -41,20 +41,25 @@ the right part; their source is `template:CATEGORY`. What is not here is refused
 - **What it is**: one of the names below, or another word for it that the [priors](priors.md) know. The last noun counts: a mug
   rack is no mug. The twin is called as the text calls it (a skillet is a skillet, made by the frying pan's template).
 - **How it looks**: colours and materials before or after the name are those of the whole (a colour of a steel tool is its
-  handle's); behind *with*, of a part, and of further ones behind *and*: `a small hammer with a red handle and a black head`. What
+  handle's); behind *with*, of a part, and of further ones behind *and*: `a small hammer with a red handle and a black head`.
+  As shops write it behind a comma, too: `screwdriver, shaft 15 cm, red handle`, `a mug, white outside and yellow inside`. What
   the text does not say is drawn from the seed. Two colours or two materials of one part are refused. What is in a thing, or
   what it is for, says nothing of it (a glass of red wine, a brush for wood); nor does a word that is not known: the check
   `text_understood` names such.
 - **How large it is**: `9 cm` is the longest extent, of a pan or pot its diameter; `9 cm tall`, `wide`, `long` is that
-  direction. `30 x 20 x 15 cm` is length, width and height, `30 x 20 cm` the longest side and the second. `15 cm wide and 7 cm
-  high` and `with a 20 cm blade` change the measures until what is made has these lengths, within 0.2 %; what would no longer be
-  such a thing is refused (a mug of 10 by 80 cm), but a box may be of any proportions. `500 ml`, `12 oz` and `1 pint` (of the
-  United States) are what a vessel holds to its brim, a closed one within its walls; `2 kg` is what the thing weighs: either
-  sets the size. A volume may stand beside lengths (`a mug, 9 cm tall, 300 ml`), a mass may not. Units may be spelt out, and
-  inches, feet, yards and fractions are read. A size that no such thing has is refused. `small` and `large` choose within the
-  usual sizes.
+  direction (a chef's knife is called by its blade, a phone, tablet or laptop of so many inches by the diagonal of its screen,
+  a wrench and an allen key of some millimetres by their nuts and screws). `30 x 20 x 15 cm` is length, width and height, `30 x
+  20 cm` the longest side and the second. `15 cm wide and 7 cm high` and `with a 20 cm blade` change the measures until what is
+  made has these lengths, within 0.2 %; what would no longer be such a thing is refused (a mug of 10 by 80 cm), but a box may
+  be of any proportions. `500 ml`, `12 oz` and `1 pint` (of the United States) are what a vessel holds to its brim, a closed
+  one within its walls; `2 kg` is what the thing weighs: either sets the size. A volume may stand beside lengths (`a mug, 9 cm
+  tall, 300 ml`), a mass may not. Units may be spelt out, and inches, feet, yards and fractions are read, British pints and
+  gallons, and one amount in two units (`12 in / 30 cm`). Sizes of standards are known: paper of a notebook or a book (A5, B6,
+  letter), envelopes (C5, DL, #10), batteries (AAA), bolts, nuts and washers (M8 x 40), and the toy brick of 2x4 studs 8 mm
+  apart. A size that no such thing has is refused. `small` and `large` choose within the usual sizes.
 - **What it cannot be told** is refused and not left out: two lengths of one side, from which to which a length is, what a
-  thing is not. So is the longer name of another thing (a garlic bulb is no light bulb).
+  thing is not, a number without a unit, a size of shoes or clothes. So is the longer name of another thing (a garlic bulb is
+  no light bulb).
 - **What it is made of** decides the mass: the volume of each part times its density; of a closed container, with its contents;
   hollow behind a sheet where a handle or a stand of sheet metal would be. It is no estimate, has no interval, and is not refused
   for being unlike that of most such things (a plastic fork); a finding says so.

@@ -47,6 +47,7 @@ FILLER_WORDS = frozenset(
 """Words that say nothing themselves."""
 PURPOSE = frozenset(
     {"for", "on", "inside", "holding", "containing", "filled", "full", "to", "by", "with", "having", "without"}
+    | {"next", "beside", "near", "behind", "under", "above", "below", "beneath", "between", "at", "against", "over"}
 )
 """What is behind these says nothing of the thing itself: a brush for wood is not of it."""
 _CONTENTS = frozenset(
@@ -54,6 +55,8 @@ _CONTENTS = frozenset(
 )
 """Materials and colours that behind 'of' are what is in a thing: a bottle of soap."""
 _GOLDEN = frozenset({"brass", "bronze", "copper"})
+_NO_COLOR_BEFORE = frozenset({"resistant", "proof", "free", "remover", "removal"})
+"""Behind a colour's word, which then is none: rust resistant."""
 _COLORED = frozenset({"colored", "coloured", "color", "colour", "painted"})
 _PLAIN = frozenset(
     {"ceramic", "plastic", "wood", "steel", "stainless steel", "rubber", "glass", "paper", "stone", "fabric"}
@@ -232,7 +235,7 @@ def _found(words: Sequence[str], at: int, of: Prior | None) -> _Said | None:
             return _Said(at, end + 1, rgb or (look.rgb if look is not None else None))
         if look is not None and behind not in NO_MATTER_BEFORE and (of is None or is_matter(phrase, look, of)):
             return _Said(at, end, rgb, look)
-        if rgb is not None:
+        if rgb is not None and behind not in _NO_COLOR_BEFORE:
             shade = words[at - 1] if at and words[at - 1] in SHADES else None
             kind = SAME_COLOR.get(phrase, phrase)
             rgb = rgb if shade is None else shaded(rgb, shade)
@@ -257,7 +260,10 @@ def _color(said: Sequence[_Said], words: Sequence[str]) -> _Said | None:
                 f"two colours of one thing, {first} and {second}: say which part has which, such as"
                 f" 'a {first} mug with a {second} handle'"
             )
-        if each.basic and color.basic:
+        if CLEAR in (color.kind, each.kind):  # transparent blue is a blue that is seen through
+            hue = each if color.kind == CLEAR else color
+            color = _Said(color.start, each.end, hue.rgb, None, hue.basic, CLEAR)
+        elif each.basic and color.basic:
             mixed = np.mean([rgb for rgb in (color.rgb, each.rgb) if rgb is not None], axis=0)
             color = _Said(color.start, each.end, (float(mixed[0]), float(mixed[1]), float(mixed[2])), None, True)
         elif color.basic:

@@ -15,8 +15,9 @@ from manitwin.models.generators.templates.described import Wish
 from manitwin.models.generators.templates.fitting.fit import Fitted
 from manitwin.models.generators.templates.looks import SHADES, color_of, shaded
 from manitwin.models.generators.templates.made import Made, make
+from manitwin.models.generators.templates.stated_lengths import lengths_in
 from manitwin.models.generators.templates.template import Template
-from manitwin.models.generators.templates.text import Wanted, lengths_in, read_text
+from manitwin.models.generators.templates.text import Wanted, read_text
 
 _HEX = re.compile(r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})")
 
@@ -100,11 +101,9 @@ def make_filled(filled: Filled, text: str, rng: np.random.Generator) -> Made:
         known = {*filled.template.slots, "", *parts_of(filled.template)}
         said = {part: wish for part, wish in plain.wishes.items() if part in known and wish != Wish()}
         wanted = replace(
-            wanted,
+            plain,
             wishes=_joined(filled.wishes, said),
-            relative=None if lengths else plain.relative,
-            part_lengths_m=plain.part_lengths_m,
-            amount=plain.amount,
+            relative=None if plain.lengths_m else plain.relative,
         )
     return make(filled.template, wanted, rng, filled.measures)
 

@@ -22,7 +22,9 @@ COLORS: dict[str, str] = {
     "terracotta": "b9623f", "clear": "dfe9e8", "mustard": "c99a2e", "emerald": "1f7a4d", "rust": "9c4a2a", "ruby": "8f1830",
     "sapphire": "1c3f94", "off white": "f4efdf", "rose gold": "b9807a", "steel blue": "4a7296", "steel grey": "71777b",
     "sky blue": "7fb8e0", "royal blue": "2a4fc0", "baby blue": "a9cbe8", "cobalt blue": "1f46a0", "hot pink": "e0408f",
-    "forest green": "24562f", "brick red": "9a3b2c", "wine red": "641c2a", "cherry red": "a81a2c",
+    "forest green": "24562f", "brick red": "9a3b2c", "wine red": "641c2a", "cherry red": "a81a2c", "sage": "9ba88d",
+    "mauve": "b08ea2", "fuchsia": "b8287f", "plum": "5e2f52", "salmon": "f08c7a", "taupe": "8b7d6f", "graphite": "4b4d50",
+    "azure": "4a90d9", "aquamarine": "7fd4bd", "chartreuse": "b5cc3a", "ochre": "c28a2e", "umber": "5f4636",
 }  # fmt: skip
 """sRGB by word, or by two."""
 BASIC_COLORS = frozenset(
@@ -107,6 +109,8 @@ MATERIALS: dict[str, Look] = {
         _look("nylon", "plastic", "2a2b2d", 0.5, 1140),
         _look("polycarbonate", "plastic", "e0e8e8", 0.15, 1200),
         _look("resin", "plastic", "d9cfb8", 0.35, 1150),
+        _look("fibreglass", "plastic", "d9cfa0", 0.4, 1900),
+        _look("carbon fibre", "plastic", "222326", 0.3, 1600),
         _look("silicone", "rubber", "8f9598", 0.7, 1150),
         _look("rubber", "rubber", "232325", 0.85, 1150),
         _look("foam", "foam", "e7c94a", 0.95, 60),
@@ -194,7 +198,12 @@ SAME_MATERIAL = {
     "terracotta": "earthenware", "terra cotta": "earthenware", "faience": "earthenware", "borosilicate": "glass",
     "borosilicate glass": "glass", "pyrex": "glass", "crystal": "glass", "perspex": "acrylic", "plexiglass": "acrylic",
     "acrylic glass": "acrylic", "polypropylene": "plastic", "polyethylene": "plastic", "pvc": "plastic", "vinyl": "plastic",
-    "bakelite": "plastic", "cotton": "fabric", "linen": "fabric", "felt": "fabric", "canvas": "fabric", "denim": "fabric",
+    "bakelite": "plastic", "abs": "plastic", "polystyrene": "plastic", "petg": "plastic", "hdpe": "plastic", "ldpe": "plastic",
+    "polyester": "fabric", "neoprene": "rubber",
+    "fiberglass": "fibreglass", "glass fibre": "fibreglass", "glass fiber": "fibreglass",
+    "carbon fiber": "carbon fibre", "carbon steel": "steel", "tool steel": "steel", "chrome vanadium": "steel",
+    "chrome vanadium steel": "steel", "tempered glass": "glass", "toughened glass": "glass",
+    "cotton": "fabric", "linen": "fabric", "felt": "fabric", "canvas": "fabric", "denim": "fabric",
     "wool": "fabric", "latex": "rubber", "suede": "leather", "oakwood": "oak", "oaken": "oak", "pinewood": "pine",
     "timber": "wood", "hardwood": "wood", "plywood": "wood", "cherry wood": "wood", "cement": "concrete",
     "ceramics": "ceramic", "earthen": "earthenware", "aluminium alloy": "aluminium", "solid silver": "sterling silver",

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 from manifold3d import Manifold
+from scipy.spatial import ConvexHull
+from scipy.spatial.distance import pdist
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
@@ -55,7 +57,10 @@ def make(template: Template, wanted: Wanted, rng: np.random.Generator, said: Map
     ``said`` are measures that are known, in place of drawn ones.
     """
     looks_by_slot = _looks(template, wanted, rng)
-    measures = template.drawn(rng) | dict(said or {})
+    measures = template.drawn(rng) | dict(said or {}) | dict(wanted.measures)
+    if wanted.nominal_m is not None:
+        called_m = template.nominal_times * float(np.prod([measures[name] for name in template.nominal]))
+        measures[template.nominal[0]] *= wanted.nominal_m / called_m
     if "wall_m" in measures:
         measures["wall_m"] = max(LEAST_WALL_M, measures["wall_m"] * _wall(template, next(iter(looks_by_slot.values()))))
     if wanted.solves_measures:
@@ -71,11 +76,11 @@ def make(template: Template, wanted: Wanted, rng: np.random.Generator, said: Map
             walled = measures | {"wall_m": LEAST_WALL_M / scale}
             its_model = template.build(**walled)
             its_mesh = its_model.assembly.mesh()
-            scale = _scale(template, wanted, its_mesh) if wanted.scaling_amount is None else scale
+            scale = _scale(template, wanted, its_model, its_mesh) if wanted.scaling_amount is None else scale
         return dressed(template, its_model, its_mesh, walled, looks_by_slot, wanted.wishes, scale)
 
     if wanted.scaling_amount is None:
-        return made_at(_scale(template, wanted, mesh))
+        return made_at(_scale(template, wanted, model, mesh))
     scale = scale_with(wanted.scaling_amount, made_at)
     _check_size(template, float(np.ptp(mesh.vertices, axis=0).max()) * scale)
     return made_at(scale)
@@ -211,15 +216,16 @@ def _check_parts(template: Template, wanted: Wanted, mesh: PartedMesh) -> None:
             raise UsageError(f"a {template.category} has no {part!r} here. Its parts: {', '.join(known)}")
 
 
-def _scale(template: Template, wanted: Wanted, mesh: PartedMesh) -> float:
+def _scale(template: Template, wanted: Wanted, model: Model, mesh: PartedMesh) -> float:
     """Return the scale that gives the stated size, or the relative one; 1 where the text says neither, or several lengths.
 
     Which side is meant by width is told by the size: of a keyboard of 40 cm the longer one.
     """
     extents = np.ptp(mesh.vertices, axis=0)
-    meant = mesh.faces[mesh.part == mesh.names.index(template.length_of)] if template.length_of else mesh.faces
+    meant = _places(model, mesh, template.length_of) if template.length_of else mesh.vertices
     now = {
-        "": [np.ptp(mesh.vertices[meant.ravel()], axis=0).max()],
+        "": [np.ptp(meant, axis=0).max()],
+        "diagonal": [_diagonal_m(_places(model, mesh, template.diagonal_of))] if template.diagonal_of else [],
         "height": [extents[2]],
         "width": [extents[:2].min(), extents[:2].max()],
         "length": [extents.max()],
@@ -228,9 +234,9 @@ def _scale(template: Template, wanted: Wanted, mesh: PartedMesh) -> float:
     prior = lookup(template.category)
     assert prior is not None, template.category
     interval = prior.longest_axis_m
-    if wanted.lengths_m or wanted.part_lengths_m:
+    if wanted.lengths_m or wanted.part_lengths_m or wanted.nominal_m is not None or wanted.measures:
         scale = 1.0
-        if not wanted.solves_measures:
+        if wanted.lengths_m and not wanted.solves_measures:
             direction, length = next(iter(wanted.lengths_m.items()))
             scales = [length / float(side) for side in now[direction]]
             usual = [scale for scale in scales if interval.low <= float(extents.max()) * scale <= interval.high]
@@ -240,6 +246,18 @@ def _scale(template: Template, wanted: Wanted, mesh: PartedMesh) -> float:
     if wanted.relative is None:
         return 1.0
     return float(interval.low + wanted.relative * (interval.high - interval.low)) / float(extents.max())
+
+
+def _places(model: Model, mesh: PartedMesh, part: str) -> np.ndarray:
+    """Return the vertices ``(N, 3)`` of a part, or of the parts that wear its slot."""
+    names = [at for at, name in enumerate(mesh.names) if part in (name, model.slots[name])]
+    return np.asarray(mesh.vertices[np.unique(mesh.faces[np.isin(mesh.part, names)])])
+
+
+def _diagonal_m(vertices: np.ndarray) -> float:
+    """Return the largest distance of two of some vertices ``(N, 3)``."""
+    hull = vertices[ConvexHull(vertices).vertices]
+    return float(pdist(hull).max())
 
 
 def _check_size(template: Template, longest_m: float) -> None:

@@ -16,6 +16,7 @@ from manitwin.models.generators.templates.described import FILLER_WORDS, PURPOSE
 from manitwin.models.generators.templates.looks import color_of, look_of, material_of
 from manitwin.models.generators.templates.matter import is_food
 from manitwin.models.generators.templates.other_shapes import KIN_OF_ANOTHER_SHAPE, is_of_another_shape
+from manitwin.models.generators.templates.standard_sizes import is_size_code
 from manitwin.models.generators.templates.template import Template
 
 _BEHIND = frozenset({"of", "in", "from", "made", "that", "which", "painted", "colored", "coloured", ","}) | PURPOSE
@@ -31,6 +32,8 @@ _GROUPS = frozenset(
     {"set", "pair", "pack", "packet", "stack", "pile", "bunch", "bundle", "collection", "group", "row", "handful"}
     | {"couple", "number", "lot", "lots", "dozen", "dozens"}
 )
+_ADJECTIVE = re.compile(r"[a-z]{4,}(?:ed|able|ible|less|proof|etic|omic|atic)")
+"""Words that are no nouns by their ending, but for those that the priors know: an eraser, magnetic."""
 USED_ALIKE = 0.6
 """The share of places of use in common, from which a thing of the same shape is worth a hint."""
 _COUNTS = frozenset(
@@ -51,7 +54,7 @@ class NamedCategory:
 
 def plain_words(words: Sequence[str]) -> list[str]:
     """Return words without the marks around them; a comma stays as a word of its own."""
-    return [word for word in (word if word == "," else word.strip('.!?;:()"') for word in words) if word]
+    return [word for word in (word if word == "," else word.strip('.!?;:()"/=') for word in words) if word]
 
 
 def find_category(words: Sequence[str], text: str, templates: Mapping[str, Template]) -> NamedCategory:
@@ -74,7 +77,7 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
     other: Prior | None = None
     for end in range(len(words), 0, -1):
         tail = words[end:]
-        if tail and tail[0] not in _BEHIND and not all(word in FILLER_WORDS or is_described(word) for word in tail):
+        if tail and not _says_more(tail):
             continue
         for start in range(end):
             if words[start] in FILLER_WORDS or "," in words[start:end] or (start > parted and not shown):
@@ -98,6 +101,24 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
             own = _own_words(words[start:end], templates[category], load_priors()[category])
             return NamedCategory(category, own, _without_counter(words[:start]), tail)
     raise UsageError(_no_category(text, words, templates))
+
+
+def _says_more(tail: Sequence[str]) -> bool:
+    """Tell whether words behind a thing's name say more of it, and are no part of the name: 'in red', 'A5', 'size 42'."""
+    first, *rest = tail
+    if first in _BEHIND or is_size_code(first) or (first == "size" and rest):
+        return True
+    if any(character.isdigit() for character in first) and not _is_number(first):
+        return True
+    coated = bool(rest) and rest[0].endswith("ed") and _ADJECTIVE.fullmatch(rest[0]) is not None  # 'zinc plated'
+    adjective = _ADJECTIVE.fullmatch(first) is not None and named(first) is None
+    if _is_number(first) or adjective or coated or first in FILLER_WORDS or is_described(first):
+        return not rest or _says_more(rest)
+    return False
+
+
+def _is_number(word: str) -> bool:
+    return word.replace(".", "").isdigit()
 
 
 def _says_how_it_looks(
@@ -195,9 +216,12 @@ def _no_category(text: str, words: list[str], templates: Mapping[str, Template])
         said = words if meant is None else meant.category.split()
         # from the noun, which is the last word
         spelt = dict.fromkeys(
-            near for word in reversed(said) for near in get_close_matches(word, names, n=2, cutoff=0.6)
+            name for word in reversed(said) for name in get_close_matches(word, names, n=2, cutoff=0.6)
         )
-        hint = f"; did you mean {', '.join(list(spelt)[:4])}?" if spelt else "."
+        # a block may be a building block
+        kinds = [name for name in names if said and name.endswith(f" {said[-1]}")]
+        near = [*kinds, *(name for name in spelt if name not in kinds)]
+        hint = f"; did you mean {', '.join(near[:4])}?" if near else "."
     return f"no template makes {text!r}{hint} There are {len(templates)} (docs/templates.md)"
 
 

@@ -11,8 +11,10 @@ _UNITS_M = {
     r"micromet(?:re|er)s?|microns?|[µμ]m": 1e-6, "inch(?:es)?": 0.0254, "in": 0.0254, "foot|feet|ft": 0.3048,
     "yards?|yds?": 0.9144,
 }  # fmt: skip
+INCHES = frozenset({"inch", "inches", "in"})
 _UNIT = "|".join(_UNITS_M)
-_NUMBER = r"(?<![\w.])(?:\d+(?:\.\d+)?|\.\d+)"
+_DIGITS = r"(?:\d+(?:\.\d+)?|\.\d+)"
+_NUMBER = rf"(?<![\w.]){_DIGITS}"
 _AMOUNT = rf"({_NUMBER}) ?({_UNIT})\b\.?"
 _MEASURES = "height|width|length|diameter|depth"
 LENGTH = re.compile(rf"{_AMOUNT} ?(?:in (?={_MEASURES}))?(\w{{0,12}})")
@@ -22,16 +24,27 @@ _OF_A_PART = re.compile(
     r"(?=$| ?[,;.]| (?:and|with|having|of|in|made|for)\b)"
 )
 """'with a 20 cm blade', 'and a 9 cm long wooden handle'; the part is called by the last word."""
+_PART_OF_LENGTH = re.compile(
+    rf"(?<= )(with|having|and) (?:an? )?((?:[a-z]+ ){{0,2}}?(?!{_MEASURES}|size)[a-z]+) (?:(?:length )?of |length ){_AMOUNT}"
+    r"(?: (?:long|across|in diameter|in length|diameter))?(?=$| ?[,;]| (?:and|with|having|made|for)\b)"
+)
+"""'with a red handle of 12 cm', 'and blade length 9 cm'."""
 _NAMED_LENGTH = re.compile(rf"\b({_MEASURES})(?: of)? ({_AMOUNT})")
 _AMOUNT_OR_NUMBER = rf"({_NUMBER})(?: ?({_UNIT})\b\.?)?"
 _BY = re.compile(rf"{_AMOUNT_OR_NUMBER} x {_AMOUNT_OR_NUMBER}(?: x {_AMOUNT_OR_NUMBER})?(?: in (?:size|all))?")
 """'30 x 20 x 15 cm': a number without a unit has that of the last one."""
 _TIMES = re.compile(rf"(?<=\d) ?(?:({_UNIT})\.?)? ?(?:x|by|×|\*) ?(?=\.?\d)")
+_LETTERED_SIDE = rf"(?:\b([lwhd])[ :]?)?({_DIGITS}) ?({_UNIT})?\.? ?(?:\(?([lwhd])\b\)?)?"
+_LETTERED = re.compile(rf"(?<![\w.]){_LETTERED_SIDE} ?[x×] ?{_LETTERED_SIDE}(?: ?[x×] ?{_LETTERED_SIDE})?(?!\w)")
+"""'9 cm (H) x 8 cm (W)', 'L30 x W20 x H10 cm'."""
 _RANGE = re.compile(rf"\d ?(?:-|–|—|\.{{2,3}}|(?:{_UNIT})?\.? ?(?:to|or|and)) ?{_AMOUNT}")
+_IN_TWO_UNITS = re.compile(rf"{_AMOUNT} ?[/(=] ?{_AMOUNT}\)?")
+ROUNDED = 0.04
+"""Share by which one amount may differ that is said in two units: 12 in is called 30 cm, 16 ft 5 m and 10 in 25 cm."""
 DIRECTIONS = {
     "tall": "height", "high": "height", "height": "height", "wide": "width", "width": "width", "broad": "width",
     "diameter": "width", "across": "width", "long": "length", "length": "length", "deep": "depth", "thick": "height",
-    "longest": "", "secondside": "second",
+    "longest": "", "secondside": "second", "diagonal": "diagonal", "diagonally": "diagonal",
 }  # fmt: skip
 """``second``: the second longest side, as of a tray of 30 x 20 cm; ``secondside`` is what ``in_figures`` makes of it."""
 _NUMERALS = {
@@ -41,13 +54,21 @@ _NUMERALS = {
 _SPELT = re.compile(rf"\b({'|'.join(_NUMERALS)})(?= (?:{_UNIT.replace('|in|', '|').replace('|m|', '|')})\b)")
 """Numbers in words before a unit, but for 'in' and 'm': 'two in one' is no length."""
 _SIGNS = {"½": "1/2", "¼": "1/4", "¾": "3/4", "⅓": "1/3", "⅔": "2/3", "⅛": "1/8", "⅜": "3/8", "⅝": "5/8", "⅞": "7/8"}
-_FRACTION = re.compile(rf"(?<![\w./])(?:(\d+) )?(\d{{1,3}})/(\d{{1,3}})(?= ?-?(?:{_UNIT})\b)")
+_OF_AMOUNTS = r"[mcd]?l|lit(?:re|er)s?|fl\b.*|oz|ounces?|pints?|pt|quarts?|qts?|gallons?|gals?|k?g|lbs?|pounds?"
+_FRACTION = re.compile(rf"(?<![\w./])(?:(\d+) )?(\d{{1,3}})/(\d{{1,3}})(?= ?-?(?:{_UNIT}|{_OF_AMOUNTS})\b)")
+_SO_MANY_IN_ONE = re.compile(r"\b(\d+) in (\d+)\b(?! ?/)")
+"""'a 3 in 1 pen' is not three inches long."""
 _FEET_AND_INCHES = re.compile(rf"({_NUMBER}) ?(?:foot|feet|ft)\.? (?:and )?({_NUMBER}) ?(?:inch(?:es)?|in)\b")
 
 
 def lengths_in(text: str) -> dict[str, float]:
     """Return the lengths (m) that a text states of the whole by their direction, '' for the longest."""
-    found = LENGTH.findall(without_lengths_of_parts(in_figures(text)))
+    return lengths_of_whole(in_figures(text))
+
+
+def lengths_of_whole(plain: str) -> dict[str, float]:
+    """Return the lengths (m) of the whole that a text states, as ``in_figures`` writes it, by direction."""
+    found = LENGTH.findall(without_lengths_of_parts(plain))
     return {DIRECTIONS.get(direction, ""): float(number) * _metres(unit) for number, unit, direction in found}
 
 
@@ -61,17 +82,17 @@ def without_lengths_of_parts(plain: str) -> str:
     return _OF_A_PART.sub(lambda m: m[0] if m[7] in DIRECTIONS else f" {m[1]}{m[2]}{m[6]} {m[7]}", plain)
 
 
-def several_lengths(text: str) -> bool:
-    """Tell whether a text states more than one length of one direction, or from which to which one is."""
-    plain = without_lengths_of_parts(in_figures(text))
-    return len(LENGTH.findall(plain)) > len(lengths_in(text)) or _RANGE.search(plain) is not None
+def several_lengths(plain: str) -> bool:
+    """Tell whether a text, as ``in_figures`` writes it, states more than one length of one direction, or from which to which."""
+    plain = without_lengths_of_parts(plain)
+    return len(LENGTH.findall(plain)) > len(lengths_of_whole(plain)) or _RANGE.search(plain) is not None
 
 
 def in_figures(text: str) -> str:
     """Return the words in lower case with each length as one number, its unit and then what it is of: '14 inches long'.
 
     A decimal comma is a point, marks of inches and feet are words, numbers and fractions are figures, feet and inches are one
-    length.
+    length, and so is one that is said in two units: '12 in / 30 cm'.
     """
     plain = re.sub(r"(?<=\d),(?=\d{3}\b)", "", text.lower())
     plain = re.sub(r"(?<=\d),(?=\d)", ".", plain)
@@ -81,12 +102,41 @@ def in_figures(text: str) -> str:
     plain = re.sub(r"(?<=\d) ?(?:'|′)(?![a-z])", " ft ", plain)  # the 70's are no feet
     plain = re.sub(r"(?<=\d)-(?=\d+/\d)", " ", plain)
     plain = _FRACTION.sub(_in_decimals, plain)
+    plain = re.sub(r"[ø⌀]|\bdiam?\b\.?", " diameter ", plain)
+    plain = re.sub(r" [-–—] (?!\.?\d)|(?<!\d) [-–—] ", " , ", plain)
+    plain = _LETTERED.sub(_by_letter, plain)
     plain = re.sub(r"(?<=\d) ?(?:-|–|—|\.{2,3}) ?(?=\.?\d)", "–", plain)
     plain = _TIMES.sub(lambda m: f" {m[1] or ''} x ", " ".join(plain.replace(",", " , ").replace("-", " ").split()))
     plain = " ".join(plain.split())
     plain = _SPELT.sub(lambda m: str(_NUMERALS[m[1]]), plain)
+    plain = _SO_MANY_IN_ONE.sub(r"\1in\2", plain)
     plain = _FEET_AND_INCHES.sub(lambda m: f"{12 * float(m[1]) + float(m[2]):g} inches", plain)
-    return _NAMED_LENGTH.sub(lambda m: f"{m[2]} {m[1]}", _BY.sub(_by_direction, plain))
+    plain = _IN_TWO_UNITS.sub(_once, plain)
+    plain = _BY.sub(_by_direction, plain)
+    plain = _PART_OF_LENGTH.sub(lambda m: f"{m[1]} a {m[3]} {m[4]} {m[2]}", plain)
+    return _NAMED_LENGTH.sub(lambda m: f"{m[2]} {m[1]}", plain)
+
+
+def _by_letter(found: re.Match[str]) -> str:
+    """Return sides that each have the letter of their direction with its word; as they are where one has none, or two the same.
+
+    D is the diameter where no width or length is beside it, else the depth.
+    """
+    sides = [found.groups()[at : at + 4] for at in (0, 4, 8) if found.groups()[at + 1]]
+    letters = [before or behind for before, _, _, behind in sides]
+    units = [unit for _, _, unit, _ in sides]
+    if None in letters or len({*letters}) < len(letters) or units[-1] is None:
+        return found[0]
+    ways = {"l": "long", "w": "wide", "h": "tall", "d": "deep" if {"l", "w"} & {*letters} else "across"}
+    said = zip(sides, units, letters, strict=True)
+    return " ".join(f"{side[1]} {unit or units[-1]} {ways[letter]}" for side, unit, letter in said if letter)
+
+
+def _once(found: re.Match[str]) -> str:
+    """Return the first of two lengths in other units, where they are one length but for rounding; else both."""
+    first, second = (float(found[at]) * _metres(found[at + 1]) for at in (1, 3))
+    same = found[2] != found[4] and abs(first - second) <= ROUNDED * max(first, second)
+    return f"{found[1]} {found[2]}" if same else found[0]
 
 
 def _by_direction(found: re.Match[str]) -> str:

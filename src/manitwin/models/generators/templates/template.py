@@ -103,10 +103,12 @@ class Template:
     measure ``wall_m`` is that of ceramic and follows the material. ``contents_kg_m3`` is the mean density of parts that are
     closed containers, with what is in them. ``of_sheet`` are parts that are hollow behind a sheet where they are of metal;
     ``of_plate``: what is of metal has the wall that is stated, and none of sheet. ``length_of`` is the part that a length
-    without a direction is of: a pan of 24 cm has that diameter, without its handle; '' for the whole. What has
-    ``any_proportions``, a box, is as long, wide and high as is said; other things keep near their intervals. What has
-    ``any_front``, an apple, has no side that is its front: of a photo it is the side that is seen. What is ``told_in_full`` is
-    not meant by the last word of its name alone: who says bottle means no perfume bottle.
+    without a direction is of: a pan of 24 cm has that diameter, without its handle; '' for the whole. ``diagonal_of`` is the
+    part, a screen, that such a length in inches is the diagonal of. ``nominal`` are the measures whose product, times
+    ``nominal_times``, is what such a tool is called by: a wrench of 13 mm has a jaw so wide. What has ``any_proportions``, a
+    box, is as long, wide and high as is said; other things keep near their intervals. What has ``any_front``, an apple, has no
+    side that is its front: of a photo it is the side that is seen. What is ``told_in_full`` is not meant by the last word of
+    its name alone: who says bottle means no perfume bottle.
     """
 
     category: str
@@ -119,6 +121,9 @@ class Template:
     of_sheet: tuple[str, ...] = ()
     of_plate: bool = False
     length_of: str = ""
+    diagonal_of: str = ""
+    nominal: tuple[str, ...] = ()
+    nominal_times: float = 1.0
     any_proportions: bool = False
     any_front: bool = False
     told_in_full: bool = False

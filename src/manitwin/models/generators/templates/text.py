@@ -11,46 +11,50 @@ from manitwin.models.annotators.prior_records import Prior
 from manitwin.models.annotators.priors import load_priors
 from manitwin.models.annotators.walls import METALS
 from manitwin.models.generators.templates.described import (
-    FILLER_WORDS,
-    RELATIVE,
     Described,
     Wish,
     described,
     described_behind,
-    is_described,
 )
 from manitwin.models.generators.templates.looks import look_of
 from manitwin.models.generators.templates.matter import is_composite
-from manitwin.models.generators.templates.named_category import find_category, plain_words
+from manitwin.models.generators.templates.named_category import find_category
+from manitwin.models.generators.templates.standard_sizes import StandardSize, in_codes, standard_size
 from manitwin.models.generators.templates.stated_amounts import Amount, amounts_in, without_amounts
 from manitwin.models.generators.templates.stated_lengths import (
     DIRECTIONS,
+    INCHES,
     LENGTH,
+    ROUNDED,
     in_figures,
-    lengths_in,
     lengths_of_parts,
+    lengths_of_whole,
     several_lengths,
     without_lengths_of_parts,
 )
 from manitwin.models.generators.templates.template import Template
+from manitwin.models.generators.templates.told_parts import (
+    features,
+    part_before,
+    shared_out,
+    slot_called,
+    with_parts_told,
+)
 
 MAX_CHARACTERS = 400
 _NEGATION = re.compile(r"\b(?:no(?!\.? ?\d)|not|without)\b")
 """What no template can be told: left out in silence, the thing would be another one."""
 _NEGATIVE = re.compile(r"(?:^|(?<=[^\d\W]) |(?<=[(,:]) ?)[-−]\.?\d[\d.]*")
 """A minus before a number, behind a word, a bracket or a comma: behind a digit it parts a range, within a word it joins."""
-_PART_NAMES = {
-    "lid": ("cap",), "cap": ("lid",), "top": ("cap", "lid"), "stopper": ("cap",), "cork": ("cap",), "grip": ("handle",),
-    "blade": ("head",), "strap": ("band",), "display": ("screen",), "bristle": ("bristles",),
-}  # fmt: skip
-"""Other words for slots of templates, the best first."""
 _TOOL_HEADS = ("head", "blade")
 _COLORED_MATTER = {"plastic", "rubber"}
-_COMMON_PARTS = ("handle", "lid", "cap", "rim", "blade")
-_PART_BEHIND_COMMA = re.compile(
-    rf" ?, (?=(?:an? )?(?:(?!with\b)[a-z]+ ){{0,3}}(?:{'|'.join(_COMMON_PARTS)})s?(?:$| ?,| and\b))"
+_ONE_OF = re.compile(r"^(?:one|any|each|either) of (?:the|these|those|my|our) ")
+_NO_LENGTH = re.compile(r"#?\d[\d.]*(?:x\d[\d.]*)*")
+"""A number, or several with 'x' between them, that says nothing."""
+_NUMBERED = frozenset(
+    {"no", "number", "nr", "model", "type", "version", "mark", "mk", "series", "vol", "volume", "route"}
 )
-"""'a screwdriver, yellow handle'."""
+_IS_SIZED = re.compile(r"\b(?:size|eur?) ((?:\w{1,3} )?(?:\d[\d.]*|x*[sml]|small|medium|large|one)\b)")
 _WITH = re.compile(r" (?:with|having|featuring) | and an? (?=.)| (?:that|which) has ")
 
 
@@ -60,7 +64,8 @@ class Wanted:
 
     ``relative`` is where in the category's interval of sizes it is, None where the text does not say; ``unused`` are the words
     that say nothing to a template; ``part_lengths_m`` those of parts or slots, of each its longest side; ``amount`` is the
-    volume or the mass.
+    volume or the mass; ``measures`` are the template's that a named size gives, such as M8 x 40 of a bolt, and
+    ``nominal_m`` the size that such a tool is called by, a wrench by that of its nuts.
     """
 
     category: str
@@ -70,6 +75,8 @@ class Wanted:
     unused: tuple[str, ...] = ()
     part_lengths_m: Mapping[str, float] = field(default_factory=dict)
     amount: Amount | None = None
+    measures: Mapping[str, float] = field(default_factory=dict)
+    nominal_m: float | None = None
 
     @property
     def solves_measures(self) -> bool:
@@ -91,23 +98,32 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
     """
     if len(text) > MAX_CHARACTERS:
         raise UsageError(f"a text of {len(text)} characters; at most {MAX_CHARACTERS} describe an object")
-    plain, lengths = in_figures(text), lengths_in(text)
+    plain = in_codes(in_figures(text))
     _check_taken(text, plain)
+    try:
+        plain = with_parts_told(_ONE_OF.sub("the ", plain), templates)
+    except UsageError as error:
+        raise UsageError(f"{text!r}: {error}") from None
+    lengths = lengths_of_whole(plain)
+    _check_lengths(text, plain)
     of_parts, plain = lengths_of_parts(plain), without_lengths_of_parts(plain)
     said_in, plain = plain, without_amounts(plain)
     rest = LENGTH.sub(lambda m: "" if m[3] in DIRECTIONS else m[3], plain)
-    main, *features = _WITH.split(_PART_BEHIND_COMMA.sub(" with ", rest), maxsplit=1)
+    main, *told = _WITH.split(rest, maxsplit=1)
     found = find_category(main.split(), text, templates)
     template, prior = templates[found.category], load_priors()[found.category]
     try:
-        parts, whole = _part_before(found.before, template)
-        parts += _features(features[0], template) if features else []
+        parts, whole = part_before(found.before, template)
+        parts += features(told[0], template) if told else []
+        shared, whole = shared_out(whole, template)
+        tailed, tail = shared_out(found.tail, template)
+        parts = [*shared, *tailed, *parts]
         before = described(whole, prior)
         slot = _slot_meant(before.wish, template, prior)
         if slot is not None:
             parts = [(slot, Described(before.wish)), *parts]
             before = replace(before, wish=Wish())
-        words = _joined(before, described(found.own), described_behind(found.tail))
+        words = _joined(before, described(found.own), described_behind(tail))
         coated = _slot_coated(words.wish, template)
         if coated is not None and coated not in {part for part, _ in parts}:
             parts = [(coated, Described(words.wish)), *parts]
@@ -116,7 +132,7 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
         unused = list(words.unused)
         for part, said in parts:
             wishes[part] = said.wish.over(wishes.get(part, Wish()))
-            unused += said.unused
+            unused += [*said.unused, *([part] if any(word.isdigit() for word in said.unused) else [])]  # '192 pages'
     except UsageError as error:
         raise UsageError(f"{text!r}: {error}") from None
     amounts = amounts_in(said_in, prior)
@@ -125,10 +141,60 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
         raise UsageError(
             f"{text!r} states {stated}: say one volume or one mass, of the two a volume alone beside lengths"
         )
-    part_lengths = {_slot_called(word, template): length for word, length in of_parts.items()}
+    part_lengths = {slot_called(word, template): length for word, length in of_parts.items()}
+    try:
+        size = standard_size(found.category, main.split())
+    except UsageError as error:
+        raise UsageError(f"{text!r}: {error}") from None
+    lengths = _lengths_beside(size, lengths, text)
+    lengths, part_lengths = _diagonal(plain, lengths, part_lengths, template, text)
+    nominal_m = None
+    if template.nominal and lengths.keys() == {""} and lengths[""] < prior.longest_axis_m.low / 2:
+        nominal_m, lengths = lengths[""], {}
+    unused = [word for word in unused if size is None or word not in (size.code, "x")]
+    _check_numbers(text, unused)
+    amount, measures = next(iter(amounts), None), {} if size is None else size.measures
     return Wanted(
-        found.category, wishes, lengths, words.relative, tuple(unused), part_lengths, next(iter(amounts), None)
+        found.category, wishes, lengths, words.relative, tuple(unused), part_lengths, amount, measures, nominal_m
     )
+
+
+def _diagonal(
+    plain: str, lengths: dict[str, float], part_lengths: dict[str, float], template: Template, text: str
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return lengths of the whole and of parts, where a screen's is its diagonal: of a laptop of 15.6 inches."""
+    if template.diagonal_of and not lengths and part_lengths.keys() == {template.diagonal_of}:
+        return {"diagonal": part_lengths[template.diagonal_of]}, {}
+    inches = all(unit in INCHES for _, unit, _ in LENGTH.findall(plain))
+    if template.diagonal_of and lengths.keys() == {""} and inches and not part_lengths:
+        return {"diagonal": lengths[""]}, {}
+    if "diagonal" in lengths and (not template.diagonal_of or len(lengths) + len(part_lengths) > 1):
+        raise UsageError(f"{text!r}: a diagonal is told of a screen, and no other length beside it; say the sides")
+    return lengths, part_lengths
+
+
+def _lengths_beside(size: StandardSize | None, lengths: dict[str, float], text: str) -> dict[str, float]:
+    """Return the lengths that a text states, or a named size of it; raises UsageError where these contradict each other."""
+    if size is None or not lengths:
+        return lengths if size is None else dict(size.lengths_m)
+    said, named = (sorted(each.values()) for each in (lengths, size.lengths_m))
+    if len(said) == len(named) and all(abs(a - b) <= ROUNDED * b for a, b in zip(said, named, strict=True)):
+        return dict(size.lengths_m)
+    raise UsageError(
+        f"{text!r} states a size, {size.code}, and a length: say one, or both as one, such as 'M8 x 40' of a bolt"
+    )
+
+
+def _check_numbers(text: str, unused: list[str]) -> None:
+    """Raise UsageError for a number without a unit: it may be a size. Of '192 pages' and 'No. 2' it is told what it counts."""
+    for at, word in enumerate(unused):
+        counted = at + 1 < len(unused) and not any(character.isdigit() for character in unused[at + 1])
+        counted = counted and unused[at + 1] != "x" and "x" not in word
+        numbered = at > 0 and (unused[at - 1] in _NUMBERED or re.fullmatch(r"[a-wyz]", unused[at - 1]) is not None)
+        if _NO_LENGTH.fullmatch(word) and not counted and not numbered:
+            raise UsageError(
+                f"{text!r}: {word!r} has no unit; say what it measures, such as '30 cm', '12 in' or '500 ml', or leave it out"
+            )
 
 
 def _slot_meant(wish: Wish, template: Template, prior: Prior) -> str | None:
@@ -166,61 +232,6 @@ def _joined(before: Described, own: Described, tail: Described) -> Described:
     return Described(wish, relative, before.unused + tail.unused)
 
 
-def _part_before(words: list[str], template: Template) -> tuple[list[tuple[str, Described]], list[str]]:
-    """Return what is said of a part before the name ('a red handled hammer'), and the words that are left."""
-    for at, word in enumerate(words):
-        part = word if word in template.slots else None
-        for name in (*template.slots, *_COMMON_PARTS):
-            if word in (f"{name}d", f"{name}ed", f"{name}{name[-1]}ed"):
-                part = _slot_called(name, template)
-        if part is not None and at:
-            return [(part, _of_part(words[:at]))], words[at + 1 :]
-    return [], words
-
-
-def _slot_called(word: str, template: Template) -> str:
-    """Return the slot that a word means, in the plural or by another name; else the word itself, in the singular."""
-    names = [word, word.removesuffix("s"), f"{word}s"]
-    names += [other for name in names[:2] for other in _PART_NAMES.get(name, ())]
-    return next((name for name in names if name in template.slots), names[1])
-
-
-def _features(text: str, template: Template) -> list[tuple[str, Described]]:
-    """Return what is said of each part behind 'with': 'a red handle, black head and green claw'.
-
-    A part that nothing is said of is as the one before it: of 'a red handle and lid' both are red.
-    """
-    features: list[tuple[str, Described]] = []
-    before: list[str] = []
-    for phrase in re.split(r"( and an? |^an? | and | , | with )", f" {text} ".replace("  ", " ")):
-        words = [word for word in plain_words(phrase.split()) if word not in FILLER_WORDS]
-        if not words:
-            continue
-        names = [at for at, word in enumerate(words) if not is_described(word) or word in template.slots]
-        if not names and _slot_called(words[-1], template) in template.slots:  # 'a cork' is a part, and of cork
-            features.append((_slot_called(words[-1], template), _of_part([*before, *words])))
-            before = []
-            continue
-        if not names:
-            before += [*words, "and"]  # 'red and white stripes'
-            continue
-        at = names[-1]  # the last but for 'a handle in red'
-        said = _of_part([*before, *words[:at], *words[at + 1 :]])
-        features.append(
-            (_slot_called(words[at], template), said if said != Described() or not features else features[-1][1])
-        )
-        before = []
-    if before:
-        raise UsageError(f"no part is named that is {' '.join(before[:-1])}")
-    return features
-
-
-def _of_part(words: list[str]) -> Described:
-    """Return what words say of a part, whose size a template cannot be told."""
-    said = described([word for word in words if word not in RELATIVE])
-    return Described(said.wish, None, (*said.unused, *(word for word in words if word in RELATIVE)))
-
-
 def _check_taken(text: str, plain: str) -> None:
     """Raise UsageError for what a template cannot be told."""
     if (below := _NEGATIVE.search(text)) is not None:
@@ -229,7 +240,16 @@ def _check_taken(text: str, plain: str) -> None:
         raise UsageError(
             f"{text!r}: a template cannot be told what a thing is not ({said[0]!r}); leave it out, or say a length"
         )
-    if several_lengths(text):
+    if (sized := _IS_SIZED.search(plain)) is not None:
+        raise UsageError(
+            f"{text!r}: {sized[0]!r} is not understood, as sizes of clothes, shoes and rings are no lengths; say one,"
+            " such as '28 cm long', or 'small' or 'large' before the name"
+        )
+
+
+def _check_lengths(text: str, plain: str) -> None:
+    """Raise UsageError where more than one length of one side is stated."""
+    if several_lengths(plain):
         raise UsageError(
             f"{text!r} states several lengths of one side, or from which to which one is; say one of each, such as '9 cm tall and"
             " 8 cm wide'"

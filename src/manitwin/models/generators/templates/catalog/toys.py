@@ -23,6 +23,7 @@ from manitwin.geometry.solids.shapes import (
 from manitwin.models.generators.templates.catalog.hand_tools import grip
 from manitwin.models.generators.templates.catalog.rings import ring_radii, with_both_sides
 from manitwin.models.generators.templates.catalog.vessel import bulge
+from manitwin.models.generators.templates.standard_sizes import BRICK_GAP_M, STUD_PITCH_M
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -154,9 +155,9 @@ def chess_piece(*, height_m: float, width: float, head: float, waist: float) -> 
 
 @template("building block")
 def building_block(*, length_m: float, height: float, wall_m: float) -> Model:
-    """Build a brick with two rows of four studs, hollow from below."""
-    pitch = length_m / 4
-    y, h = 2 * pitch, height * length_m
+    """Build a brick with two rows of four studs, hollow from below, a fortieth of a pitch less than their places."""
+    pitch = length_m * STUD_PITCH_M / (4 * STUD_PITCH_M - BRICK_GAP_M)
+    y, h = pitch * (2 - BRICK_GAP_M / STUD_PITCH_M), height * length_m
     stud, raised = 0.3 * pitch, 0.22 * pitch
     model = Model().add("body", box(length_m, y, h, radius_m=0.0003))
     model.cut("inside", box(length_m - 2 * wall_m, y - 2 * wall_m, h).translate((0, 0, -wall_m)))

@@ -1,0 +1,236 @@
+"""What a text says of single parts: 'a red handle', 'red handled', 'blades 12 cm, handles red', 'yellow inside'."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from functools import cache
+from itertools import permutations
+
+from manitwin.errors import UsageError
+from manitwin.models.generators.templates.described import (
+    FILLER_WORDS,
+    PURPOSE,
+    RELATIVE,
+    Described,
+    Wish,
+    described,
+    is_described,
+)
+from manitwin.models.generators.templates.looks import color_of, look_of
+from manitwin.models.generators.templates.named_category import find_category, plain_words
+from manitwin.models.generators.templates.stated_amounts import without_amounts
+from manitwin.models.generators.templates.stated_lengths import DIRECTIONS, LENGTH
+from manitwin.models.generators.templates.template import Builder, Template
+
+_PART_NAMES = {
+    "lid": ("cap",), "cap": ("lid",), "top": ("cap", "lid"), "stopper": ("cap",), "cork": ("cap",), "grip": ("handle",),
+    "blade": ("head",), "strap": ("band",), "display": ("screen",), "bristle": ("bristles",), "edge": ("rim",),
+    "outside": ("body",), "exterior": ("body",), "interior": ("inside",),
+}  # fmt: skip
+"""Other words for slots of templates, the best first."""
+_COMMON_PARTS = ("handle", "lid", "cap", "rim", "blade", "knob", "spout", "strap")
+"""Of which a text may speak, whether a thing has them or not."""
+_WITH = re.compile(r" (?:with|having|featuring) ")
+_PIECES = re.compile(r" ?[,;:] ")
+_ALONG = {"", "long", "length", "across", "diameter", "longest"}
+"""Directions that say the longest side of a part, which is the one that a part can be told."""
+_BESIDE = frozenset(("are", "were", "each", "both", "length", "long", "size")) | FILLER_WORDS
+_ELSEWHERE = frozenset({"next", "inside", "on", "at", "for", "to", "by", "near", "under", "without"})
+
+
+def with_parts_told(plain: str, templates: Mapping[str, Template]) -> str:
+    """Return a text, as ``in_figures`` writes it, with what it says of parts behind the thing's name put behind 'with'.
+
+    'a screwdriver , shaft 15 cm , red handle' is 'a screwdriver with a 15 cm shaft and a red handle'. What stands behind a
+    length or an amount is parted as by a comma: 'a hammer 16 oz red handle'. Raises UsageError for a length of a part that is not
+    its longest side.
+    """
+    main, *told = _WITH.split(plain, maxsplit=1)
+    name, template, behind = _parted(main, templates)
+    if template is None or not behind:
+        return plain
+    parts, others = list[str](), list[str]()
+    for piece in behind:
+        each = [_of_part_in(phrase, template) for phrase in re.split(r" and ", piece)]
+        if len(each) > 1 and not all(each):
+            each = [_of_part_in(piece, template)]
+        if all(each):
+            parts += [phrase for phrase in each if phrase is not None]
+        else:
+            others.append(piece)
+    return " with ".join([" , ".join([name, *others]), *([" and ".join(parts)] if parts else []), *told])
+
+
+def _parted(main: str, templates: Mapping[str, Template]) -> tuple[str, Template | None, list[str]]:
+    """Return the words up to the thing's name, its template (None where no words name one) and the pieces behind."""
+    pieces = [piece for piece in _PIECES.split(main) if piece.strip()]
+    for at in range(len(pieces)):
+        head = " , ".join(pieces[: at + 1])
+        for name, rest in ((head, ""), *_cut_behind_amounts(head)):
+            try:
+                found = find_category(_without_numbers(name).split(), name, templates)
+            except UsageError:
+                continue
+            return name, templates[found.category], [*([rest] if rest else []), *pieces[at + 1 :]]
+    return main, None, []
+
+
+def _cut_behind_amounts(head: str) -> list[tuple[str, str]]:
+    """Return the words up to each amount and those behind it, where both are some."""
+    cuts = []
+    for amount in LENGTH.finditer(head):
+        end = amount.end() if amount[3] in DIRECTIONS else amount.start(3)
+        cuts.append((head[:end].strip(), head[end:].strip()))
+    bare = without_amounts(head)
+    if bare != " ".join(head.split()):
+        words = head.split()
+        cuts += [
+            (" ".join(words[:at]), " ".join(words[at:])) for at in range(len(words) - 1, 0, -1) if _ends(words[:at])
+        ]
+    return [(name, rest) for name, rest in cuts if name and rest]
+
+
+def _ends(words: list[str]) -> bool:
+    """Tell whether words end with a volume or a mass."""
+    return any(without_amounts(" ".join(words[-count:])) == "" for count in (1, 2, 3) if count <= len(words))
+
+
+def _without_numbers(text: str) -> str:
+    return LENGTH.sub(lambda m: "" if m[3] in DIRECTIONS else m[3], without_amounts(text))
+
+
+def _of_part_in(phrase: str, template: Template) -> str | None:
+    """Return what a phrase says of a part as 'a 12 cm red handle'; None where it speaks of none, or says nothing of it."""
+    lengths = list(LENGTH.finditer(phrase))
+    words = plain_words(LENGTH.sub(lambda m: "" if m[3] in DIRECTIONS else m[3], phrase).split())
+    if len(lengths) > 1 or not _ELSEWHERE.isdisjoint(words[:1]):
+        return None
+    words = [word for word in words if word not in _BESIDE]
+    said = _part_at(words, len(words) - 1, template)
+    if said is None or not PURPOSE.isdisjoint(said[1]):
+        said = _part_at(words, 0, template)  # 'handle on the left'
+    if said is None:
+        return None
+    part, others = said
+    if not lengths:
+        return " ".join(["a", *others, part])
+    number, unit, direction = lengths[0].groups()
+    if direction in DIRECTIONS and direction not in _ALONG:
+        raise UsageError(
+            f"{phrase.strip()!r}: of a part only its longest side can be told, such as '{part} {number} {unit}'; leave"
+            f" {direction!r} out or say it of the whole"
+        )
+    return " ".join(["a", number, unit, *others, part])
+
+
+def _part_at(words: list[str], at: int, template: Template) -> tuple[str, list[str]] | None:
+    """Return the part that is called by the words that end with word ``at``, or begin with it, and the others."""
+    for length in (2, 1):
+        start = max(at - length + 1, 0) if at else 0
+        called = " ".join(words[start : start + length])
+        part = part_said(called, template) or _adjective_of(called, template)
+        part = part or (called.removesuffix("s") if called.removesuffix("s") in _COMMON_PARTS else None)
+        if part is not None and len(words) >= start + length and not is_described(called):
+            return part, words[:start] + words[start + length :]
+    return None
+
+
+def part_said(word: str, template: Template) -> str | None:
+    """Return the slot or the part that a word means, in the plural or by another name; None where it means none."""
+    names = [word, word.removesuffix("s"), f"{word}s"]
+    names += [other for name in names[:2] for other in _PART_NAMES.get(name, ())]
+    for known in (template.slots, _built_parts(template.build, tuple(template.typical().items()))):
+        if (part := next((name for name in names if name in known), None)) is not None:
+            return part
+    return None
+
+
+@cache
+def _built_parts(build: Builder, measures: tuple[tuple[str, float], ...]) -> frozenset[str]:
+    return frozenset(build(**dict(measures)).slots)
+
+
+def _adjective_of(word: str, template: Template) -> str | None:
+    """Return the part that a word such as 'handled' says something of; None for any other word."""
+    for name in (*template.slots, *_COMMON_PARTS):
+        if word in (f"{name}d", f"{name}ed", f"{name}{name[-1]}ed", f"{name.removesuffix('s')}ed"):
+            return slot_called(name, template)
+    return None
+
+
+def part_before(words: list[str], template: Template) -> tuple[list[tuple[str, Described]], list[str]]:
+    """Return what is said of a part before the name ('a red handled hammer'), and the words that are left."""
+    for at, word in enumerate(words):
+        part = _adjective_of(word, template) or (word if word in template.slots else None)
+        if part is not None and at:
+            return [(part, of_part(words[:at]))], words[at + 1 :]
+    return [], words
+
+
+def slot_called(word: str, template: Template) -> str:
+    """Return the slot or the part that a word means, in the plural or by another name; else the word, in the singular."""
+    return part_said(word, template) or word.removesuffix("s")
+
+
+def features(text: str, template: Template) -> list[tuple[str, Described]]:
+    """Return what is said of each part behind 'with': 'a red handle, black head and green claw'.
+
+    A part that nothing is said of is as the one before it: of 'a red handle and lid' both are red.
+    """
+    found: list[tuple[str, Described]] = []
+    before: list[str] = []
+    for phrase in re.split(r"( and an? |^an? | and | , | with )", f" {text} ".replace("  ", " ")):
+        words = [word for word in plain_words(phrase.split()) if word not in FILLER_WORDS]
+        words = _joined_names(words, template)
+        if not words:
+            continue
+        names = [at for at, word in enumerate(words) if not is_described(word) or word in template.slots]
+        if not names and slot_called(words[-1], template) in template.slots:  # 'a cork' is a part, and of cork
+            found.append((slot_called(words[-1], template), of_part([*before, *words])))
+            before = []
+            continue
+        if not names:
+            before += [*words, "and"]  # 'red and white stripes'
+            continue
+        at = names[-1]  # the last but for 'a handle in red'
+        said = of_part([*before, *words[:at], *words[at + 1 :]])
+        found.append((slot_called(words[at], template), said if said != Described() or not found else found[-1][1]))
+        before = []
+    if before:
+        raise UsageError(f"no part is named that is {' '.join(before[:-1])}")
+    return found
+
+
+def shared_out(words: list[str], template: Template) -> tuple[list[tuple[str, Described]], list[str]]:
+    """Return which part has which of two colours that a thing is said to have, and the words that are left.
+
+    A black and white soccer ball is one whose parts usually have these; of others the colours stay where they are.
+    """
+    usual = {slot: {look_of(each).rgb for each in choices if each} for slot, choices in template.slots.items()}
+    for at in range(1, len(words) - 1):
+        one, other = color_of(words[at - 1]), color_of(words[at + 1])
+        if words[at] != "and" or one is None or other is None:
+            continue
+        for first, second in permutations(usual, 2):
+            if one in usual[first] and other in usual[second]:
+                parts = [(first, Described(Wish(one))), (second, Described(Wish(other)))]
+                return parts, [*words[: at - 1], *words[at + 2 :]]
+    return [], words
+
+
+def _joined_names(words: list[str], template: Template) -> list[str]:
+    """Return words with each slot's name of two words as one: the rear lamps are not the lamps."""
+    joined = list[str]()
+    for word in words:
+        if joined and (pair := f"{joined[-1]} {word}") in template.slots:
+            joined[-1] = pair
+        else:
+            joined.append(word)
+    return joined
+
+
+def of_part(words: list[str]) -> Described:
+    """Return what words say of a part, whose size a template cannot be told."""
+    said = described([word for word in words if word not in RELATIVE])
+    return Described(said.wish, None, (*said.unused, *(word for word in words if word in RELATIVE)))

@@ -1,0 +1,135 @@
+"""Texts as shops and people write them: without 'with', in two units, with letters for sides."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from told_templates import made_of, read, whole
+
+from manitwin.errors import UsageError
+from manitwin.models.generators.templates.looks import COLORS, MATERIALS
+
+
+def _rgb(word: str) -> tuple[float, ...]:
+    return tuple(int(COLORS[word][i : i + 2], 16) / 255 for i in (0, 2, 4))
+
+
+@pytest.mark.parametrize(
+    ("text", "colors"),
+    [
+        ("a mug, white outside and yellow inside", {"body": "white", "inside": "yellow"}),
+        ("a toy car, red body, black wheels, yellow lamps", {"body": "red", "wheels": "black", "lamps": "yellow"}),
+        ("a toy car with red rear lamps", {"rear lamps": "red"}),
+        ("a spray bottle: body white, trigger red", {"body": "white", "trigger": "red"}),
+        ("a keyboard, white, grey keys", {"": "white", "keys": "grey"}),
+        ("a bowl in cobalt blue, gold-rimmed", {"": "cobalt blue", "rim": "gold"}),
+        ("a mug - red - handle blue", {"": "red", "handle": "blue"}),
+        ("a black and white soccer ball", {"pentagons": "black", "body": "white"}),
+        ("a dish sponge, yellow and green", {"body": "yellow", "scourer": "green"}),
+        ("hammer 500 g red handle", {"handle": "red"}),
+    ],
+)
+def test_parts_have_their_colours_without_with(text: str, colors: dict[str, str]) -> None:
+    wishes = read(text).wishes
+    assert {part: wish.rgb for part, wish in wishes.items()} == {part: _rgb(word) for part, word in colors.items()}
+
+
+def test_a_colour_of_a_part_that_is_no_slot_is_seen() -> None:
+    assert made_of("a power bank with a red buttons").looks["button"].rgb == _rgb("red")
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("a wooden-handled chef's knife, blade 20 cm", {"blade": 0.2}),
+        ("a magnifying glass, lens 6 cm, wooden handle", {"lens": 0.06}),
+        ("a screwdriver, shaft 15 cm, handle 10 cm", {"shaft": 0.15, "handle": 0.1}),
+        ("a ladle with a 30 cm handle and a bowl of 9 cm", {"handle": 0.3, "bowl": 0.09}),
+        ("a paring knife with blade length 9 cm", {"blade": 0.09}),
+    ],
+)
+def test_lengths_of_parts_are_no_lengths_of_the_whole(text: str, parts: dict[str, float]) -> None:
+    assert read(text).part_lengths_m == pytest.approx(parts) and read(text).lengths_m == {}
+
+
+def test_what_no_part_has_is_refused() -> None:
+    with pytest.raises(UsageError, match=r"only its longest side.*'wide'"):
+        read("a desk lamp, shade 20 cm wide")
+    with pytest.raises(UsageError, match="a serving tray has no 'handle' here"):
+        made_of("a tray, 30 x 20 cm, handles black")
+
+
+@pytest.mark.parametrize(
+    ("text", "lengths"),
+    [
+        ("Stainless steel ruler 12 in / 30 cm", {"": 0.3048}),
+        ("a frying pan 28 cm (11 inches)", {"": 0.28}),
+        ("a bowl Ø 15 cm", {"width": 0.15}),
+        ("a bowl, dia. 15 cm", {"width": 0.15}),
+        ("a mug 9 cm (H) x 8 cm (W)", {"height": 0.09, "width": 0.08}),
+        ("a cup 8cm D x 10cm H", {"width": 0.08, "height": 0.1}),
+        ("box L30 x W20 x H10 cm", {"length": 0.3, "width": 0.2, "height": 0.1}),
+    ],
+)
+def test_lengths_of_shops_are_read(text: str, lengths: dict[str, float]) -> None:
+    assert read(text).lengths_m == pytest.approx(lengths)
+
+
+@pytest.mark.parametrize(
+    ("text", "volume_m3"),
+    [
+        ("a mug 16oz (473 ml)", 473.176e-6),
+        ("a bottle 1 pt", 473.176e-6),
+        ("a saucepan 1½ qt", 1.4195e-3),
+        ("trash can 13 gal", 49.21e-3),
+        ("a glass, 1 UK pint", 568.261e-6),
+        ("a bucket of 2 imperial gallons", 9.09218e-3),
+    ],
+)
+def test_volumes_of_shops_are_read(text: str, volume_m3: float) -> None:
+    amount = read(text).amount
+    assert amount is not None and amount.volume_m3 == pytest.approx(volume_m3, rel=1e-3)
+
+
+def test_amounts_in_two_units_that_differ_are_two() -> None:
+    with pytest.raises(UsageError, match="states 16 oz and 300 ml"):
+        read("mug 16 oz / 300 ml")
+    with pytest.raises(UsageError, match="several lengths"):
+        read("a box 12 in / 40 cm")
+
+
+@pytest.mark.parametrize(
+    ("text", "category", "unused"),
+    [
+        ("Whiteboard Eraser Magnetic, Blue", "whiteboard eraser", {"magnetic"}),
+        ("Hex Bolt M10 x 50 zinc plated", "bolt", {"zinc", "plated"}),
+        ("the green bowl next to the stove", "bowl", {"stove"}),
+        ("one of the oranges", "orange", set()),
+        ("a rust resistant knife", "knife", {"rust", "resistant"}),
+    ],
+)
+def test_words_behind_a_name_that_are_no_name_are_told(text: str, category: str, unused: set[str]) -> None:
+    assert read(text).category == category and set(read(text).unused) == unused
+
+
+@pytest.mark.parametrize("text", ["a mug 9 rack", "a mug rack", "a bottle rechargeable charger stand"])
+def test_a_noun_behind_a_name_makes_it_another_thing(text: str) -> None:
+    with pytest.raises(UsageError, match="no template makes"):
+        read(text)
+
+
+def test_a_kind_of_what_is_named_is_told() -> None:
+    with pytest.raises(UsageError, match="did you mean building block"):
+        read("the blue block")
+
+
+def test_what_is_seen_through_keeps_its_hue() -> None:
+    wish = whole("a transparent blue bottle")
+    assert wish.rgb == _rgb("blue") and wish.kind == "clear"
+    assert {made_of("a clear blue bottle").looks["body"].surface} <= {"glass", "plastic"}
+
+
+def test_glass_fibre_is_no_glass() -> None:
+    handle = made_of("Claw Hammer, fibreglass handle").looks["handle"]
+    assert handle.material == MATERIALS["fibreglass"].material and handle.density_kg_m3 == pytest.approx(1900)
+    assert np.allclose(made_of("a hammer with a fiberglass handle").looks["handle"].rgb, handle.rgb)
