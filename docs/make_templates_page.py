@@ -42,10 +42,10 @@ the right part; their source is `template:CATEGORY`. What is not here is refused
   rack is no mug. The twin is called as the text calls it (a skillet is a skillet, made by the frying pan's template).
 - **How it looks**: colours and materials before or after the name are those of the whole (a colour of a steel tool is its
   handle's); behind *with*, of a part, and of further ones behind *and*: `a small hammer with a red handle and a black head`.
-  As shops write it behind a comma, too: `screwdriver, shaft 15 cm, red handle`, `a mug, white outside and yellow inside`. What
-  the text does not say is drawn from the seed. Two colours or two materials of one part are refused. What is in a thing, or
-  what it is for, says nothing of it (a glass of red wine, a brush for wood); nor does a word that is not known: the check
-  `text_understood` names such.
+  As shops write it behind a comma, too: `screwdriver, shaft 15 cm, red handle`, `a mug, white outside and yellow inside`. A
+  part in a colour of its own ends at edges of the mesh (a plate's blue rim at a circle). What the text does not say is drawn
+  from the seed. Two colours or two materials of one part are refused. What is in a thing, or what it is for, says nothing of
+  it (a glass of red wine, a brush for wood); nor does a word that is not known: the check `text_understood` names such.
 - **How large it is**: `9 cm` is the longest extent, of a pan or pot its diameter; `9 cm tall`, `wide`, `long` is that
   direction (a chef's knife is called by its blade, a phone, tablet or laptop of so many inches by the diagonal of its screen,
   a wrench and an allen key of some millimetres by their nuts and screws). `30 x 20 x 15 cm` is length, width and height, `30 x

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 
 import numpy as np
 from manifold3d import Manifold
 
+from manitwin.geometry.solids.borders import with_border
 from manitwin.geometry.solids.shapes import checked
 
 
@@ -72,8 +73,16 @@ class Assembly:
         """Return what each part adds to the union, less what was cut, as solids that do not overlap."""
         return [(name, solid) for name, solid in self._volumes if not solid.is_empty()]
 
-    def mesh(self) -> PartedMesh:
-        """Return the union as a mesh; raises SolidError where nothing is left of it."""
+    def regions(self) -> list[tuple[str, str]]:
+        """Return the name of each region and that of the part which it is of."""
+        return [(name, of) for name, of, _ in self._regions]
+
+    def mesh(self, bordered: Collection[tuple[str, str]] = ()) -> PartedMesh:
+        """Return the union as a mesh; raises SolidError where nothing is left of it.
+
+        ``bordered`` are regions, by their names and their parts', whose borders are edges of the mesh: faces on them are cut.
+        Others are of whole faces.
+        """
         mesh = checked(self._solid, "assembly").to_mesh()
         vertices = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3]
         faces = np.asarray(mesh.tri_verts, dtype=np.int64)
@@ -85,9 +94,14 @@ class Assembly:
         starts = np.asarray(mesh.run_index, dtype=np.int64) // 3
         for original, start, end in zip(mesh.run_original_id, starts[:-1], starts[1:], strict=True):
             part[start:end] = names.index(self._names[int(original)])
-        centers = vertices[faces].mean(axis=1)
         for name, of, where in self._regions:
-            part[(part == names.index(of)) & where(centers)] = names.index(name)
+            chosen = part == names.index(of)
+            if (name, of) in bordered:
+                vertices, faces, origin, within = with_border(vertices, faces, chosen, where)
+                part = part[origin]
+            else:
+                within = chosen & where(vertices[faces].mean(axis=1))
+            part[within] = names.index(name)
         used, faces_used = np.unique(faces, return_inverse=True)
         return PartedMesh(vertices[used], faces_used.reshape(-1, 3), part, tuple(names))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,7 +67,8 @@ def make(template: Template, wanted: Wanted, rng: np.random.Generator, said: Map
         holds = _holds(template, wanted, looks_by_slot)
         measures = proportioned(template, measures, wanted.lengths_m, wanted.part_lengths_m, holds)
     model = template.build(**measures)
-    mesh = model.assembly.mesh()
+    apart = _told_apart(model, _looks_of(template, model, model.slots, looks_by_slot, wanted.wishes))
+    mesh = model.assembly.mesh(apart)
     _check_parts(template, wanted, mesh)
 
     def made_at(scale: float) -> Made:
@@ -75,7 +76,7 @@ def make(template: Template, wanted: Wanted, rng: np.random.Generator, said: Map
         if measures.get("wall_m", 1.0) * scale < LEAST_WALL_M:
             walled = measures | {"wall_m": LEAST_WALL_M / scale}
             its_model = template.build(**walled)
-            its_mesh = its_model.assembly.mesh()
+            its_mesh = its_model.assembly.mesh(apart)
             scale = _scale(template, wanted, its_model, its_mesh) if wanted.scaling_amount is None else scale
         return dressed(template, its_model, its_mesh, walled, looks_by_slot, wanted.wishes, scale)
 
@@ -113,10 +114,7 @@ def dressed(
     scale: float,
 ) -> Made:
     """Return a built model and its mesh, scaled, with the looks of its slots and what is wished for single parts."""
-    looks = {part: looks_by_slot[model.slots[part] or next(iter(template.slots))] for part in mesh.names}
-    for part, wish in wishes.items():
-        if part in looks and part not in template.slots:
-            looks[part] = wish.of(looks[part])
+    looks = _looks_of(template, model, mesh.names, looks_by_slot, wishes)
     solids, masses, densities = list[tuple[Manifold, float]](), dict[str, float](), dict[str, float]()
     for part, built in model.assembly.solids():
         solid = built.scale((scale, scale, scale))
@@ -136,6 +134,26 @@ def dressed(
         masses,
         densities,
     )
+
+
+def _looks_of(
+    template: Template,
+    model: Model,
+    parts: Iterable[str],
+    looks_by_slot: Mapping[str, Look],
+    wishes: Mapping[str, Wish],
+) -> dict[str, Look]:
+    """Return the look of each part: that of its slot, with what is wished for the part."""
+    looks = {part: looks_by_slot[model.slots[part] or next(iter(template.slots))] for part in parts}
+    for part, wish in wishes.items():
+        if part in looks and part not in template.slots:
+            looks[part] = wish.of(looks[part])
+    return looks
+
+
+def _told_apart(model: Model, looks: Mapping[str, Look]) -> list[tuple[str, str]]:
+    """Return the regions, by name and part, that look unlike the part which they are of: their borders are seen."""
+    return [(name, of) for name, of in model.assembly.regions() if looks[name] != looks[of]]
 
 
 def visual_parts(made: Made) -> list[trimesh.Trimesh]:

@@ -50,7 +50,7 @@ def pencil(*, length_m: float, thick_m: float) -> Model:
     model.region("lead", "wood", lambda centers: centers[:, 0] > end - 0.006, "lead")
     model.add("ferrule", cylinder(0.98 * r, 0.012).rotate((0, 90, 0)).translate((-end + 0.004, 0, 0)), "lead")
     model.add("eraser", cylinder(0.9 * r, 0.006).rotate((0, 90, 0)).translate((-end, 0, 0)), "eraser")
-    model.point("point", "tip", "wood", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
+    model.point("point", "tip", "lead", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
     return model.point("eraser", "tip", "eraser", (-end, 0.0, 0.0), (-1.0, 0.0, 0.0)).laid()
 
 
