@@ -27,6 +27,9 @@ def _rgb(word: str) -> tuple[float, ...]:
         ("a black and white soccer ball", {"pentagons": "black", "body": "white"}),
         ("a dish sponge, yellow and green", {"body": "yellow", "scourer": "green"}),
         ("hammer 500 g red handle", {"handle": "red"}),
+        ("a mug whose handle is white", {"handle": "white"}),
+        ("a plate with a blue rim, 27 cm, white", {"": "white", "rim": "blue"}),
+        ("a mug, gold accents", {}),
     ],
 )
 def test_parts_have_their_colours_without_with(text: str, colors: dict[str, str]) -> None:
@@ -105,6 +108,12 @@ def test_amounts_in_two_units_that_differ_are_two() -> None:
         ("Hex Bolt M10 x 50 zinc plated", "bolt", {"zinc", "plated"}),
         ("the green bowl next to the stove", "bowl", {"stove"}),
         ("one of the oranges", "orange", set()),
+        ("Kitchen Scissors Heavy Duty Stainless Steel 21 cm", "scissors", {"heavy", "duty"}),
+        ("Spray Bottle 16 oz clear glass with black trigger", "spray bottle", set()),
+        ("a carrot lying on the cutting board", "carrot", {"cutting", "board"}),
+        ("a white cup with saucer", "cup and saucer", set()),
+        ("tongs 12 inch silicone tips", "tongs", {"silicone", "tips"}),
+        ("stapler full strip red", "stapler", {"full", "strip"}),
         ("a rust resistant knife", "knife", {"rust", "resistant"}),
     ],
 )
@@ -112,7 +121,18 @@ def test_words_behind_a_name_that_are_no_name_are_told(text: str, category: str,
     assert read(text).category == category and set(read(text).unused) == unused
 
 
-@pytest.mark.parametrize("text", ["a mug 9 rack", "a mug rack", "a bottle rechargeable charger stand"])
+def test_colours_and_materials_at_both_ends_are_of_one_thing() -> None:
+    assert whole("Wooden rolling pin 45 cm beech").material == MATERIALS["beech"]
+    for text in ("a red jar with a black lid, blue", "a steel rolling pin, beech"):
+        with pytest.raises(UsageError, match=r"two (colours|materials) of one thing"):
+            read(text)
+    with pytest.raises(UsageError, match="red and white: say which part has which"):
+        read("a jar, red and white lid")
+
+
+@pytest.mark.parametrize(
+    "text", ["a mug rack red", "a mug 9 rack", "a mug rack", "a bottle rechargeable charger stand"]
+)
 def test_a_noun_behind_a_name_makes_it_another_thing(text: str) -> None:
     with pytest.raises(UsageError, match="no template makes"):
         read(text)

@@ -41,13 +41,42 @@ FILLER_WORDS = frozenset(
     (
         *("a", "an", "the", "one", "some", "its", "very", "and", "of", "colored", "coloured", "made", "with", "color"),
         *("colour", "that", "which", "is", "it", "out", "entirely", "all", "solid", "finish", "painted", "in", "for"),
-        *("from", ",", "please", "i", "want", "need", "make", "create", "generate", "build", "me", "my"),
+        *(
+            "whose",
+            "are",
+            "from",
+            ",",
+            "please",
+            "i",
+            "want",
+            "need",
+            "make",
+            "create",
+            "generate",
+            "build",
+            "me",
+            "my",
+        ),
     )
 )
 """Words that say nothing themselves."""
 PURPOSE = frozenset(
     {"for", "on", "inside", "holding", "containing", "filled", "full", "to", "by", "with", "having", "without"}
     | {"next", "beside", "near", "behind", "under", "above", "below", "beneath", "between", "at", "against", "over"}
+    | {
+        "lying",
+        "standing",
+        "sitting",
+        "leaning",
+        "hanging",
+        "resting",
+        "placed",
+        "located",
+        "closest",
+        "nearest",
+        "labelled",
+    }
+    | {"labeled", "marked", "called", "named"}
 )
 """What is behind these says nothing of the thing itself: a brush for wood is not of it."""
 _CONTENTS = frozenset(
@@ -206,7 +235,7 @@ def described_behind(words: Sequence[str]) -> Described:
 
 def _about(words: Sequence[str]) -> tuple[list[str], list[str]]:
     """Return the words behind a name that speak of it, and those that speak of what is in it, or what it is for."""
-    cut = next((at for at, word in enumerate(words) if word in PURPOSE), len(words))
+    cut = next((at for at, word in enumerate(words) if word in PURPOSE and not _is_plain_full(words, at)), len(words))
     about, beside = list(words[:cut]), [word for word in words[cut:] if word not in FILLER_WORDS | PURPOSE]
     telling = [word for word in about if word not in FILLER_WORDS]
     if telling and about[0] in ("of", "in"):
@@ -214,6 +243,18 @@ def _about(words: Sequence[str]) -> tuple[list[str], list[str]]:
         if holds or not is_described(telling[-1]):
             return [], [*telling, *beside]
     return about, beside
+
+
+def _is_plain_full(words: Sequence[str], at: int) -> bool:
+    """Tell whether a word is 'full' or 'filled' of nothing: a stapler, full strip."""
+    return words[at] in ("full", "filled") and words[at + 1 : at + 2] not in (["of"], ["with"])
+
+
+def more_exact(one: Look, other: Look) -> Look | None:
+    """Return the more exact of two names of one material: oak, of wood and oak; None for two materials."""
+    if one == other or (one.surface == other.surface and other.material in _PLAIN):
+        return one
+    return other if one.surface == other.surface and one.material in _PLAIN else None
 
 
 def is_described(word: str) -> bool:

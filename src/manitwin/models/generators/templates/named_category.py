@@ -34,6 +34,54 @@ _GROUPS = frozenset(
 )
 _ADJECTIVE = re.compile(r"[a-z]{4,}(?:ed|able|ible|less|proof|etic|omic|atic)")
 """Words that are no nouns by their ending, but for those that the priors know: an eraser, magnetic."""
+_ADJECTIVES = frozenset(
+    {
+        "heavy",
+        "duty",
+        "premium",
+        "classic",
+        "deluxe",
+        "professional",
+        "pro",
+        "modern",
+        "vintage",
+        "retro",
+        "wireless",
+        "cordless",
+    }
+    | {
+        "portable",
+        "bluetooth",
+        "led",
+        "eco",
+        "organic",
+        "natural",
+        "round",
+        "square",
+        "oval",
+        "slim",
+        "wide",
+        "narrow",
+        "double",
+    }
+    | {
+        "single",
+        "full",
+        "half",
+        "empty",
+        "hard",
+        "soft",
+        "fine",
+        "medium",
+        "new",
+        "old",
+        "used",
+        "thin",
+        "extra",
+        "universal",
+    }
+)
+"""What shops and people put behind a name that is part of no name."""
 USED_ALIKE = 0.6
 """The share of places of use in common, from which a thing of the same shape is worth a hint."""
 _COUNTS = frozenset(
@@ -111,10 +159,14 @@ def _says_more(tail: Sequence[str]) -> bool:
     if any(character.isdigit() for character in first) and not _is_number(first):
         return True
     coated = bool(rest) and rest[0].endswith("ed") and _ADJECTIVE.fullmatch(rest[0]) is not None  # 'zinc plated'
-    adjective = _ADJECTIVE.fullmatch(first) is not None and named(first) is None
-    if _is_number(first) or adjective or coated or first in FILLER_WORDS or is_described(first):
+    if _is_number(first) or is_adjective(first) or coated or first in FILLER_WORDS or is_described(first):
         return not rest or _says_more(rest)
     return False
+
+
+def is_adjective(word: str) -> bool:
+    """Tell whether a word that says no colour is no noun: 'magnetic', 'foldable', 'heavy duty'."""
+    return word in _ADJECTIVES or (_ADJECTIVE.fullmatch(word) is not None and named(word) is None)
 
 
 def _is_number(word: str) -> bool:

@@ -15,6 +15,7 @@ from manitwin.models.generators.templates.described import (
     Wish,
     described,
     described_behind,
+    more_exact,
 )
 from manitwin.models.generators.templates.looks import look_of
 from manitwin.models.generators.templates.matter import is_composite
@@ -55,7 +56,7 @@ _NUMBERED = frozenset(
     {"no", "number", "nr", "model", "type", "version", "mark", "mk", "series", "vol", "volume", "route"}
 )
 _IS_SIZED = re.compile(r"\b(?:size|eur?) ((?:\w{1,3} )?(?:\d[\d.]*|x*[sml]|small|medium|large|one)\b)")
-_WITH = re.compile(r" (?:with|having|featuring) | and an? (?=.)| (?:that|which) has ")
+_WITH = re.compile(r" (?:with|having|featuring|whose) | and an? (?=.)| (?:that|which) has ")
 
 
 @dataclass(frozen=True)
@@ -130,6 +131,8 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
             words = replace(words, wish=Wish())
         wishes = {} if words.wish == Wish() else {"": words.wish}
         unused = list(words.unused)
+        if any(part == "" for part, _ in parts):
+            words = _joined(words, Described(), Described(next(said.wish for part, said in parts if part == "")))
         for part, said in parts:
             wishes[part] = said.wish.over(wishes.get(part, Wish()))
             unused += [*said.unused, *([part] if any(word.isdigit() for word in said.unused) else [])]  # '192 pages'
@@ -220,14 +223,15 @@ def _slot_coated(wish: Wish, template: Template) -> str | None:
 
 def _joined(before: Described, own: Described, tail: Described) -> Described:
     """Return what is said before a name, in it and behind it: of one thing, so that two colours contradict each other."""
-    wishes = [said.wish for said in (before, tail)]
-    for what in ("rgb", "material"):
-        first, second = (getattr(wish, what) for wish in wishes)
-        if first is not None and second is not None and first != second:
-            raise UsageError(
-                f"two {'colours' if what == 'rgb' else 'materials'} of one thing: say which part has which"
-            )
-    wish = before.wish.over(tail.wish).over(own.wish)
+    one, other = before.wish, tail.wish
+    if one.rgb is not None and other.rgb is not None and one.rgb != other.rgb:
+        raise UsageError("two colours of one thing: say which part has which")
+    if one.material is not None and other.material is not None:
+        exact = more_exact(one.material, other.material)
+        if exact is None:
+            raise UsageError("two materials of one thing: say which part has which")
+        one = replace(one, material=exact)
+    wish = one.over(other).over(own.wish)
     relative = next((said.relative for said in (before, tail) if said.relative is not None), None)
     return Described(wish, relative, before.unused + tail.unused)
 

@@ -8,6 +8,7 @@ from functools import cache
 from itertools import permutations
 
 from manitwin.errors import UsageError
+from manitwin.models.annotators.prior_names import named
 from manitwin.models.generators.templates.described import (
     FILLER_WORDS,
     PURPOSE,
@@ -18,7 +19,7 @@ from manitwin.models.generators.templates.described import (
     is_described,
 )
 from manitwin.models.generators.templates.looks import color_of, look_of
-from manitwin.models.generators.templates.named_category import find_category, plain_words
+from manitwin.models.generators.templates.named_category import find_category, is_adjective, plain_words
 from manitwin.models.generators.templates.stated_amounts import without_amounts
 from manitwin.models.generators.templates.stated_lengths import DIRECTIONS, LENGTH
 from manitwin.models.generators.templates.template import Builder, Template
@@ -29,9 +30,9 @@ _PART_NAMES = {
     "outside": ("body",), "exterior": ("body",), "interior": ("inside",),
 }  # fmt: skip
 """Other words for slots of templates, the best first."""
-_COMMON_PARTS = ("handle", "lid", "cap", "rim", "blade", "knob", "spout", "strap")
+_COMMON_PARTS = ("handle", "lid", "cap", "rim", "blade", "knob", "spout", "strap", "base")
 """Of which a text may speak, whether a thing has them or not."""
-_WITH = re.compile(r" (?:with|having|featuring) ")
+_WITH = re.compile(r" (?:with|having|featuring|whose) ")
 _PIECES = re.compile(r" ?[,;:] ")
 _ALONG = {"", "long", "length", "across", "diameter", "longest"}
 """Directions that say the longest side of a part, which is the one that a part can be told."""
@@ -46,20 +47,41 @@ def with_parts_told(plain: str, templates: Mapping[str, Template]) -> str:
     length or an amount is parted as by a comma: 'a hammer 16 oz red handle'. Raises UsageError for a length of a part that is not
     its longest side.
     """
+    plain = _with_names_joined(plain, templates)
     main, *told = _WITH.split(plain, maxsplit=1)
     name, template, behind = _parted(main, templates)
     if template is None or not behind:
         return plain
-    parts, others = list[str](), list[str]()
+    parts, others, beside = list[str](), list[str](), list[str]()
     for piece in behind:
         each = [_of_part_in(phrase, template) for phrase in re.split(r" and ", piece)]
         if len(each) > 1 and not all(each):
             each = [_of_part_in(piece, template)]
         if all(each):
             parts += [phrase for phrase in each if phrase is not None]
+        elif _is_of_something_else(piece):
+            beside.append(piece)
         else:
             others.append(piece)
-    return " with ".join([" , ".join([name, *others]), *([" and ".join(parts)] if parts else []), *told])
+    main = " for ".join([" , ".join([name, *others]), *beside])
+    return " with ".join([main, *([" and ".join(parts)] if parts else []), *told])
+
+
+def _with_names_joined(plain: str, templates: Mapping[str, Template]) -> str:
+    """Return a text with names that say 'with' as their categories: of a cup with saucer the saucer is no part."""
+    for template in templates.values():
+        for name in template.names:
+            if " with " in name:
+                plain = re.sub(rf"\b{name}\b", template.category, plain)
+    return plain
+
+
+def _is_of_something_else(piece: str) -> bool:
+    """Tell whether colours and materials of a piece are of what is named in it, which is no part: gold accents, black ink."""
+    words = [word for word in plain_words(_without_numbers(piece).split()) if word not in FILLER_WORDS]
+    if len(words) < 2 or is_described(words[-1]) or is_adjective(words[-1]) or not words[-1].isalpha():
+        return False
+    return named(words[-1]) is None and any(is_described(word) for word in words[:-1])
 
 
 def _parted(main: str, templates: Mapping[str, Template]) -> tuple[str, Template | None, list[str]]:
@@ -67,7 +89,9 @@ def _parted(main: str, templates: Mapping[str, Template]) -> tuple[str, Template
     pieces = [piece for piece in _PIECES.split(main) if piece.strip()]
     for at in range(len(pieces)):
         head = " , ".join(pieces[: at + 1])
-        for name, rest in ((head, ""), *_cut_behind_amounts(head)):
+        cuts = _cut_behind_amounts(head)
+        sure = [(name, rest) for name, rest in cuts if not described(plain_words(rest.split())).unused]
+        for name, rest in (*sure, (head, ""), *cuts):
             try:
                 found = find_category(_without_numbers(name).split(), name, templates)
             except UsageError:
@@ -106,7 +130,9 @@ def _of_part_in(phrase: str, template: Template) -> str | None:
     words = plain_words(LENGTH.sub(lambda m: "" if m[3] in DIRECTIONS else m[3], phrase).split())
     if len(lengths) > 1 or not _ELSEWHERE.isdisjoint(words[:1]):
         return None
-    words = [word for word in words if word not in _BESIDE]
+    words = [
+        word for at, word in enumerate(words) if word not in _BESIDE or (word == "and" and 0 < at < len(words) - 1)
+    ]
     said = _part_at(words, len(words) - 1, template)
     if said is None or not PURPOSE.isdisjoint(said[1]):
         said = _part_at(words, 0, template)  # 'handle on the left'
@@ -180,7 +206,9 @@ def features(text: str, template: Template) -> list[tuple[str, Described]]:
     """
     found: list[tuple[str, Described]] = []
     before: list[str] = []
-    for phrase in re.split(r"( and an? |^an? | and | , | with )", f" {text} ".replace("  ", " ")):
+    mark = ""
+    for phrase in re.split(r"( and an? |^an? | and | , | with | and whose )", f" {text} ".replace("  ", " ")):
+        mark = phrase.strip() if phrase.strip() in ("and", ",") else mark
         words = [word for word in plain_words(phrase.split()) if word not in FILLER_WORDS]
         words = _joined_names(words, template)
         if not words:
@@ -197,6 +225,8 @@ def features(text: str, template: Template) -> list[tuple[str, Described]]:
         said = of_part([*before, *words[:at], *words[at + 1 :]])
         found.append((slot_called(words[at], template), said if said != Described() or not found else found[-1][1]))
         before = []
+    if before and found and mark == ",":  # 'with a straw, pink': of the whole
+        return [*found, ("", described(before[:-1]))]
     if before:
         raise UsageError(f"no part is named that is {' '.join(before[:-1])}")
     return found
