@@ -28,6 +28,7 @@ def _rgb(word: str) -> tuple[float, ...]:
         ("a dish sponge, yellow and green", {"body": "yellow", "scourer": "green"}),
         ("hammer 500 g red handle", {"handle": "red"}),
         ("a mug whose handle is white", {"handle": "white"}),
+        ("a mug, which is blue and has a white handle", {"": "blue", "handle": "white"}),
         ("a plate with a blue rim, 27 cm, white", {"": "white", "rim": "blue"}),
         ("a mug, gold accents", {}),
     ],
@@ -114,6 +115,7 @@ def test_amounts_in_two_units_that_differ_are_two() -> None:
         ("a white cup with saucer", "cup and saucer", set()),
         ("tongs 12 inch silicone tips", "tongs", {"silicone", "tips"}),
         ("stapler full strip red", "stapler", {"full", "strip"}),
+        ("a vase shaped like a bottle", "vase", {"bottle"}),
         ("a rust resistant knife", "knife", {"rust", "resistant"}),
     ],
 )
@@ -131,7 +133,16 @@ def test_colours_and_materials_at_both_ends_are_of_one_thing() -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["a mug rack red", "a mug 9 rack", "a mug rack", "a bottle rechargeable charger stand"]
+    "text",
+    [
+        "a mug rack red",
+        "a mug 9 rack",
+        "a mug rack",
+        "a 9V battery",
+        "a 9 V block battery",
+        "a button cell battery",
+        "a bottle rechargeable charger stand",
+    ],
 )
 def test_a_noun_behind_a_name_makes_it_another_thing(text: str) -> None:
     with pytest.raises(UsageError, match="no template makes"):

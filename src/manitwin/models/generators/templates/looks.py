@@ -142,6 +142,11 @@ MATERIALS: dict[str, Look] = {
         _look("olive wood", "wood", "b98a4e", 0.5, 900),
         _look("acacia", "wood", "8a5a34", 0.55, 700),
         _look("mahogany", "wood", "6b3421", 0.5, 600),
+        _look("hickory", "wood", "c9a26b", 0.6, 820),
+        _look("rosewood", "wood", "5b3326", 0.5, 850),
+        _look("cedar", "wood", "b5764a", 0.6, 380),
+        _look("spruce", "wood", "dfc79b", 0.65, 430),
+        _look("rubberwood", "wood", "d3b384", 0.6, 600),
         _look("ebony", "wood", "2b211d", 0.45, 1050),
         _look("cork", "foam", "b78c5c", 0.9, 200),
         _look("cardboard", "cardboard", "b08d5f", 0.85, 690),
@@ -205,8 +210,9 @@ SAME_MATERIAL = {
     "chrome vanadium steel": "steel", "tempered glass": "glass", "toughened glass": "glass",
     "cotton": "fabric", "linen": "fabric", "felt": "fabric", "canvas": "fabric", "denim": "fabric",
     "wool": "fabric", "latex": "rubber", "suede": "leather", "oakwood": "oak", "oaken": "oak", "pinewood": "pine",
-    "timber": "wood", "hardwood": "wood", "plywood": "wood", "cherry wood": "wood", "cement": "concrete",
-    "ceramics": "ceramic", "earthen": "earthenware", "aluminium alloy": "aluminium", "solid silver": "sterling silver",
+    "timber": "wood", "hardwood": "wood", "plywood": "wood", "cherry wood": "wood", "rubber wood": "rubberwood",
+    "cement": "concrete", "ceramics": "ceramic", "earthen": "earthenware", "aluminium alloy": "aluminium",
+    "solid silver": "sterling silver",
 }  # fmt: skip
 OF_PRECIOUS_METAL = {"silver": "sterling silver", "gold": "solid gold"}
 """What is a colour, but behind 'of': a goblet of silver."""

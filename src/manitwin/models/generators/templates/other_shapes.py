@@ -31,7 +31,9 @@ _NAMES_OF_OTHERS = _listed(
     """
     cherry tomato, baguette, cube, wooden cube, jenga block, alphabet block, tile, disc, chess king, chess queen, chess
     knight, rook, game piece, boot, high heel, sandal, slipper, clog, flip flop, pump shoe, high top, beanie, binder,
-    ring binder, laptop charger, power supply, joystick, stand, fitness band, fitness tracker, card holder, tetra pak
+    ring binder, laptop charger, power supply, joystick, stand, fitness band, fitness tracker, card holder, tetra pak,
+    9v battery, button cell, coin cell, button cell battery, coin cell battery,
+    coin battery, button battery
     """
 )
 """Other names in the priors of a template's category, of what it does not make: a boot is no low shoe, of chess pieces it makes

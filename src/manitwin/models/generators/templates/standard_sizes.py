@@ -52,6 +52,7 @@ _REWRITTEN = (
     (r"\b(?:us|ansi) (letter|legal|tabloid)\b", r"\1-size"),
     (r"\b(?:din |iso )?([abc]\d{1,2}|dl)(?: sized?| format)?\b", r"\1"),
     (r"# (\d+)\b", r"#\1"),
+    (r"(?<![\w.])9 ?v(?:olts?)? (?:block )?(?=batter)", "9v "),
     (r"\b(?:size )?(aaaa|aaa|aa|c|d)(?: size| cell)? (?=batter)", r"\1 "),
     (r"(?<=battery )(?:size |type )?(aaaa|aaa|aa|c|d)(?: size| cell)?\b", r"\1"),
     (r"\b(m\d+) ?x (\d+(?:\.\d+)?)(?: ?mm\b)?(?! x)", r"\1x\2"),

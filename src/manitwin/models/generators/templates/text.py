@@ -50,13 +50,14 @@ _NEGATIVE = re.compile(r"(?:^|(?<=[^\d\W]) |(?<=[(,:]) ?)[-−]\.?\d[\d.]*")
 _TOOL_HEADS = ("head", "blade")
 _COLORED_MATTER = {"plastic", "rubber"}
 _ONE_OF = re.compile(r"^(?:one|any|each|either) of (?:the|these|those|my|our) ")
+_SHAPED_LIKE = re.compile(r" (?:(?:that is )?shaped like|in the (?:shape|form) of|(?:that looks|looking) like) ")
 _NO_LENGTH = re.compile(r"#?\d[\d.]*(?:x\d[\d.]*)*")
 """A number, or several with 'x' between them, that says nothing."""
 _NUMBERED = frozenset(
     {"no", "number", "nr", "model", "type", "version", "mark", "mk", "series", "vol", "volume", "route"}
 )
 _IS_SIZED = re.compile(r"\b(?:size|eur?) ((?:\w{1,3} )?(?:\d[\d.]*|x*[sml]|small|medium|large|one)\b)")
-_WITH = re.compile(r" (?:with|having|featuring|whose) | and an? (?=.)| (?:that|which) has ")
+_WITH = re.compile(r" (?:(?:that|which|it|and) )?(?:with|having|featuring|whose|has) | and an? (?=.)")
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
     plain = in_codes(in_figures(text))
     _check_taken(text, plain)
     try:
-        plain = with_parts_told(_ONE_OF.sub("the ", plain), templates)
+        plain = with_parts_told(_SHAPED_LIKE.sub(" for ", _ONE_OF.sub("the ", plain)), templates)
     except UsageError as error:
         raise UsageError(f"{text!r}: {error}") from None
     lengths = lengths_of_whole(plain)

@@ -32,7 +32,7 @@ _PART_NAMES = {
 """Other words for slots of templates, the best first."""
 _COMMON_PARTS = ("handle", "lid", "cap", "rim", "blade", "knob", "spout", "strap", "base")
 """Of which a text may speak, whether a thing has them or not."""
-_WITH = re.compile(r" (?:with|having|featuring|whose) ")
+_WITH = re.compile(r" (?:(?:, )?(?:and|that|which|it) )?(?:with|having|featuring|whose|has) ")
 _PIECES = re.compile(r" ?[,;:] ")
 _ALONG = {"", "long", "length", "across", "diameter", "longest"}
 """Directions that say the longest side of a part, which is the one that a part can be told."""
