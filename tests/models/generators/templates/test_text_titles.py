@@ -50,6 +50,8 @@ def test_a_colour_of_a_part_that_is_no_slot_is_seen() -> None:
         ("a screwdriver, shaft 15 cm, handle 10 cm", {"shaft": 0.15, "handle": 0.1}),
         ("a ladle with a 30 cm handle and a bowl of 9 cm", {"handle": 0.3, "bowl": 0.09}),
         ("a paring knife with blade length 9 cm", {"blade": 0.09}),
+        ("a steel-bladed knife with a red plastic handle, blade length 9 cm", {"blade": 0.09}),
+        ("Phillips screwdriver PH2 x 100 mm", {"shaft": 0.1}),
     ],
 )
 def test_lengths_of_parts_are_no_lengths_of_the_whole(text: str, parts: dict[str, float]) -> None:
@@ -59,6 +61,10 @@ def test_lengths_of_parts_are_no_lengths_of_the_whole(text: str, parts: dict[str
 def test_what_no_part_has_is_refused() -> None:
     with pytest.raises(UsageError, match=r"only its longest side.*'wide'"):
         read("a desk lamp, shade 20 cm wide")
+    with pytest.raises(UsageError, match=r"only its longest side.*'wide'"):
+        read("a paint roller with a blue handle, roller 23 cm wide")
+    with pytest.raises(UsageError, match="a plate has no 'flower' here"):
+        made_of("a plate with a green edge and a flower in the middle")
     with pytest.raises(UsageError, match="a serving tray has no 'handle' here"):
         made_of("a tray, 30 x 20 cm, handles black")
 
@@ -87,6 +93,7 @@ def test_lengths_of_shops_are_read(text: str, lengths: dict[str, float]) -> None
         ("a saucepan 1½ qt", 1.4195e-3),
         ("trash can 13 gal", 49.21e-3),
         ("a glass, 1 UK pint", 568.261e-6),
+        ("pill bottle amber 30 dram with white cap", 110.9e-6),
         ("a bucket of 2 imperial gallons", 9.09218e-3),
     ],
 )

@@ -41,7 +41,8 @@ the pawn."""
 _COMPOUNDS = _listed(
     """
     cookie cutter, biscuit cutter, glass cutter, pipe cutter, bolt cutter, tile cutter, cigar cutter, fried egg, scrambled
-    egg, poached egg, horse shoe, snow shoe, brake shoe, onion ring, boxing ring, piston ring
+    egg, poached egg, horse shoe, snow shoe, brake shoe, onion ring, boxing ring, piston ring,
+    socket wrench, socket spanner, torque wrench, pipe wrench, strap wrench
     """
 )
 """A template's name behind a word that makes it another thing: a horse shoe is no shoe."""

@@ -49,6 +49,7 @@ _CORNERS = float(1 / np.cos(np.pi / 6))
 _THREAD = re.compile(r"m(\d+)(?:x(\d+(?:\.\d+)?))?")
 _REWRITTEN = (
     (r"\b(?:us |ansi )?(letter|legal|tabloid) (?:sized?|format|paper)\b", r"\1-size"),
+    (r"\b(legal|tabloid)\b(?!-)", r"\1-size"),
     (r"\b(?:us|ansi) (letter|legal|tabloid)\b", r"\1-size"),
     (r"\b(?:din |iso )?([abc]\d{1,2}|dl)(?: sized?| format)?\b", r"\1"),
     (r"# (\d+)\b", r"#\1"),
@@ -58,6 +59,7 @@ _REWRITTEN = (
     (r"\b(m\d+) ?x (\d+(?:\.\d+)?)(?: ?mm\b)?(?! x)", r"\1x\2"),
     (r"(?<![\w.#])(\d[\d.]*) x (\d[\d.]*)(?: x (\d[\d.]*))?(?![\w.])", r"\1x\2x\3"),
     (r"(?<=\d)x(?= |$)", ""),
+    (r"(?<=screwdriver )((?:ph|pz|sl|tx|t|h)\d+) x (\d+)(?: mm\b)?", r"\1 with a \2 mm shaft"),
 )
 
 

@@ -12,6 +12,7 @@ from manitwin.models.generators.templates.stated_lengths import ROUNDED
 _VOLUMES_M3 = {
     r"millilit(?:re|er)s?|ml": 1e-6, r"centilit(?:re|er)s?|cl": 1e-5, r"decilit(?:re|er)s?|dl": 1e-4,
     r"lit(?:re|er)s?|l": 1e-3, r"fl(?:uid)?\.? ?(?:ounces?|oz)": 29.5735e-6, r"pints?|pt": 473.176e-6,
+    r"(?:fl(?:uid)? )?drams?": 3.69669e-6,
     r"quarts?|qts?": 946.353e-6, r"gallons?|gals?": 3.785412e-3, r"cubic centimet(?:re|er)s?|ccm?|cm3|cm³": 1e-6,
     r"(?:uk|imperial|imp\.?|british) fl(?:uid)?\.? ?(?:ounces?|oz)": 28.4131e-6,
     r"(?:uk|imperial|imp\.?|british) (?:pints?|pt)": 568.261e-6,

@@ -33,6 +33,7 @@ _PART_NAMES = {
 _COMMON_PARTS = ("handle", "lid", "cap", "rim", "blade", "knob", "spout", "strap", "base")
 """Of which a text may speak, whether a thing has them or not."""
 _WITH = re.compile(r" (?:(?:, )?(?:and|that|which|it) )?(?:with|having|featuring|whose|has) ")
+_SOMEWHERE = re.compile(r" (?:in|on|at|near|around|along|under|above) the ")
 _PIECES = re.compile(r" ?[,;:] ")
 _ALONG = {"", "long", "length", "across", "diameter", "longest"}
 """Directions that say the longest side of a part, which is the one that a part can be told."""
@@ -50,7 +51,10 @@ def with_parts_told(plain: str, templates: Mapping[str, Template]) -> str:
     plain = _with_names_joined(plain, templates)
     main, *told = _WITH.split(plain, maxsplit=1)
     name, template, behind = _parted(main, templates)
-    if template is None or not behind:
+    if template is None:
+        return plain
+    told, late = _lengths_behind(told, template)
+    if not (behind or late):
         return plain
     parts, others, beside = list[str](), list[str](), list[str]()
     for piece in behind:
@@ -63,8 +67,19 @@ def with_parts_told(plain: str, templates: Mapping[str, Template]) -> str:
             beside.append(piece)
         else:
             others.append(piece)
+    parts += late
     main = " for ".join([" , ".join([name, *others]), *beside])
     return " with ".join([main, *([" and ".join(parts)] if parts else []), *told])
+
+
+def _lengths_behind(told: list[str], template: Template) -> tuple[list[str], list[str]]:
+    """Return what is told behind 'with' without the lengths of further parts behind a comma, and these: ', blade 9 cm'."""
+    if not told:
+        return told, []
+    first, *pieces = _PIECES.split(told[0])
+    late = {at: _of_part_in(piece, template) for at, piece in enumerate(pieces) if LENGTH.search(piece)}
+    kept = [piece for at, piece in enumerate(pieces) if late.get(at) is None]
+    return [" , ".join([first, *kept])], [phrase for phrase in late.values() if phrase is not None]
 
 
 def _with_names_joined(plain: str, templates: Mapping[str, Template]) -> str:
@@ -206,9 +221,11 @@ def features(text: str, template: Template) -> list[tuple[str, Described]]:
     """
     found: list[tuple[str, Described]] = []
     before: list[str] = []
-    mark = ""
+    mark, elsewhere = "", list[str]()
     for phrase in re.split(r"( and an? |^an? | and | , | with | and whose )", f" {text} ".replace("  ", " ")):
         mark = phrase.strip() if phrase.strip() in ("and", ",") else mark
+        phrase, *place = _SOMEWHERE.split(phrase, maxsplit=1)  # 'a flower in the middle'
+        elsewhere += [word for each in place for word in plain_words(each.split())]
         words = [word for word in plain_words(phrase.split()) if word not in FILLER_WORDS]
         words = _joined_names(words, template)
         if not words:
@@ -226,9 +243,12 @@ def features(text: str, template: Template) -> list[tuple[str, Described]]:
         found.append((slot_called(words[at], template), said if said != Described() or not found else found[-1][1]))
         before = []
     if before and found and mark == ",":  # 'with a straw, pink': of the whole
-        return [*found, ("", described(before[:-1]))]
-    if before:
+        found.append(("", described(before[:-1])))
+    elif before:
         raise UsageError(f"no part is named that is {' '.join(before[:-1])}")
+    if elsewhere and found:
+        part, said = found[-1]
+        found[-1] = (part, Described(said.wish, said.relative, (*said.unused, *elsewhere)))
     return found
 
 
