@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.described import RELATIVE
 from manitwin.models.generators.templates.looks import COLORS, MATERIALS, SAME_MATERIAL, SHADES
 from manitwin.models.generators.templates.made import make
 from manitwin.models.generators.templates.template import Template
 from manitwin.models.generators.templates.text import DIRECTIONS, Wanted
+from manitwin.models.generators.templates.vocabulary import RELATIVE
 
 PAGE = Path(__file__).parent / "templates.md"
 INTRODUCTION = """# Things from a sentence: the templates

@@ -79,6 +79,11 @@ from manitwin.models.generators.templates.text import MAX_CHARACTERS, read_text
         ("a pack of playing cards", "playing cards"),
         ("a lighter", "lighter"),
         ("a lighter blue mug", "mug"),
+        ("black over ear headphones", "headphones"),
+        ("a standing desk lamp", "desk lamp"),
+        ("a hanging basket", "basket"),
+        ("a red marked ruler", "ruler"),
+        ("the box labelled fragile", "box"),
     ],
 )
 def test_category_is_the_thing_that_is_named(text: str, category: str) -> None:

@@ -25,64 +25,15 @@ from manitwin.models.generators.templates.looks import (
     usual_looks,
 )
 from manitwin.models.generators.templates.matter import NO_MATTER_BEFORE, is_composite, is_matter, surfaces_of
+from manitwin.models.generators.templates.vocabulary import (
+    CONTENTS,
+    FILLER_WORDS,
+    PLACES,
+    PURPOSE,
+    RELATIVE,
+    speaks_of_others,
+)
 
-RELATIVE = {
-    "tiny": 0.0,
-    "small": 0.12,
-    "little": 0.12,
-    "mini": 0.0,
-    "large": 0.88,
-    "big": 0.88,
-    "huge": 1.0,
-    "giant": 1.0,
-}
-"""Where in the interval of a category's sizes a word puts a thing: 0 the least, 1 the largest."""
-FILLER_WORDS = frozenset(
-    (
-        *("a", "an", "the", "one", "some", "its", "very", "and", "of", "colored", "coloured", "made", "with", "color"),
-        *("colour", "that", "which", "is", "it", "out", "entirely", "all", "solid", "finish", "painted", "in", "for"),
-        *(
-            "whose",
-            "are",
-            "from",
-            ",",
-            "please",
-            "i",
-            "want",
-            "need",
-            "make",
-            "create",
-            "generate",
-            "build",
-            "me",
-            "my",
-        ),
-    )
-)
-"""Words that say nothing themselves."""
-PURPOSE = frozenset(
-    {"for", "on", "inside", "holding", "containing", "filled", "full", "to", "by", "with", "having", "without"}
-    | {"next", "beside", "near", "behind", "under", "above", "below", "beneath", "between", "at", "against", "over"}
-    | {
-        "lying",
-        "standing",
-        "sitting",
-        "leaning",
-        "hanging",
-        "resting",
-        "placed",
-        "located",
-        "closest",
-        "nearest",
-        "labelled",
-    }
-    | {"labeled", "marked", "called", "named"}
-)
-"""What is behind these says nothing of the thing itself: a brush for wood is not of it."""
-_CONTENTS = frozenset(
-    {"soap", "wax", "paper", "clay", "cloth", "fabric", "cream", "mustard", "mint", "lime", "olive", "peach"}
-)
-"""Materials and colours that behind 'of' are what is in a thing: a bottle of soap."""
 _GOLDEN = frozenset({"brass", "bronze", "copper"})
 _NO_COLOR_BEFORE = frozenset({"resistant", "proof", "free", "remover", "removal"})
 """Behind a colour's word, which then is none: rust resistant."""
@@ -235,19 +186,14 @@ def described_behind(words: Sequence[str]) -> Described:
 
 def _about(words: Sequence[str]) -> tuple[list[str], list[str]]:
     """Return the words behind a name that speak of it, and those that speak of what is in it, or what it is for."""
-    cut = next((at for at, word in enumerate(words) if word in PURPOSE and not _is_plain_full(words, at)), len(words))
-    about, beside = list(words[:cut]), [word for word in words[cut:] if word not in FILLER_WORDS | PURPOSE]
+    cut = next((at for at, word in enumerate(words) if speaks_of_others(words, at)), len(words))
+    about, beside = list(words[:cut]), [word for word in words[cut:] if word not in FILLER_WORDS | PURPOSE | PLACES]
     telling = [word for word in about if word not in FILLER_WORDS]
     if telling and about[0] in ("of", "in"):
-        holds = about[0] == "of" and telling[-1] in _CONTENTS
+        holds = about[0] == "of" and telling[-1] in CONTENTS
         if holds or not is_described(telling[-1]):
             return [], [*telling, *beside]
     return about, beside
-
-
-def _is_plain_full(words: Sequence[str], at: int) -> bool:
-    """Tell whether a word is 'full' or 'filled' of nothing: a stapler, full strip."""
-    return words[at] in ("full", "filled") and words[at + 1 : at + 2] not in (["of"], ["with"])
 
 
 def more_exact(one: Look, other: Look) -> Look | None:

@@ -12,16 +12,21 @@ from manitwin.errors import UsageError
 from manitwin.models.annotators.prior_names import lookup, named
 from manitwin.models.annotators.prior_records import Prior
 from manitwin.models.annotators.priors import load_priors
-from manitwin.models.generators.templates.described import FILLER_WORDS, PURPOSE, is_described, own_materials
+from manitwin.models.generators.templates.described import is_described, own_materials
 from manitwin.models.generators.templates.looks import color_of, look_of, material_of
 from manitwin.models.generators.templates.matter import is_food
 from manitwin.models.generators.templates.other_shapes import KIN_OF_ANOTHER_SHAPE, is_of_another_shape
 from manitwin.models.generators.templates.standard_sizes import is_size_code
 from manitwin.models.generators.templates.template import Template
+from manitwin.models.generators.templates.vocabulary import FILLER_WORDS, PURPOSE, speaks_of_others
 
-_BEHIND = frozenset({"of", "in", "from", "made", "that", "which", "painted", "colored", "coloured", ","}) | PURPOSE
+_BEHIND = (
+    frozenset({"of", "in", "from", "made", "that", "which", "painted", "colored", "coloured", ","})
+    | {"labelled", "labeled", "marked", "called", "named"}
+    | PURPOSE
+)
 """Words behind a name that begin what is said of the thing."""
-_PARTED = frozenset({"of", "in", "from"}) | PURPOSE
+_PARTED = frozenset({"of", "in", "from"})
 """What a thing is, the words before these say: a box of pencils is a box."""
 _SHOWN_AS = frozenset(
     {"piece", "kind", "sort", "type", "style", "model", "photo", "picture", "image"}
@@ -154,7 +159,7 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
 def _says_more(tail: Sequence[str]) -> bool:
     """Tell whether words behind a thing's name say more of it, and are no part of the name: 'in red', 'A5', 'size 42'."""
     first, *rest = tail
-    if first in _BEHIND or is_size_code(first) or (first == "size" and rest):
+    if first in _BEHIND or speaks_of_others(tail, 0) or is_size_code(first) or (first == "size" and rest):
         return True
     if any(character.isdigit() for character in first) and not _is_number(first):
         return True
@@ -187,7 +192,7 @@ def _says_how_it_looks(
     colored = color_of(phrase) is not None or (food and color_of(behind) is not None)
     if not (is_look or colored or (food and "," in before)):
         return False
-    ends = [at for at, word in enumerate(before) if word in _BEHIND - _PARTED]
+    ends = [at for at, word in enumerate(before) if word in _BEHIND - _PARTED - PURPOSE]
     if colored:
         telling = [at for at, word in enumerate(before) if word not in FILLER_WORDS and not is_described(word)]
         ends += [at + 1 for at in telling[-1:]]
@@ -195,9 +200,8 @@ def _says_how_it_looks(
 
 
 def _parts(words: Sequence[str], at: int) -> bool:
-    """Tell whether a word parts a thing from what is in it: 'full' in 'a cup full of tea', not in 'a half full glass'."""
-    behind = words[at + 1] if at + 1 < len(words) else ""
-    return words[at] in _PARTED and (words[at] not in ("full", "filled") or behind in ("of", "with"))
+    """Tell whether a word parts a thing from what is in it or beside it: 'full' in 'a cup full of tea'."""
+    return words[at] in _PARTED or speaks_of_others(words, at)
 
 
 def _without_counter(before: list[str]) -> list[str]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from manitwin.models.annotators.prior_names import singulars
-from manitwin.models.generators.templates.described import FILLER_WORDS, is_described
+from manitwin.models.generators.templates.described import is_described
+from manitwin.models.generators.templates.vocabulary import FILLER_WORDS
 
 
 def _listed(names: str) -> frozenset[str]:

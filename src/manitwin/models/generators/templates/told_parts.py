@@ -10,9 +10,6 @@ from itertools import permutations
 from manitwin.errors import UsageError
 from manitwin.models.annotators.prior_names import named
 from manitwin.models.generators.templates.described import (
-    FILLER_WORDS,
-    PURPOSE,
-    RELATIVE,
     Described,
     Wish,
     described,
@@ -23,6 +20,7 @@ from manitwin.models.generators.templates.named_category import find_category, i
 from manitwin.models.generators.templates.stated_amounts import without_amounts
 from manitwin.models.generators.templates.stated_lengths import DIRECTIONS, LENGTH
 from manitwin.models.generators.templates.template import Builder, Template
+from manitwin.models.generators.templates.vocabulary import FILLER_WORDS, PLACES, PURPOSE, RELATIVE
 
 _PART_NAMES = {
     "lid": ("cap",), "cap": ("lid",), "top": ("cap", "lid"), "stopper": ("cap",), "cork": ("cap",), "grip": ("handle",),
@@ -149,7 +147,7 @@ def _of_part_in(phrase: str, template: Template) -> str | None:
         word for at, word in enumerate(words) if word not in _BESIDE or (word == "and" and 0 < at < len(words) - 1)
     ]
     said = _part_at(words, len(words) - 1, template)
-    if said is None or not PURPOSE.isdisjoint(said[1]):
+    if said is None or not (PURPOSE | PLACES).isdisjoint(said[1]):
         said = _part_at(words, 0, template)  # 'handle on the left'
     if said is None:
         return None
