@@ -31,6 +31,8 @@ _PART_NAMES = {
 _COMMON_PARTS = ("handle", "lid", "cap", "rim", "blade", "knob", "spout", "strap", "base")
 """Of which a text may speak, whether a thing has them or not."""
 _WITH = re.compile(r" (?:(?:, )?(?:and|that|which|it) )?(?:with|having|featuring|whose|has) ")
+MOST_PIECES = 8
+"""Between commas, in which the thing's name is looked for: who says more of it before has said its name."""
 _SOMEWHERE = re.compile(r" (?:in|on|at|near|around|along|under|above) the ")
 _PIECES = re.compile(r" ?[,;:] ")
 _ALONG = {"", "long", "length", "across", "diameter", "longest"}
@@ -100,7 +102,7 @@ def _is_of_something_else(piece: str) -> bool:
 def _parted(main: str, templates: Mapping[str, Template]) -> tuple[str, Template | None, list[str]]:
     """Return the words up to the thing's name, its template (None where no words name one) and the pieces behind."""
     pieces = [piece for piece in _PIECES.split(main) if piece.strip()]
-    for at in range(len(pieces)):
+    for at in range(min(len(pieces), MOST_PIECES)):
         head = " , ".join(pieces[: at + 1])
         cuts = _cut_behind_amounts(head)
         sure = [(name, rest) for name, rest in cuts if not described(plain_words(rest.split())).unused]
