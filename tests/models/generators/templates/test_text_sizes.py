@@ -175,6 +175,9 @@ def test_a_thing_that_is_stated_small_has_walls_that_can_be_made() -> None:
         ("a white porcelain bowl, 15cm wide and 7 cm high", (0.15, 0.15, 0.07)),
         ("a mug, height 10 cm, diameter 8 cm", (None, 0.08, 0.10)),
         ("a bottle 7 x 25 cm", (0.07, 0.07, 0.25)),
+        ("a bowl 15 x 7 cm", (0.15, 0.15, 0.07)),
+        ("a dinner plate, 27 x 2.5 cm", (0.27, 0.27, 0.025)),
+        ("candle 7 x 10 cm", (0.07, 0.07, 0.10)),  # drawn slender, its two sides across are alike
         ("a frying pan of 28 cm, 5 cm deep", (None, 0.28, 0.05)),
         ("a hammer 30 cm long and 12 cm wide", (0.30, 0.12, None)),
         ("a mug, 9 cm tall, 300 ml", (None, None, 0.09)),

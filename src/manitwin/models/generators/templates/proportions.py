@@ -111,8 +111,13 @@ def _axes(sides_m: np.ndarray, lengths_m: Mapping[str, float], targets_m: np.nda
 
     ``targets_m (K,)`` are the lengths and what is said besides, which is now behind the three extents in ``sides_m``.
     """
-    second = (int(np.argsort(-sides_m[:3], kind="stable")[1]),) if "" in lengths_m else (X, Y, Z)
-    choices = [second if direction == "second" else _AXES[direction] for direction in lengths_m]
+    longest, middle, least = (int(axis) for axis in np.argsort(-sides_m[:3], kind="stable"))
+    said = dict(zip(lengths_m, targets_m, strict=False))
+    is_round = np.isclose(sides_m[longest], sides_m[middle], rtol=1e-3)
+    if is_round and {"", "second"} <= said.keys() and not np.isclose(said[""], said["second"], rtol=1e-3):
+        middle = least  # a bowl of 15 x 7 cm is so wide and so high
+    both = {"": (longest,), "second": (middle,)} if {"", "second"} <= lengths_m.keys() else {"second": (X, Y, Z)}
+    choices = [both.get(direction, _AXES.get(direction, ())) for direction in lengths_m]
     of_parts = [*range(3, len(sides_m))]
     distinct = [axes for axes in product(*choices) if len({*axes}) == len(axes)]
     if not distinct:
