@@ -48,16 +48,16 @@ the right part; their source is `template:CATEGORY`. What is not here is refused
   it (a glass of red wine, a brush for wood); nor does a word that is not known: the check `text_understood` names such.
 - **How large it is**: `9 cm` is the longest extent, of a pan or pot its diameter; `9 cm tall`, `wide`, `long` is that
   direction (a chef's knife is called by its blade, a phone, tablet or laptop of so many inches by the diagonal of its screen,
-  a wrench and an allen key of some millimetres by their nuts and screws). `30 x 20 x 15 cm` is length, width and height, `30 x
-  20 cm` the longest side and the second (of a round bowl its width and its height). `15 cm wide and 7 cm high` and `with a 20
-  cm blade` change the measures until what is made has these lengths, within 0.2 %; what would no longer be such a thing is
-  refused (a mug of 10 by 80 cm), but a box may be of any proportions. `500 ml`, `12 oz` and `1 pint` (of the United States)
-  are what a vessel holds to its brim, a closed one within its walls; `2 kg` is what the thing weighs: either sets the size. A
-  volume may stand beside lengths (`a mug, 9 cm tall, 300 ml`), a mass may not. Units may be spelt out, and inches, feet, yards
-  and fractions are read, British pints and gallons, and one amount in two units (`12 in / 30 cm`). Sizes of standards are
-  known: paper of a notebook or a book (A5, B6, letter), envelopes (C5, DL, #10), batteries (AAA), bolts, nuts and washers (M8
-  x 40), and the toy brick of 2x4 studs 8 mm apart. A size that no such thing has is refused. `small` and `large` choose within
-  the usual sizes.
+  a wrench and an allen key of some millimetres by their nuts and screws, a paint brush and a putty knife by their width). `30
+  x 20 x 15 cm` is length, width and height, `30 x 20 cm` the longest side and the second (of a round bowl its width and its
+  height). `15 cm wide and 7 cm high` and `with a 20 cm blade` change the measures until what is made has these lengths, within
+  0.2 %; what would no longer be such a thing is refused (a mug of 10 by 80 cm), but a box may be of any proportions. `500 ml`,
+  `12 oz` and `1 pint` (of the United States) are what a vessel holds to its brim, a closed one within its walls; `2 kg` is
+  what the thing weighs: either sets the size. A volume may stand beside lengths (`a mug, 9 cm tall, 300 ml`), a mass may not.
+  Units may be spelt out, and inches, feet, yards and fractions are read, British pints and gallons, and one amount in two
+  units (`12 in / 30 cm`). Sizes of standards are known: paper of a notebook or a book (A5, B6, letter), envelopes (C5, DL,
+  #10), batteries (AAA), bolts, nuts and washers (M8 x 40), and the toy brick of 2x4 studs 8 mm apart. A size that no such
+  thing has is refused. `small` and `large` choose within the usual sizes.
 - **What it cannot be told** is refused and not left out: two lengths of one side, from which to which a length is, what a
   thing is not, a number without a unit, a size of shoes or clothes. So is the longer name of another thing (a garlic bulb is
   no light bulb).

@@ -63,6 +63,8 @@ def test_a_tool_is_called_by_its_nuts_and_a_screen_by_its_diagonal() -> None:
     assert min(key) * np.cos(np.pi / 6) == pytest.approx(0.005, rel=1e-3)
     wrench = made_of("wrench 13 mm")
     assert np.prod([wrench.measures[name] for name in ("length_m", "head", "jaw")]) == pytest.approx(0.013, rel=1e-6)
+    for text, width_m in (('2" putty knife', 2 * INCH), ("a 4-inch paintbrush", 4 * INCH)):
+        assert np.ptp(made_of(text).mesh.vertices, axis=0)[1] == pytest.approx(width_m, rel=1e-3)
     assert np.ptp(made_of("a wrench, 20 cm").mesh.vertices, axis=0).max() == pytest.approx(0.2, rel=1e-6)
     for text in ('laptop 15.6"', "a laptop with a 15.6 inch screen"):
         mesh = made_of(text).mesh

@@ -27,6 +27,8 @@ def _rgb(word: str) -> tuple[float, ...]:
         ("a black and white soccer ball", {"pentagons": "black", "body": "white"}),
         ("a dish sponge, yellow and green", {"body": "yellow", "scourer": "green"}),
         ("hammer 500 g red handle", {"handle": "red"}),
+        ("black-rimmed glasses", {"frame": "black"}),
+        ("casserole 24cm volcanic orange", {"": "orange"}),
         ("a mug whose handle is white", {"handle": "white"}),
         ("a mug, which is blue and has a white handle", {"": "blue", "handle": "white"}),
         ("a plate with a blue rim, 27 cm, white", {"": "white", "rim": "blue"}),
@@ -79,6 +81,10 @@ def test_what_no_part_has_is_refused() -> None:
         ("a mug 9 cm (H) x 8 cm (W)", {"height": 0.09, "width": 0.08}),
         ("a cup 8cm D x 10cm H", {"width": 0.08, "height": 0.1}),
         ("box L30 x W20 x H10 cm", {"length": 0.3, "width": 0.2, "height": 0.1}),
+        ("box (LxWxH): 30x20x10 cm", {"length": 0.3, "width": 0.2, "height": 0.1}),
+        ("box 60 x 40 x 30 cm (W x D x H)", {"width": 0.6, "depth": 0.4, "height": 0.3}),
+        ("vase height: 30 cm, width: 12cm", {"height": 0.3, "width": 0.12}),
+        ("vase h 30 cm", {"height": 0.3}),
     ],
 )
 def test_lengths_of_shops_are_read(text: str, lengths: dict[str, float]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from fractions import Fraction
 
 _UNITS_M = {
@@ -29,11 +30,19 @@ _PART_OF_LENGTH = re.compile(
     r"(?: (?:long|across|in diameter|in length|diameter))?(?=$| ?[,;]| (?:and|with|having|made|for)\b)"
 )
 """'with a red handle of 12 cm', 'and blade length 9 cm'."""
-_NAMED_LENGTH = re.compile(rf"\b({_MEASURES})(?: of)? ({_AMOUNT})")
+_NAMED_LENGTH = re.compile(rf"\b({_MEASURES})(?: of| ?[:=])? ({_AMOUNT})")
 _AMOUNT_OR_NUMBER = rf"({_NUMBER})(?: ?({_UNIT})\b\.?)?"
 _BY = re.compile(rf"{_AMOUNT_OR_NUMBER} x {_AMOUNT_OR_NUMBER}(?: x {_AMOUNT_OR_NUMBER})?(?: in (?:size|all))?")
 """'30 x 20 x 15 cm': a number without a unit has that of the last one."""
 _TIMES = re.compile(rf"(?<=\d) ?(?:({_UNIT})\.?)? ?(?:x|by|×|\*) ?(?=\.?\d)")
+_LETTERS = r"\(?\b([lwhd]) ?[x×] ?([lwhd])(?: ?[x×] ?([lwhd]))?\b\)?"
+_SIDES = rf"({_DIGITS}) ?[x×] ?({_DIGITS})(?: ?[x×] ?({_DIGITS}))? ?({_UNIT})\b"
+_LETTERS_FIRST = re.compile(rf"{_LETTERS}[ :]*{_SIDES}")
+_LETTERS_LAST = re.compile(rf"{_SIDES} ?{_LETTERS}")
+"""'(LxWxH): 30x20x10 cm' and '30x20x10 cm (LxWxH)'."""
+_ONE_LETTERED = re.compile(rf"\b([lwh])[ :.=]{{1,2}}(?={_DIGITS} ?(?:{_UNIT})\b)")
+"""'h 30 cm', of one side."""
+_WORD_OF = {"l": "length", "w": "width", "h": "height"}
 _LETTERED_SIDE = rf"(?:\b([lwhd])[ :]?)?({_DIGITS}) ?({_UNIT})?\.? ?(?:\(?([lwhd])\b\)?)?"
 _LETTERED = re.compile(rf"(?<![\w.]){_LETTERED_SIDE} ?[x×] ?{_LETTERED_SIDE}(?: ?[x×] ?{_LETTERED_SIDE})?(?!\w)")
 """'9 cm (H) x 8 cm (W)', 'L30 x W20 x H10 cm'."""
@@ -104,7 +113,10 @@ def in_figures(text: str) -> str:
     plain = _FRACTION.sub(_in_decimals, plain)
     plain = re.sub(r"[ø⌀]|\bdiam?\b\.?", " diameter ", plain)
     plain = re.sub(r" [-–—] (?!\.?\d)|(?<!\d) [-–—] ", " , ", plain)
+    plain = _LETTERS_FIRST.sub(lambda m: _with_letters(m.groups()[3:], m.groups()[:3]) or m[0], plain)
+    plain = _LETTERS_LAST.sub(lambda m: _with_letters(m.groups()[:4], m.groups()[4:]) or m[0], plain)
     plain = _LETTERED.sub(_by_letter, plain)
+    plain = _ONE_LETTERED.sub(lambda m: f"{_WORD_OF[m[1]]} ", plain)
     plain = re.sub(r"(?<=\d) ?(?:-|–|—|\.{2,3}) ?(?=\.?\d)", "–", plain)
     plain = _TIMES.sub(lambda m: f" {m[1] or ''} x ", " ".join(plain.replace(",", " , ").replace("-", " ").split()))
     plain = " ".join(plain.split())
@@ -115,6 +127,15 @@ def in_figures(text: str) -> str:
     plain = _BY.sub(_by_direction, plain)
     plain = _PART_OF_LENGTH.sub(lambda m: f"{m[1]} a {m[3]} {m[4]} {m[2]}", plain)
     return _NAMED_LENGTH.sub(lambda m: f"{m[2]} {m[1]}", plain)
+
+
+def _with_letters(sides: Sequence[str | None], letters: Sequence[str | None]) -> str:
+    """Return numbers and their unit, each number with its letter before it: 'l30 x w20 x h10 cm'; '' for more of one kind."""
+    *numbers, unit = sides
+    if letters.count(None) != numbers.count(None):
+        return ""
+    pairs = zip(letters, numbers, strict=True)
+    return " x ".join(f"{letter}{number}" for letter, number in pairs if letter) + f" {unit}"
 
 
 def _by_letter(found: re.Match[str]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -20,6 +21,7 @@ from manitwin.models.generators.templates.described import (
 from manitwin.models.generators.templates.looks import look_of
 from manitwin.models.generators.templates.matter import is_composite
 from manitwin.models.generators.templates.named_category import find_category
+from manitwin.models.generators.templates.proportions import MARGIN
 from manitwin.models.generators.templates.standard_sizes import StandardSize, in_codes, standard_size
 from manitwin.models.generators.templates.stated_amounts import Amount, amounts_in, without_amounts
 from manitwin.models.generators.templates.stated_lengths import (
@@ -153,7 +155,7 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
     lengths = _lengths_beside(size, lengths, text)
     lengths, part_lengths = _diagonal(plain, lengths, part_lengths, template, text)
     nominal_m = None
-    if template.nominal and lengths.keys() == {""} and lengths[""] < prior.longest_axis_m.low / 2:
+    if lengths.keys() == {""} and _is_nominal(lengths[""], template, prior):
         nominal_m, lengths = lengths[""], {}
     unused = [word for word in unused if size is None or word not in (size.code, "x")]
     _check_numbers(text, unused)
@@ -161,6 +163,14 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
     return Wanted(
         found.category, wishes, lengths, words.relative, tuple(unused), part_lengths, amount, measures, nominal_m
     )
+
+
+def _is_nominal(length_m: float, template: Template, prior: Prior) -> bool:
+    """Tell whether a length is what such a tool is called by: it is that of no whole one, and near such sizes."""
+    of_it = [template.measures[name] for name in template.nominal]
+    low = template.nominal_times * math.prod(measure.low for measure in of_it) / MARGIN
+    high = template.nominal_times * math.prod(measure.high for measure in of_it) * MARGIN
+    return bool(of_it) and length_m < prior.longest_axis_m.low and low <= length_m <= high
 
 
 def _diagonal(

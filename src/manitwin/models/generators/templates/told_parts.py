@@ -24,7 +24,7 @@ from manitwin.models.generators.templates.vocabulary import FILLER_WORDS, PLACES
 
 _PART_NAMES = {
     "lid": ("cap",), "cap": ("lid",), "top": ("cap", "lid"), "stopper": ("cap",), "cork": ("cap",), "grip": ("handle",),
-    "blade": ("head",), "strap": ("band",), "display": ("screen",), "bristle": ("bristles",), "edge": ("rim",),
+    "blade": ("head",), "strap": ("band",), "display": ("screen",), "bristle": ("bristles",), "edge": ("rim",), "rim": ("frame",),
     "outside": ("body",), "exterior": ("body",), "interior": ("inside",),
 }  # fmt: skip
 """Other words for slots of templates, the best first."""
@@ -105,7 +105,7 @@ def _parted(main: str, templates: Mapping[str, Template]) -> tuple[str, Template
     for at in range(min(len(pieces), MOST_PIECES)):
         head = " , ".join(pieces[: at + 1])
         cuts = _cut_behind_amounts(head)
-        sure = [(name, rest) for name, rest in cuts if not described(plain_words(rest.split())).unused]
+        sure = [(name, rest) for name, rest in cuts if is_described("".join(plain_words(rest.split())[-1:]))]
         for name, rest in (*sure, (head, ""), *cuts):
             try:
                 found = find_category(_without_numbers(name).split(), name, templates)
