@@ -21,8 +21,8 @@ def import_assets(
 ) -> list[Imported]:
     """Import all assets at and below ``paths`` into folders below ``out`` that ``build`` takes; return what became of each.
 
-    What moves by joints is kept with its links and joints (URDF, MJCF, SDF), of other formats the first rigid part is taken; with
-    ``lock_joints`` all of it (URDF, MJCF, SDF) is one rigid body as the file stands. With ``each_object`` every
+    What moves by joints is kept with its links and joints (URDF, MJCF, SDF, USD), of other formats the first rigid part is taken;
+    with ``lock_joints`` all of it (the same formats) is one rigid body as the file stands. With ``each_object`` every
     object of an MJCF file that is free to move is an asset, else the first one alone. An asset that cannot be read has an
     ``error`` and no folder. Nothing is written over. Raises UsageError for a path that is not there, and where a folder of
     another kind has an asset's name.

@@ -73,17 +73,13 @@ class AssetFiles:
     def remark_left_out(self, parts: Sequence[str], what: str) -> None:
         """Note parts that are not of the rigid object that is read: each by what is said of it, or many as their count."""
         self.partial = self.partial or bool(parts)
-        if len(parts) > MOST_NAMED:
-            self.remark(f"{parts[0]}, and with it {len(parts) - 1} more {what} were left out: one rigid object is read")
-        for part in parts if len(parts) <= MOST_NAMED else ():
-            self.remark(f"{part} and was left out: one rigid object is read")
+        for sentence in of_left_out(parts, what):
+            self.remark(sentence)
 
     def remark_locked(self, joints: Sequence[str]) -> None:
         """Note joints that move and are held as the file stands."""
-        if joints:
-            more = f" and {len(joints) - MOST_NAMED} more" if len(joints) > MOST_NAMED else ""
-            named = ", ".join(_short(name) for name in joints[:MOST_NAMED])
-            self.remark(f"joints were locked as the file stands, so that it is one rigid body: {named}{more}")
+        for sentence in of_locked(joints):
+            self.remark(sentence)
 
     def find(self, name: str, candidates: Iterable[Path], below: str | None = None) -> Path | None:
         """Return the first candidate that is a file below the root; None, and noted as missing, where there is none.
@@ -256,6 +252,22 @@ class AssetFiles:
     def missing_names(self) -> tuple[str, ...]:
         """Return what is named and not there, each once."""
         return tuple(dict.fromkeys(self.missing))
+
+
+def of_left_out(parts: Sequence[str], what: str) -> list[str]:
+    """Return the remarks on parts that were left out: each by what is said of it, or many as their count."""
+    if len(parts) > MOST_NAMED:
+        return [f"{parts[0]}, and with it {len(parts) - 1} more {what} were left out: one rigid object is read"]
+    return [f"{part} and was left out: one rigid object is read" for part in parts]
+
+
+def of_locked(joints: Sequence[str]) -> list[str]:
+    """Return the remark on joints that move and are held as the file stands; none where there are none."""
+    if not joints:
+        return []
+    more = f" and {len(joints) - MOST_NAMED} more" if len(joints) > MOST_NAMED else ""
+    named = ", ".join(_short(name) for name in joints[:MOST_NAMED])
+    return [f"joints were locked as the file stands, so that it is one rigid body: {named}{more}"]
 
 
 def joined(parts: Iterable[trimesh.Trimesh]) -> tuple[np.ndarray, np.ndarray]:

@@ -53,7 +53,7 @@ VALID_ASSETS = (
 """What a person is told who gave something else."""
 _NAME_FILES = ("urdf", "mjcf", "sdf", "gso", "embodiedgen", "usd")
 """Descriptions that name meshes of other folders."""
-WITH_JOINTS = ("urdf", "mjcf", "sdf")
+WITH_JOINTS = ("urdf", "mjcf", "sdf", "usd")
 FORMATS: tuple[Format, ...] = ("twin", "urdf", "mjcf", "sdf", "usd", "robotwin", "manitwin100k", "embodiedgen", "gso")
 
 

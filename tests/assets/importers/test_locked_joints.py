@@ -85,8 +85,8 @@ def test_an_sdf_is_one_body(tmp_path: Path) -> None:
 
 
 def test_joints_of_formats_without_any_are_not_locked(tmp_path: Path) -> None:
-    path = written(tmp_path, "thing.usda", '#usda 1.0\ndef Xform "a" {}\n')
-    with pytest.raises(AssetError, match="urdf, mjcf, sdf; usd is read as it stands"):
+    path = written(tmp_path, "thing.urdf", '<robot name="r"><link name="l"><extra_info/></link></robot>')
+    with pytest.raises(AssetError, match="urdf, mjcf, sdf, usd; embodiedgen is read as it stands"):
         read_asset(path, joints="lock")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -19,11 +19,13 @@ from manitwin.errors import AssetError
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import DEFAULT_COLOR, bake_transform, make_part, pbr_material
 from manitwin.formats.meshes.triangles import triangle_fans
+from manitwin.formats.meshes.usd_places import PlacedPrim
 from manitwin.formats.meshes.usd_skin import Skeletons
 from manitwin.formats.meshes.usd_surfaces import PreviewSurfaces, UsdSurface, flat_colored
 from manitwin.formats.meshes.usdz import display_color, mesh_parts, mesh_polygons
 
 _MAX_SIZE_M = 1e6  # what is larger is no object, and its products overflow single precision
+_SOLIDS = ("Cube", "Sphere", "Cylinder", "Capsule", "Cone")
 _ALONG = {
     "X": [[0, 0, 1], [1, 0, 0], [0, 1, 0]],
     "Y": [[0, 1, 0], [0, 0, 1], [1, 0, 0]],
@@ -31,70 +33,78 @@ _ALONG = {
 }  # from along Z
 
 
+Seen = tuple[trimesh.Trimesh, PlacedPrim]
+"""A visual part, and the prim that it is of."""
+Felt = tuple[CollisionShape, PlacedPrim]
+
+
 class StageShapes:
-    """The shapes of a stage in its world's axes, transforms and scales baked in, in metres."""
+    """The shapes of a stage's prims in its world's axes, transforms and scales baked in, in metres."""
 
-    def __init__(self, stage: Usd.Stage, unit_m: float, surfaces: LayeredSurfaces, source: MeshSource):
-        self._unit_m, self._surfaces, self._source = unit_m, surfaces, source
-        self._transforms = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
-        self._skeletons = Skeletons(stage, source)
+    def __init__(
+        self,
+        placed: Sequence[PlacedPrim],
+        unit_m: float,
+        surfaces: LayeredSurfaces,
+        skeletons: Skeletons,
+        source: MeshSource,
+    ):
+        self._unit_m, self._surfaces, self._skeletons, self._source = unit_m, surfaces, skeletons, source
         self._faces = 0
-        self.prims = self._all_prims(stage)
-        self.gprims = [prim for prim in self.prims if self._is_shape(prim)]
+        self._made: dict[Sdf.Path, list[trimesh.Trimesh]] = {}
+        self.placed = tuple(placed)
+        self._shapes = [each for each in placed if self._is_shape(each.prim)]
 
-    def to_world(self, prim: Usd.Prim) -> np.ndarray:
+    def to_world(self, placed: PlacedPrim) -> np.ndarray:
         """Return the transform ``(4, 4)`` from a prim's own axes and unit to the stage's axes and metres."""
-        matrix = np.array(self._transforms.GetLocalToWorldTransform(prim)).T  # USD multiplies rows
-        matrix = np.diag([self._unit_m, self._unit_m, self._unit_m, 1.0]) @ matrix
-        if not np.isfinite(matrix).all() or np.abs(matrix).max() > _MAX_SIZE_M:
-            raise AssetError(
-                f"{self._source.path}: the transform of {prim.GetPath()} is {matrix[:3].tolist()}; mend it"
-            )
-        return matrix
+        return in_metres(placed, self._unit_m, self._source)
 
-    def visual(self) -> tuple[trimesh.Trimesh, ...]:
+    def visual(self) -> list[Seen]:
         """Return what is seen: shapes that are visible and for rendering."""
-        parts: list[trimesh.Trimesh] = []
-        for prim in self.gprims:
-            imageable = UsdGeom.Imageable(prim)
-            if imageable.ComputeVisibility() == UsdGeom.Tokens.invisible:
+        parts: list[Seen] = []
+        for placed in self._shapes:
+            if placed.is_hidden():
                 self._source.find("hidden shapes in it are no part of what is seen")
-            elif imageable.ComputePurpose() not in (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy):
-                parts += [self._checked(bake_transform(part, self.to_world(prim)), prim) for part in self._parts(prim)]
-        return tuple(parts)
+            elif is_rendered(placed):
+                matrix = self.to_world(placed)
+                parts += [
+                    (self._checked(bake_transform(part, matrix), placed.prim), placed) for part in self._parts(placed)
+                ]
+        return parts
 
-    def colliders(self) -> Iterator[Usd.Prim]:
+    def colliders(self) -> Iterator[PlacedPrim]:
         """Yield the shapes that collide: those with a collision API or below one, and those for guidance only."""
-        for prim in self.gprims:
-            owner = _nearest_with(prim, UsdPhysics.CollisionAPI)
-            if owner is None and UsdGeom.Imageable(prim).ComputePurpose() == UsdGeom.Tokens.guide:
+        for placed in self._shapes:
+            owner = nearest_with(placed, UsdPhysics.CollisionAPI)
+            if owner is None and UsdGeom.Imageable(placed.prim).ComputePurpose() == UsdGeom.Tokens.guide:
                 self._source.find("shapes of purpose guide without a collision API were taken as collision shapes")
-                yield prim
+                yield placed
             elif owner is not None and UsdPhysics.CollisionAPI(owner).GetCollisionEnabledAttr().Get() is not False:
-                if owner != prim:
+                if owner != placed.prim:
                     self._source.find(
                         f"the collision API is on {owner.GetTypeName() or 'a prim'}, not on the shapes below it"
                     )
-                yield prim
+                yield placed
 
-    def collision(self) -> tuple[CollisionShape, ...]:
+    def collision(self) -> list[Felt]:
         """Return the collision shapes; ``convex`` where the approximation is a hull, a box or a sphere."""
-        shapes = []
-        for prim in self.colliders():
-            local, convex = self._collider(prim)
-            world = self.to_world(prim)
-            baked = bake_transform(local, world)
+        shapes: list[Felt] = []
+        for placed in self.colliders():
+            prim = placed.prim
+            local, convex = self._collider(placed)
+            baked = bake_transform(local, self.to_world(placed))
             self._checked(baked, prim)
             vertices, faces = np.asarray(baked.vertices), np.asarray(baked.faces)
             primitive = not prim.IsA(UsdGeom.Mesh)
-            shapes.append(CollisionShape(prim.GetName(), vertices, faces, convex, primitive=primitive))
-        return tuple(shapes)
+            shapes.append((CollisionShape(prim.GetName(), vertices, faces, convex, primitive=primitive), placed))
+        return shapes
 
-    def _collider(self, prim: Usd.Prim) -> tuple[trimesh.Trimesh, bool]:
+    def _collider(self, placed: PlacedPrim) -> tuple[trimesh.Trimesh, bool]:
+        prim = placed.prim
         if not prim.IsA(UsdGeom.Mesh):
             return self._primitive(prim), True
         mesh = _bare_mesh(UsdGeom.Mesh(prim), self._source)
-        owner = _nearest_with(prim, UsdPhysics.MeshCollisionAPI)
+        owner = nearest_with(placed, UsdPhysics.MeshCollisionAPI)
         approximation = "none" if owner is None else UsdPhysics.MeshCollisionAPI(owner).GetApproximationAttr().Get()
         if approximation == UsdPhysics.Tokens.boundingCube and len(mesh.vertices):
             return _grey(mesh.bounding_box.copy(), prim), True
@@ -107,7 +117,13 @@ class StageShapes:
             self._source.find(f"collision shapes are left to the simulator to approximate ({str(approximation)[:40]})")
         return mesh, approximation == UsdPhysics.Tokens.convexHull
 
-    def _parts(self, prim: Usd.Prim) -> list[trimesh.Trimesh]:
+    def _parts(self, placed: PlacedPrim) -> list[trimesh.Trimesh]:
+        """Return a prim's parts in its own axes; of one that is repeated they are made once."""
+        if placed.prim.GetPath() not in self._made:
+            self._made[placed.prim.GetPath()] = self._parts_of(placed.prim)
+        return self._made[placed.prim.GetPath()]
+
+    def _parts_of(self, prim: Usd.Prim) -> list[trimesh.Trimesh]:
         if prim.IsA(UsdGeom.Mesh):
             return mesh_parts(UsdGeom.Mesh(prim), self._surfaces, self._skeletons, self._source)
         solid = self._primitive(prim)
@@ -143,15 +159,13 @@ class StageShapes:
         return value
 
     def _is_shape(self, prim: Usd.Prim) -> bool:
-        if prim.IsA(UsdGeom.Mesh):
-            return True
-        if str(prim.GetTypeName()) in ("Cube", "Sphere", "Cylinder", "Capsule", "Cone"):
+        if is_solid(prim):
             return True
         if UsdGeom.Imageable(prim).ComputePurpose() == UsdGeom.Tokens.guide and not prim.HasAPI(
             UsdPhysics.CollisionAPI
         ):
             return False  # drawn for people, as lines of grasps are
-        if prim.IsA(UsdGeom.Gprim) or prim.IsA(UsdGeom.PointInstancer):
+        if prim.IsA(UsdGeom.Gprim):
             self._source.find(f"{prim.GetTypeName()} prims in it were left out")
         return False
 
@@ -165,22 +179,36 @@ class StageShapes:
             )
         return part
 
-    def _all_prims(self, stage: Usd.Stage) -> list[Usd.Prim]:
-        prims = list(Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)))
-        for prim in prims:
-            check_types(prim, self._source)
-        if sum(prim.IsA(UsdGeom.Gprim) for prim in prims) > MAX_SHAPES:
-            raise AssetError(f"{self._source.path}: more than {MAX_SHAPES} shapes; it is no single object")
-        return prims
+
+def check_prims(placed: Sequence[PlacedPrim], source: MeshSource) -> None:
+    """Raise AssetError for values that are not of their schemas' types, and for more shapes than one object has."""
+    for prim in {each.prim.GetPath(): each.prim for each in placed}.values():
+        check_types(prim, source)
+    if sum(each.prim.IsA(UsdGeom.Gprim) for each in placed) > MAX_SHAPES:
+        raise AssetError(f"{source.path}: more than {MAX_SHAPES} shapes; it is no single object")
 
 
-def _nearest_with(prim: Usd.Prim, api: type) -> Usd.Prim | None:
+def in_metres(placed: PlacedPrim, unit_m: float, source: MeshSource) -> np.ndarray:
+    """Return the transform ``(4, 4)`` from a prim's own axes and unit to the stage's axes and metres."""
+    matrix = np.diag([unit_m, unit_m, unit_m, 1.0]) @ placed.to_world
+    if not np.isfinite(matrix).all() or np.abs(matrix).max() > _MAX_SIZE_M:
+        raise AssetError(f"{source.path}: the transform of {placed.prim.GetPath()} is {matrix[:3].tolist()}; mend it")
+    return np.asarray(matrix)
+
+
+def is_solid(prim: Usd.Prim) -> bool:
+    """Tell whether a prim is a shape that is read."""
+    return bool(prim.IsA(UsdGeom.Mesh)) or str(prim.GetTypeName()) in _SOLIDS
+
+
+def is_rendered(placed: PlacedPrim) -> bool:
+    """Tell whether a shape is for rendering, and not for guidance or a stand-in."""
+    return UsdGeom.Imageable(placed.prim).ComputePurpose() not in (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
+
+
+def nearest_with(placed: PlacedPrim, api: type) -> Usd.Prim | None:
     """Return the prim, or the nearest above it, that has an API."""
-    while prim and not prim.IsPseudoRoot():
-        if prim.HasAPI(api):
-            return prim
-        prim = prim.GetParent()
-    return None
+    return next((prim for prim in placed.lineage() if prim.HasAPI(api)), None)
 
 
 def _bare_mesh(mesh: UsdGeom.Mesh, source: MeshSource) -> trimesh.Trimesh:

@@ -35,7 +35,8 @@ def import_(
     lock_joints: Annotated[
         bool,
         typer.Option(
-            "--lock-joints", help="Take what moves by joints (URDF, MJCF, SDF) as one rigid body, as the file stands."
+            "--lock-joints",
+            help="Take what moves by joints (URDF, MJCF, SDF, USD) as one rigid body, as the file stands.",
         ),
     ] = False,
     each_object: Annotated[

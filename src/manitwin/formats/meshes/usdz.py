@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from pxr import Tf, Usd, UsdGeom, UsdShade
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
 
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import bake_transform, color_by_corner, make_part
 from manitwin.formats.meshes.triangles import triangle_fans
 from manitwin.formats.meshes.usd_errors import broken
+from manitwin.formats.meshes.usd_places import placed_prims
 from manitwin.formats.meshes.usd_skin import Skeletons, is_bound
 from manitwin.formats.meshes.usd_surfaces import PreviewSurfaces, UsdSurface
 from manitwin.formats.meshes.usdz_package import UsdzArchive
@@ -53,28 +54,26 @@ def _read(
 
 def _parts(stage: Usd.Stage, archive: UsdzArchive, source: MeshSource) -> list[trimesh.Trimesh]:
     surfaces, skeletons = PreviewSurfaces(archive, source), Skeletons(stage, source)
-    transforms = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
     parts: list[trimesh.Trimesh] = []
+    made: dict[Sdf.Path, list[trimesh.Trimesh]] = {}
     faces = 0
-    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)):
+    for placed in placed_prims(stage, source):
+        prim = placed.prim
         if not prim.IsA(UsdGeom.Mesh):
             drawn_for_people = UsdGeom.Imageable(prim).ComputePurpose() == UsdGeom.Tokens.guide  # as grasp lines are
-            if not drawn_for_people and (prim.IsA(UsdGeom.Gprim) or prim.IsA(UsdGeom.PointInstancer)):
+            if not drawn_for_people and prim.IsA(UsdGeom.Gprim):
                 source.find(f"{prim.GetTypeName()} prims in it were left out: only meshes are read")
             continue
-        imageable = UsdGeom.Imageable(prim)
-        if imageable.ComputeVisibility() == UsdGeom.Tokens.invisible or imageable.ComputePurpose() in (
-            "guide",
-            "proxy",
-        ):
+        if placed.is_hidden() or UsdGeom.Imageable(prim).ComputePurpose() in ("guide", "proxy"):
             source.find("hidden, guide or proxy meshes in it were left out")
             continue
-        matrix = np.array(transforms.GetLocalToWorldTransform(prim)).T  # USD multiplies rows
-        for part in mesh_parts(UsdGeom.Mesh(prim), surfaces, skeletons, source):
+        if prim.GetPath() not in made:  # what an instancer repeats is made once
+            made[prim.GetPath()] = mesh_parts(UsdGeom.Mesh(prim), surfaces, skeletons, source)
+        for part in made[prim.GetPath()]:
             faces += len(part.faces)
             source.check_faces(faces)
             source.check_parts(len(parts) + 1)
-            parts.append(bake_transform(part, matrix))
+            parts.append(bake_transform(part, placed.to_world))
     return parts
 
 

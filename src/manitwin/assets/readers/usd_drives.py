@@ -1,0 +1,81 @@
+"""What slows, drives and bounds a joint of a USD stage: UsdPhysics drives, and what PhysX, MuJoCo and Newton add to a joint."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from pxr import Usd, UsdPhysics
+
+from manitwin.assets.readers.usd_masses import StageUnits
+from manitwin.errors import AssetError
+from manitwin.formats.meshes.source import MeshSource
+
+_UNLIMITED = 1e15
+_FASTEST = 1e6
+"""PhysX's own greatest speed of a joint, where nobody says another (PhysxJointAPI)."""
+_NOT_OF_TWINS = (
+    "physxJoint:armature", "newton:armature", "mjc:armature", "mjc:stiffness", "physxJoint:jointFriction",
+)  # fmt: skip
+"""PhysX's friction of a joint is a share of the force that holds it, and none of its own."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """``damping`` in N m s/rad or N s/m, ``friction`` and ``effort`` in N m or N, ``velocity`` in rad/s or m/s; None: unsaid."""
+
+    damping: float = 0.0
+    friction: float = 0.0
+    effort: float | None = None
+    velocity: float | None = None
+
+
+def drive_of(prim: Usd.Prim, axis: str, units: StageUnits, source: MeshSource, *, slides: bool) -> Drive:
+    """Return what is said of a joint about or along ``axis`` (X, Y or Z).
+
+    A drive without stiffness that drives nowhere is a damper. USD's angles are degrees: a damping is a torque for each degree
+    a second. MuJoCo's values are in its own units, m, kg and rad. What twins do not have is remarked.
+    Source: UsdPhysics schema, DriveAPI; PhysxSchema, PhysxJointAPI; MuJoCo's OpenUSD documentation, MjcJointAPI.
+    """
+    force = units.kg * units.m if slides else units.kg * units.m**2  # of a force or a torque, over s2
+    way = units.m if slides else math.radians(1.0)
+
+    def said(name: str) -> float | None:
+        return _positive(prim, name, source)
+
+    damping, effort, motor = None, None, False
+    for name in ("linear" if slides else "angular", f"{'trans' if slides else 'rot'}{axis}"):
+        if not prim.HasAPI(UsdPhysics.DriveAPI, name):
+            continue
+        drive = f"drive:{name}:physics"
+        most, damps = said(f"{drive}:maxForce"), said(f"{drive}:damping")
+        effort = effort if most is None else most * force
+        if said(f"{drive}:stiffness") or prim.GetAttribute(f"{drive}:targetVelocity").Get():
+            motor = True
+        elif damps is not None:
+            damping = damps * force / way
+    newton, mujoco = said("newton:damping"), said("mjc:damping")
+    damping = mujoco or (damping if newton is None else newton * force / way)
+    rubs, resists = said("mjc:frictionloss"), said("newton:friction")
+    fastest = said("physxJoint:maxJointVelocity")
+    if motor or any(said(name) is not None for name in _NOT_OF_TWINS):
+        source.find("motors, springs and armatures of its joints were left out: twins do not have them")
+    return Drive(
+        damping or 0.0,
+        rubs or (0.0 if resists is None else resists * force),
+        effort,
+        None if fastest is None or fastest >= _FASTEST else fastest * way,
+    )
+
+
+def _positive(prim: Usd.Prim, name: str, source: MeshSource) -> float | None:
+    """Return a number above 0 that somebody wrote; None where there is none, or one that bounds nothing."""
+    attribute = prim.GetAttribute(name)
+    written = attribute.Get(Usd.TimeCode.EarliestTime()) if attribute and attribute.HasAuthoredValue() else None
+    if written is None:
+        return None
+    if not isinstance(written, int | float) or math.isnan(written):
+        raise AssetError(f"{source.path}: {attribute.GetPath()} is {str(written)[:40]!r}; mend it")
+    value = float(str(np.float32(written)))  # the number as it was meant, as of masses
+    return value if 0 < value < _UNLIMITED else None

@@ -1,0 +1,218 @@
+"""Which prims of a USD stage are of the first object that moves in itself, and which joints of it a twin can have."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+from pxr import Sdf, Usd, UsdPhysics
+
+from manitwin.assets.articulation import Node, Tree, rigid_links
+from manitwin.assets.asset_files import of_left_out, of_locked
+from manitwin.assets.joints import DeclaredJoint, Joints
+from manitwin.assets.readers.usd_held import held_together
+from manitwin.assets.readers.usd_joints import StageJoint, declared_joint, stage_joints
+from manitwin.assets.readers.usd_masses import StageUnits, body_of
+from manitwin.assets.readers.usd_shapes import is_rendered, is_solid
+from manitwin.formats.meshes.source import MeshSource
+from manitwin.formats.meshes.usd_places import PlacedPrim
+
+Body: TypeAlias = "Sdf.Path | None"
+"""A rigid body by its path, or None: what is of no rigid body, and stands fast."""
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """The prims of the object that is read, which is the ``whole`` stage or what joints hold together; ``joints`` are all of it.
+
+    ``moving`` is what moves, None where nothing does, ``bodies`` and ``nodes`` the bodies in its order. ``partial``: others were
+    left out.
+    """
+
+    placed: tuple[PlacedPrim, ...]
+    joints: tuple[DeclaredJoint, ...]
+    whole: bool = True
+    partial: bool = False
+    bodies: tuple[Body, ...] = ()
+    nodes: tuple[Node, ...] = ()
+    moving: Tree | None = None
+
+    def node_of(self, placed: PlacedPrim) -> int:
+        """Return the place of the node that a prim is of."""
+        return self.bodies.index(path_of_body(placed))
+
+
+def path_of_body(placed: PlacedPrim) -> Body:
+    """Return the path of the rigid body that a prim is of."""
+    body = body_of(placed)
+    return None if body is None else body.GetPath()
+
+
+def chosen_bodies(
+    stage: Usd.Stage, placed: Sequence[PlacedPrim], units: StageUnits, joints: Joints, source: MeshSource
+) -> Chosen:
+    """Return what of a stage is read: all of it where nothing moves by joints, or with ``joints="part"``.
+
+    "lock" and "keep": of what joints hold together the first that moves, as the stage has it; "keep" with the links and joints.
+    What stands fast is of it where a joint names it, or moves what hangs from the world. Raises AssetError.
+    """
+    of_path = {each.prim.GetPath(): each for each in placed if not each.copy}
+    found = stage_joints(placed, of_path, source)
+    declared = tuple(declared_joint(joint, units) for joint in found)
+    held = [joint for joint in found if joint.holds]
+    if joints == "part" or all(joint.kind == "fixed" for joint in held):
+        return Chosen(tuple(placed), declared)
+    owned = [(each, path_of_body(each)) for each in placed]
+    default = stage.GetDefaultPrim()
+    world = default.GetPath() if default else Sdf.Path.absoluteRootPath
+    joining = [joint for joint in held if all(joint.ends) or _holds_what_stands(joint, owned, world)]
+    fast = {_below(joint, world) for joint in joining} - {None}
+    owned = [(each, body) for each, body in owned if body is not None or _is_below(each, fast)]
+    groups = _joined(joining, owned)
+    solid = {body for each, body in owned if is_solid(each.prim)}
+    moved = [joint for joint in joining if joint.kind != "fixed" and groups[joint.ends[0]] & solid]
+    if not moved:
+        return Chosen(tuple(placed), declared)
+    chosen = groups[moved[0].ends[0]]
+    kept = [(each, body) for each, body in owned if body in chosen]
+    left = _left_out(placed, {id(each) for each, _ in kept}, held)
+    for sentence in of_left_out(left, "bodies and shapes"):
+        source.find(sentence)
+    mine, within = tuple(each for each, _ in kept), [joint for joint in joining if joint.ends[0] in chosen]
+    if joints == "lock":
+        for sentence in of_locked([joint.told() for joint in within if joint.kind != "fixed"]):
+            source.find(sentence)
+        return Chosen(mine, declared, whole=False, partial=bool(left))
+    root = _root(list(dict.fromkeys(body for _, body in kept)), within, held, of_path)
+    order, nodes, motions = _tree(root, within, kept, of_path, units, source)
+    tree = rigid_links(nodes)
+    for sentence in tree.remarks:
+        source.find(sentence)
+    moving = tree if tree.joints else None
+    scale = np.diag([units.m] * 3 + [1.0])
+    in_units = {body: np.linalg.inv(scale) @ motion @ scale for body, motion in zip(order, motions, strict=True)}
+    mine = tuple(replace(each, to_world=in_units[body] @ each.to_world) for each, body in kept)
+    return Chosen(mine, declared, False, bool(left), tuple(order), tuple(nodes), moving)
+
+
+def _below(joint: StageJoint, world: Sdf.Path) -> Body:
+    """Return below which prim a joint to the world holds what stands fast; None of one that holds nothing of it.
+
+    One that is fixed and names no prim only stands its body there.
+    """
+    if all(joint.ends):
+        return None
+    named = joint.named[joint.ends.index(None)]
+    if named is not None:
+        return named.GetPath()
+    return None if joint.kind == "fixed" else world
+
+
+def _holds_what_stands(joint: StageJoint, owned: Sequence[tuple[PlacedPrim, Body]], world: Sdf.Path) -> bool:
+    below = _below(joint, world)
+    fast = (each for each, body in owned if body is None and is_solid(each.prim))
+    return below is not None and any(_is_below(each, {below}) for each in fast)
+
+
+def _is_below(placed: PlacedPrim, paths: Set[Body]) -> bool:
+    return Sdf.Path.absoluteRootPath in paths or any(prim.GetPath() in paths for prim in placed.lineage())
+
+
+def _joined(joints: Sequence[StageJoint], owned: Sequence[tuple[PlacedPrim, Body]]) -> dict[Body, set[Body]]:
+    """Return for each body those that joints hold together with it."""
+    group: dict[Body, set[Body]] = {body: {body} for _, body in owned}
+    for joint in joints:
+        first, second = (group[end] for end in joint.ends)
+        if first is not second:
+            small, large = sorted((first, second), key=len)
+            large |= small
+            group.update(dict.fromkeys(small, large))
+    return group
+
+
+def _left_out(placed: Sequence[PlacedPrim], kept: Set[int], held: Sequence[StageJoint]) -> list[str]:
+    """Return what is said of each body, and of each shape of none, that is not of the object; ``kept`` are ids of what is."""
+    moves = {end: joint for joint in held if joint.kind != "fixed" for end in joint.ends}
+    left: dict[Body, str] = {}
+    for each in placed:
+        if id(each) in kept or not is_solid(each.prim):
+            continue
+        body = path_of_body(each)
+        if body is None:
+            left.setdefault(each.prim.GetPath(), f"shape {each.prim.GetName()!r} is of no rigid body")
+        else:
+            how = f"moves by joint {moves[body].told()}" if body in moves else "is joined to nothing that moves"
+            left.setdefault(body, f"body {body.name!r} {how}")
+    return list(left.values())
+
+
+def _root(
+    bodies: Sequence[Body],
+    within: Sequence[StageJoint],
+    held: Sequence[StageJoint],
+    of_path: Mapping[Sdf.Path, PlacedPrim],
+) -> Body:
+    """Return the body that the others hang from.
+
+    That is what stands fast, what a fixed joint holds to the world, what is said to be the root of an articulation, or the first
+    that is no joint's second body.
+    """
+    anchored = {end for joint in held if joint.kind == "fixed" and None in joint.ends for end in joint.ends}
+    said = {body for body in bodies if body and of_path[body].prim.HasAPI(UsdPhysics.ArticulationRootAPI)}
+    seconds = {joint.ends[1] for joint in within}
+    first = [body for body in bodies if body not in seconds]
+    for these in ({None}, anchored, said, set(first)):
+        root = [body for body in bodies if body in these]
+        if root:
+            return root[0]
+    return bodies[0]
+
+
+def _tree(
+    root: Body,
+    joints: Sequence[StageJoint],
+    kept: Sequence[tuple[PlacedPrim, Body]],
+    of_path: Mapping[Sdf.Path, PlacedPrim],
+    units: StageUnits,
+    source: MeshSource,
+) -> tuple[list[Body], list[Node], list[np.ndarray]]:
+    """Return the bodies in an order in which those that hold come first, what each is held by, and how it is moved ``(4, 4)``.
+
+    That is from where the stage has it to where joints hold it, in the stage's axes and metres. A joint that would hold a body a
+    second time closes a loop, and is left out with a remark: of two the one that is excluded from the articulation.
+    """
+    seen = {body for each, body in kept if is_solid(each.prim) and is_rendered(each) and not each.is_hidden()}
+    at: dict[Body, dict[Body, list[StageJoint]]] = {}
+    for joint in joints:
+        for body, other in (joint.ends, joint.ends[::-1]):
+            at.setdefault(body, {}).setdefault(other, []).append(joint)
+    place_of = {root: 0}
+    order, used = [root], set()
+    nodes, motions = [Node(_named(root, joints), None, root in seen)], [np.eye(4)]
+    for extra in (False, True):
+        for body in order:  # grows by the bodies that joints hold to it
+            for other, between in at.get(body, {}).items():
+                if other in place_of or (not extra and all(joint.is_extra for joint in between)):
+                    continue
+                joint, held = held_together(between, body, of_path, units, source)
+                holder = motions[place_of[body]]
+                moves = None if held.joint is None else held.joint.moved(holder)
+                nodes.append(Node(_named(other, joints), place_of[body], other in seen, moves, held.cause))
+                motions.append(holder @ held.motion)
+                place_of[other] = len(order)
+                order.append(other)
+                used |= {each.prim.GetPath() for each in (between if held.cause else (joint,))}
+    for joint in joints:
+        if joint.prim.GetPath() not in used:
+            source.find(f"joint {joint.told()} closes a loop and was left out")
+    return order, nodes, motions
+
+
+def _named(body: Body, joints: Sequence[StageJoint]) -> str:
+    """Return a body's name; of what stands fast that of the prim which a joint names."""
+    if body is not None:
+        return str(body.name)
+    named = (joint.named[joint.ends.index(None)] for joint in joints if None in joint.ends)
+    return next((str(prim.GetName()) for prim in named if prim is not None), "world")
