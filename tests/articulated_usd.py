@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 
 import numpy as np
-from pxr import Gf, Usd, UsdGeom, UsdPhysics
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
 from scipy.spatial.transform import Rotation
 
 from manitwin.assets.asset import Asset
@@ -128,3 +128,46 @@ def _join(
     drive.CreateDampingAttr(joint.damping / force * unit)
     if joint.effort is not None:
         drive.CreateMaxForceAttr(joint.effort / force)
+
+
+def motions_of(stage: Usd.Stage, positions: dict[str, float]) -> dict[Sdf.Path, np.ndarray]:
+    """Return how bodies move ``(4, 4)`` in metres from where a stage has them, its joints at positions in rad and m.
+
+    Joints, bodies and frames are as UsdPhysics reads them; the second body of each is put where its frame meets the first one's.
+    """
+    parse = getattr(UsdPhysics, "UsdPhysicsLoadStageFromPrimRange", None) or UsdPhysics.LoadUsdPhysicsFromRange
+    parsed, unit_m = parse(stage, ["/"]), UsdGeom.GetStageMetersPerUnit(stage)
+    revolute, prismatic = UsdPhysics.ObjectType.RevoluteJoint, UsdPhysics.ObjectType.PrismaticJoint
+    found: dict[Sdf.Path, tuple[Sdf.Path, np.ndarray]] = {}
+    scale = np.diag([unit_m] * 3 + [1.0])
+    for kind in (revolute, prismatic):
+        for path, each in zip(*parsed.get(kind, ([], [])), strict=True):
+            step, axis = np.eye(4), AXES[each.axis.name[-1]]
+            if kind == prismatic:
+                step[:3, 3] = positions[path.name] / unit_m * axis
+            else:
+                turn = Gf.Rotation(Gf.Vec3d(*axis.tolist()), math.degrees(positions[path.name]))
+                step[:3, :3] = np.array(Gf.Matrix3d(turn)).T
+            first = _pose(stage, each.body0) @ _frame(each.localPose0Position, each.localPose0Orientation)
+            second = _pose(stage, each.body1) @ _frame(each.localPose1Position, each.localPose1Orientation)
+            alone = scale @ first @ step @ np.linalg.inv(second) @ np.linalg.inv(scale)
+            found[each.body1] = (each.body0, alone)
+    return {body: _chained(found, body) for body in found}
+
+
+def _chained(found: dict[Sdf.Path, tuple[Sdf.Path, np.ndarray]], body: Sdf.Path) -> np.ndarray:
+    if body not in found:
+        return np.eye(4)
+    holder, alone = found[body]
+    return _chained(found, holder) @ alone
+
+
+def _pose(stage: Usd.Stage, path: Sdf.Path) -> np.ndarray:
+    return np.array(UsdGeom.Xformable(stage.GetPrimAtPath(path)).ComputeLocalToWorldTransform(0)).T
+
+
+def _frame(position: Gf.Vec3f, turn: Gf.Quatf) -> np.ndarray:
+    found = np.eye(4)
+    found[:3, :3] = np.array(Gf.Matrix3d(Gf.Quatd(turn))).T
+    found[:3, 3] = position
+    return found

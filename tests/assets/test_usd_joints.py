@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import numpy as np
 import pytest
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics
 
 from articulated_assets import ASSETS, write_assets
-from articulated_usd import AXES, write_usd
+from articulated_usd import motions_of, write_usd
 from manitwin.api import import_assets
 from manitwin.assets.articulation import Articulation
 from manitwin.assets.asset import Asset
@@ -80,41 +78,12 @@ def test_links_move_as_usds_own_reading_of_joints_has_it(tmp_path: Path, name: s
     found = whole(asset)
     ways = [(1 - share) * (joint.lower or 0) + share * (joint.upper or 0) for joint in found.joints]
     motions = link_motions(found.joints, ways)
-    parse = getattr(UsdPhysics, "UsdPhysicsLoadStageFromPrimRange", None) or UsdPhysics.LoadUsdPhysicsFromRange
-    parsed = parse(stage, ["/"])
-    kinds = (UsdPhysics.ObjectType.RevoluteJoint, UsdPhysics.ObjectType.PrismaticJoint)
-    described = {path.name: each for kind in kinds if kind in parsed for path, each in zip(*parsed[kind], strict=True)}
-    placed = {"/thing": np.eye(4)}
-    for joint, way in zip(found.joints, ways, strict=True):
-        each = described[joint.name]
-        first = pose(stage, each.body0) if str(each.body0) not in placed else placed[str(each.body0)]
-        step = np.eye(4)
-        axis = AXES[each.axis.name[-1]]
-        if joint.kind == "prismatic":
-            step[:3, 3] = way / 0.01 * axis
-        else:
-            step[:3, :3] = Gf.Matrix3d(Gf.Rotation(Gf.Vec3d(*axis), math.degrees(way))).GetTranspose()
-        frames = [
-            frame(each.localPose0Position, each.localPose0Orientation),
-            frame(each.localPose1Position, each.localPose1Orientation),
-        ]
-        there = first @ frames[0] @ step @ np.linalg.inv(frames[1])
-        placed[str(each.body1)] = there
-        was = pose(stage, each.body1)
-        center = np.asarray(found.links[joint.child].inertial.center_of_mass_m)
-        expected = (there @ np.linalg.inv(was) @ np.append(center / 0.01, 1))[:3] * 0.01
-        np.testing.assert_allclose(transform_points(motions[joint.child], center[None])[0], expected, atol=1e-6)
-
-
-def pose(stage: Usd.Stage, path: Sdf.Path) -> np.ndarray:
-    return np.array(UsdGeom.Xformable(stage.GetPrimAtPath(path)).ComputeLocalToWorldTransform(0)).T
-
-
-def frame(position: Gf.Vec3f, turn: Gf.Quatf) -> np.ndarray:
-    found = np.eye(4)
-    found[:3, :3] = np.array(Gf.Matrix3d(Gf.Quatd(turn))).T
-    found[:3, 3] = position
-    return found
+    named = {joint.name: way for joint, way in zip(found.joints, ways, strict=True)}
+    theirs = {path.name: motion for path, motion in motions_of(stage, named).items()}
+    for link, motion in zip(found.links[1:], motions[1:], strict=True):
+        center = np.asarray(link.inertial.center_of_mass_m)
+        expected = transform_points(theirs[link.name], center[None])[0]
+        np.testing.assert_allclose(transform_points(motion, center[None])[0], expected, atol=1e-6)
 
 
 def test_an_import_keeps_the_links_of_a_stage(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Links and joints go out whole as URDF and MJCF: engines have the masses, limits and places of the twin at any position."""
+"""Links and joints go out whole as URDF, MJCF, SDF and USD: engines have the twin's masses, limits and places."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ import mujoco
 import numpy as np
 import pytest
 from lxml import etree
+from pxr import Usd, UsdGeom, UsdPhysics
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from articulated_twins import JOINTS, MASSES_KG, NAMES, write_articulated
+from articulated_usd import motions_of
 from manitwin.assets.read import read_asset
 from manitwin.assets.writers.exporter import TwinContent
 from manitwin.assets.writers.registry import formats
@@ -22,7 +24,7 @@ from manitwin.geometry.articulation import link_motions
 from manitwin.geometry.poses import transform_points
 from manitwin.twin.loaded_twin import Twin
 
-WITH_JOINTS = ("urdf", "mjcf", "sdf")
+WITH_JOINTS = ("urdf", "mjcf", "sdf", "usd", "usdz")
 POSITIONS = [(0.35, 0.02), (0.0, 0.0), (-0.4, 0.06), (1.1, -0.01), (0.7, 0.03)]
 
 
@@ -107,6 +109,45 @@ def test_pybullet_has_the_links_where_the_twin_has_them(
         pybullet.disconnect(client)
 
 
+@pytest.mark.parametrize("positions", POSITIONS)
+def test_usd_has_the_links_where_the_twin_has_them(
+    twin: Twin, exports: dict[str, Path], positions: tuple[float, float]
+) -> None:
+    stage = Usd.Stage.Open(str(exports["usd"]))
+    motions = motions_of(stage, {joint["name"]: at for joint, at in zip(JOINTS, positions, strict=True)})
+    bodies = [prim for prim in stage.Traverse() if prim.HasAPI(UsdPhysics.RigidBodyAPI)]
+    assert [prim.GetName() for prim in bodies] == list(NAMES)
+    for prim, mass_kg, (center, tensor) in zip(bodies, MASSES_KG, wanted(twin, positions), strict=True):
+        api, pose = UsdPhysics.MassAPI(prim), np.array(UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0)).T
+        placed = motions.get(prim.GetPath(), np.eye(4)) @ pose
+        quaternion = api.GetPrincipalAxesAttr().Get()
+        axes = placed[:3, :3] @ Rotation.from_quat([*quaternion.GetImaginary(), quaternion.GetReal()]).as_matrix()
+        assert api.GetMassAttr().Get() == pytest.approx(mass_kg)
+        assert np.allclose(transform_points(placed, np.array([api.GetCenterOfMassAttr().Get()]))[0], center, atol=1e-7)
+        assert np.allclose(axes @ np.diag(api.GetDiagonalInertiaAttr().Get()) @ axes.T, tensor, rtol=0, atol=1e-9)
+
+
+def test_usd_has_the_joints_and_each_link_its_own_meshes(twin: Twin, exports: dict[str, Path]) -> None:
+    stage = Usd.Stage.Open(str(exports["usd"]))
+    root = stage.GetDefaultPrim()
+    assert root.HasAPI(UsdPhysics.ArticulationRootAPI) and not root.HasAPI(UsdPhysics.RigidBodyAPI)
+    elbow = stage.GetPrimAtPath(root.GetPath().AppendPath("joints/elbow"))
+    said = JOINTS[0]
+    assert elbow.GetAttribute("physics:upperLimit").Get() == pytest.approx(np.degrees(said["upper"]))
+    assert elbow.GetAttribute("drive:angular:physics:damping").Get() == pytest.approx(np.radians(said["damping"]))
+    assert elbow.GetAttribute("drive:angular:physics:maxForce").Get() == pytest.approx(said["effort"])
+    assert elbow.GetAttribute("physxJoint:maxJointVelocity").Get() == pytest.approx(np.degrees(said["velocity"]))
+    asset = read_asset(exports["usd"], joints="keep")
+    assert asset.articulation is not None and asset.articulation.link_of_visual == TwinContent.of(twin).link_of_visual
+    assert [joint.stands_at for joint in asset.articulation.joints] == pytest.approx(
+        [joint["locked_at"] for joint in JOINTS], abs=1e-6
+    )
+    assert (asset.articulation.joints[0].effort, asset.articulation.joints[0].velocity) == pytest.approx((2, 3))
+    assert asset.inertial.mass_kg == pytest.approx(sum(MASSES_KG)) and len(asset.collision) == len(twin.hulls)
+    for mine, theirs in zip(asset.visual, TwinContent.of(twin).visual, strict=True):
+        assert np.allclose(mine.bounds, theirs.bounds, atol=1e-6)
+
+
 @pytest.mark.parametrize("format", WITH_JOINTS)
 def test_what_goes_out_comes_in_again(twin: Twin, exports: dict[str, Path], format: str) -> None:
     asset = read_asset(exports[format], joints="keep")
@@ -141,11 +182,11 @@ def test_other_formats_say_that_joints_are_not_in_them(twin: Twin, tmp_path: Pat
 
 
 def test_the_command_says_in_one_line_what_went_out_without_joints(twin: Twin, tmp_path: Path) -> None:
-    done = CliRunner().invoke(app, ["export", str(twin.folder), "--to", "urdf,usd,glb", "-o", str(tmp_path)])
+    done = CliRunner().invoke(app, ["export", str(twin.folder), "--to", "urdf,glb,isaaclab", "-o", str(tmp_path)])
     line = " ".join(done.output.split())
     assert (
         done.exit_code == 0
-        and "without its joints, as one rigid body, in usd, glb; mjcf, urdf and sdf have them" in line
+        and "without its joints, as one rigid body, in glb, isaaclab; mjcf, urdf, sdf and usd have them" in line
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -42,6 +42,10 @@ class TwinContent:
         """The physical properties; an accepted twin has them."""
         assert self.record.physical is not None
         return self.record.physical
+
+    def as_one_body(self) -> TwinContent:
+        """Return it without links and joints, one rigid body as it stands, for what has no place for them."""
+        return replace(self, record=self.record.model_copy(update={"links": [], "joints": []}), link_of_visual=())
 
     @classmethod
     def of(cls, twin: Twin) -> TwinContent:

@@ -39,7 +39,7 @@ def export(twin: TwinContent) -> Exported:
     Source: Isaac Lab 2.x and 3.0, isaaclab.assets.RigidObjectCfg and isaaclab.sim.UsdFileCfg. No pose is written: its
     quaternions are wxyz up to 2.x and xyzw from 3.0.
     """
-    stage = usd.export(twin)
+    stage = usd.export(twin.as_one_body())
     module, source = f"{twin.name}_cfg", twin.record.source
     text = _MODULE.format(
         module=module,

@@ -39,7 +39,7 @@ def describe_asset(stage: Usd.Stage, twin: TwinContent) -> None:
         "asset_license": record.source.license or "unknown",
         "category": category,
         "qcode": item_of(category),
-        "rigid_body_count": 1,
+        "rigid_body_count": max(len(record.links), 1),
         "asset_extents": Gf.Vec3f(*physical.extents_m),
         "mass": physical.mass_kg.value,
     }

@@ -5,14 +5,24 @@ from __future__ import annotations
 import io
 import struct
 import zipfile
+from dataclasses import replace
 
 from manitwin.assets.writers.exporter import Exported, TwinContent
+from manitwin.assets.writers.format_notes import FormatNotes
 from manitwin.assets.writers.simready import thumbnail
-from manitwin.assets.writers.usd_stage import CANNOT_SAY, build_stage, crate
+from manitwin.assets.writers.usd_stage import CANNOT_SAY, OF_JOINTS, build_stage, crate
 
 _ALIGNMENT = 64  # USDZ specification, "Layout": file data starts on a multiple of 64 bytes
 _HEADER = 30  # ZIP APPNOTE 4.3.7: a local header without its name and extra field
 _PADDING_ID = 0x1986  # the extra field that Pixar's own writer pads with
+_OF_LINKS = ("mass", "centre of mass", "inertia")
+_LOAD_LINKS = (
+    "from pxr import Usd, UsdPhysics\n\n"
+    'stage = Usd.Stage.Open("{main}")\n'
+    "for prim in stage.Traverse():\n"
+    "    if prim.HasAPI(UsdPhysics.RigidBodyAPI) or prim.IsA(UsdPhysics.Joint):\n"
+    "        print(prim.GetPath(), prim.GetTypeName())"
+)
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date that a ZIP entry has: equal twins give equal packages
 
 
@@ -20,7 +30,7 @@ def export(twin: TwinContent) -> Exported:
     """Return the stage and its textures as they are in the twin; ``usdcat`` shows the stage as text."""
     stage, textures = build_stage(twin)
     main = f"{twin.name}.usdc"
-    return Exported({main: crate(stage.GetRootLayer()), **textures, **thumbnail(twin, main)}, main, CANNOT_SAY)
+    return _exported({main: crate(stage.GetRootLayer()), **textures, **thumbnail(twin, main)}, main, twin, "usd")
 
 
 def export_usdz(twin: TwinContent) -> Exported:
@@ -28,7 +38,17 @@ def export_usdz(twin: TwinContent) -> Exported:
     stage, textures = build_stage(twin)
     main = f"{twin.name}.usdz"
     members = {f"{twin.name}.usdc": crate(stage.GetRootLayer()), **dict(sorted(textures.items()))}
-    return Exported({main: _packed(members)}, main, CANNOT_SAY)
+    return _exported({main: _packed(members)}, main, twin, "usdz")
+
+
+def _exported(files: dict[str, bytes], main: str, twin: TwinContent, format_name: str) -> Exported:
+    """Return files with what is said of them: of a twin with links that each of these has its own numbers."""
+    if not twin.record.links:
+        return Exported(files, main, CANNOT_SAY, joints=True)
+    notes = FormatNotes.of(format_name)
+    says = {what: f"{where}, of each link" if what in _OF_LINKS else where for what, where in notes.says.items()}
+    load = notes.load | {"OpenUSD": _LOAD_LINKS}
+    return Exported(files, main, (*CANNOT_SAY, *OF_JOINTS), notes=replace(notes, says=says, load=load), joints=True)
 
 
 def _packed(members: dict[str, bytes]) -> bytes:

@@ -22,7 +22,8 @@ MAX_NAME = 255
 _FORBIDDEN = frozenset('<>:"|?*\\')  # Windows takes none of them, and what it takes for a separator is no name here
 README_FILE = "README.md"
 JOINTS_LOCKED = (
-    "its {count} joints: it is one rigid body as the twin stands; the formats mjcf, urdf and sdf have links and joints."
+    "its {count} joints: it is one rigid body as the twin stands; the formats mjcf, urdf, sdf, usd and usdz have links"
+    " and joints."
 )
 """Said of a format that a twin with joints was written in."""
 

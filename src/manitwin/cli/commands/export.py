@@ -139,7 +139,7 @@ def _export(
     out_console.print(f"{content.name}: {', '.join(written) or 'nothing'}")
     if locked:
         out_console.print(
-            f"  without its joints, as one rigid body, in {', '.join(locked)}; mjcf, urdf and sdf have them"
+            f"  without its joints, as one rigid body, in {', '.join(locked)}; mjcf, urdf, sdf and usd have them"
         )
     return len(written) == len(formats)
 

@@ -25,7 +25,10 @@ APERTURE_MM = 24.0  # vertical, of a full-frame camera: with the focal length it
 
 
 def export_usd(scene: Scene) -> Exported:
-    """Return the scene's stage with its twins beside it. Raises ExportError for a twin that USD cannot take."""
+    """Return the scene's stage with its twins beside it; a twin with joints is one rigid body as it stands.
+
+    Raises ExportError for a twin that USD cannot take.
+    """
     record = scene.record
     layer = Sdf.Layer.CreateAnonymous(".usda")  # held here: a stage's own goes with it
     stage = Usd.Stage.Open(layer)
@@ -45,7 +48,7 @@ def export_usd(scene: Scene) -> Exported:
     for placed in record.objects:
         if placed.twin_id not in known:
             content = TwinContent.of(scene.twin(placed.twin_id))
-            exported = usd.export(content)
+            exported = usd.export(content.as_one_body())
             folder = f"{TWINS}/{content.name}"
             files |= {f"{folder}/{name}": data for name, data in exported.files.items()}
             known[placed.twin_id] = f"./{folder}/{exported.main}"
