@@ -17,13 +17,15 @@ from PIL import Image
 from pxr import Usd, UsdGeom, UsdSemantics, UsdShade
 
 import known_twins
+from articulated_twins import write_articulated
 from exported_twins import content
 from manitwin.assets.writers import isaaclab, usd
-from manitwin.assets.writers.exporter import TwinContent
+from manitwin.assets.writers.exporter import Exported, TwinContent
 from manitwin.assets.writers.grasp_rows import best_and_diverse, grasp_rows
 from manitwin.assets.writers.simready import BESIDE_PAD_M, MOST_GRASP_LINES, thumbnail
 from manitwin.assets.writers.usd_stage import build_stage
 from manitwin.assets.writers.wikidata_items import ITEMS, PHYSICAL_OBJECT, item_of
+from manitwin.twin.loaded_twin import Twin
 
 VALIDATOR = Path(__file__).resolve().parents[3] / ".venv-simready" / "bin" / "simready-validate"
 PROFILE, VERSION = "Robotics-Prop", "4.0.0"
@@ -32,6 +34,8 @@ REQUIRED = {
 }  # fmt: skip
 OPTIONAL = {"FET_003_MUJOCO", "FET_003_NEWTON", "FET_003_PHYSX", "FET_005_STANDARD", "FET_010_STANDARD"}
 """What a rigid prop can meet of the rest (docs/export.md)."""
+MULTI_BODY = {"FET_004_STANDARD", "FET_004_MUJOCO", "FET_004_NEWTON", "FET_004_PHYSX"}
+"""What one with links meets too."""
 
 
 def with_picture(twin: TwinContent) -> TwinContent:
@@ -134,12 +138,12 @@ def test_the_profile_passes_in_both_exports_and_fails_without_labels(tmp_path: P
     files = []
     for twin in (content(tmp_path / "twin"), with_own_hulls(known_twins.brick()), with_own_hulls(known_twins.hammer())):
         for name, export in (("usd", usd.export), ("isaaclab", isaaclab.export)):
-            exported = export(with_picture(twin))
             folder = tmp_path / "exported" / twin.name / name
-            for file, data in exported.files.items():
-                (folder / file).parent.mkdir(parents=True, exist_ok=True)
-                (folder / file).write_bytes(data)
-            files.append(folder / f"{twin.name}.usdc")
+            files.append(written(export(with_picture(twin)), folder).parent / f"{twin.name}.usdc")
+    jointed = TwinContent.of(Twin(write_articulated(tmp_path / "jointed")))
+    files.append(
+        written(usd.export(with_picture(with_own_hulls(jointed))), tmp_path / "jointed_export" / jointed.name / "usd")
+    )
     spoilt = tmp_path / "spoilt" / "spoilt.usdc"
     spoilt.parent.mkdir()
     stage = Usd.Stage.Open(Usd.Stage.Open(str(files[0])).Flatten())
@@ -152,7 +156,15 @@ def test_the_profile_passes_in_both_exports_and_fails_without_labels(tmp_path: P
     met = verdicts([*files, spoilt], tmp_path)
     for file in files:
         assert met[str(file)] >= REQUIRED | OPTIONAL, file
+    assert met[str(files[-1])] >= MULTI_BODY
     assert {"FET_011_STANDARD", "FET_011_RTX", "FET_033_STANDARD"}.isdisjoint(met[str(spoilt)])
+
+
+def written(exported: Exported, folder: Path) -> Path:
+    for file, data in exported.files.items():
+        (folder / file).parent.mkdir(parents=True, exist_ok=True)
+        (folder / file).write_bytes(data)
+    return folder / exported.main
 
 
 def verdicts(files: list[Path], folder: Path) -> dict[str, set[str]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,11 @@ import pytest
 from pxr import Usd, UsdGeom, UsdPhysics
 
 import known_twins
+from articulated_twins import write_articulated
 from exported_twins import content
 from manitwin.assets.writers import usd
+from manitwin.assets.writers.exporter import TwinContent
+from manitwin.twin.loaded_twin import Twin
 
 PYTHON = Path(__file__).resolve().parents[3] / ".venv-usd-validate" / "bin" / "python"
 ASK = """
@@ -55,7 +59,9 @@ def verdicts(files: list[Path]) -> dict[str, Any]:
 
 def test_validator_finds_nothing_in_exports_and_much_in_a_spoilt_one(tmp_path: Path) -> None:
     files = []
-    for twin in (content(tmp_path / "twin"), known_twins.brick()):
+    jointed = TwinContent.of(Twin(write_articulated(tmp_path / "jointed")))
+    jointed = replace(jointed, name=f"jointed_{jointed.name}")
+    for twin in (content(tmp_path / "twin"), known_twins.brick(), jointed):
         for exported in (usd.export(twin), usd.export_usdz(twin)):
             for name, data in exported.files.items():
                 file = tmp_path / "exported" / twin.name / name
