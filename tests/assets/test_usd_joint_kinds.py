@@ -401,3 +401,13 @@ def test_circles_of_joints_are_cut_once(tmp_path: Path) -> None:
     asset = made(tmp_path, make, two=False)
     assert len(whole(asset).links) == 20
     assert len([remark for remark in asset.remarks if "closes a loop" in remark]) == 1
+
+
+def test_of_many_loops_the_first_are_named(tmp_path: Path) -> None:
+    def make(stage: Usd.Stage) -> None:
+        for number in range(9):
+            join(stage, name=f"hinge_{number}", at=(-0.1 * number, 0, 0))
+
+    asset = made(tmp_path, make)
+    assert len([remark for remark in asset.remarks if "closes a loop" in remark]) == 3
+    assert "5 more joints close loops and were left out" in asset.remarks

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
+from pxr import Usd, UsdGeom, UsdPhysics
 
 from manitwin.assets.audit.check import audit_path
 from manitwin.assets.audit.rules import RULES
@@ -96,6 +98,33 @@ def test_mjcf_has_degrees_unless_it_says_radian(tmp_path: Path, range_: str, com
         f'<mujoco>{compiler}<worldbody><body><freejoint/><geom size="0.1" mass="1"/>{lid}</body></worldbody></mujoco>'
     )
     assert ("JNT003" in joint_findings(path)) == found
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "axis", "code"),
+    [
+        (0.0, 90.0, "X", None),
+        (-1000.0, 1000.0, "X", None),
+        (0.0, 1.5707964, "X", "JNT003"),
+        (90.0, 0.0, "X", "JNT002"),
+        (math.nan, 90.0, "X", "JNT002"),
+        (30.0, 30.0, "X", "JNT005"),
+        (0.0, 90.0, "W", "JNT001"),
+    ],
+)
+def test_joints_of_usd_have_degrees(tmp_path: Path, lower: float, upper: float, axis: str, code: str | None) -> None:
+    stage = Usd.Stage.CreateNew(str(tmp_path / "box.usda"))
+    stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/box").GetPrim())
+    for name in ("body", "lid"):
+        UsdPhysics.RigidBodyAPI.Apply(UsdGeom.Cube.Define(stage, f"/box/{name}").GetPrim())
+    joint = UsdPhysics.RevoluteJoint.Define(stage, "/box/hinge")
+    joint.CreateBody0Rel().SetTargets(["/box/body"])
+    joint.CreateBody1Rel().SetTargets(["/box/lid"])
+    joint.CreateLowerLimitAttr(lower)
+    joint.CreateUpperLimitAttr(upper)
+    joint.CreateAxisAttr(axis)
+    stage.Save()
+    assert set(joint_findings(tmp_path / "box.usda")) == ({code} if code else set())
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import numpy as np
 from pxr import Sdf, Usd, UsdPhysics
 
 from manitwin.assets.articulation import Node, Tree, rigid_links
-from manitwin.assets.asset_files import of_left_out, of_locked
+from manitwin.assets.asset_files import MOST_NAMED, of_left_out, of_locked
 from manitwin.assets.joints import DeclaredJoint, Joints
 from manitwin.assets.readers.usd_held import held_together
 from manitwin.assets.readers.usd_joints import StageJoint, declared_joint, stage_joints
@@ -204,9 +204,11 @@ def _tree(
                 place_of[other] = len(order)
                 order.append(other)
                 used |= {each.prim.GetPath() for each in (between if held.cause else (joint,))}
-    for joint in joints:
-        if joint.prim.GetPath() not in used:
-            source.find(f"joint {joint.told()} closes a loop and was left out")
+    closing = [joint.told() for joint in joints if joint.prim.GetPath() not in used]
+    for told in closing[:MOST_NAMED]:
+        source.find(f"joint {told} closes a loop and was left out")
+    if len(closing) > MOST_NAMED:
+        source.find(f"{len(closing) - MOST_NAMED} more joints close loops and were left out")
     return order, nodes, motions
 
 

@@ -65,19 +65,21 @@ def limits_inverted(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 def limits_in_degrees(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Complain of limits that are radians by their format and degrees by their numbers, or the other way round."""
-    mjcf = measured.asset.format == "mjcf"
+    in_degrees, radians = measured.asset.format in ("mjcf", "usd"), measured.asset.format != "usd"
 
     def applies(joint: DeclaredJoint) -> bool:
         if joint.kind not in TURNS or joint.lower is None or joint.upper is None:
             return False
         ends = [abs(end) for end in (joint.lower, joint.upper) if end]
-        if mjcf and joint.upper - joint.lower <= 2 * DEGREES_FOR_RADIANS * (1 + _NEAR_FRACTION):
+        if in_degrees and joint.upper - joint.lower <= 2 * DEGREES_FOR_RADIANS * (1 + _NEAR_FRACTION):
             return bool(ends) and all(_is_a_fraction(end) for end in ends)
-        return any(TWO_TURNS + _MULTIPLE_OF_PI < end <= MOST_DEGREES and not _is_multiple_of_pi(end) for end in ends)
+        return radians and any(
+            TWO_TURNS + _MULTIPLE_OF_PI < end <= MOST_DEGREES and not _is_multiple_of_pi(end) for end in ends
+        )
 
     def said(joint: DeclaredJoint) -> str:
         lower, upper = (float(joint.lower or 0), float(joint.upper or 0))
-        if mjcf and max(abs(lower), abs(upper)) < 1:
+        if in_degrees and max(abs(lower), abs(upper)) < 1:
             degrees = f"{math.degrees(lower):.4g} to {math.degrees(upper):.4g} degrees"
             return f"joint {joint.name!r} turns from {degrees}, which looks like radians"
         return f"joint {joint.name!r} turns from {lower:g} to {upper:g} rad, which looks like degrees"
@@ -169,9 +171,9 @@ RULES = (
         "joint-limits-in-degrees",
         "warning",
         why="Limits are radians in URDF and SDF. A number beyond two turns that is no whole multiple of pi is most often an"
-        " angle in degrees: the joint then has no limit that it could meet. MJCF has degrees unless its compiler says radian;"
-        " limits that are simple parts of pi are then 57 times too narrow.",
-        remedy='Write radians; in MJCF say `<compiler angle="radian"/>` where they are.',
+        " angle in degrees: the joint then has no limit that it could meet. USD has degrees, and so has MJCF unless its compiler"
+        " says radian; limits that are simple parts of pi are then 57 times too narrow.",
+        remedy='Write radians, in USD degrees; in MJCF say `<compiler angle="radian"/>` where they are radians.',
         check=limits_in_degrees,
     ),
     Rule(
