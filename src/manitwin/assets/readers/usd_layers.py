@@ -11,14 +11,15 @@ from pathlib import Path
 
 from pxr import Sdf, Tf, Usd
 
+from manitwin.assets.readers.usd_mtlx import SUFFIX, mtlx_layer
 from manitwin.errors import AssetError
-from manitwin.formats.bounded_file import open_regular
+from manitwin.formats.bounded_file import open_regular, read_bytes
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.usd_errors import broken
 from manitwin.formats.meshes.usdz_package import UsdzArchive, package_path
 from manitwin.formats.sniff import told_of_no_file_itself
 
-_LAYERS = (".usd", ".usda", ".usdc", ".usdz")
+_LAYERS = (".usd", ".usda", ".usdc", ".usdz", SUFFIX)
 _MAX_LAYERS = 1_000
 MAX_PRIMS = 100_000
 _MAX_DEPTH = 300
@@ -100,13 +101,27 @@ class LayerFiles:
                 f"{self._source.path}: it and the layers that it names have more than {self._source.limits.max_bytes} bytes"
                 "; simplify it"
             )
-        name = str(place.file) if place.member is None else package_path(place.file, place.member)
-        layer = Sdf.Layer.OpenAsAnonymous(name)
+        layer = self._copied(place)
         if layer is not None:
             self._layers[place] = layer
             self._places[layer.identifier] = place
             self._use(place.file)
         return layer
+
+    def _copied(self, place: Place) -> Sdf.Layer | None:
+        name = place.file.name if place.member is None else place.member
+        if not name.lower().endswith(SUFFIX):
+            named = str(place.file) if place.member is None else package_path(place.file, place.member)
+            return Sdf.Layer.OpenAsAnonymous(named)
+        try:
+            if place.member is None:
+                content = read_bytes(place.file, self._source.limits.max_bytes, AssetError, inside=self._root)
+            else:
+                content = self._archives[place.file].read(place.member, "layer") or b""
+            return mtlx_layer(content, name, self._source)
+        except AssetError as error:
+            self._source.find(f"{error}; its materials were not read")
+            return None
 
     def _use(self, file: Path) -> None:
         self.files.add(file)
