@@ -411,3 +411,44 @@ def test_of_many_loops_the_first_are_named(tmp_path: Path) -> None:
     asset = made(tmp_path, make)
     assert len([remark for remark in asset.remarks if "closes a loop" in remark]) == 3
     assert "5 more joints close loops and were left out" in asset.remarks
+
+
+def test_names_are_those_that_a_converter_could_not_write(tmp_path: Path) -> None:
+    def make(stage: Usd.Stage) -> None:
+        join(stage).SetDisplayName("hinge.0")
+        stage.GetPrimAtPath("/thing/door").SetDisplayName("front door")
+
+    found = whole(made(tmp_path, make))
+    assert [link.name for link in found.links] == ["body", "front door"] and found.joints[0].name == "hinge.0"
+
+
+def test_what_converters_note_of_a_joint(tmp_path: Path) -> None:
+    def make(stage: Usd.Stage) -> None:
+        prim = join(stage)
+        for name, value in (("newton:velocityLimit", 90.0), ("newton:damping", 0.02), ("newton:friction", 0.3)):
+            prim.CreateAttribute(name, Sdf.ValueTypeNames.Float).Set(value)
+        prim.CreateAttribute("urdf:limit:effort", Sdf.ValueTypeNames.Float).Set(7.0)
+
+    (joint,) = whole(made(tmp_path, make)).joints
+    assert (joint.velocity, joint.friction, joint.effort) == pytest.approx((math.pi / 2, 0.3, 7.0))
+    assert joint.damping == pytest.approx(0.02 * 180 / math.pi)
+
+
+def test_a_body_that_shows_nothing_names_the_link_that_it_holds(tmp_path: Path) -> None:
+    """As the first link of a URDF without a shape does."""
+
+    def make(stage: Usd.Stage) -> None:
+        UsdPhysics.RigidBodyAPI.Apply(UsdGeom.Xform.Define(stage, "/thing/base").GetPrim())
+        join(stage, UsdPhysics.FixedJoint, ("base", "body"), "weld")
+        join(stage)
+
+    assert [link.name for link in whole(made(tmp_path, make)).links] == ["base", "door"]
+
+
+def test_shapes_of_no_size_are_left_out(tmp_path: Path) -> None:
+    def make(stage: Usd.Stage) -> None:
+        UsdGeom.Sphere.Define(stage, "/thing/door/mark").CreateRadiusAttr(0.0)
+        join(stage)
+
+    asset = made(tmp_path, make)
+    assert len(asset.visual) == 2 and "shapes of no size in it were left out" in asset.remarks

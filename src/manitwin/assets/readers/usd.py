@@ -126,8 +126,9 @@ def _articulation(
     for place, head in enumerate(moving.heads):
         mine = [node for node, link in enumerate(moving.link_of) if link == place]
         bodies = [weighed[node] for node in mine if felt_of[node] or weighed[node].mass_kg is not None]
-        name = next(chosen.nodes[node].name for node in (head, *mine) if chosen.nodes[node].shaped)
-        links.append(AssetLink(name, _together(bodies)))
+        # what stands fast and shows nothing is no body of the file's
+        named = head if chosen.bodies[head] is not None else next(node for node in mine if chosen.nodes[node].shaped)
+        links.append(AssetLink(chosen.nodes[named].name, _together(bodies)))
     unweighed = [link.name for link in links if link.inertial.mass_kg is None]
     if unweighed and len(unweighed) < len(links):
         source.find(f"link {unweighed[0]!r} declares no mass: that of all of it is not known")

@@ -35,8 +35,9 @@ def drive_of(prim: Usd.Prim, axis: str, units: StageUnits, source: MeshSource, *
     """Return what is said of a joint about or along ``axis`` (X, Y or Z).
 
     A drive without stiffness that drives nowhere is a damper. USD's angles are degrees: a damping is a torque for each degree
-    a second. MuJoCo's values are in its own units, m, kg and rad. What twins do not have is remarked.
-    Source: UsdPhysics schema, DriveAPI; PhysxSchema, PhysxJointAPI; MuJoCo's OpenUSD documentation, MjcJointAPI.
+    a second. MuJoCo's values are in its own units, m, kg and rad, and so is the effort that a converter from URDF notes.
+    What twins do not have is remarked. Source: UsdPhysics schema, DriveAPI; PhysxSchema, PhysxJointAPI; MuJoCo's OpenUSD
+    documentation, MjcJointAPI; the schemas of newton-usd-schemas 0.6 and urdf-usd-converter 0.3, NewtonJointAPI.
     """
     force = units.kg * units.m if slides else units.kg * units.m**2  # of a force or a torque, over s2
     way = units.m if slides else math.radians(1.0)
@@ -58,7 +59,8 @@ def drive_of(prim: Usd.Prim, axis: str, units: StageUnits, source: MeshSource, *
     newton, mujoco = said("newton:damping"), said("mjc:damping")
     damping = mujoco or (damping if newton is None else newton * force / way)
     rubs, resists = said("mjc:frictionloss"), said("newton:friction")
-    fastest = said("physxJoint:maxJointVelocity")
+    fastest = said("physxJoint:maxJointVelocity") or said("newton:velocityLimit")
+    effort = effort or said("urdf:limit:effort")
     if motor or any(said(name) is not None for name in _NOT_OF_TWINS):
         source.find("motors, springs and armatures of its joints were left out: twins do not have them")
     return Drive(

@@ -48,7 +48,7 @@ class StageJoint:
     @property
     def name(self) -> str:
         """Its own name."""
-        return str(self.prim.GetName())
+        return name_of(self.prim)
 
     @property
     def holds(self) -> bool:
@@ -58,6 +58,11 @@ class StageJoint:
     def told(self) -> str:
         """Return its name and kind for a remark."""
         return f"{self.name[:NAME]} ({self.kind})"
+
+
+def name_of(prim: Usd.Prim) -> str:
+    """Return a prim's name; what its display name says, where a converter could not write a name as it was."""
+    return str(prim.GetDisplayName() or prim.GetName())
 
 
 def stage_joints(
@@ -132,7 +137,7 @@ def _way(prim: Usd.Prim) -> tuple[str, str, float, float]:
 
 def declared_joint(joint: StageJoint, units: StageUnits) -> DeclaredJoint:
     """Return a joint as the file declares it, its limits in radians or metres."""
-    names = [prim.GetName() if prim is not None else "world" for prim in joint.named]
+    names = [name_of(prim) if prim is not None else "world" for prim in joint.named]
     moves = joint.kind in ("revolute", "prismatic")
     unit = unit_of(joint, units)
     axis = AXES.get(joint.axis, np.full(3, np.nan)) if moves else None

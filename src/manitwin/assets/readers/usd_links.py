@@ -13,7 +13,7 @@ from manitwin.assets.articulation import Node, Tree, rigid_links
 from manitwin.assets.asset_files import MOST_NAMED, of_left_out, of_locked
 from manitwin.assets.joints import DeclaredJoint, Joints
 from manitwin.assets.readers.usd_held import held_together
-from manitwin.assets.readers.usd_joints import StageJoint, declared_joint, stage_joints
+from manitwin.assets.readers.usd_joints import StageJoint, declared_joint, name_of, stage_joints
 from manitwin.assets.readers.usd_masses import StageUnits, body_of
 from manitwin.assets.readers.usd_shapes import is_rendered, is_solid
 from manitwin.formats.meshes.source import MeshSource
@@ -190,7 +190,7 @@ def _tree(
             at.setdefault(body, {}).setdefault(other, []).append(joint)
     place_of = {root: 0}
     order, used = [root], set()
-    nodes, motions = [Node(_named(root, joints), None, root in seen)], [np.eye(4)]
+    nodes, motions = [Node(_named(root, joints, of_path), None, root in seen)], [np.eye(4)]
     for extra in (False, True):
         for body in order:  # grows by the bodies that joints hold to it
             for other, between in at.get(body, {}).items():
@@ -199,7 +199,7 @@ def _tree(
                 joint, held = held_together(between, body, of_path, units, source)
                 holder = motions[place_of[body]]
                 moves = None if held.joint is None else held.joint.moved(holder)
-                nodes.append(Node(_named(other, joints), place_of[body], other in seen, moves, held.cause))
+                nodes.append(Node(_named(other, joints, of_path), place_of[body], other in seen, moves, held.cause))
                 motions.append(holder @ held.motion)
                 place_of[other] = len(order)
                 order.append(other)
@@ -212,9 +212,9 @@ def _tree(
     return order, nodes, motions
 
 
-def _named(body: Body, joints: Sequence[StageJoint]) -> str:
+def _named(body: Body, joints: Sequence[StageJoint], of_path: Mapping[Sdf.Path, PlacedPrim]) -> str:
     """Return a body's name; of what stands fast that of the prim which a joint names."""
     if body is not None:
-        return str(body.name)
+        return name_of(of_path[body].prim)
     named = (joint.named[joint.ends.index(None)] for joint in joints if None in joint.ends)
-    return next((str(prim.GetName()) for prim in named if prim is not None), "world")
+    return next((name_of(prim) for prim in named if prim is not None), "world")

@@ -53,7 +53,7 @@ class StageShapes:
         self._faces = 0
         self._made: dict[Sdf.Path, list[trimesh.Trimesh]] = {}
         self.placed = tuple(placed)
-        self._shapes = [each for each in placed if self._is_shape(each.prim)]
+        self._shapes = [each for each in placed if self._is_shape(each.prim) and not self._is_nothing(each.prim)]
 
     def to_world(self, placed: PlacedPrim) -> np.ndarray:
         """Return the transform ``(4, 4)`` from a prim's own axes and unit to the stage's axes and metres."""
@@ -168,6 +168,14 @@ class StageShapes:
         if prim.IsA(UsdGeom.Gprim):
             self._source.find(f"{prim.GetTypeName()} prims in it were left out")
         return False
+
+    def _is_nothing(self, prim: Usd.Prim) -> bool:
+        """Tell whether a shape has no size at all, as marks of URDF have."""
+        sizes = (prim.GetAttribute(name) for name in ("size", "radius", "height") if not prim.IsA(UsdGeom.Mesh))
+        nothing = any(each and each.Get(Usd.TimeCode.EarliestTime()) == 0 for each in sizes)
+        if nothing:
+            self._source.find("shapes of no size in it were left out")
+        return nothing
 
     def _checked(self, part: trimesh.Trimesh, prim: Usd.Prim) -> trimesh.Trimesh:
         self._faces += len(part.faces)

@@ -54,6 +54,7 @@ def define_links(
     for place, link in enumerate(links):
         body = UsdGeom.Xform.Define(stage, scope.AppendChild(unique_name(stage, scope, link.name)))
         body.AddTranslateOp().Set(Gf.Vec3d(*origins[place].tolist()))
+        _say_name(body.GetPrim(), link.name)
         bodies.append(body.GetPath())
         _define_body(body.GetPrim(), inertial_of_link(twin, link), origins[place])
         parts = [part for part, of in zip(twin.visual, twin.link_of_visual, strict=True) if of == place]
@@ -63,6 +64,12 @@ def define_links(
         ends = (joint.parent, joint.child)
         made = scope.AppendChild(unique_name(stage, scope, joint.name))
         _define_joint(stage, made, joint, [bodies[end] for end in ends], [origins[end] for end in ends])
+
+
+def _say_name(prim: Usd.Prim, name: str) -> None:
+    """Say the name of a prim that USD cannot write as it is."""
+    if prim.GetName() != name:
+        prim.SetDisplayName(name)
 
 
 def _define_body(prim: Usd.Prim, inertial: TwinInertial, origin_m: np.ndarray) -> None:
@@ -117,6 +124,7 @@ def _define_joint(
         made.CreateLowerLimitAttr(joint.lower / unit)
         made.CreateUpperLimitAttr(joint.upper / unit)
     prim = made.GetPrim()
+    _say_name(prim, joint.name)
     if joint.damping or joint.effort is not None:
         drive = UsdPhysics.DriveAPI.Apply(prim, UsdPhysics.Tokens.linear if slides else UsdPhysics.Tokens.angular)
         drive.CreateTypeAttr(UsdPhysics.Tokens.force)
