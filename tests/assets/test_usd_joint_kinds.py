@@ -452,3 +452,15 @@ def test_shapes_of_no_size_are_left_out(tmp_path: Path) -> None:
 
     asset = made(tmp_path, make)
     assert len(asset.visual) == 2 and "shapes of no size in it were left out" in asset.remarks
+
+
+def test_a_ground_that_is_not_read_weighs_nothing(tmp_path: Path) -> None:
+    """A body that hangs from the world, in which a plane of no rigid body declares a mass, as converters from MJCF write it."""
+
+    def make(stage: Usd.Stage) -> None:
+        UsdPhysics.MassAPI.Apply(UsdGeom.Plane.Define(stage, "/thing/floor").GetPrim()).CreateMassAttr(9.0)
+        join(stage, ends=(None, "body"), name="slider")
+        join(stage)
+
+    found = whole(made(tmp_path, make))
+    assert [(link.name, link.inertial.mass_kg) for link in found.links] == [("body", 2), ("door", 1)]

@@ -112,9 +112,12 @@ def _articulation(
     chosen: Chosen, moving: Tree, seen: Sequence[Seen], felt: Sequence[Felt], units: StageUnits, source: MeshSource
 ) -> tuple[Inertial, Articulation]:
     """Return the mass properties of the whole, which are unknown where those of a body are, and its links and joints."""
+    solid = {chosen.node_of(placed) for _, placed in (*seen, *felt)}
     of_node: list[list[PlacedPrim]] = [[] for _ in chosen.bodies]
     for each in chosen.placed:
-        of_node[chosen.node_of(each)].append(each)
+        node = chosen.node_of(each)
+        if chosen.bodies[node] is not None or node in solid:  # a ground that is not read weighs nothing
+            of_node[node].append(each)
     felt_of: list[list[Felt]] = [[] for _ in chosen.bodies]
     for shape in felt:
         felt_of[chosen.node_of(shape[1])].append(shape)
