@@ -25,6 +25,8 @@ from manitwin.geometry.poses import transform_points
 from manitwin.twin.loaded_twin import Twin
 
 WITH_JOINTS = ("urdf", "mjcf", "sdf", "usd", "usdz")
+NAMED = ("front door", "front-door", "2nd")
+"""Of which USD makes one name, and that of a prim that begins with no digit."""
 POSITIONS = [(0.35, 0.02), (0.0, 0.0), (-0.4, 0.06), (1.1, -0.01), (0.7, 0.03)]
 
 
@@ -168,6 +170,19 @@ def test_what_goes_out_comes_in_again(twin: Twin, exports: dict[str, Path], form
     again = [transform_points(m, np.asarray(link.inertial.center_of_mass_m)[None])[0] for m, link in
              zip(link_motions(theirs, at), asset.articulation.links, strict=True)]  # fmt: skip
     assert np.allclose(standing[0], np.eye(4)) and np.allclose(centers, again, atol=1e-6)
+
+
+def test_names_that_usd_cannot_write_come_in_again(twin: Twin, tmp_path: Path) -> None:
+    links = [link.model_copy(update={"name": name}) for link, name in zip(twin.record.links, NAMED, strict=True)]
+    joints = [
+        joint.model_copy(update={"name": f"{name}.0", "parent": parent, "child": name})
+        for joint, parent, name in zip(twin.record.joints, NAMED, NAMED[1:], strict=False)
+    ]
+    record = twin.record.model_copy(update={"links": links, "joints": joints})
+    main = export_twin(replace(TwinContent.of(twin), record=record), "usd", tmp_path)
+    found = read_asset(main, joints="keep").articulation
+    assert found is not None and tuple(link.name for link in found.links) == NAMED
+    assert [joint.name for joint in found.joints] == [f"{name}.0" for name in NAMED[1:]]
 
 
 def test_other_formats_say_that_joints_are_not_in_them(twin: Twin, tmp_path: Path) -> None:
