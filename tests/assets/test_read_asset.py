@@ -118,6 +118,51 @@ def test_worlds_of_included_models_and_layers_without_a_shape_are_no_assets(
     assert aside == ([] if is_asset else [file])
 
 
+MESH = 'def Xform "a" {\n def Mesh "m" {}\n}\n'
+ROOTED = 'def Xform "a" (\n    kind = "component"\n    prepend payload = @./Payload/Contents.usda@\n)\n{\n}\n'
+IN_SCENE = 'def Xform "w" {\n    def "cup" (\n        prepend payload = @./cup/cup.usda@\n    )\n    {\n    }\n}\n'
+
+
+def usda(path: Path, text: str) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return write(path, f"#usda 1.0\n{text}")
+
+
+def test_layers_of_a_stage_are_no_assets(tmp_path: Path) -> None:
+    """As converters write them: a payload of the root, its sublayers, and what these refer to."""
+    root = usda(tmp_path / "box.usda", ROOTED)
+    layers = {
+        usda(
+            tmp_path / "Payload" / "Contents.usda", f"(\n    subLayers = [\n        @./Geometry.usda@\n    ]\n)\n{MESH}"
+        ),
+        usda(
+            tmp_path / "Payload" / "Geometry.usda",
+            'def Xform "a" {\n def "m" (references = @./Library.usdc@</m>) {}\n}\n',
+        ),
+        usda(tmp_path / "Payload" / "Library.usdc", MESH),
+    }
+    aside: list[Path] = []
+    assert list(find_assets(tmp_path, aside)) == [root] and set(aside) == layers
+    assert list(find_assets(tmp_path / "Payload" / "Geometry.usda")) == [tmp_path / "Payload" / "Geometry.usda"]
+
+
+def test_assets_that_a_scene_is_made_of_stay_assets(tmp_path: Path) -> None:
+    scene = usda(tmp_path / "scene.usda", IN_SCENE)
+    cup = usda(tmp_path / "cup" / "cup.usda", MESH)
+    assert list(find_assets(tmp_path)) == [scene, cup]
+
+
+@pytest.mark.parametrize("named", ["../secret.usda", "/etc/secret.usda", "loop.usda", "\udcff.usda", "box.usda"])
+def test_layers_outside_of_the_folder_and_in_circles_are_not_followed(tmp_path: Path, named: str) -> None:
+    usda(tmp_path / "secret.usda", MESH)
+    folder = tmp_path / "asset"
+    folder.mkdir()
+    (folder / "loop.usda").symlink_to("loop.usda")
+    text = f"#usda 1.0\n(\n    subLayers = [@{named}@]\n)\n{MESH}"
+    (folder / "box.usda").write_bytes(text.encode("utf-8", "surrogateescape"))
+    assert list(find_assets(folder)) == [folder / "box.usda"]
+
+
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from manitwin.assets.unread_formats import why_not_read
+from manitwin.assets.usd_texts import USD_SUFFIXES, USD_TEXT, layers_of
 from manitwin.errors import AssetError, choose_from
 from manitwin.formats.bounded_file import open_regular
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from manitwin.assets.asset import Asset, Format
     from manitwin.assets.joints import Joints
 
-USD_SUFFIXES = frozenset({".usd", ".usda", ".usdc", ".usdz"})
 SCAN_METADATA = "metadata.pbtxt"
 """Which Google Scanned Objects have, and other models of Gazebo have not."""
 _HEAD_BYTES, _FRAGMENT_BYTES = 1 << 16, 1 << 23
@@ -30,7 +30,6 @@ _MODEL = re.compile(rb"<model\s")
 _WORLD_BODY = re.compile(rb"<worldbody[\s>].*?</worldbody>", re.DOTALL)
 _PLANE = re.compile(rb"<geom\b[^>]*\btype\s*=\s*[\"']plane[\"'][^>]*>")
 _ENDS = (b"</mujoco>", b"</robot>", b"</sdf>")
-_USD_TEXT = b"#usda"
 _USD_SHAPE = re.compile(
     rb"^\s*def\s+(?:Mesh|Cube|Sphere|Cylinder|Capsule|Cone|Plane|Points|TetMesh|BasisCurves|Nurbs\w+|Hermite\w+|PointInstancer)\w*\s",
     re.MULTILINE,
@@ -149,15 +148,19 @@ class _Aside:
 
     fragments: list[Path]
     templates: list[Path]
+    layers: set[Path] = field(default_factory=set)
 
     def takes(self, file: Path) -> bool:
-        """Tell whether a description is no asset, and keep it: it has no shape, or words where numbers should be."""
+        """Tell whether a description is no asset, and keep it: no shape, words where numbers should be, a layer of another."""
         suffix = file.suffix.lower()
         usd = suffix in USD_SUFFIXES
+        if usd and file.resolve() in self.layers:
+            self.fragments.append(file)
+            return True
         if not usd and suffix not in (".urdf", ".xml", ".mjcf", ".sdf"):
             return False
         with open_regular(file, AssetError) as stream:
-            if usd and stream.read(len(_USD_TEXT)) != _USD_TEXT:
+            if usd and stream.read(len(USD_TEXT)) != USD_TEXT:
                 return False
             content = stream.read(_FRAGMENT_BYTES)
         if len(content) == _FRAGMENT_BYTES:
@@ -252,9 +255,9 @@ def find_assets(path: Path, fragments: list[Path] | None = None, templates: list
     """Yield every asset at or below a path, in the order of their names; hidden folders are left out.
 
     A folder that is one asset as a whole is not looked into; links to folders, and to files out of the folder, are not
-    followed. A RoboTwin folder gives its model_data files. Descriptions without a shape, which others include, are no assets and
-    go to ``fragments``; those with words for numbers, which programs fill in, to ``templates``. Raises AssetError where the
-    path is not there.
+    followed. A RoboTwin folder gives its model_data files. Descriptions without a shape, which others include, and layers of
+    other stages are no assets and go to ``fragments``; those with words for numbers, which programs fill in, to ``templates``.
+    Raises AssetError where the path is not there.
     """
     _require_there(path)
     if not path.is_dir():
@@ -291,6 +294,8 @@ def _assets_below(path: Path, root: Path, aside: _Aside) -> Iterator[Path]:
         return
     with os.scandir(path) as scanned:
         entries = sorted((entry for entry in scanned if not entry.name.startswith(".")), key=lambda e: e.name)
+    stages = [Path(entry.path) for entry in entries if Path(entry.name).suffix.lower() in USD_SUFFIXES]
+    aside.layers.update(layers_of((stage for stage in stages if is_file_below(stage, root)), root))
     for entry in entries:
         file = Path(entry.path)
         if not is_file_below(file, root) or file_format(file) is None:

@@ -86,7 +86,7 @@ def audit(
             _write_text(each, len(assets) > 1)
     if fragments:
         err_console.print(
-            f"{len(fragments)} descriptions without a shape, which others include, are no assets and were left alone"
+            f"{len(fragments)} descriptions without a shape, or layers of others, are no assets and were left alone"
         )
     if templates:
         err_console.print(
