@@ -138,6 +138,8 @@ def test_usd_has_the_joints_and_each_link_its_own_meshes(twin: Twin, exports: di
     assert elbow.GetAttribute("physics:upperLimit").Get() == pytest.approx(np.degrees(said["upper"]))
     assert elbow.GetAttribute("drive:angular:physics:damping").Get() == pytest.approx(np.radians(said["damping"]))
     assert elbow.GetAttribute("drive:angular:physics:maxForce").Get() == pytest.approx(said["effort"])
+    frictions = [elbow.GetAttribute(name).Get() for name in ("mjc:frictionloss", "newton:friction")]
+    assert frictions == pytest.approx([said["friction"]] * 2)
     assert elbow.GetAttribute("physxJoint:maxJointVelocity").Get() == pytest.approx(np.degrees(said["velocity"]))
     asset = read_asset(exports["usd"], joints="keep")
     assert asset.articulation is not None and asset.articulation.link_of_visual == TwinContent.of(twin).link_of_visual

@@ -44,7 +44,8 @@ def define_links(
 
     It stands as the twin stands; the two frames of a joint meet at its position 0. Raises ExportError for mass properties that no
     body has. Source: UsdPhysics schema, ArticulationRootAPI, RevoluteJoint, PrismaticJoint, DriveAPI (a drive without stiffness
-    is a damper, per degree); MuJoCo's OpenUSD documentation, MjcJointAPI; PhysxSchema, PhysxJointAPI (degrees per second).
+    is a damper, per degree); MuJoCo's OpenUSD documentation, MjcJointAPI; newton-usd-schemas 0.6, NewtonJointAPI; PhysxSchema,
+    PhysxJointAPI (degrees per second).
     """
     UsdPhysics.ArticulationRootAPI.Apply(stage.GetPrimAtPath(path))
     joints, links = joints_of(twin.record), twin.record.links
@@ -134,6 +135,7 @@ def _define_joint(
             drive.CreateMaxForceAttr(joint.effort)
     for schema, name, value in (
         ("MjcJointAPI", "mjc:frictionloss", joint.friction or None),
+        ("NewtonJointAPI", "newton:friction", joint.friction or None),
         ("PhysxJointAPI", "physxJoint:maxJointVelocity", None if joint.velocity is None else joint.velocity / unit),
     ):
         if value is not None:

@@ -24,7 +24,8 @@ CANNOT_SAY = (
     "approach and depth: all are in grasps.parquet",
 )
 OF_JOINTS = (
-    "UsdPhysics has no friction of a joint, and PhysX a share of the force that holds it: mjc:frictionloss has it in N m or N",
+    "UsdPhysics has no friction of a joint, and PhysX a share of the force that holds it: mjc:frictionloss and newton:friction "
+    "have it in N m or N",
     "a drive without stiffness is the damping of a joint, and its greatest force the effort: set a stiffness to drive it",
 )
 """Said of a twin with joints beside ``CANNOT_SAY``."""
