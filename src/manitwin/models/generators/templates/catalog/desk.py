@@ -48,7 +48,8 @@ def pencil(*, length_m: float, thick_m: float) -> Model:
         "wood",
     )
     model.region("lead", "wood", lambda centers: centers[:, 0] > end - 0.006, "lead")
-    model.add("ferrule", cylinder(0.98 * r, 0.012).rotate((0, 90, 0)).translate((-end + 0.004, 0, 0)), "lead")
+    # wider than the corners of the barrel, which would pierce it
+    model.add("ferrule", cylinder(1.005 * r, 0.012).rotate((0, 90, 0)).translate((-end + 0.004, 0, 0)), "lead")
     model.add("eraser", cylinder(0.9 * r, 0.006).rotate((0, 90, 0)).translate((-end, 0, 0)), "eraser")
     model.point("point", "tip", "lead", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
     return model.point("eraser", "tip", "eraser", (-end, 0.0, 0.0), (-1.0, 0.0, 0.0)).laid()
