@@ -12,6 +12,7 @@ from PIL import Image
 from manitwin.config import MattingConfig, Resource
 from manitwin.engine.stage import Draft
 from manitwin.errors import InputError, Rejected
+from manitwin.geometry.pixel_boxes import PixelBox
 from manitwin.models.generators.templates.fitting.outline_check import template_outline_check
 from manitwin.models.matting.candidates import network_makers
 from manitwin.models.matting.learned import Network
@@ -24,7 +25,7 @@ from manitwin.pipeline.given_alpha import doubted_rectangle
 from manitwin.pipeline.item import Item, masks_of
 from manitwin.pipeline.photo_groups import copies_told, told_apart
 from manitwin.pipeline.photo_pixels import pixels_of_photo
-from manitwin.pipeline.stated_place import Box, as_box
+from manitwin.pipeline.stated_place import as_box
 
 
 class PhotoStage:
@@ -67,7 +68,7 @@ class PhotoStage:
         confirmed: Callable[[DoubtedCutOut], Matte],
         called: str | None = None,
         mask: Path | None = None,
-        box_px: Box | None = None,
+        box_px: PixelBox | None = None,
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Return a photo ``(H, W, 4) uint8`` of what a person called ``name`` with its matte, and what is known of that.
 

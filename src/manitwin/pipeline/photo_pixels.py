@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,8 +12,9 @@ from PIL import Image
 from manitwin.config import MattingConfig
 from manitwin.formats.image_file import Photo, full_size, read_image
 from manitwin.formats.outline_mask import require_mask
+from manitwin.geometry.pixel_boxes import PixelBox, within
 from manitwin.pipeline.given_alpha import Given, as_given, as_masked
-from manitwin.pipeline.stated_place import Box, window_of
+from manitwin.pipeline.stated_place import window_of
 
 CROPPED = "looked at within the box that was stated of it"
 
@@ -27,12 +29,12 @@ class PhotoPixels:
     given: Given
     findings: tuple[str, ...]
     focal_mm: float | None
-    box_px: Box | None = None
-    window_px: Box | None = None
+    box_px: PixelBox | None = None
+    window_px: PixelBox | None = None
 
 
 def pixels_of_photo(
-    path: Path, name: str | None, settings: MattingConfig, *, mask: Path | None = None, box_px: Box | None = None
+    path: Path, name: str | None, settings: MattingConfig, *, mask: Path | None = None, box_px: PixelBox | None = None
 ) -> PhotoPixels:
     """Read a photo of what a person calls ``name``; ``mask`` is a picture of its outline, ``box_px`` where the thing is.
 
@@ -47,22 +49,18 @@ def pixels_of_photo(
         whole = (0.0, 0.0, float(width), float(height)) if given.pixels.shape[:2] == photo.pixels.shape[:2] else None
         return PhotoPixels(given, photo.findings, photo.focal_mm, window_px=whole)
     masked = None if mask is None else as_masked(photo.pixels, mask, orientation)
-    window = window_of(box_px, (photo.pixels.shape[1], photo.pixels.shape[0]), path.name)
-    left, top, right, bottom = window
+    left, top, right, bottom = window_of(box_px, (photo.pixels.shape[1], photo.pixels.shape[0]), path.name)
+    window = (float(left), float(top), float(right), float(bottom))
     cropped = (photo.pixels if masked is None else masked.pixels)[top:bottom, left:right]
     scale = min(1.0, settings.photo_side_px / max(cropped.shape[:2]))
     pixels = _scaled(cropped, scale)
     given = as_given(pixels, name) if masked is None else Given(pixels, masked.findings)
-    within = tuple(scale * (edge - start) for edge, start in zip(box_px, (left, top, left, top), strict=True))
-    shown = (
-        (float(left), float(top), float(right), float(bottom)) if given.pixels.shape[:2] == pixels.shape[:2] else None
-    )
     return PhotoPixels(
         given,
         (*photo.findings, CROPPED),
-        _focal_of_window(photo, window),
-        (within[0], within[1], within[2], within[3]),
-        shown,
+        _focal_of_window(photo, cropped.shape),
+        within(box_px, window, scale),
+        window if given.pixels.shape[:2] == pixels.shape[:2] else None,
     )
 
 
@@ -73,9 +71,9 @@ def _scaled(pixels: np.ndarray, scale: float) -> np.ndarray:
     return np.ascontiguousarray(pixels)
 
 
-def _focal_of_window(photo: Photo, window: tuple[int, int, int, int]) -> float | None:
-    """Return the lens that a picture of the window's size would have: the same angle of view a pixel."""
+def _focal_of_window(photo: Photo, shape: tuple[int, ...]) -> float | None:
+    """Return the lens that a picture of a window's ``shape`` would have: the same angle of view a pixel."""
     if photo.focal_mm is None:
         return None
-    left, top, right, bottom = window
-    return photo.focal_mm * float(np.hypot(*photo.pixels.shape[:2]) / np.hypot(right - left, bottom - top))
+    height, width = photo.pixels.shape[:2]
+    return photo.focal_mm * math.hypot(width, height) / math.hypot(shape[1], shape[0])

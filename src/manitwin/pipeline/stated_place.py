@@ -13,6 +13,7 @@ from manitwin.errors import InputError, UsageError
 from manitwin.formats.image_file import MIN_SIDE_PX
 from manitwin.formats.printable import printable_line
 from manitwin.formats.source_files import MESH_SUFFIXES
+from manitwin.geometry.pixel_boxes import PixelBox
 
 MASK, BOX = "mask", "box_px"
 """The columns of a manifest."""
@@ -24,12 +25,11 @@ OUTSIDE_PX = 1.0
 _EXAMPLE = "left,top,right,bottom in pixels, such as 120,80,410,395"
 _SHOWN = 60
 
-Box = tuple[float, float, float, float]
-"""Left, top, right and bottom, in pixels of the upright photo at its own size: x to the right, y down, from its corner."""
 
-
-def stated_box_px(said: object, where: str) -> Box | None:
+def stated_box_px(said: object, where: str) -> PixelBox | None:
     """Return the box that is said of a thing, None where none is; a text of four numbers, or a sequence of them.
+
+    Its edges are in pixels of the upright photo at its own size.
 
     Raises UsageError for what is no box.
     """
@@ -80,7 +80,7 @@ def require_one_photo(inputs: Sequence[str | Path], texts: Sequence[str], *, vie
         )
 
 
-def window_of(box_px: Box, size_px: tuple[int, int], name: str) -> tuple[int, int, int, int]:
+def window_of(box_px: PixelBox, size_px: tuple[int, int], name: str) -> tuple[int, int, int, int]:
     """Return what of a photo of ``size_px`` (width, height) is looked at: left, top, right, bottom, whole pixels.
 
     Raises InputError for a box that is not inside the photo, or too small to show anything.
@@ -108,6 +108,6 @@ def window_of(box_px: Box, size_px: tuple[int, int], name: str) -> tuple[int, in
     )
 
 
-def as_box(numbers: Sequence[float]) -> Box | None:
+def as_box(numbers: Sequence[float]) -> PixelBox | None:
     """Return the four numbers of an item as a box; None where it has none."""
     return (numbers[0], numbers[1], numbers[2], numbers[3]) if numbers else None

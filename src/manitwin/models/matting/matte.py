@@ -13,6 +13,7 @@ from scipy import ndimage
 
 from manitwin.config import MattingConfig
 from manitwin.errors import Rejected
+from manitwin.geometry.pixel_boxes import PixelBox, mapped
 from manitwin.models.matting.causes import CAUSES, REMEDY, told
 from manitwin.models.matting.confidence import border_of
 from manitwin.models.matting.explained import Explains, explained_first
@@ -32,8 +33,6 @@ TRIMMED = "the image border touches the object, which is taken to end there: the
 MIN_CONFIDENCE = MattingConfig().min_confidence
 MOST_BOXES = 6
 """Of the boxes of separate objects, so many are told."""
-Box = tuple[float, float, float, float]
-"""Left, top, right and bottom, in pixels."""
 LIKELY = 0.5  # that pieces are things: the photo is rejected in any case, and that is the cause
 
 
@@ -74,7 +73,7 @@ def matte_photo(
     second_object_share: float = 0.12,
     networks: Sequence[Network] = (),
     explains: Explains | None = None,
-    window_px: Box | None = None,
+    window_px: PixelBox | None = None,
 ) -> Matte:
     """Find the object in ``image`` (H, W, 3 or 4) uint8 upright sRGB; ``name`` is used in messages only.
 
@@ -131,7 +130,7 @@ def decided(
     min_confidence: float = MIN_CONFIDENCE,
     min_area_share: float = 0.002,
     second_object_share: float = 0.12,
-    window_px: Box | None = None,
+    window_px: PixelBox | None = None,
 ) -> Judged:
     """Return the candidate of a study that is believed; raises Rejected as ``matte_photo`` where none is."""
     if not study.judged or study.judged[0].candidate.found.mask.mean() < min_area_share:
@@ -147,7 +146,7 @@ def decided(
 
 
 def _given_matte(
-    image: np.ndarray, name: str, min_area_share: float, second_object_share: float, window_px: Box | None
+    image: np.ndarray, name: str, min_area_share: float, second_object_share: float, window_px: PixelBox | None
 ) -> Matte:
     mask = image[..., 3] > 127
     if mask.mean() < min_area_share:
@@ -177,7 +176,7 @@ def _rounded_down(confidence: float) -> float:
 
 
 def _reject_doubtful(
-    name: str, judged: Judged, min_confidence: float, second_object_share: float, window_px: Box | None
+    name: str, judged: Judged, min_confidence: float, second_object_share: float, window_px: PixelBox | None
 ) -> None:
     found = judged.candidate.found
     if judged.of_pieces >= min(min_confidence, LIKELY):
@@ -191,7 +190,7 @@ def _reject_doubtful(
         )
 
 
-def _reject_several(name: str, mask: np.ndarray, second_object_share: float, window_px: Box | None) -> None:
+def _reject_several(name: str, mask: np.ndarray, second_object_share: float, window_px: PixelBox | None) -> None:
     _, _, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     areas = stats[1:, cv2.CC_STAT_AREA]
     large = stats[1:][areas >= second_object_share * areas.max()]
@@ -208,13 +207,12 @@ def _reject_several(name: str, mask: np.ndarray, second_object_share: float, win
         )
 
 
-def _in_photo(piece: np.ndarray, shape: tuple[int, ...], window_px: Box) -> str:
+def _in_photo(piece: np.ndarray, shape: tuple[int, ...], window_px: PixelBox) -> str:
     """Return the box of a piece in the photo's pixels; ``piece`` is x, y, width and height in a mask of this ``shape``."""
     left, top, right, bottom = window_px
-    scale_x, scale_y = (right - left) / shape[1], (bottom - top) / shape[0]
     x, y, width, height = (float(piece[i]) for i in range(4))
-    edges = left + scale_x * x, top + scale_y * y, left + scale_x * (x + width), top + scale_y * (y + height)
-    return ",".join(f"{edge:.0f}" for edge in edges)
+    scale = shape[1] / (right - left), shape[0] / (bottom - top)
+    return ",".join(f"{edge:.0f}" for edge in mapped((x, y, x + width, y + height), window_px, scale))
 
 
 def _findings(chosen: Judged) -> list[str]:
