@@ -80,6 +80,21 @@ def test_a_rejection_without_a_known_remedy_has_none() -> None:
     assert (cause.message, cause.remedy) == ("nothing said; a rehearsal", None)
 
 
+@pytest.mark.parametrize(
+    ("said", "remedy"),
+    [
+        ("a.png: the box 1,2,3,4 lies outside the photo, which is 2 x 2 pixels; give others", "give others"),
+        (
+            "b.png: a mask of 3 x 3 pixels, and its photo has 2 x 2; give it at the photo's size",
+            "give it at the photo's size",
+        ),
+    ],
+)
+def test_where_a_thing_was_said_to_be_is_no_fault_of_the_photo(said: str, remedy: str) -> None:
+    (cause,) = group_causes([Unaccepted("1", "rejected", "unreadable", f"unreadable: {said}")])
+    assert cause.remedy == remedy and cause.message == said.removesuffix(f"; {remedy}")
+
+
 def test_a_remedy_is_said_once() -> None:
     said = f"empty: a.png: the file has zero bytes; {REMEDIES['empty']}"
     (cause,) = group_causes([Unaccepted("1", "rejected", "empty", said)])

@@ -15,7 +15,7 @@ from manitwin.config import MattingConfig
 from manitwin.engine.stage import Draft
 from manitwin.errors import InputError, Rejected, UsageError
 from manitwin.formats.outline_mask import read_mask
-from manitwin.geometry.pixel_boxes import box_of_pixels, mapped, share_in_common, within
+from manitwin.geometry.pixel_boxes import box_of_pixels, share_in_common, to_picture, to_window
 from manitwin.pipeline.assembly import _write_source
 from manitwin.pipeline.item import Item, twin_id
 from manitwin.pipeline.manifest import Notes, iterate_items
@@ -297,6 +297,8 @@ def test_a_twin_keeps_them(tmp_path: Path) -> None:
     other = tmp_path / "reference"
     other.mkdir()
     assert _write_source(Draft("t", item, seed=0), "image", other, keep=False)["mask"] is None
+    lines = (other / "source.txt").read_text().splitlines()
+    assert [line.split(":")[0] for line in lines] == ["two.png", "source_mask.png"]
 
 
 def test_boxes_in_common() -> None:
@@ -306,5 +308,5 @@ def test_boxes_in_common() -> None:
 
 
 def test_boxes_of_a_window_and_back() -> None:
-    assert within((120, 80, 160, 90), (100, 60, 300, 260), 0.5) == (10, 10, 30, 15)
-    assert mapped((10, 10, 30, 15), (100, 60, 300, 260), (0.5, 0.5)) == (120, 80, 160, 90)
+    assert to_window((120, 80, 160, 90), (100, 60, 300, 260), 0.5) == (10, 10, 30, 15)
+    assert to_picture((10, 10, 30, 15), (100, 60, 300, 260), (0.5, 0.5)) == (120, 80, 160, 90)

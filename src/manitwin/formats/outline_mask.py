@@ -63,9 +63,7 @@ def read_mask(path: Path, shape: tuple[int, int], orientation: int = 1) -> np.nd
         mask = pixels[..., 3]
     else:
         mask = pixels[..., :3].max(axis=2)
-        bright = mask > mask.max() * _HALF
-        hues = pixels[bright][:, :3] * (255 / mask[bright].astype(float)[:, None])
-        if len(hues) and np.ptp(hues, axis=0).max() > MOST_TINT:
+        if _spread_of_colour(pixels, mask) > MOST_TINT:
             raise _refused(
                 f"{called}: a mask with several colours; give one that is white where the thing is and black elsewhere"
             )
@@ -90,11 +88,23 @@ def read_mask(path: Path, shape: tuple[int, int], orientation: int = 1) -> np.nd
     return np.ascontiguousarray(mask)
 
 
+def _spread_of_colour(pixels: np.ndarray, mask: np.ndarray) -> float:
+    """Return by how much the channels differ among what is bright, of 255, where each pixel's brightest channel is made 255."""
+    bright = mask > mask.max() * _HALF
+    if not bright.any():
+        return 0.0
+    full = np.float32(255) / mask[bright]
+    return max(float(np.ptp(pixels[..., channel][bright] * full)) for channel in range(3))
+
+
 def _require_one_thing(mask: np.ndarray, called: str) -> None:
     """Raise InputError for a picture of which several levels each cover an area: a map of several things, numbered."""
-    levels, counts = np.unique(mask[mask > 0], return_counts=True)
+    counts = np.bincount(mask.ravel(), minlength=256)
+    counts[0] = 0
+    levels = np.flatnonzero(counts)
     if not len(levels):
         return
+    counts = counts[levels]
     main = float(levels[np.argmax(counts)])
     is_other = (
         (levels != main) if levels[-1] < FEW else (levels > LOSSES * 255) & (np.abs(levels - main) > LOSSES * main)

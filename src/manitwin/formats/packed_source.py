@@ -23,16 +23,24 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date of a ZIP entry: equal inputs
 _BLOCK_BYTES = 1 << 20
 
 
-def pack_source(path: Path, folder: Path, beside: Iterable[Path] = (), *, keep: bool = True) -> tuple[str, str]:
+def pack_source(
+    path: Path, folder: Path, beside: Iterable[Path] = (), *, keep: bool = True, mask: Path | None = None
+) -> tuple[str, str]:
     """Write into a folder what a twin keeps of its input; return the name there and its sha256.
 
     A single file is kept byte for byte; a mesh with side files, or with others ``beside`` it in its folder, as an archive of
     all of them, uncompressed, undated. Of more than ``MAX_KEPT_BYTES`` a text says the names and sizes; so it does without
-    ``keep``, with the digest of each file. Raises InputError ``unreadable`` for a file that is gone or no regular one.
+    ``keep``, with the digest of each file. The ``mask`` of a photo lies beside what is kept, as ``mask_name`` calls it. Raises
+    InputError ``unreadable`` for a file that is gone or no regular one.
     """
     others = sorted({*side_files(path), *(other.resolve() for other in beside)})
     root = path.parent.resolve()
     files = {_name_in(root, file, path.name): file for file in (path.resolve(), *others)}
+    if mask is not None and keep:
+        with _opened(mask) as stream, (folder / mask_name(mask)).open("wb") as kept:
+            shutil.copyfileobj(stream, kept, _BLOCK_BYTES)
+    elif mask is not None:
+        files[mask_name(mask)] = mask
     return _packed(files, folder, path if not others else None, keep)
 
 
@@ -51,12 +59,9 @@ def masks_beside(masks: Sequence[str]) -> dict[str, Path]:
     return {f"mask_{number:02d}{Path(mask).suffix.lower()}": Path(mask) for number, mask in enumerate(masks) if mask}
 
 
-def pack_mask(mask: Path, folder: Path) -> str:
-    """Write the mask of one photo beside it, byte for byte, and return its name. Raises InputError ``unreadable``."""
-    name = f"source_mask{mask.suffix.lower()}"
-    with _opened(mask) as stream, (folder / name).open("wb") as kept:
-        shutil.copyfileobj(stream, kept, _BLOCK_BYTES)
-    return name
+def mask_name(mask: Path) -> str:
+    """Return what the mask of one photo is called beside it."""
+    return f"source_mask{mask.suffix.lower()}"
 
 
 def pack_photos(

@@ -23,13 +23,13 @@ def share_in_common(one: PixelBox, other: PixelBox) -> float:
     return both / (sum(areas) - both)
 
 
-def mapped(box: PixelBox, window: PixelBox, scale: tuple[float, float]) -> PixelBox:
+def to_picture(box: PixelBox, window: PixelBox, scale: tuple[float, float]) -> PixelBox:
     """Return a box in a picture of a ``window``, drawn ``scale`` (x, y) times as large, in pixels of the whole picture."""
     left, top = window[:2]
     return left + box[0] / scale[0], top + box[1] / scale[1], left + box[2] / scale[0], top + box[3] / scale[1]
 
 
-def within(box: PixelBox, window: PixelBox, scale: float) -> PixelBox:
+def to_window(box: PixelBox, window: PixelBox, scale: float) -> PixelBox:
     """Return a box of the whole picture in pixels of one of a ``window``, drawn ``scale`` times as large."""
     left, top = window[:2]
     return scale * (box[0] - left), scale * (box[1] - top), scale * (box[2] - left), scale * (box[3] - top)

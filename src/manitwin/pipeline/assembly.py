@@ -18,7 +18,7 @@ from manitwin.errors import InputError, Rejected
 from manitwin.formats.camera_poses.transforms_json import transforms_of
 from manitwin.formats.installation import installed_version
 from manitwin.formats.npy_file import labels_to_npy
-from manitwin.formats.packed_source import mask_names, masks_beside, pack_mask, pack_photos, pack_source, photo_names
+from manitwin.formats.packed_source import mask_name, mask_names, masks_beside, pack_photos, pack_source, photo_names
 from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.pipeline.grasps import GRASP_POINTS
@@ -99,7 +99,9 @@ def assemble(
         "machine": platform.machine(), "system": platform.system(), "python": platform.python_version()
     }  # fmt: skip
     if not keep_source and draft.payload.file is not None:
-        host["source"] = [str(Path(file).resolve()) for file in draft.payload.files]
+        host["source"] = [
+            str(Path(file).resolve()) for file in (*draft.payload.files, *filter(None, draft.payload.masks))
+        ]
     run = {"stages": {name: vars(cost) for name, cost in costs.items()}, "host": host}
     write_bytes_atomically(fresh / RUN, canonical_json(run).encode())
     sealed = seal(fresh, record)
@@ -150,8 +152,9 @@ def _write_source(draft: Draft[Item], kind: str, folder: Path, keep: bool) -> di
             name, sha256 = pack_photos(paths, folder, keep=keep, beside=beside)
     else:
         given = [] if item.given is None else [Path(item.given)]
-        name, sha256 = pack_source(Path(item.file), folder, given, keep=keep)
-        mask = pack_mask(Path(item.masks[0]), folder) if item.masks and keep else None
+        outline = Path(item.masks[0]) if item.masks else None
+        name, sha256 = pack_source(Path(item.file), folder, given, keep=keep, mask=outline)
+        mask = mask_name(outline) if outline is not None and keep else None
     return {
         "kind": kind,
         "file": name,

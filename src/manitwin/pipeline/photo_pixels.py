@@ -12,7 +12,7 @@ from PIL import Image
 from manitwin.config import MattingConfig
 from manitwin.formats.image_file import Photo, full_size, read_image
 from manitwin.formats.outline_mask import require_mask
-from manitwin.geometry.pixel_boxes import PixelBox, within
+from manitwin.geometry.pixel_boxes import PixelBox, to_window
 from manitwin.pipeline.given_alpha import Given, as_given, as_masked
 from manitwin.pipeline.stated_place import window_of
 
@@ -59,7 +59,7 @@ def pixels_of_photo(
         given,
         (*photo.findings, CROPPED),
         _focal_of_window(photo, cropped.shape),
-        within(box_px, window, scale),
+        to_window(box_px, window, scale),
         window if given.pixels.shape[:2] == pixels.shape[:2] else None,
     )
 

@@ -13,7 +13,7 @@ from scipy import ndimage
 
 from manitwin.config import MattingConfig
 from manitwin.errors import Rejected
-from manitwin.geometry.pixel_boxes import PixelBox, mapped
+from manitwin.geometry.pixel_boxes import PixelBox, to_picture
 from manitwin.models.matting.causes import CAUSES, REMEDY, told
 from manitwin.models.matting.confidence import border_of
 from manitwin.models.matting.explained import Explains, explained_first
@@ -212,7 +212,7 @@ def _in_photo(piece: np.ndarray, shape: tuple[int, ...], window_px: PixelBox) ->
     left, top, right, bottom = window_px
     x, y, width, height = (float(piece[i]) for i in range(4))
     scale = shape[1] / (right - left), shape[0] / (bottom - top)
-    return ",".join(f"{edge:.0f}" for edge in mapped((x, y, x + width, y + height), window_px, scale))
+    return ",".join(f"{edge:.0f}" for edge in to_picture((x, y, x + width, y + height), window_px, scale))
 
 
 def _findings(chosen: Judged) -> list[str]:
