@@ -22,6 +22,7 @@ from manitwin.pipeline.manifest_item import COLUMNS, forget_folders, item_of, li
 from manitwin.pipeline.manifest_rows import manifest_rows
 from manitwin.pipeline.photo_groups import PhotoGroups, one_of_photos
 from manitwin.pipeline.photo_thinning import thinned_words
+from manitwin.pipeline.refused_inputs import RefusedInputs
 from manitwin.pipeline.stated_place import BOX, MASK, require_one_photo
 from manitwin.pipeline.stated_size import COLUMN as COLUMN_OF_SIZE
 from manitwin.pipeline.stated_size import MEANT
@@ -153,9 +154,10 @@ def _given_items(
     ``texts`` are things to make from words alone, after the ``inputs``. ``strict``: a column that nobody knows is an error.
     ``refusal`` says of an item why nothing can ever be made of it.
 
-    Raises UsageError for a path that is not there, a folder without inputs, a manifest that cannot be read, an unknown
-    value, or an item that is refused.
+    Raises UsageError for a path that is not there, a folder without inputs or a manifest that cannot be read; and, behind
+    the last item, for the rows with an unknown value and the items that are refused, all of them together.
     """
+    refused = RefusedInputs()
     unsaid = dict.fromkeys(("name", "longest_side_m", "license", "attribution"))
     defaults = {"units": "auto", "up": "auto", **unsaid, **defaults}
     for given in inputs:
@@ -166,19 +168,22 @@ def _given_items(
                 " manifest; words to make a thing of are a text (texts)"
             )
         if path.is_dir():
-            yield from _allowed(_folder_items(path, str(given), defaults, notes), str(given), refusal)
+            for item in _folder_items(path, str(given), defaults, notes):
+                yield from _allowed(item, str(given), refusal, refused)
         elif path.suffix.lower() in MANIFEST_SUFFIXES:
-            yield from _manifest_items(path, defaults, notes, strict, refusal)
+            yield from _manifest_items(path, defaults, notes, strict, refusal, refused)
         else:
-            yield from _allowed([item_of({"file": str(path)}, Path.cwd(), defaults, str(path))], str(given), refusal)
+            item = item_of({"file": str(path)}, Path.cwd(), defaults, str(path))
+            yield from _allowed(item, str(given), refusal, refused)
     for text in texts:
         if not text.strip():
             raise UsageError("an empty text; say what to make, such as 'a red mug'")
-        yield from _allowed([item_of({"text": text}, Path.cwd(), defaults, text)], "--text", refusal)
+        yield from _allowed(item_of({"text": text}, Path.cwd(), defaults, text), "--text", refusal, refused)
+    refused.tell()
 
 
-def _allowed(items: Iterable[Item], where: str, refusal: Refusal) -> Iterator[Item]:
-    for item in items:
+def _allowed(item: Item, where: str, refusal: Refusal, refused: RefusedInputs) -> Iterator[Item]:
+    with refused.noted():
         why = refusal(item)
         if why is not None:
             raise UsageError(f"{where}: {why}")
@@ -200,7 +205,7 @@ def _folder_items(folder: Path, given: str, defaults: dict[str, Any], notes: Not
 
 
 def _manifest_items(
-    path: Path, defaults: dict[str, Any], notes: Notes, strict: bool, refusal: Refusal
+    path: Path, defaults: dict[str, Any], notes: Notes, strict: bool, refusal: Refusal, refused: RefusedInputs
 ) -> Iterator[Item]:
     unknown: dict[str, str] = {}
     groups = PhotoGroups(path)
@@ -216,11 +221,12 @@ def _manifest_items(
                 raise UsageError(f"{path}: unknown column {unknown[column]}; valid: {', '.join(COLUMNS)}")
         notes.tell(f"row {line:,} of {path.name}")
         where = f"{path}:{line}"
-        if not groups.takes(line, row):
-            yield from _allowed([item_of(row, path.parent, defaults, where, unknown)], where, refusal)
+        with refused.noted():
+            if not groups.takes(line, row):
+                yield from _allowed(item_of(row, path.parent, defaults, where, unknown), where, refusal, refused)
     for item, where in groups.items(lambda row, where: item_of(row, path.parent, defaults, where, unknown)):
         notes.remarks.extend(_thinned(item, where))
-        yield from _allowed([item], where, refusal)
+        yield from _allowed(item, where, refusal, refused)
     if line is None:
         raise UsageError(
             f"{path}: no rows; a manifest has a column 'file' or 'text', and optionally {', '.join(COLUMNS[2:])}"
