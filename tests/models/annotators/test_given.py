@@ -71,6 +71,14 @@ def test_given_captions_come_first() -> None:
     assert language.shape
 
 
+def test_sentences_call_a_thing_what_its_category_says() -> None:
+    called = replace(subject(MUG, "measuring cup"), given=given_record(category="measuring jug"))
+    language = KeepsGiven(RulesAnnotator()).describe(called, "glass", np.ptp(MUG.vertices, axis=0))
+    told = [caption for caption in (language.caption, *language.captions) if "measuring" in caption.split(" for ")[0]]
+    assert language.category == "measuring jug"
+    assert told and all("measuring jug" in caption and "measuring cup" not in caption for caption in told)
+
+
 def test_given_points_snap_to_the_nearest_candidate() -> None:
     positions, _ = candidates(MUG)
     near = positions[7] + [0.003, 0, 0]

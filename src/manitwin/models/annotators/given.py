@@ -10,6 +10,7 @@ import numpy as np
 
 from manitwin.config import Resource
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
+from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.protocol import (
     Annotator,
     AnnotatorQuestion,
@@ -181,10 +182,13 @@ class KeepsGiven:
         return answer if given is None else _with_given(answer, given)
 
     def describe(self, subject: Subject, material: str, extents_m: np.ndarray) -> Language:
-        """Keep the given category and captions; the other words are the inner annotator's."""
-        language, given = self._inner.describe(subject, material, extents_m), subject.given
+        """Keep the given category and captions; the other words are the inner annotator's, who is told that category."""
+        given = subject.given
         if given is None:
-            return language
+            return self._inner.describe(subject, material, extents_m)
+        if given.category and lookup(given.category) is not None:
+            subject = replace(subject, name=given.category)
+        language = self._inner.describe(subject, material, extents_m)
         captions = list(dict.fromkeys([*given.captions, language.caption, *language.captions]))
         return language.model_copy(
             update={
