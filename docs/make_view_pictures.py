@@ -8,6 +8,8 @@
     python docs/make_view_pictures.py LINK NUMBER --episode
     manitwin review DATASET --no-browser
     python docs/make_view_pictures.py LINK TWIN_ID --review
+    manitwin review cutouts DATASET --draw --no-browser
+    python docs/make_view_pictures.py LINK TWIN_ID --outline 60,29 83,32 81,48 77,71 66,68
 
 ``LINK`` is the link of one use that the command prints.
 """
@@ -58,6 +60,18 @@ def judged(page: Any, address: str) -> Image.Image:
     return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
 
 
+def drawn(page: Any, address: str, corners: list[str]) -> Image.Image:
+    """Return what the page of an outline looks like while ``corners``, in percent of the photo, are drawn."""
+    page.set_viewport_size(WIDE)
+    page.goto(address, wait_until="networkidle")
+    page.wait_for_selector("#outline[data-ready]")
+    box = page.locator("#canvas").bounding_box()
+    for corner in corners:
+        x, y = (float(number) / 100 for number in corner.split(","))
+        page.mouse.click(box["x"] + x * box["width"], box["y"] + y * box["height"])
+    return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+
+
 def beside(pictures: list[Image.Image]) -> Image.Image:
     """Return pictures of one height beside each other."""
     together = Image.new(
@@ -79,6 +93,7 @@ def main() -> None:
     parser.add_argument(
         "--review", action="store_true", help="the picture of a review's page alone, of a twin of its sample"
     )
+    parser.add_argument("--outline", nargs="+", metavar="X,Y", help="the page of an outline alone, with these corners")
     parser.add_argument("--episode", action="store_true", help="the picture of an episode's page alone, by its number")
     given = parser.parse_args()
     address = given.link.split("/enter")[0]
@@ -92,6 +107,8 @@ def main() -> None:
             pictures = {"view_scene": shown(page, f"{address}/scene/{given.id}", SCENE, "light")}
         elif given.review:
             pictures = {"review": judged(page, f"{address}/review/{given.id}")}
+        elif given.outline:
+            pictures = {"outline": drawn(page, f"{address}/outline/{given.id}", given.outline)}
         elif given.episode:
             pictures = {"view_episode": shown(page, f"{address}/episode/{given.id}#t={MOMENT_S}", EPISODE, "light")}
         else:

@@ -224,6 +224,7 @@ WRONG_VALUES = [
     "review tune nothing_here",
     "review cutouts nothing_here",
     "review cutouts . --sheet a.txt",
+    "review cutouts . --draw --accept c16c",
 ]
 
 

@@ -12,7 +12,13 @@ Header = tuple[str, str]
 
 
 def asked(
-    app: ASGIApp, path: str = "/", headers: Sequence[Header] = (), *, method: str = "GET", kind: str = "http"
+    app: ASGIApp,
+    path: str = "/",
+    headers: Sequence[Header] = (),
+    *,
+    method: str = "GET",
+    kind: str = "http",
+    body: bytes = b"",
 ) -> list[dict[str, Any]]:
     """Return the messages that the application sends for one request."""
     place, _, query = path.partition("?")
@@ -27,7 +33,7 @@ def asked(
         "scheme": "http",
     }
     sent: list[dict[str, Any]] = []
-    incoming = [{"type": "websocket.connect"} if kind == "websocket" else {"type": "http.request", "body": b""}]
+    incoming = [{"type": "websocket.connect"} if kind == "websocket" else {"type": "http.request", "body": body}]
 
     async def receive() -> dict[str, Any]:
         if not incoming:

@@ -27,7 +27,8 @@ REMEDIES = {
     " file of its own",
     "low_confidence_matte": "photograph it whole on a plain surface of another colour, or give a mask of it (--mask, or a column"
     " mask) or an image with an alpha channel;"
-    " where a cutout.webp lies beside a photo's twin.json and is right, `manitwin review cutouts DATASET --accept ID` builds it",
+    " where a cutout.webp lies beside a photo's twin.json and is right, `manitwin review cutouts DATASET --accept ID` builds it,"
+    " and with --draw its outline is drawn in the browser",
     "generator_failed": "another photo, another generator (--generator, see docs/generators.md), or a mesh",
     "not_watertight": "close the holes of the mesh in a modeller",
     "degenerate": "give a mesh that encloses a volume, with walls and no holes",

@@ -21,6 +21,7 @@ from manitwin.models.matting.object_network import built_in_model
 from manitwin.models.matting.outline_network import outline_model
 from manitwin.pipeline.box_check import require_in_box
 from manitwin.pipeline.cutout import confirmed_or_rejected
+from manitwin.pipeline.drawn_outline import DrawnOutline, as_drawn, drawn_outline
 from manitwin.pipeline.given_alpha import doubted_rectangle
 from manitwin.pipeline.item import Item, masks_of
 from manitwin.pipeline.photo_groups import copies_told, told_apart
@@ -57,6 +58,7 @@ class PhotoStage:
             lambda doubted: confirmed_or_rejected(doubted, path.name, amendment),
             mask=next(iter(masks_of(draft.payload))),
             box_px=as_box(draft.payload.box_px),
+            drawn=drawn_outline(amendment, path.name),
         )
         _save(rgba, folder / "photo.png")
         return {"matte": field}
@@ -69,16 +71,18 @@ class PhotoStage:
         called: str | None = None,
         mask: Path | None = None,
         box_px: PixelBox | None = None,
+        drawn: DrawnOutline | None = None,
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Return a photo ``(H, W, 4) uint8`` of what a person called ``name`` with its matte, and what is known of that.
 
         ``called`` is what messages call the file: its name by default. ``confirmed`` returns the matte of a doubted cut-out
         that is right all the same, or raises. ``mask`` is a picture of its outline, ``box_px`` where in the photo the thing is:
-        what is returned is the photo around that. Raises InputError, Rejected.
+        what is returned is the photo around that. ``drawn`` is an outline that a person drew on what is looked at; it goes
+        before all of these. Raises InputError, Rejected.
         """
         settings, file = self.settings, called or path.name
         photo = pixels_of_photo(path, name, settings, mask=mask, box_px=box_px)
-        given = photo.given
+        given = photo.given if drawn is None else as_drawn(photo.given, drawn, file)
         try:
             matte = matte_photo(
                 given.pixels,
@@ -93,7 +97,7 @@ class PhotoStage:
             )
             if given.is_doubted:
                 raise doubted_rectangle(matte, file, name)
-            if photo.box_px is not None:
+            if photo.box_px is not None and drawn is None:
                 require_in_box(matte, photo.box_px, file)
         except DoubtedCutOut as doubted:
             matte = confirmed(doubted)

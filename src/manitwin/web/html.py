@@ -12,6 +12,7 @@ from manitwin.web.links import Links
 STYLE, THREE, VIEWER, GALLERY, REVIEW = "manitwin.css", "three.js", "twin_viewer.js", "gallery.js", "review.js"
 STAGE, SCENE_VIEWER, EPISODE_VIEWER = "stage.js", "scene_viewer.js", "episode_viewer.js"
 EPISODE_TIMELINE, TWIN_SHAPES, TRIAL_PLAYER = "episode_timeline.js", "twin_shapes.js", "trial_player.js"
+OUTLINE = "outline.js"
 """The styles and scripts of the pages, by the names under which they are served and written."""
 
 

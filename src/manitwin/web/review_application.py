@@ -20,6 +20,7 @@ from manitwin.twin.loaded_twin import Twin
 from manitwin.web import trial_document
 from manitwin.web.access import PERSON
 from manitwin.web.application import LINKS, message
+from manitwin.web.request_body import request_body
 from manitwin.web.review_page import PATH, done_page, review_page
 from manitwin.web.served_files import INPUTS, VIEWS, TwinFolders
 from manitwin.web.twin_document import DOCUMENT
@@ -40,7 +41,11 @@ def review_application(pages: ASGIApp, twins: TwinFolders, session: ReviewSessio
         return await _answered(lambda: _page(session, twins.twin(twin_id), person))
 
     async def confirm(request: Request) -> Response:
-        person, twin_id, body = _person(request), request.path_params["twin_id"], await _body(request)
+        person, twin_id, body = (
+            _person(request),
+            request.path_params["twin_id"],
+            await request_body(request, MOST_BODY_BYTES),
+        )
 
         def work() -> Response:
             session.confirm(person, _accepted(twins.twin(twin_id)).record, _said(body, "review", person))
@@ -49,7 +54,11 @@ def review_application(pages: ASGIApp, twins: TwinFolders, session: ReviewSessio
         return await _answered(work, as_json=True)
 
     async def draft(request: Request) -> Response:
-        person, twin_id, body = _person(request), request.path_params["twin_id"], await _body(request)
+        person, twin_id, body = (
+            _person(request),
+            request.path_params["twin_id"],
+            await request_body(request, MOST_BODY_BYTES),
+        )
 
         def work() -> Response:
             said = _said(body, "draft", person)
@@ -59,7 +68,7 @@ def review_application(pages: ASGIApp, twins: TwinFolders, session: ReviewSessio
         return await _answered(work, as_json=True)
 
     async def undo(request: Request) -> Response:
-        person, body = _person(request), await _body(request)
+        person, body = _person(request), await request_body(request, MOST_BODY_BYTES)
 
         def work() -> Response:
             undone = session.undo(person, str(_said(body, "undo", person).get("request", "")))
@@ -146,17 +155,6 @@ def _said(body: bytes, what: str, person: str) -> dict[str, Any]:
             f"not saved: this browser has been {person}'s since their link was opened in it; open yours again"
         )
     return said
-
-
-async def _body(request: Request) -> bytes:
-    """Return what was sent, of which more than the limit is left unread and makes no JSON."""
-    parts, size = [], 0
-    async for part in request.stream():
-        size += len(part)
-        if size > MOST_BODY_BYTES:
-            return b""
-        parts.append(part)
-    return b"".join(parts)
 
 
 async def _answered(work: Callable[[], Response], *, as_json: bool = False) -> Response:

@@ -15,6 +15,7 @@ from urllib.parse import quote
 import uvicorn
 from starlette.types import ASGIApp
 
+from manitwin.dataset.review.outlines import OutlineSession
 from manitwin.dataset.review.session import ReviewSession
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
@@ -23,6 +24,7 @@ from manitwin.web.application import application
 from manitwin.web.episode_application import episode_application, no_twins
 from manitwin.web.episode_folders import EpisodeFolders, is_episodes
 from manitwin.web.gallery_query import Gallery
+from manitwin.web.outline_application import outline_application
 from manitwin.web.review_application import review_application
 from manitwin.web.scene_application import scene_application
 from manitwin.web.scene_folders import SceneFolders, is_scenes
@@ -190,6 +192,22 @@ def review(
             server.run()
         finally:
             server.socket.close()
+
+
+def draw_outlines(
+    session: OutlineSession,
+    host: str,
+    port: int,
+    on_ready: Callable[[PageServer], None],
+    on_new_link: Callable[[str], None],
+) -> None:
+    """Serve the pages on which outlines are drawn until interrupted; ``on_ready`` is called when it listens."""
+    server = PageServer(outline_application(session), host, port, on_new_link)
+    try:
+        on_ready(server)
+        server.run()
+    finally:
+        server.socket.close()
 
 
 def serve(

@@ -1,15 +1,20 @@
-"""``manitwin review cutouts``: cut-outs of rejected photos are looked at, and built where a person finds them right."""
+"""``manitwin review cutouts``: people look at cut-outs of rejected photos, or draw them anew, and what is right is built."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from manitwin.cli import options
 from manitwin.cli.commands.review import Dataset
-from manitwin.cli.console import out_console, print_error
+from manitwin.cli.console import error_console, out_console, print_error
+
+if TYPE_CHECKING:
+    from manitwin.engine.drive import RunReport
+    from manitwin.twin.dataset_root import DatasetRoot
+    from manitwin.web.serve import PageServer
 
 PICTURES = (".png", ".webp", ".jpg")
 
@@ -29,7 +34,20 @@ def review_cutouts(
             metavar="ID",
         ),
     ] = None,
+    draw: Annotated[
+        bool,
+        typer.Option(
+            "--draw", help="Draw the outlines anew in the browser, until interrupted; then what was drawn is built."
+        ),
+    ] = False,
     annotator: Annotated[str, typer.Option(help="Who has looked at them.", metavar="NAME")] = "me",
+    port: Annotated[int, typer.Option(help="The port of --draw; 0: any that is free.", min=0, max=65535)] = 0,
+    host: Annotated[
+        str, typer.Option(help="The address that --draw listens on; 0.0.0.0: all.", metavar="ADDRESS")
+    ] = "127.0.0.1",
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Open the page of --draw in the browser.")
+    ] = True,
     jobs: options.Jobs = None,
 ) -> None:
     """List rejected photos whose cut-out was doubted, draw them, or build those that you find right."""
@@ -37,6 +55,8 @@ def review_cutouts(
 
     if sheet is not None and sheet.suffix.lower() not in PICTURES:
         raise UsageError(f"--sheet {sheet}: no picture; end it in {', '.join(PICTURES)}")
+    if draw and (accept or sheet is not None):
+        raise UsageError("--draw goes by itself; accept cut-outs, or draw a sheet of them, before or after it")
 
     from manitwin.cli.progress import WatchedRun
     from manitwin.dataset.review.cutouts import confirm, doubted_photos, write_sheets
@@ -45,6 +65,8 @@ def review_cutouts(
     from manitwin.twin.dataset_root import DatasetRoot
 
     root, name = DatasetRoot(dataset), require_annotator(annotator)
+    if draw:
+        _draw(dataset, root, name, host, port, browser, jobs)
     photos = doubted_photos(root)
     if sheet is not None:
         for written in write_sheets(root, photos, sheet):
@@ -56,10 +78,50 @@ def review_cutouts(
         raise typer.Exit(0)
     with WatchedRun("photos", dataset) as watched:
         confirmed, run = confirm(root, accept, name, jobs=jobs, **watched.callbacks)
+    raise typer.Exit(_told(dataset, run, f"{len(confirmed)} cut-outs are confirmed by {name}"))
+
+
+def _draw(dataset: str, root: DatasetRoot, name: str, host: str, port: int, browser: bool, jobs: int | None) -> None:
+    """Serve the pages until interrupted, then build what was drawn; ends the command."""
+    import webbrowser
+
+    from manitwin.cli.commands.view import has_screen, interruptible, tell_link
+    from manitwin.cli.progress import WatchedRun
+    from manitwin.dataset.review.outlines import OutlineSession
+    from manitwin.errors import UsageError
+    from manitwin.web.serve import draw_outlines
+
+    session = OutlineSession(root, name)
+    if not session.photos:
+        raise UsageError(f"{dataset}: has no doubted cut-out to be drawn anew")
+    remark = f"{len(session.photos)} photos; end it with Ctrl-C, and what was drawn is built"
+    with interruptible() as ends_with:
+
+        def ready(server: PageServer) -> None:
+            ends_with(server)
+            if server.names.open:
+                error_console.print(
+                    "it listens beyond this machine, and what it sends is not encrypted", style="yellow"
+                )
+            tell_link(server.link(), remark)
+            if browser and has_screen():
+                webbrowser.open(server.link())
+
+        draw_outlines(session, host, port, ready, lambda link: tell_link(link, remark))
+    if not session.kept:
+        out_console.print("stopped; nothing was drawn")
+        raise typer.Exit(0)
+    with WatchedRun("photos", dataset) as watched:
+        run = session.build(jobs=jobs, **watched.callbacks)
+    raise typer.Exit(_told(dataset, run, f"{len(session.kept)} outlines are drawn by {name}"))
+
+
+def _told(dataset: str, run: RunReport, begun: str) -> int:
+    """Print what became of the photos; returns the exit status."""
     counts = run.counts_of_given
     told = ", ".join(f"{counts[state]} {state}" for state in ("accepted", "rejected", "failed") if counts.get(state))
-    out_console.print(f"{len(confirmed)} cut-outs are confirmed by {name}: {told}")
+    out_console.print(f"{begun}: {told}")
     unfinished = bool(run.open or counts.get("failed"))
     if unfinished or counts.get("rejected"):
         print_error(f"`manitwin status {dataset}` says why not all are accepted")
-    raise typer.Exit(4 if unfinished else 3 if counts.get("rejected") else 0)
+    return 4 if unfinished else 3 if counts.get("rejected") else 0

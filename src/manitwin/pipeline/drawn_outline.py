@@ -1,0 +1,89 @@
+"""The outline of a thing in its photo as a person drew it: how it is kept among the amendments, and what is cut out by it."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from manitwin.errors import Rejected
+from manitwin.models.matting.matte import TRANSPARENT_SHARE
+from manitwin.pipeline.cutout import SHOWN_PX
+from manitwin.pipeline.given_alpha import Given
+
+DRAWN = "outline"
+"""Key of the photo stage's amendment: ``{png, source}``, the outline as a PNG file in base64, and who drew it."""
+_REMEDY = "remove its file below DATASET/amendments, build again and draw it anew"
+_BOUND = 0.02
+"""By which the proportions of an outline and of its photo may differ, relative: both are of whole pixels."""
+
+
+@dataclass(frozen=True)
+class DrawnOutline:
+    """What a person drew: ``mask (H, W) bool``, at most ``SHOWN_PX`` large, True where the thing is; ``source`` says who."""
+
+    mask: np.ndarray
+    source: str
+
+    def to_json(self) -> dict[str, str]:
+        """Return it as it is kept."""
+        encoded = io.BytesIO()
+        Image.fromarray(self.mask).save(encoded, "PNG", optimize=True)
+        return {"png": base64.b64encode(encoded.getvalue()).decode("ascii"), "source": self.source}
+
+
+def drawn_outline(amendment: Mapping[str, Any], name: str) -> DrawnOutline | None:
+    """Return the outline among the photo stage's amendments, None where there is none.
+
+    Raises Rejected where it is none that was kept here: the photo ``name`` is not cut out as nobody meant it.
+    """
+    said = amendment.get(DRAWN)
+    if said is None:
+        return None
+    try:
+        return DrawnOutline(mask_of_png(base64.b64decode(said["png"], validate=True)), str(said["source"]))
+    except (KeyError, TypeError, ValueError, binascii.Error) as error:
+        raise _refused(f"{name}: the outline that was drawn of it cannot be read; {_REMEDY}") from error
+
+
+def mask_of_png(data: bytes) -> np.ndarray:
+    """Return the mask ``(H, W) bool`` of a PNG file, True where it is brighter than half; raises ValueError for what is none."""
+    try:
+        with Image.open(io.BytesIO(data), formats=("PNG",)) as picture:
+            if max(picture.size) > SHOWN_PX:  # before any of it is unpacked
+                raise ValueError(f"an outline has at most {SHOWN_PX} pixels a side, not {max(picture.size)}")
+            return np.asarray(picture.convert("L")) > 127
+    except (OSError, SyntaxError, Image.DecompressionBombError) as error:
+        raise ValueError("no PNG file") from error
+
+
+def why_no_outline(mask: np.ndarray) -> str | None:
+    """Return why a mask ``(H, W) bool`` is no outline of a thing, as the end of a sentence; None where it may be one."""
+    if not mask.any():
+        return "is empty"
+    return "leaves nothing of the photo out" if (~mask).mean() <= TRANSPARENT_SHARE else None
+
+
+def as_drawn(given: Given, drawn: DrawnOutline, name: str) -> Given:
+    """Return a picture cut out by an outline that a person drew on it, whatever its own alpha channel says.
+
+    Raises Rejected where the outline is of a picture of other proportions, is empty, or leaves nothing out.
+    """
+    height, width = given.pixels.shape[:2]
+    if abs(drawn.mask.shape[0] * width / (drawn.mask.shape[1] * height) - 1) > _BOUND:
+        raise _refused(f"{name}: {drawn.source} drew the outline on another picture; {_REMEDY}")
+    if (why := why_no_outline(drawn.mask)) is not None:
+        raise _refused(f"{name}: the outline that {drawn.source} drew {why}; {_REMEDY}")
+    grey = Image.fromarray(np.where(drawn.mask, 255, 0).astype(np.uint8))
+    alpha = np.asarray(grey.resize((width, height), Image.Resampling.BILINEAR))
+    return Given(np.dstack([given.pixels[..., :3], alpha]), (f"cut out as {drawn.source} drew its outline",))
+
+
+def _refused(detail: str) -> Rejected:
+    return Rejected("low_confidence_matte", detail, "generate")

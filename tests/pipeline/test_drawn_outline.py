@@ -1,0 +1,98 @@
+"""An outline that a person drew is what a photo is cut out by, whatever is seen in it otherwise."""
+
+from __future__ import annotations
+
+import base64
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from manitwin.config import MattingConfig
+from manitwin.engine.stage import Draft
+from manitwin.errors import Rejected
+from manitwin.pipeline.drawn_outline import DRAWN, DrawnOutline, as_drawn, drawn_outline, mask_of_png
+from manitwin.pipeline.given_alpha import Given
+from manitwin.pipeline.item import Item
+from manitwin.pipeline.photo import PhotoStage
+
+
+def ellipse(height: int, width: int) -> np.ndarray:
+    rows, columns = np.mgrid[:height, :width]
+    return np.asarray(((rows / height - 0.5) / 0.3) ** 2 + ((columns / width - 0.5) / 0.2) ** 2 < 1)
+
+
+def png(picture: Image.Image) -> bytes:
+    encoded = io.BytesIO()
+    picture.save(encoded, "PNG")
+    return encoded.getvalue()
+
+
+def test_kept_outline_is_read_as_it_was_drawn() -> None:
+    drawn = DrawnOutline(ellipse(200, 300), "human:ada")
+    read = drawn_outline({DRAWN: drawn.to_json()}, "a.jpg")
+    assert read is not None and read.source == "human:ada" and (read.mask == drawn.mask).all()
+    assert len(drawn.to_json()["png"]) < 2000 and drawn_outline({}, "a.jpg") is None
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        {"png": "####", "source": "human:ada"},
+        {"png": base64.b64encode(b"no picture").decode(), "source": "human:ada"},
+        {"png": base64.b64encode(png(Image.new("1", (1025, 8)))).decode(), "source": "human:ada"},
+        {"source": "human:ada"},
+        "mask.png",
+    ],
+)
+def test_what_is_no_outline_is_refused_and_not_passed_over(said: Any) -> None:
+    with pytest.raises(Rejected, match=r"a\.jpg: the outline that was drawn of it cannot be read; remove its file"):
+        drawn_outline({DRAWN: said}, "a.jpg")
+
+
+def test_png_of_another_kind_is_none() -> None:
+    jpeg = io.BytesIO()
+    Image.new("L", (64, 64)).save(jpeg, "JPEG")
+    for data in (jpeg.getvalue(), png(Image.new("L", (64, 64)))[:40], b""):
+        with pytest.raises(ValueError, match="no PNG file"):
+            mask_of_png(data)
+    grey = np.tile(np.arange(256, dtype=np.uint8), (64, 1))
+    assert (mask_of_png(png(Image.fromarray(grey))) == (grey > 127)).all()
+
+
+def test_outline_is_scaled_to_its_picture_and_goes_before_the_pictures_own_alpha() -> None:
+    pixels = np.full((400, 600, 4), 90, np.uint8)
+    given = as_drawn(
+        Given(pixels, ("another",), is_doubted=True), DrawnOutline(ellipse(200, 300), "human:ada"), "a.png"
+    )
+    assert given.pixels.shape == (400, 600, 4) and not given.is_doubted
+    assert ((given.pixels[..., 3] > 127) == ellipse(400, 600)).mean() > 0.99
+    assert given.findings == ("cut out as human:ada drew its outline",)
+
+
+def test_outline_of_other_proportions_an_empty_one_and_a_full_one_are_refused() -> None:
+    given = Given(np.zeros((400, 600, 3), np.uint8))
+    for mask, why in (
+        (ellipse(300, 300), "drew the outline on another picture"),
+        (np.zeros((200, 300), bool), "is empty"),
+        (np.ones((200, 300), bool), "leaves nothing of the photo out"),
+    ):
+        with pytest.raises(Rejected, match=why):
+            as_drawn(given, DrawnOutline(mask, "human:ada"), "a.png")
+
+
+@pytest.mark.parametrize("box_px", [(), (100.0, 100.0, 500.0, 500.0)])
+def test_photo_that_shows_nothing_is_cut_out_as_drawn(tmp_path: Path, box_px: tuple[float, ...]) -> None:
+    grain = np.random.default_rng(0).integers(120, 136, (600, 600, 3), np.uint8)
+    Image.fromarray(grain).save(tmp_path / "pale.png")
+    item = Item(str(tmp_path / "pale.png"), "bottle", box_px=box_px)
+    with pytest.raises(Rejected):
+        PhotoStage(MattingConfig()).run(Draft("t", item, seed=0), tmp_path)
+    said = {PhotoStage.name: {DRAWN: DrawnOutline(ellipse(300, 300), "human:ada").to_json()}}
+    field = PhotoStage(MattingConfig()).run(Draft("t", item, seed=0, amendments=said), tmp_path)["matte"]
+    alpha = np.asarray(Image.open(tmp_path / "photo.png"))[..., 3] > 127
+    assert (alpha == ellipse(*alpha.shape)).mean() > 0.99
+    assert field["method"] == "alpha" and "cut out as human:ada drew its outline" in field["findings"]

@@ -1,0 +1,29 @@
+"""A data set with two photos whose cut-outs are doubted: quickly made, as nothing comes after a doubted cut-out."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import manitwin
+from manitwin.config import BuildConfig, MattingConfig
+
+SAMPLE = Path(__file__).resolve().parents[2] / "samples" / "bottle.jpg"
+DOUBTING = MattingConfig(min_confidence=0.985)
+
+
+def write_doubted(folder: Path) -> Path:
+    """Return the data set, below a folder that has the photos."""
+    photos = folder / "photos"
+    photos.mkdir(parents=True)
+    for name in ("first.jpg", "second.jpg"):
+        shutil.copy(SAMPLE, photos / name)
+    manifest = folder / "list.csv"
+    manifest.write_text("file,name\nphotos/first.jpg,bottle\nphotos/second.jpg,water bottle\n")
+    config = BuildConfig(
+        matting=DOUBTING.model_dump(), grasps={"simulated": 8, "unfiltered": 0, "least_per_point": 2, "tries_per_point": 4},
+        second_opinion={"enabled": False}, robustness={"enabled": False},
+    )  # fmt: skip
+    results = manitwin.build(manifest, folder / "twins", config=config, executor="inline").results
+    assert [each.status for each in results] == ["rejected", "rejected"]
+    return folder / "twins"

@@ -1,0 +1,142 @@
+"""The pages on which outlines are drawn, without a browser: what they give, keep and refuse."""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from access_requests import asked, header
+from doubted_photos import write_doubted
+from PIL import Image
+from starlette.applications import Starlette
+
+from manitwin.dataset.review.outlines import OutlineSession
+from manitwin.engine.amendments import read_amendments, write_amendments
+from manitwin.pipeline.cutout import CONFIRMED
+from manitwin.pipeline.drawn_outline import DRAWN, drawn_outline
+from manitwin.pipeline.photo import PhotoStage
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.store import read_record
+from manitwin.web.outline_application import MOST_BODY_BYTES, outline_application
+
+
+@pytest.fixture(scope="module")
+def doubted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A data set with doubted photos; nothing may write there."""
+    return write_doubted(tmp_path_factory.mktemp("doubted"))
+
+
+@pytest.fixture
+def session(doubted: Path, tmp_path: Path) -> OutlineSession:
+    return OutlineSession(DatasetRoot(shutil.copytree(doubted, tmp_path / "twins")), "ada")
+
+
+@pytest.fixture
+def app(session: OutlineSession) -> Starlette:
+    return outline_application(session)
+
+
+def body(messages: list[dict[str, object]]) -> bytes:
+    return b"".join(each.get("body", b"") for each in messages[1:])  # type: ignore[misc]
+
+
+def png(mask: np.ndarray) -> bytes:
+    encoded = io.BytesIO()
+    Image.fromarray(np.where(mask, 255, 0).astype(np.uint8)).save(encoded, "PNG")
+    return encoded.getvalue()
+
+
+def box_in(size_px: tuple[int, int], least: float, most: float) -> np.ndarray:
+    width, height = size_px
+    mask = np.zeros((height, width), bool)
+    mask[int(least * height) : int(most * height), int(least * width) : int(most * width)] = True
+    return mask
+
+
+def test_list_and_page_name_the_photos_and_give_picture_and_mask(app: Starlette, session: OutlineSession) -> None:
+    messages = asked(app, "/")
+    page = body(messages).decode()
+    first, second = session.photos
+    assert page.count('<li class="card">') == 2 and "first.jpg" in page and "2 of 2 are not drawn" in page
+    assert header(messages, "cache-control") == "no-store"
+    page = body(asked(app, f"/outline/{first}")).decode()
+    assert f'data-next="/outline/{second}"' in page and "the object cannot be told from the background" in page
+    picture = Image.open(io.BytesIO(body(asked(app, f"/outline/{first}/photo.webp"))))
+    mask = Image.open(io.BytesIO(body(asked(app, f"/outline/{first}/mask.png"))))
+    assert picture.size == mask.size and picture.mode == "RGB" and 0.02 < np.asarray(mask).mean() / 255 < 0.8
+    assert asked(app, "/outline/zz")[0]["status"] == 404
+    assert asked(app, "/static/outline.js")[0]["status"] == 200
+
+
+def test_outline_is_fitted_kept_and_shown_again(app: Starlette, session: OutlineSession) -> None:
+    first, second = session.photos
+    root = session.root
+    amendments = {PhotoStage.name: {CONFIRMED: {"sha256": "0" * 64, "source": "human:ben"}}}
+    write_amendments(root, first, amendments)
+    size_px = Image.open(io.BytesIO(session.picture(first))).size
+    drawn = png(box_in(size_px, 0.3, 0.7))
+    fitted = asked(app, f"/outline/{first}/fit", method="POST", body=drawn)
+    assert fitted[0]["status"] == 200 and Image.open(io.BytesIO(body(fitted))).size == size_px
+    assert read_amendments(root, first) == amendments, "to fit keeps nothing"
+    kept = asked(app, f"/outline/{first}", method="POST", body=drawn)
+    assert json.loads(body(kept)) == {"next": f"/outline/{second}"} and session.kept == (first,)
+    said = read_amendments(root, first)[PhotoStage.name]
+    assert set(said) == {DRAWN} and said[DRAWN]["source"] == "human:ada"
+    found = drawn_outline(said, "first.jpg")
+    assert found is not None and (found.mask == box_in(size_px, 0.3, 0.7)).all()
+    assert body(asked(app, f"/outline/{first}/mask.png")) == drawn
+    assert "drawn, to be built" in body(asked(app, "/")).decode()
+    kept = asked(app, f"/outline/{second}", method="POST", body=drawn)
+    assert json.loads(body(kept)) == {"next": "/"}
+
+
+@pytest.mark.parametrize(
+    ("sent", "why"),
+    [
+        (b"", "no PNG file"),
+        (b"no picture", "no PNG file"),
+        (png(np.ones((8, 8), bool)), "is none of this photo; reload the page"),
+        (png(np.ones((8, 2000), bool)), "at most 1024 pixels a side"),
+        (bytes(MOST_BODY_BYTES + 1), "no PNG file"),
+    ],
+)
+def test_what_is_no_outline_is_refused_and_nothing_is_kept(
+    app: Starlette, session: OutlineSession, sent: bytes, why: str
+) -> None:
+    first = next(iter(session.photos))
+    for address in (f"/outline/{first}", f"/outline/{first}/fit"):
+        answer = asked(app, address, method="POST", body=sent)
+        assert answer[0]["status"] == 400 and why in json.loads(body(answer))["error"]
+    assert session.kept == () and read_amendments(session.root, first) == {}
+
+
+def test_empty_outlines_full_ones_and_those_of_two_things_are_not_kept(app: Starlette, session: OutlineSession) -> None:
+    first = next(iter(session.photos))
+    size_px = Image.open(io.BytesIO(session.picture(first))).size
+    two = box_in(size_px, 0.1, 0.4) | box_in(size_px, 0.6, 0.9)
+    for mask, why in (
+        (np.zeros(size_px[::-1], bool), "is empty"),
+        (np.ones(size_px[::-1], bool), "leaves nothing of the photo out"),
+        (two, "separate objects"),
+    ):
+        answer = asked(app, f"/outline/{first}", method="POST", body=png(mask))
+        assert answer[0]["status"] == 400
+        error = json.loads(body(answer))["error"]
+        assert error.startswith("not kept: ") and why in error
+    assert session.kept == ()
+
+
+def test_what_was_drawn_becomes_a_twin_that_says_so(session: OutlineSession) -> None:
+    first, second = session.photos
+    session.keep(first, session.mask(first))
+    run = session.build(jobs=1, executor="inline")
+    assert run.counts_of_given == {"accepted": 1}
+    record = read_record(Path(str(session.root.local)) / session.root.twin_name(first))
+    assert record.status == "accepted"
+    [matte] = [check for check in record.quality.checks if check.name == "matte"]
+    assert "cut out as human:ada drew its outline" in matte.message
+    assert read_record(Path(str(session.root.local)) / session.root.twin_name(second)).status == "rejected"
