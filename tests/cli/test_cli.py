@@ -225,6 +225,7 @@ WRONG_VALUES = [
     "review cutouts nothing_here",
     "review cutouts . --sheet a.txt",
     "review cutouts . --draw --accept c16c",
+    "review cutouts . --redraw c16c",
 ]
 
 

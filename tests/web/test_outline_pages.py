@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from starlette.applications import Starlette
 
 from manitwin.dataset.review.outlines import OutlineSession
 from manitwin.engine.amendments import read_amendments, write_amendments
+from manitwin.errors import UsageError
 from manitwin.pipeline.cutout import CONFIRMED
 from manitwin.pipeline.drawn_outline import DRAWN, drawn_outline
 from manitwin.pipeline.photo import PhotoStage
@@ -60,20 +62,22 @@ def box_in(size_px: tuple[int, int], least: float, most: float) -> np.ndarray:
 def test_list_and_page_name_the_photos_and_give_picture_and_mask(app: Starlette, session: OutlineSession) -> None:
     messages = asked(app, "/")
     page = body(messages).decode()
-    first, second = session.photos
-    assert page.count('<li class="card">') == 2 and "first.jpg" in page and "2 of 2 are not drawn" in page
+    first, second, bare = session.photos
+    assert page.count('<li class="card">') == 3 and "first.jpg" in page and "3 of 3 are not drawn" in page
     assert header(messages, "cache-control") == "no-store"
     page = body(asked(app, f"/outline/{first}")).decode()
     assert f'data-next="/outline/{second}"' in page and "the object cannot be told from the background" in page
     picture = Image.open(io.BytesIO(body(asked(app, f"/outline/{first}/photo.webp"))))
     mask = Image.open(io.BytesIO(body(asked(app, f"/outline/{first}/mask.png"))))
     assert picture.size == mask.size and picture.mode == "RGB" and 0.02 < np.asarray(mask).mean() / 255 < 0.8
+    nothing = np.asarray(Image.open(io.BytesIO(body(asked(app, f"/outline/{bare}/mask.png")))))
+    assert nothing.shape == (300, 400) and not nothing.any()
     assert asked(app, "/outline/zz")[0]["status"] == 404
     assert asked(app, "/static/outline.js")[0]["status"] == 200
 
 
 def test_outline_is_fitted_kept_and_shown_again(app: Starlette, session: OutlineSession) -> None:
-    first, second = session.photos
+    first, second, bare = session.photos
     root = session.root
     amendments = {PhotoStage.name: {CONFIRMED: {"sha256": "0" * 64, "source": "human:ben"}}}
     write_amendments(root, first, amendments)
@@ -91,7 +95,9 @@ def test_outline_is_fitted_kept_and_shown_again(app: Starlette, session: Outline
     assert body(asked(app, f"/outline/{first}/mask.png")) == drawn
     assert "drawn, to be built" in body(asked(app, "/")).decode()
     kept = asked(app, f"/outline/{second}", method="POST", body=drawn)
-    assert json.loads(body(kept)) == {"next": "/"}
+    assert json.loads(body(kept)) == {"next": f"/outline/{bare}"}
+    session.keep(bare, png(box_in((400, 300), 0.3, 0.7)))
+    assert json.loads(body(asked(app, f"/outline/{second}", method="POST", body=drawn))) == {"next": "/"}
 
 
 @pytest.mark.parametrize(
@@ -131,8 +137,9 @@ def test_empty_outlines_full_ones_and_those_of_two_things_are_not_kept(app: Star
 
 
 def test_what_was_drawn_becomes_a_twin_that_says_so(session: OutlineSession) -> None:
-    first, second = session.photos
-    session.keep(first, session.mask(first))
+    first, second, bare = session.photos
+    kept = session.mask(first)
+    session.keep(first, kept)
     run = session.build(jobs=1, executor="inline")
     assert run.counts_of_given == {"accepted": 1}
     record = read_record(Path(str(session.root.local)) / session.root.twin_name(first))
@@ -140,3 +147,16 @@ def test_what_was_drawn_becomes_a_twin_that_says_so(session: OutlineSession) -> 
     [matte] = [check for check in record.quality.checks if check.name == "matte"]
     assert "cut out as human:ada drew its outline" in matte.message
     assert read_record(Path(str(session.root.local)) / session.root.twin_name(second)).status == "rejected"
+    assert first not in OutlineSession(session.root, "ben").photos
+    again = OutlineSession(session.root, "ben", [first[:6]])
+    assert list(again.photos) == [first, second, bare] and again.mask(first) == kept
+    with pytest.raises(UsageError, match=r"^zz: no photo; "):
+        OutlineSession(session.root, "ben", ["zz"])
+
+
+def test_photo_that_is_gone_is_said_to_be(session: OutlineSession, tmp_path: Path) -> None:
+    *_, bare = session.photos
+    moved = replace(session.photos[bare], item=replace(session.photos[bare].item, file=str(tmp_path / "bare.png")))
+    session.photos[bare] = moved
+    with pytest.raises(UsageError, match=r"bare\.png: cannot be looked at"):
+        session.picture(bare)

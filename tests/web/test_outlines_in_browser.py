@@ -92,7 +92,7 @@ def test_corners_brush_undo_and_what_is_kept_is_built(tmp_path: Path, visitor: C
             with page.expect_navigation():
                 page.keyboard.press("Enter")
             page.wait_for_selector("#outline[data-ready]")
-            assert page.url.rsplit("/", 1)[1] != first and "1 drawn, 1 left" in page.inner_text("#progress")
+            assert page.url.rsplit("/", 1)[1] != first and "1 drawn, 2 left" in page.inner_text("#progress")
             page.keyboard.press("n")
             page.keyboard.press("Enter")
             page.wait_for_selector(".said.error")

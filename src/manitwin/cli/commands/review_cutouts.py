@@ -12,8 +12,8 @@ from manitwin.cli.commands.review import Dataset
 from manitwin.cli.console import error_console, out_console, print_error
 
 if TYPE_CHECKING:
+    from manitwin.dataset.review.outlines import OutlineSession
     from manitwin.engine.drive import RunReport
-    from manitwin.twin.dataset_root import DatasetRoot
     from manitwin.web.serve import PageServer
 
 PICTURES = (".png", ".webp", ".jpg")
@@ -40,6 +40,10 @@ def review_cutouts(
             "--draw", help="Draw the outlines anew in the browser, until interrupted; then what was drawn is built."
         ),
     ] = False,
+    redraw: Annotated[
+        list[str] | None,
+        typer.Option(help="Show --draw this photo too, whose cut-out was believed; may be given again.", metavar="ID"),
+    ] = None,
     annotator: Annotated[str, typer.Option(help="Who has looked at them.", metavar="NAME")] = "me",
     port: Annotated[int, typer.Option(help="The port of --draw; 0: any that is free.", min=0, max=65535)] = 0,
     host: Annotated[
@@ -55,6 +59,8 @@ def review_cutouts(
 
     if sheet is not None and sheet.suffix.lower() not in PICTURES:
         raise UsageError(f"--sheet {sheet}: no picture; end it in {', '.join(PICTURES)}")
+    if redraw and not draw:
+        raise UsageError("--redraw says what --draw shows besides; give --draw too")
     if draw and (accept or sheet is not None):
         raise UsageError("--draw goes by itself; accept cut-outs, or draw a sheet of them, before or after it")
 
@@ -66,7 +72,9 @@ def review_cutouts(
 
     root, name = DatasetRoot(dataset), require_annotator(annotator)
     if draw:
-        _draw(dataset, root, name, host, port, browser, jobs)
+        from manitwin.dataset.review.outlines import OutlineSession
+
+        _draw(dataset, OutlineSession(root, name, redraw or ()), host, port, browser, jobs)
     photos = doubted_photos(root)
     if sheet is not None:
         for written in write_sheets(root, photos, sheet):
@@ -81,19 +89,17 @@ def review_cutouts(
     raise typer.Exit(_told(dataset, run, f"{len(confirmed)} cut-outs are confirmed by {name}"))
 
 
-def _draw(dataset: str, root: DatasetRoot, name: str, host: str, port: int, browser: bool, jobs: int | None) -> None:
+def _draw(dataset: str, session: OutlineSession, host: str, port: int, browser: bool, jobs: int | None) -> None:
     """Serve the pages until interrupted, then build what was drawn; ends the command."""
     import webbrowser
 
     from manitwin.cli.commands.view import has_screen, interruptible, tell_link
     from manitwin.cli.progress import WatchedRun
-    from manitwin.dataset.review.outlines import OutlineSession
     from manitwin.errors import UsageError
     from manitwin.web.serve import draw_outlines
 
-    session = OutlineSession(root, name)
     if not session.photos:
-        raise UsageError(f"{dataset}: has no doubted cut-out to be drawn anew")
+        raise UsageError(f"{dataset}: has no photo that was rejected for its cut-out; --redraw ID shows another one")
     remark = f"{len(session.photos)} photos; end it with Ctrl-C, and what was drawn is built"
     with interruptible() as ends_with:
 
@@ -113,7 +119,7 @@ def _draw(dataset: str, root: DatasetRoot, name: str, host: str, port: int, brow
         raise typer.Exit(0)
     with WatchedRun("photos", dataset) as watched:
         run = session.build(jobs=jobs, **watched.callbacks)
-    raise typer.Exit(_told(dataset, run, f"{len(session.kept)} outlines are drawn by {name}"))
+    raise typer.Exit(_told(dataset, run, f"{len(session.kept)} outlines are drawn by {session.annotator}"))
 
 
 def _told(dataset: str, run: RunReport, begun: str) -> int:

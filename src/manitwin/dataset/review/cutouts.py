@@ -30,19 +30,20 @@ SHOWN = 48
 """Cut-outs on one sheet."""
 AROUND = (200, 0, 200)
 """Magenta, which few things and grounds have."""
+BELIEVED = "its cut-out was believed"
 DIMMED = 0.25
 """How much of the photo is still seen where it would be cut away."""
 
 
 @dataclass(frozen=True)
 class DoubtedPhoto:
-    """A rejected photo: its number in the ledger, why it was rejected, and the digest of the cut-out beside that."""
+    """A photo: its number in the ledger, why it was rejected, and the digest of the cut-out beside that, None where none is."""
 
     twin_id: str
     number: int
     item: Item
     detail: str
-    sha256: str
+    sha256: str | None
 
 
 def doubted_photos(root: DatasetRoot) -> list[DoubtedPhoto]:
@@ -50,20 +51,32 @@ def doubted_photos(root: DatasetRoot) -> list[DoubtedPhoto]:
 
     Raises UsageError where it has no ledger.
     """
+    return [photo for photo in photos_to_draw(root) if photo.sha256 is not None]
+
+
+def photos_to_draw(root: DatasetRoot, redraw: Iterable[str] = ()) -> list[DoubtedPhoto]:
+    """Return the photos that were rejected for their cut-out, those in which nothing was found too, in the order of the items.
+
+    ``redraw`` are beginnings of the ids of others, whose cut-outs were believed. Several photos of one thing are left out.
+    Raises UsageError where the data set has no ledger, and for an id that is no photo's there.
+    """
     path, found = local_ledger(root), []
     with read_ledger(path) as ledger:
         rows = ledger.execute(
-            "SELECT number, twin_id, item FROM items WHERE state = 'rejected' AND twin_id IS NOT NULL AND reason IN"
-            " ('low_confidence_matte', 'several_objects') ORDER BY number"
+            "SELECT number, twin_id, item, state = 'rejected' AND reason IN ('low_confidence_matte', 'several_objects',"
+            " 'no_object') FROM items WHERE twin_id IS NOT NULL AND kind = 'image' ORDER BY number"
         ).fetchall()
-    for number, twin_id, said in rows:
+    chosen = {_only(root, begun, [str(row[1]) for row in rows], "no photo") for begun in redraw}
+    for number, twin_id, said, is_refused in rows:
+        if not is_refused and twin_id not in chosen:
+            continue
         try:
             record = parse_record(root.read_bytes(f"{root.twin_name(twin_id)}/{RECORD}"))
         except (FileNotFoundError, TwinError):  # told and put right by `manitwin check`
             continue
-        if CUTOUT in record.files and record.rejection is not None:
-            item = Item.from_json(parse_json_object(said, f"{path}: item {number}", UsageError, file_names=True))
-            found.append(DoubtedPhoto(twin_id, int(number), item, record.rejection.detail, record.files[CUTOUT]))
+        detail = BELIEVED if record.rejection is None else record.rejection.detail
+        item = Item.from_json(parse_json_object(said, f"{path}: item {number}", UsageError, file_names=True))
+        found.append(DoubtedPhoto(twin_id, int(number), item, detail, record.files.get(CUTOUT)))
     return found
 
 
@@ -106,14 +119,18 @@ def confirm(
 
 
 def _chosen(root: DatasetRoot, photos: Sequence[DoubtedPhoto], twin_ids: Iterable[str]) -> list[DoubtedPhoto]:
-    found: dict[str, DoubtedPhoto] = {}
-    for said in twin_ids:
-        alike = [each for each in photos if said and each.twin_id.startswith(said)]
-        if len(alike) != 1:
-            why = "no rejected photo with a cut-out" if not alike else f"{len(alike)} photos begin so"
-            raise UsageError(f"{said}: {why}; `manitwin review cutouts {root.url}` lists them")
-        found[alike[0].twin_id] = alike[0]
-    return list(found.values())
+    known = {photo.twin_id: photo for photo in photos}
+    found = dict.fromkeys(_only(root, said, list(known), "no rejected photo with a cut-out") for said in twin_ids)
+    return [known[twin_id] for twin_id in found]
+
+
+def _only(root: DatasetRoot, begun: str, twin_ids: Sequence[str], none: str) -> str:
+    """Return the one id that begins so; raises UsageError where it is none or several."""
+    alike = [each for each in twin_ids if begun and each.startswith(begun)]
+    if len(alike) != 1:
+        why = none if not alike else f"{len(alike)} photos begin so"
+        raise UsageError(f"{begun}: {why}; `manitwin review cutouts {root.url}` lists them")
+    return alike[0]
 
 
 def _tile(root: DatasetRoot, twin_id: str) -> np.ndarray:

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import io
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Unpack
 
 import numpy as np
 from PIL import Image
 
-from manitwin.dataset.review.cutouts import DoubtedPhoto, doubted_photos
+from manitwin.config import MattingConfig
+from manitwin.dataset.review.cutouts import DoubtedPhoto, photos_to_draw
 from manitwin.dataset.review.making_again import made_again
 from manitwin.engine.amendments import read_amendments, write_amendments
 from manitwin.engine.drive import RunOptions, RunReport
-from manitwin.errors import Rejected, UsageError
+from manitwin.errors import InputError, Rejected, UsageError
 from manitwin.models.matting.fitted_outline import fit_outline
 from manitwin.models.matting.matte import matte_photo
-from manitwin.pipeline.cutout import CONFIRMED, CUTOUT, QUALITY
+from manitwin.pipeline.cutout import CONFIRMED, CUTOUT, QUALITY, SHOWN_PX, reduced
 from manitwin.pipeline.drawn_outline import (
     DRAWN,
     DrawnOutline,
@@ -28,21 +30,25 @@ from manitwin.pipeline.drawn_outline import (
 )
 from manitwin.pipeline.given_alpha import Given
 from manitwin.pipeline.human_corrections import HUMAN
+from manitwin.pipeline.item import Item, masks_of
 from manitwin.pipeline.photo import PhotoStage
+from manitwin.pipeline.photo_pixels import pixels_of_photo
 from manitwin.pipeline.settings import stored_config
+from manitwin.pipeline.stated_place import as_box
 from manitwin.twin.dataset_root import DatasetRoot
 
 
 class OutlineSession:
-    """The doubted photos of a data set, what each shows, and the outlines that ``annotator`` draws of them.
+    """The photos of a data set that ``photos_to_draw`` returns, what each shows, and the outlines that ``annotator`` draws.
 
-    What is kept is in the data set's amendments at once; ``build`` makes the twins. Raises UsageError where there is no ledger.
+    What is kept is in the data set's amendments at once; ``build`` makes the twins. Raises UsageError as that does.
     """
 
-    def __init__(self, root: DatasetRoot, annotator: str):
+    def __init__(self, root: DatasetRoot, annotator: str, redraw: Iterable[str] = ()):
         self.root, self.annotator = root, annotator
-        self.photos = {photo.twin_id: photo for photo in doubted_photos(root)}
+        self.photos = {photo.twin_id: photo for photo in photos_to_draw(root, redraw)}
         self._settings = stored_config(root).matting
+        self._looked_at: dict[str, np.ndarray] = {}
         self._kept: dict[str, None] = {}
         self._lock = threading.Lock()
 
@@ -104,7 +110,13 @@ class OutlineSession:
         return made_again(self.root, ((each.number, each.item) for each in chosen), jobs, **options)
 
     def _rgba(self, twin_id: str) -> np.ndarray:
-        name = f"{self.root.twin_name(self.photo(twin_id).twin_id)}/{CUTOUT}"
+        photo = self.photo(twin_id)
+        if photo.sha256 is None:
+            with self._lock:
+                if twin_id not in self._looked_at:
+                    self._looked_at[twin_id] = _seen_again(photo.item, self._settings)
+            return self._looked_at[twin_id]
+        name = f"{self.root.twin_name(twin_id)}/{CUTOUT}"
         with Image.open(io.BytesIO(self.root.read_bytes(name, UsageError))) as picture:
             return np.asarray(picture.convert("RGBA"))
 
@@ -118,6 +130,23 @@ class OutlineSession:
                 f"an outline of {mask.shape[1]} x {mask.shape[0]} pixels is none of this photo; reload the page"
             )
         return mask
+
+
+def _seen_again(item: Item, settings: MattingConfig) -> np.ndarray:
+    """Return a photo ``(H, W, 4) uint8`` as ``shown_cutout`` would show it, cut out without more networks, empty if that fails.
+
+    Raises UsageError where the photo cannot be read any more.
+    """
+    path, mask, box_px = Path(item.file or ""), next(iter(masks_of(item))), as_box(item.box_px)
+    stage = PhotoStage(settings)
+    try:
+        rgba, _ = stage.cut_out(path, item.name, lambda doubted: doubted.matte, mask=mask, box_px=box_px)
+    except InputError as error:
+        raise UsageError(f"{path}: cannot be looked at: {error.detail}") from error
+    except Rejected:
+        pixels = pixels_of_photo(path, item.name, settings, mask=mask, box_px=box_px).given.pixels
+        rgba = np.dstack([pixels[..., :3], np.zeros(pixels.shape[:2], np.uint8)])
+    return reduced(rgba, SHOWN_PX)
 
 
 def _png(mask: np.ndarray) -> bytes:
