@@ -42,7 +42,7 @@ def test_a_mug_is_held_by_its_handle_and_poured_from_its_rim() -> None:
 
 
 def test_a_cup_with_a_handle_is_held_by_it_and_one_without_is_not() -> None:
-    handled, plain = select(mug(), "tea cup"), select(cup(), "tea cup")
+    handled, plain = select(mug(), "drinking cup"), select(cup(), "drinking cup")
     assert [point.label for point in handled.functional] == ["opening", "handle", "base"]
     assert (
         "opening of the cup" not in handled.functional[1].description

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from manitwin.geometry.solids.shapes import box, cylinder, lathe, rounded
-from manitwin.models.generators.templates.catalog.vessel import bulge, hollowed
+from manitwin.models.generators.templates.catalog.vessel import bulge, ear, hollowed, teacup_profile
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -50,6 +50,15 @@ def carafe(*, height_m: float, width: float, neck: float, flare: float, wall_m: 
     n = neck * r
     profile = bulge([(0.8 * r, 0.0), (r, 0.2 * h), (0.86 * r, 0.45 * h), (n, 0.74 * h), (flare * n, h)])
     return hollowed(Model(), profile, wall_m, 2 * wall_m)
+
+
+@template("tea cup")
+def tea_cup(*, width_m: float, rim: float, belly: float, taper: float, handle: float, wall_m: float) -> Model:
+    """Build a cup with an ear that swells from its foot; ``rim`` is its height over its width, ``handle`` of the height."""
+    model, radius, height = Model(), 0.5 * width_m, rim * width_m
+    wide = belly * radius
+    grip = ear(model, 0.5 * (wide + radius), 0.84 * height, 0.26 * height, handle * height, 0.007)
+    return hollowed(model, teacup_profile(radius, height, wide, taper * radius), wall_m, 1.6 * wall_m, grip)
 
 
 @template("ramekin")

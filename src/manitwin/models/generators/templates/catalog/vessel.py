@@ -76,6 +76,12 @@ def stick(
     return "handle", tube(path, half_m, flatten=0.65)
 
 
+def teacup_profile(radius_m: float, height_m: float, wide_m: float, foot_m: float) -> list[Point]:
+    """Return the side of a cup that swells from its foot to a wide belly and opens towards its rim: radii, counted upward."""
+    side = [(wide_m, 0.35 * height_m), (0.5 * (wide_m + 0.96 * radius_m), 0.68 * height_m), (radius_m, height_m)]
+    return bulge([(foot_m, 0.0), (0.4 * foot_m + 0.6 * wide_m, 0.1 * height_m), *side])
+
+
 def bulge(points: list[Point], *, rows: int = 20) -> list[Point]:
     """Return a smooth profile through (radius, z) points counted upward: Catmull-Rom, its radii kept positive."""
     curve = arc([(radius, 0.0, z) for radius, z in points], samples=rows)

@@ -8,7 +8,7 @@ import numpy as np
 
 from manitwin.geometry.solids.shapes import box, cylinder, lathe, polygon, prism, rounded
 from manitwin.geometry.solids.sweep import arc, tube
-from manitwin.models.generators.templates.catalog.vessel import RIM_SHARE, bulge, ear, hollowed, shell
+from manitwin.models.generators.templates.catalog.vessel import RIM_SHARE, bulge, ear, hollowed, shell, teacup_profile
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -121,9 +121,7 @@ def cup_and_saucer(
         wall_m,
         floor + 0.0005,
     )
-    side = [(wide, 0.35 * height), (0.5 * (wide + 0.96 * radius), 0.68 * height), (radius, height)]
-    profile = bulge([(foot, 0.0), (0.4 * foot + 0.6 * wide, 0.1 * height), *side])
-    outer, inner = shell(profile, wall_m, 1.5 * wall_m)
+    outer, inner = shell(teacup_profile(radius, height, wide, foot), wall_m, 1.5 * wall_m)
     name, grip = ear(model, 0.5 * (wide + radius), 0.86 * height, 0.3 * height, handle * height, 0.008)
     raised = [(x, y, z + floor) for x, y, z in (point.position_m for point in model.points)]
     model.points = [replace(point, position_m=at) for point, at in zip(model.points, raised, strict=True)]
