@@ -112,6 +112,18 @@ def test_a_plan_is_two_manifests_that_a_build_reads(tmp_path: Path) -> None:
     assert said == json.loads((out / "plan.json").read_text())
 
 
+def test_masks_beside_photos_are_in_the_plan(tmp_path: Path) -> None:
+    photos, out = tmp_path / "photos", tmp_path / "plan"
+    photos.mkdir()
+    for name in ("mug.jpg", "mug_mask.png", "spoon.jpg"):
+        (photos / name).write_bytes(name.encode())
+    collect("add", tmp_path / "c.db", photos, "--source", "mine", "--licence", "CC0-1.0")
+    collect("plan", tmp_path / "c.db", "--items", 12, "-o", out)
+    items = list(iterate_items([out / MANIFEST], {}, Notes(), strict=True))
+    masks = {Path(item.file or "").name: item.masks for item in items}
+    assert masks == {"mug.jpg": (str(photos / "mug_mask.png"),), "spoon.jpg": ()}
+
+
 def test_a_plan_of_nothing_is_all_prompts(tmp_path: Path) -> None:
     write_plan(plan_inputs([], 7), tmp_path / "plan")
     with (tmp_path / "plan" / PROMPTS).open() as stream:

@@ -10,11 +10,14 @@ from pathlib import Path
 
 from manitwin.dataset.collect.planning import CollectPlan
 from manitwin.formats.output_folder import require_writable_folder
+from manitwin.pipeline.masks_beside import masks_of_photos
 from manitwin.twin.import_record import IMPORTED_MESH
 from manitwin.twin.store import write_bytes_atomically
 
 MANIFEST, PROMPTS, SUMMARY = "manifest.csv", "prompts.csv", "plan.json"
 _COLUMNS = ("file", "name", "license", "attribution")
+_MASK = "mask"
+"""A further column, where a photo of the plan has a mask beside it."""
 
 
 def write_plan(plan: CollectPlan, folder: Path) -> list[Path]:
@@ -24,10 +27,12 @@ def write_plan(plan: CollectPlan, folder: Path) -> list[Path]:
     """
     require_writable_folder(folder)
     folder.mkdir(parents=True, exist_ok=True)
+    masks = masks_of_photos([Path(row.place) for row in plan.chosen if row.kind == "image"])
     built = [
         (
             str(Path(row.place, IMPORTED_MESH)) if row.kind == "asset" else row.place,
             row.name or row.category, row.licence, row.attribution or "",
+            *([str(masks.get(Path(row.place), ""))] if masks else []),
         )
         for row in plan.chosen
     ]  # fmt: skip
@@ -40,7 +45,7 @@ def write_plan(plan: CollectPlan, folder: Path) -> list[Path]:
         "left_out": plan.left_out,
     }
     files = {
-        MANIFEST: _table(_COLUMNS, built),
+        MANIFEST: _table((*_COLUMNS, _MASK) if masks else _COLUMNS, built),
         PROMPTS: _table(("text", "name"), prompts),
         SUMMARY: json.dumps(summary, indent=1) + "\n",
     }
