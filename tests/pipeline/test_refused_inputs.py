@@ -8,7 +8,7 @@ from input_items import collect_items
 from manitwin.errors import UsageError
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.manifest import Notes, iterate_items
-from manitwin.pipeline.refused_inputs import ROWS_NAMED, TOLD, RefusedInputs
+from manitwin.pipeline.refused_inputs import MOST, ROWS_NAMED, TOLD, RefusedInputs
 
 
 def no_unicorns(item: Item) -> str | None:
@@ -74,6 +74,24 @@ def test_of_very_many_the_rest_are_told_by_their_rows() -> None:
     assert f"{TOLD + ROWS_NAMED + 5} more cannot be used" in said and "give another. " in said
     assert said.count("no such thing") == 1 + TOLD and f"and {ROWS_NAMED + 5} more in rows 11, 12, " in said
     assert said.endswith(", 210, ...") and len(said) < 3000
+
+
+def test_a_list_of_nothing_else_is_not_read_to_its_end(tmp_path: Path) -> None:
+    read = []
+
+    def refusal(item: Item) -> str | None:
+        read.append(item)
+        return "none of these"
+
+    texts = [f"thing {number}" for number in range(3 * MOST)]
+    with pytest.raises(UsageError, match=rf"{MOST - 1} more cannot be used: .*; what comes after them was not read$"):
+        list(iterate_items([], {}, Notes(), texts, refusal=refusal))
+    assert len(read) == MOST
+    manifest = tmp_path / "list.csv"
+    manifest.write_text("text\n" + "".join(f"{text}\n" for text in texts))
+    with pytest.raises(UsageError) as raised:
+        list(iterate_items([manifest], {}, Notes(), refusal=refusal))
+    assert str(raised.value).count("cannot be used") == 1 and len(read) == 2 * MOST
 
 
 def test_other_errors_are_not_kept() -> None:

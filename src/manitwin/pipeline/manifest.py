@@ -221,9 +221,11 @@ def _manifest_items(
                 raise UsageError(f"{path}: unknown column {unknown[column]}; valid: {', '.join(COLUMNS)}")
         notes.tell(f"row {line:,} of {path.name}")
         where = f"{path}:{line}"
+        item = None
         with refused.noted():
-            if not groups.takes(line, row):
-                yield from _allowed(item_of(row, path.parent, defaults, where, unknown), where, refusal, refused)
+            item = None if groups.takes(line, row) else item_of(row, path.parent, defaults, where, unknown)
+        if item is not None:
+            yield from _allowed(item, where, refusal, refused)
     for item, where in groups.items(lambda row, where: item_of(row, path.parent, defaults, where, unknown)):
         notes.remarks.extend(_thinned(item, where))
         yield from _allowed(item, where, refusal, refused)

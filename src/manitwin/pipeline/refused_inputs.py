@@ -12,6 +12,8 @@ from manitwin.formats.printable import printable_line
 TOLD = 8
 """So many are told with their reason besides the first, which is told whole; of the rest where they stand, if in rows."""
 ROWS_NAMED = 200
+MOST = 1000
+"""A list with so many is not the one that was meant: the rest of it is not read."""
 _CHARACTERS = 200
 
 
@@ -23,11 +25,13 @@ class RefusedInputs:
 
     @contextmanager
     def noted(self) -> Iterator[None]:
-        """Keep a UsageError for later, so that the next input is looked at too."""
+        """Keep a UsageError for later, so that the next input is looked at too; the last of ``MOST`` raises one of all."""
         try:
             yield
         except UsageError as error:
             self.lines.append(str(error))
+        if len(self.lines) >= MOST:
+            self.tell()
 
     def tell(self) -> None:
         """Raise UsageError where there is any, in one line: the first whole, the others as far as their first semicolon."""
@@ -39,7 +43,8 @@ class RefusedInputs:
         told = [printable_line(line.split("; ")[0], max_characters=_CHARACTERS) for line in others[:TOLD]]
         if rest := others[TOLD:]:
             told.append(f"and {len(rest):,} more{_rows(rest)}")
-        raise UsageError(f"{first}. {len(others):,} more cannot be used: {'; '.join(told)}")
+        unread = "; what comes after them was not read" if len(self.lines) >= MOST else ""
+        raise UsageError(f"{first}. {len(others):,} more cannot be used: {'; '.join(told)}{unread}")
 
 
 def _rows(lines: list[str]) -> str:
