@@ -10,8 +10,10 @@ import numpy as np
 from manitwin.models.matting.outline import dilated, eroded
 
 WORKING_SIDE_PX = 640
-BAND_SHARE, LEAST_BAND_PX = 0.04, 4
+BAND_SHARE, LEAST_BAND_PX = 0.03, 4
 """How far an outline moves at most: this share of the thing's diagonal in the picture, or so many pixels."""
+NEAR_BANDS = 4
+"""So many bands of ground around the thing are looked at: what lies farther says nothing of the ground beside it."""
 ITERATIONS = 4
 
 
@@ -21,25 +23,27 @@ def fit_outline(rgb: np.ndarray, mask: np.ndarray, *, seed: int = 0) -> np.ndarr
     What lies deeper within the mask than the band is wide is the thing, what lies farther outside is none. A mask that is empty
     or has no ground around it is returned as it is.
     """
-    if not mask.any() or mask.all():
+    if not mask.any():
         return mask
-    height, width = mask.shape
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    band_px = BAND_SHARE * math.hypot(np.ptp(rows) + 1, np.ptp(columns) + 1)
+    margin_px = math.ceil(NEAR_BANDS * max(LEAST_BAND_PX, band_px))
+    near = np.s_[
+        max(0, rows[0] - margin_px) : rows[-1] + margin_px + 1,
+        max(0, columns[0] - margin_px) : columns[-1] + margin_px + 1,
+    ]
+    height, width = mask[near].shape
     scale = min(1.0, WORKING_SIDE_PX / max(height, width))
     size = (max(1, round(width * scale)), max(1, round(height * scale)))
-    small = cv2.resize(rgb, size, interpolation=cv2.INTER_AREA)
-    rough = cv2.resize(mask.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST).astype(bool)
-    rows, columns = np.flatnonzero(rough.any(axis=1)), np.flatnonzero(rough.any(axis=0))
-    if not len(rows):
-        return mask
-    band_px = max(LEAST_BAND_PX, round(BAND_SHARE * math.hypot(np.ptp(rows) + 1, np.ptp(columns) + 1)))
-    core, reach = eroded(rough, band_px), dilated(rough, band_px)
+    rough = cv2.resize(mask[near].astype(np.uint8), size, interpolation=cv2.INTER_NEAREST).astype(bool)
+    band = max(LEAST_BAND_PX, round(scale * band_px))
     labels = np.where(rough, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
-    labels[core], labels[~reach] = cv2.GC_FGD, cv2.GC_BGD
-    if reach.all() or not (labels == cv2.GC_BGD).any():
+    labels[eroded(rough, band)], labels[~dilated(rough, band)] = cv2.GC_FGD, cv2.GC_BGD
+    if not rough.any() or not (labels == cv2.GC_BGD).any():
         return mask
     cv2.setRNGSeed(seed)
     cv2.grabCut(
-        np.ascontiguousarray(small),
+        cv2.resize(rgb[near], size, interpolation=cv2.INTER_AREA),
         labels,
         (0, 0, 1, 1),
         np.zeros((1, 65)),
@@ -50,4 +54,6 @@ def fit_outline(rgb: np.ndarray, mask: np.ndarray, *, seed: int = 0) -> np.ndarr
     found = ((labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)).astype(np.float32)
     if not found.any():
         return mask
-    return np.asarray(cv2.resize(found, (width, height), interpolation=cv2.INTER_LINEAR) > 0.5)
+    fitted = np.zeros(mask.shape, bool)
+    fitted[near] = cv2.resize(found, (width, height), interpolation=cv2.INTER_LINEAR) > 0.5
+    return fitted
