@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -88,24 +88,58 @@ def carved_of(
 
 def _level_set(field: np.ndarray, cell: float, origin: np.ndarray) -> Manifold:
     """Return the solid where a field (X, Y, Z) is positive; raises Rejected where there is none."""
-    values = field.tolist()
-    nx, ny, nz = field.shape
-    x0, y0, z0 = (float(each) for each in origin)
-
-    def at(x: float, y: float, z: float) -> float:
-        i, j, k = (x - x0) / cell, (y - y0) / cell, (z - z0) / cell
-        a, b, c = int(i), int(j), int(k)
-        if i < 0 or j < 0 or k < 0 or a >= nx - 1 or b >= ny - 1 or c >= nz - 1:
-            return -cell
-        i, j, k = i - a, j - b, k - c
-        near, far = values[a], values[a + 1]
-        p, q, r, s = near[b], near[b + 1], far[b], far[b + 1]
-        low = (p[c] * (1 - j) + q[c] * j) * (1 - i) + (r[c] * (1 - j) + s[c] * j) * i
-        high = (p[c + 1] * (1 - j) + q[c + 1] * j) * (1 - i) + (r[c + 1] * (1 - j) + s[c + 1] * j) * i
-        return float(low * (1 - k) + high * k)
-
-    bounds = [x0, y0, z0, x0 + (nx - 1) * cell, y0 + (ny - 1) * cell, z0 + (nz - 1) * cell]
-    solid = Manifold.level_set(at, bounds, 1.3 * cell).simplify(SIMPLER_CELLS * cell)
+    solid = Manifold.level_set(interpolated(field, cell, origin), _bounds(field, cell, origin), 1.3 * cell)
+    solid = solid.simplify(SIMPLER_CELLS * cell)
     if solid.is_empty():
         raise Rejected("generator_failed", "the outlines have nothing in common; check the turns", "generate")
     return solid
+
+
+def _bounds(field: np.ndarray, cell: float, origin: np.ndarray) -> list[float]:
+    low = [float(each) for each in origin]
+    return [*low, *(start + (count - 1) * cell for start, count in zip(low, field.shape, strict=True))]
+
+
+def interpolated(field: np.ndarray, cell: float, origin: np.ndarray) -> Callable[[float, float, float], float]:
+    """Return the function of a point that is the field (X, Y, Z) between its nodes, and ``-cell`` beyond them.
+
+    ``cell`` is the field's own and ``origin (3,)`` its first node. Manifold asks for millions of points, of two lines along z
+    in turn: the two last lines are kept, as they are between the nodes along x and y.
+    """
+    values = field.astype(np.float64)
+    nx, ny, nz = field.shape
+    x0, y0, z0 = (float(each) for each in origin)
+    outside = [-cell] * nz
+    last = nz - 1
+
+    def along_z(x: float, y: float) -> list[float]:
+        i, j = (x - x0) / cell, (y - y0) / cell
+        a, b = int(i), int(j)
+        if i < 0 or j < 0 or a >= nx - 1 or b >= ny - 1:
+            return outside
+        i, j = i - a, j - b
+        near, far = values[a], values[a + 1]
+        between = (near[b] * (1 - j) + near[b + 1] * j) * (1 - i) + (far[b] * (1 - j) + far[b + 1] * j) * i
+        return list(between.tolist())
+
+    newer_x = newer_y = older_x = older_y = np.nan
+    newer = older = outside
+
+    def at(x: float, y: float, z: float) -> float:
+        nonlocal newer_x, newer_y, newer, older_x, older_y, older
+        if x == newer_x and y == newer_y:
+            column = newer
+        elif x == older_x and y == older_y:
+            column = older
+        else:
+            older_x, older_y, older = newer_x, newer_y, newer
+            newer_x, newer_y = x, y
+            column = newer = along_z(x, y)
+        k = (z - z0) / cell
+        if k < 0 or k >= last:
+            return -cell
+        c = int(k)
+        k -= c
+        return column[c] * (1 - k) + column[c + 1] * k
+
+    return at
