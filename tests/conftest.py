@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import os
 import signal
 from collections.abc import Generator, Iterator
@@ -83,6 +85,18 @@ def shared_data() -> Path:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Let files of whole programs begin first: a long one that begins last leaves all other processes idle."""
     items.sort(key=lambda item: _WHOLE_PROGRAMS.get(item.path.relative_to(_TESTS).parts[0], 2))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection(session: pytest.Session) -> Generator[None, object, object]:
+    """Keep all that is collected out of the garbage collector: it would look at a million objects again and again."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        atexit.register(gc.unfreeze)  # libraries complain of objects that are left when the process ends
+        gc.enable()
 
 
 _WHOLE_PROGRAMS = {
