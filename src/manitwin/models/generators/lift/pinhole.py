@@ -112,10 +112,9 @@ def around(sights: Sequence[Sight]) -> tuple[np.ndarray, float]:
     return centre, _AROUND * max(reach)
 
 
-def points_on_rays(sights: Sequence[Sight], number: int, pixels: np.ndarray) -> np.ndarray:
-    """Return points ``(N, steps, 3)`` along the rays through pixels ``(N, 2)`` of one outline, where the object may be."""
-    centre, radius = around(sights)
-    own = sights[number]
+def points_on_rays(own: Sight, pixels: np.ndarray, surroundings: tuple[np.ndarray, float]) -> np.ndarray:
+    """Return points ``(N, steps, 3)`` along the rays through pixels ``(N, 2)`` of one outline, within what is ``around`` all."""
+    centre, radius = surroundings
     depth = float(own.project(centre)[2])
     depths = np.linspace(max(depth - radius, 0.05 * depth), depth + radius, _STEPS)
     return np.asarray(own.position + own.rays(pixels)[:, None, :] * depths[None, :, None])
@@ -132,10 +131,11 @@ def inside_others(sights: Sequence[Sight], number: int, points: np.ndarray) -> n
 
 def passing_px(sights: Sequence[Sight]) -> float:
     """Return by how many pixels the rays along all outlines pass outside of the others' in the mean; each at most so many."""
+    surroundings = around(sights)
     passed = []
     for number, sight in enumerate(sights):
         some = np.linspace(0, len(sight.rim) - 1, RIM_RAYS).astype(int)
-        best = inside_others(sights, number, points_on_rays(sights, number, sight.rim[some])).max(axis=1)
+        best = inside_others(sights, number, points_on_rays(sight, sight.rim[some], surroundings)).max(axis=1)
         # the middle of a pixel of the rim is half a pixel within the outline
         passed.append(np.clip(0.5 - best, 0.0, MOST_PASSING_PX))
     return float(np.mean(passed))

@@ -25,12 +25,13 @@ def covered_shares(sights: Sequence[Sight]) -> tuple[list[float], np.ndarray]:
     Without itself an outline is filled by the others, as it is with itself.
     """
     count = len(sights)
+    surroundings = around(sights)
     shares, without = [], np.zeros((count, count))
     for number, sight in enumerate(sights):
         rows, columns = np.nonzero(sight.distance > 0)
         some = np.linspace(0, len(rows) - 1, min(_COVERED_RAYS, len(rows))).astype(int)
         pixels = np.column_stack([columns[some], rows[some]]) + sight.corner + 0.5
-        points = points_on_rays(sights, number, pixels)
+        points = points_on_rays(sight, pixels, surroundings)
         each = np.full((count, *points.shape[:2]), FAR_PX, np.float32)
         for other in range(count):
             if other != number:
@@ -81,10 +82,11 @@ def ground_level(sights: Sequence[Sight], of: Sequence[int] | None = None) -> fl
 
     Of each photo the rays along the outline that meet the common solid lowest do so at the ground, or just in front of it.
     """
+    surroundings = around(sights)
     lowest = []
     for number in range(len(sights)) if of is None else of:
         sight = sights[number]
-        points = points_on_rays(sights, number, sight.rim)
+        points = points_on_rays(sight, sight.rim, surroundings)
         rays = sight.rays(sight.rim)
         downward = -rays[:, 2] / np.linalg.norm(rays, axis=1) > _LEAST_DOWNWARD
         met = inside_others(sights, number, points) > -0.5
