@@ -15,6 +15,7 @@ import pytest
 import typer.main
 import typer.testing
 
+import manitwin.cli.main
 from manitwin.cli.console import out_console
 from manitwin.engine.process_bounds import one_thread_each
 from manitwin.errors import RendererMissing
@@ -55,6 +56,14 @@ def commands_built_once() -> Iterator[None]:
         built = cache(typer.main.get_command)
         patch.setattr(typer.main, "get_command", built)
         patch.setattr(typer.testing, "_get_command", built)
+        # an application of the commands that are named is another one at each call: one for each set of them is built
+        of_names = cache(manitwin.cli.main.only_asked_for)
+        names = {name.split()[0] for name in typer.main.get_command(manitwin.cli.main.app).commands}  # type: ignore[attr-defined]
+        patch.setattr(
+            manitwin.cli.main,
+            "only_asked_for",
+            lambda app, words: of_names(app, tuple(sorted(names.intersection(words)))),
+        )
         yield
 
 
