@@ -71,11 +71,28 @@ def evidence_of(rgba: np.ndarray, focal_mm: float | None = None) -> Evidence:
 
 
 def signed_distance(mask: np.ndarray) -> np.ndarray:
-    """Return the distance to a finely drawn outline over the reach, cut to -1..1, positive inside, at every other pixel."""
-    inside = mask.astype(np.uint8)
+    """Return the distance to a finely drawn outline over the reach, cut to -1..1, positive inside, at every other pixel.
+
+    It is worked out within the reach of the mask's box: what is further out is -1.
+    """
+    step, reach = 2 * FINE, REACH * mask.shape[0]
+    found = np.full([len(range(1, side, step)) for side in mask.shape], -1.0, np.float32)
+    if not mask.any():
+        return found
+    rows, columns = (_within_reach(np.asarray(mask.any(axis=other)), int(reach) + 2, step) for other in (1, 0))
+    inside = np.ascontiguousarray(mask[rows, columns]).astype(np.uint8)
     away = cv2.distanceTransform(inside, cv2.DIST_L2, 3) - cv2.distanceTransform(1 - inside, cv2.DIST_L2, 3)
-    some = away[1 :: 2 * FINE, 1 :: 2 * FINE]
-    return np.clip(some / (REACH * mask.shape[0]), -1, 1)
+    some = np.clip(away[1::step, 1::step] / reach, -1, 1)
+    top, left = rows.start // step, columns.start // step
+    found[top : top + some.shape[0], left : left + some.shape[1]] = some
+    return found
+
+
+def _within_reach(drawn: np.ndarray, reach_px: int, step: int) -> slice:
+    """Return the lines around those that are ``drawn (N,) bool``; the first of them is a multiple of ``step``."""
+    at = np.flatnonzero(drawn)
+    first = max(0, (int(at[0]) - reach_px) // step * step)
+    return slice(first, min(len(drawn), int(at[-1]) + 1 + reach_px))
 
 
 def _largest(mask: np.ndarray) -> np.ndarray:
