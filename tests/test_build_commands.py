@@ -14,6 +14,7 @@ import pytest
 from PIL import Image
 
 import manitwin as package
+import manitwin.cli.main as main_module
 from manitwin.config import BuildConfig
 from manitwin.engine import drive
 from manitwin.engine.ledger.ledger import Ledger
@@ -83,11 +84,19 @@ def test_a_run_from_manifest_to_tables(tmp_path: Path, manifest: Path) -> None:
     ],
 )
 def test_wrong_use_is_one_line_and_makes_no_data_set(
-    tmp_path: Path, manifest: Path, arguments: list[str], message: str
+    tmp_path: Path,
+    manifest: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    message: str,
 ) -> None:
-    done = manitwin(*arguments, folder=tmp_path)
-    assert done.returncode == 2, done.stdout
-    assert message in done.stderr and done.stderr.count("\n") == 1
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setattr(sys, "argv", ["manitwin", *arguments])
+    assert main_module._run() == 2
+    said = capsys.readouterr()
+    assert message in said.err and said.err.count("\n") == 1 and not said.out
     assert not (tmp_path / "data").exists()
 
 

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+import manitwin.cli.main as main_module
+
 
 def manitwin(*arguments: object, **environment: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "manitwin", *map(str, arguments)]
@@ -60,7 +62,13 @@ def one_line(text: str) -> str:
         (("paint",), "paint"),
     ],
 )
-def test_wrong_use_is_one_line_and_exit_status_2(tmp_path: Path, arguments: tuple[str, ...], message: str) -> None:
+def test_wrong_use_is_one_line_and_exit_status_2(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: tuple[str, ...],
+    message: str,
+) -> None:
     file = tmp_path / "cup.stl"
     file.write_bytes(b"x")
     (tmp_path / "list.csv").write_text("file,text\ncup.stl,\n,a unicorn\n")
@@ -68,9 +76,16 @@ def test_wrong_use_is_one_line_and_exit_status_2(tmp_path: Path, arguments: tupl
     places = {
         "FILE": file, "OUT": tmp_path / "out", "LIST": tmp_path / "list.csv", "PHOTO": tmp_path / "dot.png"
     }  # fmt: skip
-    done = manitwin(*(places.get(a, a) for a in arguments))
-    assert done.returncode == 2
-    assert message in one_line(done.stderr)
+    monkeypatch.setattr(sys, "argv", ["manitwin", *(str(places.get(a, a)) for a in arguments)])
+    assert main_module._run() == 2
+    assert message in one_line(capsys.readouterr().err)
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_process_of_a_wrong_use_says_one_line_and_ends_with_2(tmp_path: Path) -> None:
+    done = manitwin("build", "--text", "a hamer", "-o", tmp_path / "out")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "--text: no template makes 'a hamer'; did you mean hammer" in one_line(done.stderr)
     assert not (tmp_path / "out").exists()
 
 
