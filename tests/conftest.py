@@ -110,7 +110,7 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
 
 _WHOLE_PROGRAMS = {
     **dict.fromkeys(("test_build.py", "test_build_commands.py", "test_bad_inputs.py", "test_served_models.py"), 0),
-    **dict.fromkeys(("docs", "fuzz", "examples", "engine", "cli"), 1),
+    **dict.fromkeys(("docs", "fuzz", "examples", "engine", "cli", "web"), 1),
 }
 """What begins first of the tests, by folder or file; the rest as collected."""
 
