@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from kept_opinions import kept_opinions
 from manitwin.config import GenerateConfig, MattingConfig
 from manitwin.engine.stage import Draft
 from manitwin.errors import InputError, Rejected, Unsupported
@@ -24,6 +25,13 @@ from manitwin.twin.import_record import ImportRecord
 from tiny_networks import tiny_network
 
 SAMPLE = Path(__file__).resolve().parents[2] / "samples" / "bottle.jpg"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def rules_and_the_built_in_network_asked_once() -> Iterator[None]:
+    """Keep what they say of a picture: nearly all that is studied here is the sample."""
+    with kept_opinions():
+        yield
 
 
 def _draft(**item: str | None) -> Draft:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
+from kept_opinions import kept_opinions
 from manitwin.errors import Rejected, UsageError
 from manitwin.formats.isolated import Limits, run_isolated
 from manitwin.models.matting import learned, matte_photo, study
@@ -29,22 +30,8 @@ def forget() -> None:
 @pytest.fixture(scope="module", autouse=True)
 def rules_and_the_built_in_network_asked_once() -> Iterator[None]:
     """Keep what they say of a picture: the same few are studied with one network and another."""
-    with pytest.MonkeyPatch.context() as patch:
-        for name in ("segment", "object_share"):
-            patch.setattr(study, name, _kept(getattr(study, name)))
+    with kept_opinions():
         yield
-
-
-def _kept(function: Callable[[np.ndarray], Any]) -> Callable[[np.ndarray], Any]:
-    found: dict[tuple[tuple[int, ...], bytes], Any] = {}
-
-    def of_picture(rgb: np.ndarray) -> Any:
-        key = rgb.shape, rgb.tobytes()
-        if key not in found:
-            found[key] = function(rgb)
-        return found[key]
-
-    return of_picture
 
 
 def _network(tmp_path: Path, **more: object) -> str:
