@@ -7,7 +7,7 @@ from pathlib import Path
 
 from manitwin.render.drawable import Drawable, drawable
 from manitwin.scenes.perception.object_views import SeenShape
-from manitwin.twin.loaded_twin import read_visual
+from manitwin.twin.mesh_files import read_visual
 from manitwin.twin.store import RECORD
 
 TWINS_KEPT, SIMPLIFIED_KEPT = 32, 64

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from fnmatch import fnmatch
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -14,11 +12,9 @@ import numpy as np
 import pyarrow as pa
 import trimesh
 
-from manitwin.errors import InputError, TwinError, UsageError, choose_from
-from manitwin.formats.bounded_file import open_regular, read_bytes
-from manitwin.formats.glb import read_glb
+from manitwin.errors import TwinError, UsageError, choose_from
+from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.npy_file import MAX_LABEL_BYTES, parse_labels
-from manitwin.formats.xml_file import MAX_NUMBER
 from manitwin.geometry.articulation import ArticulatedBody
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.geometry.rigid_body import RigidBody
@@ -26,13 +22,10 @@ from manitwin.twin.dataset_root import MAX_FILE_BYTES, DatasetRoot
 from manitwin.twin.fill_records import FillState
 from manitwin.twin.grasp_table import read_grasp_table
 from manitwin.twin.loaded_links import articulated_body, joints_of, posed_parts, read_face_links
+from manitwin.twin.mesh_files import read_hulls, read_visual
 from manitwin.twin.part_records import FACE_PARTS, NO_PART
 from manitwin.twin.record import Physical, TwinRecord
 from manitwin.twin.store import RECORD, REMEDY, read_record
-
-MAX_HULL_BYTES = 16 << 20
-HULLS = "collision/hull_*.obj"
-"""The names of the files of hulls among those of a record."""
 
 
 @dataclass(frozen=True)
@@ -84,10 +77,7 @@ class Twin:
     def hulls(self) -> list[trimesh.Trimesh]:
         """The convex collision hulls; raises TwinError where one that the record names is not there: a thing with a hole."""
         self.physical  # noqa: B018
-        named = sorted(name for name in self.record.files if fnmatch(name, HULLS))
-        if missing := [name for name in named if not os.path.lexists(self.folder / name)]:
-            raise TwinError(f"{self.folder}: {', '.join(missing)} missing; {REMEDY}")
-        return [_hull(path, self.folder) for path in sorted(self.folder.glob(HULLS))]
+        return read_hulls(self.folder, self.record.files)
 
     def face_parts(self) -> np.ndarray:
         """Return of each face of the visual meshes, one after the other, the place of its part in ``record.parts``.
@@ -225,35 +215,6 @@ class Twin:
             visual_glb=self.folder / "visual.glb" if visual else None,
             name=self.record.twin_id,
         )
-
-
-def read_visual(path: Path) -> list[trimesh.Trimesh]:
-    """Return the parts of a twin's ``visual.glb`` in the object frame; raises TwinError."""
-    if not os.path.lexists(path):
-        raise TwinError(f"{path}: missing; {REMEDY}")
-    open_regular(path, TwinError, inside=path.parent, name=str(path)).close()
-    try:
-        parts = read_glb(path)
-    except InputError as error:
-        raise TwinError(f"{path}: cannot be read ({error.detail}); {REMEDY}") from error
-    if not all(np.isfinite(part.vertices).all() for part in parts):
-        raise TwinError(f"{path}: has vertices that are no finite numbers; {REMEDY}")
-    return parts
-
-
-def _hull(path: Path, folder: Path) -> trimesh.Trimesh:
-    """Read the vertices and triangles of a hull's OBJ, of which nothing else is looked at; raises TwinError."""
-    content = read_bytes(path, MAX_HULL_BYTES, TwinError, inside=folder, name=str(path))
-    rows = [line.split() for line in content.splitlines() if line.strip()]
-    try:
-        vertices = np.array([row[1:4] for row in rows if row[0] == b"v"], np.float64).reshape(-1, 3)
-        corners = [[word.partition(b"/")[0] for word in row[1:]] for row in rows if row[0] == b"f"]
-        faces = np.array(corners, np.int64).reshape(-1, 3) - 1
-    except (ValueError, OverflowError) as error:
-        raise TwinError(f"{path}: no hull that can be read ({str(error)[:120]}); {REMEDY}") from error
-    if not len(faces) or not (np.abs(vertices) <= MAX_NUMBER).all() or faces.min() < 0 or faces.max() >= len(vertices):
-        raise TwinError(f"{path}: no hull of finite vertices and their triangles; {REMEDY}")
-    return trimesh.Trimesh(vertices, faces, process=False)
 
 
 MOVED = "put it back, or name the data set where the twins are now (--twins)"

@@ -11,7 +11,7 @@ import trimesh
 from manitwin.errors import AssetError, TwinError
 from manitwin.formats.json_file import json_number, json_vector, read_json_object
 from manitwin.geometry.shape_descriptor import QUANTILES, ShapeDescriptor, shape_descriptor
-from manitwin.twin.loaded_twin import read_visual
+from manitwin.twin.mesh_files import read_visual
 from manitwin.twin.store import REMEDY, canonical_json
 
 SHAPE = "shape.json"
