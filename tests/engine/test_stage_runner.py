@@ -5,8 +5,9 @@ import pytest
 from pydantic import BaseModel
 
 from manitwin.engine.charges import charge, counted, note_rehearsal
+from manitwin.engine.lost_charges import lost_usd
 from manitwin.engine.stage import Draft
-from manitwin.engine.stage_runner import lost_usd, run_stage, stage_key
+from manitwin.engine.stage_runner import run_stage, stage_key
 from manitwin.errors import ManiTwinError, Rejected, Unavailable
 from manitwin.pipeline.item import Item
 

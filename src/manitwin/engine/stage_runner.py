@@ -19,23 +19,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from manitwin.engine.charges import Bill, counted
 from manitwin.engine.ledger.location import cache_folder
+from manitwin.engine.lost_charges import LOST, kept_bill, lost_usd
 from manitwin.engine.stage import Draft, Stage, is_field
 from manitwin.errors import ManiTwinError, TwinError
-from manitwin.formats.bounded_file import read_bytes
-from manitwin.formats.json_file import json_number, parse_json, read_json_object
+from manitwin.formats.json_file import read_json_object
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import WORK, canonical_json, sha256_of_artifact, sha256_of_json, write_bytes_atomically
 
 RUN = logging.getLogger("manitwin.run")
 RESULT = "result.json"
-MAX_LOST_BYTES = 64
 _ANEW = "remove its folder, and the stage runs again"
 JOBS = "jobs"
 """The folder of a twin's work that remembers jobs of services, beside those of the stages."""
-LOST = "lost_usd.json"
-"""What services charged for attempts at a stage that came to nothing: the one that succeeds, or is rejected, counts it."""
 
 
 @dataclass(frozen=True)
@@ -144,37 +140,13 @@ def _cpu_seconds() -> float:
     return time.process_time() + sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2])
 
 
-@contextmanager
-def _kept_bill(stage_folder: Path) -> Iterator[Bill]:
-    """Count what is charged; where the work fails, keep it for the attempt that will not."""
-    with counted() as bill:
-        try:
-            yield bill
-        except BaseException:
-            if bill.usd:
-                total = lost_usd(stage_folder) + bill.usd
-                write_bytes_atomically(stage_folder / LOST, canonical_json(total).encode())
-            raise
-
-
-def lost_usd(stage_folder: Path) -> float:
-    """Return what was charged for attempts at a stage that came to nothing."""
-    lost = stage_folder / LOST
-    if not lost.is_file():
-        return 0.0
-    said = parse_json(
-        read_bytes(lost, MAX_LOST_BYTES, TwinError), str(lost), TwinError, remedy="remove it: it is a sum of USD"
-    )
-    return json_number(said, str(lost))
-
-
 def _run_into(stage: Stage, draft: Draft, place: Path, require_same: Callable[[], None]) -> None:
     fresh = place.with_name(f".{place.name}.{os.getpid()}")
     shutil.rmtree(fresh, ignore_errors=True)
     fresh.mkdir(parents=True)
     try:
         started, cpu_started = time.perf_counter(), _cpu_seconds()
-        with _kept_bill(place.parent) as bill:
+        with kept_bill(place.parent) as bill:
             try:
                 fields = stage.run(draft, fresh)
             finally:

@@ -25,9 +25,10 @@ from manitwin.engine.jobs import (
     WorkerSetup,
     WriteTables,
 )
+from manitwin.engine.lost_charges import lost_usd
 from manitwin.engine.recipe import Ending
 from manitwin.engine.stage import INPUT, Draft, Stage, StagePart
-from manitwin.engine.stage_runner import JOBS, StageCost, StageRun, WorkFolder, lost_usd, present_reads
+from manitwin.engine.stage_runner import JOBS, StageCost, StageRun, WorkFolder, present_reads
 from manitwin.engine.task import Payload, Task
 from manitwin.errors import (
     AccessDenied,

@@ -1,0 +1,41 @@
+"""What services charged for attempts at a stage that came to nothing: kept beside its results for the attempt that ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from manitwin.engine.charges import Bill, counted
+from manitwin.errors import TwinError
+from manitwin.formats.bounded_file import read_bytes
+from manitwin.formats.json_file import json_number, parse_json
+from manitwin.twin.store import canonical_json, write_bytes_atomically
+
+LOST = "lost_usd.json"
+"""The file in a stage's folder with the sum: the attempt that succeeds, or is rejected, counts it."""
+MAX_LOST_BYTES = 64
+
+
+@contextmanager
+def kept_bill(stage_folder: Path) -> Iterator[Bill]:
+    """Count what is charged; where the work fails, keep it for the attempt that will not."""
+    with counted() as bill:
+        try:
+            yield bill
+        except BaseException:
+            if bill.usd:
+                total = lost_usd(stage_folder) + bill.usd
+                write_bytes_atomically(stage_folder / LOST, canonical_json(total).encode())
+            raise
+
+
+def lost_usd(stage_folder: Path) -> float:
+    """Return what was charged for attempts at a stage that came to nothing."""
+    lost = stage_folder / LOST
+    if not lost.is_file():
+        return 0.0
+    said = parse_json(
+        read_bytes(lost, MAX_LOST_BYTES, TwinError), str(lost), TwinError, remedy="remove it: it is a sum of USD"
+    )
+    return json_number(said, str(lost))
