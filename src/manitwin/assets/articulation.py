@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from manitwin.assets.asset import Inertial
+from manitwin.assets.inertial import Inertial
 from manitwin.geometry.articulation import ArticulatedJoint
 from manitwin.twin.link_records import MAX_LINKS
 

@@ -8,15 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 import trimesh
 
+from manitwin.assets.articulation import Articulation
+from manitwin.assets.inertial import Inertial
 from manitwin.assets.joints import DeclaredJoint
-
-if TYPE_CHECKING:
-    from manitwin.assets.articulation import Articulation
 
 Format = Literal["twin", "urdf", "mjcf", "sdf", "usd", "robotwin", "manitwin100k", "embodiedgen", "gso"]
 FrameKind = Literal["contact", "functional", "target", "orientation"]
@@ -39,21 +38,6 @@ class CollisionShape:
     primitive: bool = False
     groups: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     as_drawn: bool = False
-
-
-@dataclass(frozen=True)
-class Inertial:
-    """The declared mass properties: the centre of mass and ``inertia_kg_m2 (3, 3)`` about it, both along the asset's axes.
-
-    ``computed``: centre and inertia are what the format's engine computes of masses or densities of shapes, and not written.
-    ``engine_kg`` is what that engine weighs, where it weighs more than the file declares; None where it does not.
-    """
-
-    mass_kg: float | None = None
-    center_of_mass_m: np.ndarray | None = None
-    inertia_kg_m2: np.ndarray | None = None
-    computed: bool = False
-    engine_kg: float | None = None
 
 
 @dataclass(frozen=True)
@@ -124,7 +108,7 @@ class Asset:
     collision: tuple[CollisionShape, ...]
     up: Literal["y", "z"]
     unit_m: float | None
-    inertial: Inertial = Inertial()
+    inertial: Inertial = field(default_factory=Inertial)
     contact: Contact = Contact()
     category: str | None = None
     captions: tuple[str, ...] = ()

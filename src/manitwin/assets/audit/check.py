@@ -7,7 +7,8 @@ from pathlib import Path
 
 from manitwin.assets.asset import Asset
 from manitwin.assets.asset_files import MESHES
-from manitwin.assets.audit.finding import Audited, Complaint, Finding, Rule
+from manitwin.assets.audit.complaint import Complaint
+from manitwin.assets.audit.finding import Audited, Finding, Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.assets.audit.rules import RULES_BY_CODE
 from manitwin.assets.audit.taken_by import DRAWN_FORMATS, OF_HULLS, TRIANGLES, as_taken_by

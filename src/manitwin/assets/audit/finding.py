@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from manitwin.assets.audit.complaint import Complaint
+
 if TYPE_CHECKING:
     from manitwin.assets.asset import Asset
     from manitwin.assets.audit.measured import MeasuredAsset
@@ -66,12 +68,3 @@ class Rule(RuleText):
     def text(self) -> RuleText:
         """Return what is said of it, which needs nothing that measures."""
         return RuleText(self.code, self.name, self.severity, self.why, self.remedy)
-
-
-@dataclass(frozen=True)
-class Complaint:
-    """The message, where, and the numbers behind it."""
-
-    message: str
-    file: Path | None = None
-    values: dict[str, Any] | None = None

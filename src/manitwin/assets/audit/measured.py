@@ -14,8 +14,8 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from manitwin.assets.asset import Asset
+from manitwin.assets.audit.complaint import Complaint
 from manitwin.assets.audit.convex_shapes import ConvexShapes, UniformSolid, inertia_of_second_moment
-from manitwin.assets.audit.finding import Complaint
 from manitwin.assets.audit.open_air import OpenAir, open_air
 from manitwin.geometry.distance import closest_points_on_triangles, distance_to_surface
 from manitwin.geometry.sampling import sample_surface

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from manitwin.assets.asset import CollisionShape
-from manitwin.assets.audit.finding import Complaint, Rule
+from manitwin.assets.audit.complaint import Complaint
+from manitwin.assets.audit.finding import Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 
 SEEN_ONLY = frozenset({"visual", "vis", "marker", "ghost", "target", "goal"})

@@ -9,8 +9,9 @@ from functools import cache
 import numpy as np
 
 from manitwin.assets.asset import AnnotatedFrame
+from manitwin.assets.audit.complaint import Complaint
 from manitwin.assets.audit.convex_shapes import ConvexShapes
-from manitwin.assets.audit.finding import Complaint, Rule
+from manitwin.assets.audit.finding import Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.assets.audit.rules.collision import stands_for_object
 from manitwin.assets.audit.rules.frames import is_sound

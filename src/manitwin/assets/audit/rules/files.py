@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from manitwin.assets.audit.finding import Complaint, Rule
+from manitwin.assets.audit.complaint import Complaint
+from manitwin.assets.audit.finding import Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.errors import TwinError
 from manitwin.twin.store import RECORD, sha256_of_untrusted, verify_record

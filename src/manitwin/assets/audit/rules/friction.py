@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from manitwin.assets.audit.finding import Complaint, Rule
+from manitwin.assets.audit.complaint import Complaint
+from manitwin.assets.audit.finding import Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 
 LARGEST = 2.0

@@ -8,7 +8,8 @@ from functools import cache
 import numpy as np
 
 from manitwin.assets.asset import AnnotatedGrasps
-from manitwin.assets.audit.finding import Complaint, Rule
+from manitwin.assets.audit.complaint import Complaint
+from manitwin.assets.audit.finding import Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.assets.audit.rules.contacts import REACH_M, SLACK_M, distance_to_matter, under_table
 from manitwin.assets.audit.rules.frames import frames_of

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from manitwin.assets.audit.finding import Complaint, Rule
+from manitwin.assets.audit.complaint import Complaint
+from manitwin.assets.audit.finding import Rule
 from manitwin.assets.audit.fix import write_missing_inertial
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.assets.audit.rules.mass import positive_mass_kg

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from manitwin.assets.audit.finding import Complaint, Rule
+from manitwin.assets.audit.complaint import Complaint
+from manitwin.assets.audit.finding import Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 
 NOT_SAID = frozenset({"", "unknown", "none", "noassertion", "other", "todo"})

@@ -7,7 +7,8 @@ import re
 from collections.abc import Iterator
 from itertools import pairwise
 
-from manitwin.assets.audit.finding import Complaint, Rule
+from manitwin.assets.audit.complaint import Complaint
+from manitwin.assets.audit.finding import Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.assets.audit.rules.scale import is_of_wrong_size
 from manitwin.models.annotators.prior_records import HEAVIEST_CONTENTS_KG_M3

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manitwin.assets.audit.finding import Complaint, Rule
+from manitwin.assets.audit.complaint import Complaint
+from manitwin.assets.audit.finding import Rule
 from manitwin.assets.audit.linkage.linkage import Linkage
 from manitwin.assets.audit.linkage.overlaps import overlaps_of
 from manitwin.assets.audit.linkage.read import read_linkage

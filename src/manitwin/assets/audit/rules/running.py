@@ -8,8 +8,9 @@ from itertools import chain, combinations, islice
 import numpy as np
 
 from manitwin.assets.audit.ball_runs import balls
+from manitwin.assets.audit.complaint import Complaint
 from manitwin.assets.audit.engine_runs import Drops, Run, drops
-from manitwin.assets.audit.finding import Complaint, Rule
+from manitwin.assets.audit.finding import Rule
 from manitwin.assets.audit.joint_runs import with_joints_free
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.assets.audit.rules.collision import filled_opening, has_convex_pieces

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from PIL import Image
 
 from manitwin.assets.asset import Asset
-from manitwin.assets.audit.finding import Complaint, Rule
+from manitwin.assets.audit.complaint import Complaint
+from manitwin.assets.audit.finding import Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 
 LARGEST_PIXELS = 4096

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from manitwin.assets.audit.finding import Complaint, Rule
+from manitwin.assets.audit.complaint import Complaint
+from manitwin.assets.audit.finding import Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.errors import TwinError
 from manitwin.geometry.frames.on_feature import ON_FEATURE_M, off_feature_m
