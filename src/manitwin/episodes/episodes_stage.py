@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from functools import cached_property, lru_cache
@@ -38,6 +37,7 @@ from manitwin.episodes.target_grasps import TargetGrasp, shuffled, usable_grasps
 from manitwin.episodes.tasks.task_files import read_tasks
 from manitwin.episodes.tasks.task_record import TaskRecord
 from manitwin.episodes.tasks.task_setting import TaskSetting, task_setting
+from manitwin.episodes.told_attempt import told_attempt
 from manitwin.errors import UsageError
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.load import load_robot
@@ -192,7 +192,7 @@ class EpisodesStage:
         skill = self._skill_of(batch)
         episode_id = f"{batch.batch_id}-{number:08d}"
         if setting is None:
-            return _attempt(
+            return told_attempt(
                 episode_id,
                 self._robot,
                 skill,
@@ -226,7 +226,7 @@ class EpisodesStage:
             None if task_set is None else task_set.several,
         )  # fmt: skip
         spoken = self._instructions(setting, seed) if task_set is None else task_set.task.instructions
-        attempt = _attempt(
+        attempt = told_attempt(
             episode_id, self._robot, skill, target.twin_id, twin.record.language.category, setting.scene_id, seed,
             len(problem.obstacles), facts, grasps.get(facts.grasp.grasp_id) if facts.grasp else None, spoken,
             batch.task_id,
@@ -277,46 +277,3 @@ class EpisodesStage:
 
     def _language(self, twin_id: str) -> Any:
         return self._twin(twin_id).record.language
-
-
-def _attempt(
-    episode_id: str,
-    robot: Robot,
-    skill: str,
-    twin_id: str,
-    category: str,
-    scene_id: str | None,
-    seed: int,
-    others: int,
-    facts: EpisodeFacts,
-    grasp: TargetGrasp | None = None,
-    instructions: tuple[str, ...] = (),
-    task_id: str | None = None,
-) -> Attempt:
-    errors, judged = facts.errors, facts.evaluation
-    return Attempt(
-        episode_id=episode_id,
-        robot=robot.name,
-        skill=skill,
-        twin_id=twin_id,
-        category=category,
-        scene_id=scene_id,
-        seed=seed,
-        others=others,
-        outcome=facts.outcome,
-        grasp_id=grasp.grasp.grasp_id if grasp else None,
-        grasp_type=grasp.grasp_type if grasp else None,
-        transferred=grasp.transferred if grasp else False,
-        grasps_tried=facts.grasps_tried,
-        plan_failures=json.dumps(dict(sorted(facts.plan_failures.items()))),
-        position_error_m=errors.position_error_m if errors else None,
-        tilt_rad=errors.tilt_rad if errors else None,
-        yaw_error_rad=errors.yaw_error_rad if errors else None,
-        slip_m=facts.slip_m,
-        length_s=facts.length_s,
-        instructions=instructions,
-        goal=str(judged.goal) if judged else None,
-        failure=judged.failure if judged else None,
-        measured=json.dumps(judged.to_json()) if judged else None,
-        task_id=task_id,
-    )
