@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from kept_opinions import kept_opinions
 from manitwin.config import BuildConfig, GenerateConfig, MattingConfig
 from manitwin.engine.stage import Draft
 from manitwin.engine.stage_runner import run_stage, stage_key
@@ -38,6 +40,13 @@ def photos(tmp_path: Path) -> Path:
 def _listed(folder: Path, text: str, **defaults: str) -> list[Item]:
     (folder / "things.csv").write_text(text)
     return list(iterate_items([folder / "things.csv"], dict(defaults), Notes(), strict=True))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def rules_and_the_built_in_network_asked_once() -> Iterator[None]:
+    """Keep what they say of a picture: the same photos are cut out alone and in groups."""
+    with kept_opinions():
+        yield
 
 
 def test_rows_of_a_group_become_one_item_with_what_one_of_them_says(photos: Path) -> None:

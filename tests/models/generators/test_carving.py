@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -11,6 +12,7 @@ import trimesh
 from PIL import Image
 from typer.testing import CliRunner
 
+from kept_opinions import kept_opinions
 from manitwin.cli.arguments import degrees_of
 from manitwin.cli.main import app
 from manitwin.errors import Rejected, UsageError
@@ -30,6 +32,13 @@ COLORS = np.array(
 )
 CYLINDER = trimesh.creation.cylinder(0.03, 0.12, sections=96)
 BOX = trimesh.creation.box((0.1, 0.05, 0.12))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def rules_and_the_built_in_network_asked_once() -> Iterator[None]:
+    """Keep what they say of a picture: the same photos are carved with and without a name, and with others."""
+    with kept_opinions():
+        yield
 
 
 def _photo(mesh: trimesh.Trimesh, turn_deg: float, *, size_px: int = 300) -> np.ndarray:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import cv2
 import numpy as np
 import pytest
 
+from kept_opinions import kept_opinions
 from manitwin.errors import Rejected
 from manitwin.models.matting import matte_photo
 from manitwin.models.matting.study import study_photo
@@ -16,6 +17,13 @@ SIZE = (384, 512)
 LENS_PX = 0.7  # the blur of a photo in focus
 PENUMBRA_PX = 2.0  # the blur of a shadow's edge, before the lens
 ATTACHED_SHADOW = (22, 26)  # how far the shadow of the body lies from it, in pixels (x, y)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def rules_and_the_built_in_network_asked_once() -> Iterator[None]:
+    """Keep what they say of a picture: a photo is cut out, and what was found is looked at again."""
+    with kept_opinions():
+        yield
 
 
 def _plain(seed: int) -> np.ndarray:
