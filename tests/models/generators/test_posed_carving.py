@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,6 +14,7 @@ import trimesh
 
 from manitwin.errors import Rejected
 from manitwin.formats.camera_poses.posed_camera import Lens, PosedCamera
+from manitwin.models.generators.lift import posed_views
 from manitwin.models.generators.lift.carved_solid import Carved
 from manitwin.models.generators.lift.made_of_views import MadeOfViews
 from manitwin.models.generators.lift.posed_carving import carve_posed
@@ -26,6 +28,23 @@ from turned_things import turned_thing
 POSES = [pose_at(*place, roll_deg=2.0 * (-1) ** k) for k, place in enumerate(PLACES)]
 PHOTOS = [posed_photo(pose) for pose in POSES]
 LENS = Lens((FOCAL_PX, FOCAL_PX), (WIDTH / 2, HEIGHT / 2), (WIDTH, HEIGHT))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def the_same_photos_carved_once() -> Iterator[None]:
+    """Keep what photos are carved to at their poses: what is made of it, in which unit, is looked at here."""
+    kept: dict[tuple[Any, ...], Any] = {}
+
+    def carved(photos: Any, cameras: Sequence[PosedCamera], turns_deg: Any) -> Any:
+        pictures = tuple(rgba.tobytes() for _, rgba in photos)
+        key = pictures, tuple(each.world_to_camera.tobytes() for each in cameras), tuple(turns_deg)
+        if key not in kept:
+            kept[key] = carve_posed(photos, cameras, turns_deg)
+        return kept[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(posed_views, "carve_posed", carved)
+        yield
 
 
 def _cameras(poses: Sequence[np.ndarray]) -> list[PosedCamera]:
