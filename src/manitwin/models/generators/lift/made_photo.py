@@ -15,17 +15,12 @@ from manitwin.formats.glb import write_glb
 from manitwin.geometry.poses import GLTF_TO_OBJECT
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.words import article
-from manitwin.models.generators.lift.end_on import CLEARLY_LESS, DISC_ELLIPSE_IOU, reject_end_on
+from manitwin.models.generators.lift.end_on import reject_end_on
 from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name, is_cylinder, why_no_cylinder, why_not_round
 from manitwin.models.generators.lift.lifting import Lifted, lift
 from manitwin.models.generators.lift.lobes import reject_several_round
-from manitwin.models.generators.lift.plain_solids import (
-    PRIMITIVES,
-    PlainSolids,
-    explains_closely,
-    is_rather,
-    plain_solids,
-)
+from manitwin.models.generators.lift.nameless import OF_PLAIN_SOLIDS, Alone, explains_more, shape_without_name
+from manitwin.models.generators.lift.plain_solids import PRIMITIVES, PlainSolids, plain_solids
 from manitwin.models.generators.lift.roundness import is_round, is_round_along
 from manitwin.models.generators.lift.seen_corners import box_from_corner
 from manitwin.models.generators.lift.surface import unseen_share
@@ -50,12 +45,6 @@ from manitwin.models.generators.templates.fitting.generated import (
 )
 from manitwin.twin.import_record import ImportRecord
 
-LEAST_LIKELY = 0.1
-"""Probability of a name below which its shape is not tried."""
-NAMELESS_IOU, NAMELESS_OUTLINE = 0.92, 0.0045
-"""A name that is only likely has to explain more than one that a person says (``LEAST_IOU``, ``MOST_OUTLINE``)."""
-OF_LIKELY_NAMES = "template of a likely name fitted to the photo"
-
 
 @dataclass(frozen=True)
 class Job:
@@ -79,8 +68,8 @@ def from_photo(
 
     What has no template, and no name or that of a box, is a box where its outline is that of one seen from a corner; so is what
     lies otherwise than its template does where a box explains it much better (a long speaker). What has no template, or one whose
-    fit is not believed, is a plain solid where one explains the photo closely. What has no name has the shape of a template of
-    the ``likely`` names, each with its probability, where one explains the photo better.
+    fit is not believed, is a plain solid where one explains the photo closely. What has no name has the shape that explains the
+    photo best (``nameless``), a template's of the ``likely`` names, each with its probability, among others.
     ``focal_mm`` is the lens as 35 mm equivalent, where it is known. Several round things that touch are rejected.
     """
     reject_several_round(rgba[..., 3] > 127, name)
@@ -97,7 +86,7 @@ def from_photo(
     )
     lies = fitted is not None and not fitted.upright  # otherwise than the template rests
     box = box_from_corner(rgba, focal_mm) if lies else None
-    if box is not None and fitted is not None and _explains_more(box, fitted.residual.iou):
+    if box is not None and fitted is not None and explains_more(box, fitted.residual.iou):
         return _shape_alone(box, rgba, primitive="box", source="the outline's six corners")
     if fitted is None or fitted.confidence < LEAST_CONFIDENCE:
         solid = plain_solids(rgba, hint, focal_mm).close
@@ -200,61 +189,14 @@ def from_fit(fitted: Fitted, rgba: np.ndarray, name: str | None) -> Job:
 def _without_name(
     rgba: np.ndarray, likely: Sequence[tuple[str, float]], focal_mm: float | None, plain: PlainSolids
 ) -> Job:
-    """Return the shape of a likely name's template where it explains the photo and a simpler solid hardly does, else lift it.
-
-    A ``plain`` solid that explains the photo closely stands but for a template that does so better; another one only where it
-    explains the photo rather than what the outline is lifted to.
-    """
-    fitted = _best_template(rgba, likely, focal_mm)
-    if plain.close is not None:
-        if fitted is not None and fitted.residual.cost < plain.close.residual.cost:
-            return _of_likely_name(fitted, rgba)
-        return _plain(plain.close, rgba)
-    try:
-        lifted = lift(rgba, ShapeHint())
-    except Rejected:
-        if fitted is None or not _explains_more(fitted, DISC_ELLIPSE_IOU):  # what no solid explains may be an ellipse
-            raise
-        lifted = None
-    if lifted is None or (fitted is not None and _is_preferred(fitted, lifted)):
-        assert fitted is not None
-        return _of_likely_name(fitted, rgba)
-    if plain.nearest is not None and is_rather(plain.nearest, lifted.notes["primitive"]):
-        return _plain(plain.nearest, rgba)
-    return _lifted_job(lifted, lifted.notes)
-
-
-def _of_likely_name(fitted: Fitted, rgba: np.ndarray) -> Job:
-    return _shape_alone(fitted, rgba, primitive=f"shape of template:{fitted.category}", source=OF_LIKELY_NAMES)
+    shape = shape_without_name(rgba, likely, focal_mm, plain)
+    if isinstance(shape, Alone):
+        return _shape_alone(shape.fitted, rgba, primitive=shape.primitive, source=shape.source)
+    return _lifted_job(shape, shape.notes)
 
 
 def _plain(plain: Fitted, rgba: np.ndarray) -> Job:
-    return _shape_alone(plain, rgba, primitive=PRIMITIVES[plain.category], source="plain solid fitted to the photo")
-
-
-def _is_preferred(fitted: Fitted, lifted: Lifted) -> bool:
-    """Whether a template is to be preferred to a solid that needs no name; an inflated outline explains nothing.
-
-    The front of a box, its corners round or seen from near, is what many flat things seen at an angle nearly look like.
-    """
-    if lifted.notes["primitive"] == "box" and not explains_closely(fitted.residual):
-        return False
-    return lifted.notes["primitive"] == "inflation" or _explains_more(fitted, lifted.explained.silhouette_iou)
-
-
-def _explains_more(fitted: Fitted, simpler_iou: float) -> bool:
-    """Whether a template leaves much less of the outline unexplained than a simpler solid of that overlap."""
-    return 1 - fitted.residual.iou < CLEARLY_LESS * (1 - simpler_iou)
-
-
-def _best_template(rgba: np.ndarray, likely: Sequence[tuple[str, float]], focal_mm: float | None) -> Fitted | None:
-    """Return the template of the ``likely`` names that explains the photo best; None where none does closely."""
-    templates = [template_for(name) for name, probability in likely if probability >= LEAST_LIKELY]
-    kinds = list(dict.fromkeys(template.category for template in templates if template is not None))
-    found = fit(kinds[0], rgba, or_of=kinds[1:], focal_mm=focal_mm) if kinds else None
-    if found is None or found.residual.iou < NAMELESS_IOU or found.residual.outline > NAMELESS_OUTLINE:
-        return None
-    return found
+    return _shape_alone(plain, rgba, primitive=PRIMITIVES[plain.category], source=OF_PLAIN_SOLIDS)
 
 
 def _lifted_job(lifted: Lifted, notes: dict[str, Any]) -> Job:

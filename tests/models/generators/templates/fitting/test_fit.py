@@ -16,7 +16,8 @@ from manitwin.formats.glb import read_glb
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.generators.lift import LiftGenerator
 from manitwin.models.generators.lift.lifting import hint_from_name, lift
-from manitwin.models.generators.lift.made_photo import OF_LIKELY_NAMES, fitted_or_lifted, from_photo
+from manitwin.models.generators.lift.made_photo import fitted_or_lifted, from_photo
+from manitwin.models.generators.lift.nameless import OF_LIKELY_NAMES
 from manitwin.models.generators.lift.several import from_views
 from manitwin.models.generators.protocol import Generated, GenerationRequest, PhotoView
 from manitwin.models.generators.templates.catalog import load_templates

@@ -1,0 +1,144 @@
+"""A body of revolution that stands in the photo, with the camera's perspective: its profile and the view, by least squares.
+
+The visual hull of an outline (``revolution``) is that of a camera far away, and follows the upper and lower ends, which are seen
+less and more steeply from near: its elevation is some 8 degrees too high, and what is seen from 55 degrees then a quarter too
+long. Here the hull at each of several elevations is where a least-squares fit begins (``templates.fitting``), of the radii at the
+corners of its profile and of a pinhole camera; edges and the outline choose among what they end at.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from manitwin.geometry.solids.shapes import SolidError, lathe
+from manitwin.models.generators.lift.revolution import (
+    LEVEL_DEG,
+    ROUND_ENDS_DEG,
+    end_elevations,
+    half_widths,
+    turned_from,
+)
+from manitwin.models.generators.lift.silhouette import CROP_SIDE_PX
+from manitwin.models.generators.lift.texture import crop_object
+from manitwin.models.generators.templates.fitting.evidence import Evidence, evidence_of
+from manitwin.models.generators.templates.fitting.fit import Fitted, first_built
+from manitwin.models.generators.templates.fitting.least_squares import Placed, Problem
+from manitwin.models.generators.templates.fitting.residual import residual
+from manitwin.models.generators.templates.fitting.search import Candidate
+from manitwin.models.generators.templates.fitting.shape import Family
+from manitwin.models.generators.templates.fitting.view import LEAST_PERSPECTIVE, MOST_PERSPECTIVE, View, boxed
+from manitwin.models.generators.templates.template import Measure, Model, Template
+
+UPRIGHT = "can"
+"""A category of things that stand and are round: a body of revolution stands as they do."""
+STEPS_DEG = (0.0, 4.0, 8.0, 12.0, 16.0)
+"""Below the elevation of the hull: those of 54 photos of templates from 10, 30 and 55 degrees are 0 to 16 degrees too high."""
+LEVEL_START_DEG = 2.0
+MOST_CORNERS, CORNER_SHARE, COARSER = 12, 0.006, 1.2
+"""Of a profile that is drawn with so few corners: how far it may be off, of its height; as much more until they are so few."""
+LEAST_SAMPLES = 8  # of a profile
+HEIGHT_M = 0.1  # of no meaning: a photo tells no size
+SPREAD = 0.12  # of a radius, by which the hull's may be off
+STRETCH = (0.5, 1.0, 2.0)  # of all radii to the height: that of an elevation which is off
+_AXIS = 1e-3  # of the height: no ring is a point
+_ROUNDS, _ENOUGH = 12, 0.9995
+_USUAL_ELEVATION_DEG, _STEEP_COST = 30.0, 0.0005  # a degree more, as in ``templates.fitting.search``
+_OUTLINE, _EDGES = 6.0, 0.1  # as in ``Residual.cost``
+
+
+@dataclass(frozen=True)
+class _Start:
+    """A profile, (K, 2) of heights and radii in pixels, and the elevation at which it is the hull of an outline."""
+
+    profile: np.ndarray
+    elevation_deg: float
+
+
+def turned_solid(rgba: np.ndarray, focal_mm: float | None = None) -> Fitted | None:
+    """Return the body of revolution about the picture's vertical that explains ``rgba (H, W, 4) uint8``, whose alpha is the mask.
+
+    None where no profile gives a solid. ``focal_mm`` is the lens as 35 mm equivalent, where it is known.
+    """
+    tilted, level = _starts(crop_object(rgba, CROP_SIDE_PX).mask)
+    evidence = evidence_of(rgba, focal_mm)
+    found = [
+        min(candidates, key=_unexplained)
+        for starts in (tilted, level)
+        if (candidates := [each for start in starts if (each := _refined(start, evidence)) is not None])
+    ]
+    return first_built(sorted(found, key=lambda each: each.residual.cost), evidence)
+
+
+def _starts(mask: np.ndarray) -> tuple[list[_Start], list[_Start]]:
+    """Return where to begin with a camera that looks down, and with one at the thing's height where the outline may be that."""
+    rows, widths, column_px = half_widths(mask)
+    upper, lower = end_elevations(rows, widths, column_px)
+    highest = (upper + lower) / 2
+    elevations = [highest - step for step in STEPS_DEG if highest - step > LEVEL_DEG]
+    is_level = not elevations or min(upper, lower) <= LEVEL_DEG or upper > ROUND_ENDS_DEG
+
+    def at(elevation_deg: float) -> list[_Start]:
+        turned = turned_from(rows, widths, column_px, 0.0 if elevation_deg <= LEVEL_DEG else elevation_deg)
+        if len(turned.heights) < LEAST_SAMPLES:
+            return []
+        return [_Start(_with_corners(turned.heights, turned.radii), elevation_deg)]
+
+    return [start for each in elevations for start in at(each)], at(LEVEL_START_DEG) if is_level else []
+
+
+def _with_corners(heights: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Return a profile as a line with few corners ``(K, 2)``, upward (Douglas and Peucker 1973)."""
+    points = np.column_stack([heights, radii]).astype(np.float32)[:, None]
+    tolerance = CORNER_SHARE * float(np.ptp(heights))
+    while len(corners := cv2.approxPolyDP(points, tolerance, closed=False)[:, 0]) > MOST_CORNERS:
+        tolerance *= COARSER
+    return np.asarray(corners, float)
+
+
+def _family(profile: np.ndarray) -> Family:
+    """Return the bodies with corners at the heights of a profile ``(K, 2)``, upward, and about its radii."""
+    height = float(profile[-1, 0] - profile[0, 0])
+    levels, radii = (profile[:, 0] - profile[0, 0]) / height, np.maximum(profile[:, 1] / height, _AXIS)
+    names = [f"radius_{number}" for number in range(len(radii))]
+    measures = {"height_m": Measure(HEIGHT_M, HEIGHT_M, HEIGHT_M, "m"), "width": Measure(*STRETCH, "")}
+    for name, radius in zip(names, radii.tolist(), strict=True):
+        measures[name] = Measure((1 - SPREAD) * radius, radius, (1 + SPREAD) * radius, "")
+
+    def build(*, height_m: float, width: float, **shares: float) -> Model:
+        across = np.maximum([width * shares[name] for name in names], _AXIS)
+        return Model().add("body", lathe(height_m * np.column_stack([across, levels])))
+
+    return Family(Template(UPRIGHT, "household", measures, {"body": ("cardboard",)}, build))
+
+
+def _refined(start: _Start, evidence: Evidence) -> Candidate | None:
+    """Return what a least-squares fit from a start ends at; None where it has no solid."""
+    try:
+        family = _family(start.profile)
+    except SolidError:
+        return None
+    spreads = np.zeros(len(family.free))
+    solid = family.solid(spreads)
+    if solid is None:
+        return None
+    perspective = float(np.clip(evidence.perspective / 1.6, LEAST_PERSPECTIVE, MOST_PERSPECTIVE))
+    ahead = View(0.0, float(np.radians(start.elevation_deg)), 0.0, perspective)
+    scale, x, y = boxed(ahead.project(solid.vertices)[0])
+    view = View(0.0, ahead.elevation_rad, 0.0, perspective, scale, x, y)
+    at, (placed,) = Problem(family, [evidence], True).solve(
+        spreads, [Placed(view, True)], measures=True, rounds=_ROUNDS, enough=_ENOUGH
+    )
+    final = family.solid(at)
+    if final is None:
+        return None
+    return Candidate(family, at, placed.view, True, residual(final, placed.view, evidence))
+
+
+def _unexplained(candidate: Candidate) -> float:
+    """Return what a candidate leaves of outline and edges: how it is shaded tells a body from a view of it, not its elevation."""
+    left = candidate.residual
+    steep = max(0.0, float(np.degrees(candidate.view.elevation_rad)) - _USUAL_ELEVATION_DEG)
+    return (1 - left.iou) + _OUTLINE * left.outline + _EDGES * left.edges + _STEEP_COST * steep
