@@ -15,6 +15,7 @@ from manitwin.errors import Rejected
 from manitwin.models.generators.lift.end_on import CLEARLY_LESS, DISC_ELLIPSE_IOU
 from manitwin.models.generators.lift.hint import ShapeHint
 from manitwin.models.generators.lift.lifting import Lifted, lift
+from manitwin.models.generators.lift.likely_round import is_likely_round
 from manitwin.models.generators.lift.plain_solids import PRIMITIVES, PlainSolids, explains_closely, is_rather
 from manitwin.models.generators.lift.turned_solid import turned_solid
 from manitwin.models.generators.templates.fitting.fit import Fitted, fit, template_for
@@ -48,7 +49,8 @@ def shape_without_name(
 
     A ``plain`` solid that explains the photo closely stands but for a template of the ``likely`` names, each with its
     probability, or a body of revolution that does so better; another one only where it explains the photo rather than what the
-    outline is lifted to. What is lifted to a body of revolution that stands is fitted again with the camera's perspective.
+    outline is lifted to. What is lifted to a body of revolution that stands is fitted again with the camera's perspective; what
+    is no such body by its outline, but likely has the name of something round, is as thick as it is wide.
     ``focal_mm`` is the lens as 35 mm equivalent, where it is known.
     """
     fitted = _best_template(rgba, likely, focal_mm)
@@ -71,6 +73,8 @@ def shape_without_name(
         return _of_likely_name(fitted)
     if plain.nearest is not None and is_rather(plain.nearest, lifted.notes["primitive"]):
         return _plain(plain.nearest)
+    if lifted.notes["primitive"] == "inflation" and is_likely_round(likely, lifted.notes["silhouette"]):
+        return lift(rgba, ShapeHint(round=True))
     return lifted
 
 

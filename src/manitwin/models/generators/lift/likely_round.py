@@ -1,0 +1,50 @@
+"""Whether what nobody has named is round about its length, by what it may be called and by its outline.
+
+A single guess is often wrong and yet of the same shape: a bottle that is taken for a screwdriver is round, and so are both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+
+import numpy as np
+
+from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.generators.lift.hint import is_cylinder
+from manitwin.models.generators.lift.roundness import ROUND_SHARE
+from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.fitting.fit import made_of, template_for
+
+LEAST_SHARE, LEAST_SAID = 0.5, 0.1
+"""Of the probability of the likely names, what has to be that of round things; and that probability itself."""
+LEAST_SOLIDITY, LEAST_MIRROR_IOU = 0.85, 0.8
+"""Of an outline of one body that is about the same on both sides of an axis, as far as a cut-out tells."""
+
+
+def is_likely_round(likely: Sequence[tuple[str, float]], silhouette: Mapping[str, float]) -> bool:
+    """Tell whether most of the ``likely`` names, each with its probability, are of things that are round about their length.
+
+    ``silhouette`` has the scores of the outline (``Silhouette.scores``), which has to be one that such things may have.
+    """
+    if silhouette["solidity"] < LEAST_SOLIDITY or silhouette["mirror_iou"] < LEAST_MIRROR_IOU or silhouette["holes"]:
+        return False
+    said = sum(probability for _, probability in likely)
+    round_things = sum(probability for name, probability in likely if _is_round_thing(name))
+    return said >= LEAST_SAID and round_things >= LEAST_SHARE * said
+
+
+def _is_round_thing(name: str) -> bool:
+    template = template_for(name)
+    if template is not None:
+        return _is_round_template(template.category)
+    prior = lookup(name)
+    return is_cylinder(name) or (prior is not None and prior.shape == "bottle")
+
+
+@cache
+def _is_round_template(category: str) -> bool:
+    """Tell whether a template of usual measures is as thick one way across its length as the other."""
+    template = load_templates()[category]
+    thin_m, thick_m, _ = np.sort(np.ptp(made_of(template, template.typical()).mesh.vertices, axis=0))
+    return bool(thick_m - thin_m <= ROUND_SHARE * thick_m)
