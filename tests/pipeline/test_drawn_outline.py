@@ -14,7 +14,7 @@ from PIL import Image
 from manitwin.config import MattingConfig
 from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
-from manitwin.pipeline.drawn_outline import DRAWN, DrawnOutline, as_drawn, drawn_outline, mask_of_png
+from manitwin.pipeline.drawn_outline import DRAWN, DrawnOutline, as_drawn, drawn_outline, mask_file, mask_of_png
 from manitwin.pipeline.given_alpha import Given
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.photo import PhotoStage
@@ -82,6 +82,24 @@ def test_outline_of_other_proportions_an_empty_one_and_a_full_one_are_refused() 
     ):
         with pytest.raises(Rejected, match=why):
             as_drawn(given, DrawnOutline(mask, "human:ada"), "a.png")
+
+
+def test_outline_as_a_mask_of_the_whole_photo_lies_where_it_was_drawn() -> None:
+    drawn = DrawnOutline(ellipse(200, 300), "human:ada")
+    whole = mask_file(drawn, (600, 400), None)
+    assert whole is not None and (mask_of_png_of_any_size(whole) == ellipse(400, 600)).mean() > 0.99
+    box = (300.0, 100.0, 500.0, 300.0)  # with a margin of 30 pixels
+    square = mask_file(DrawnOutline(ellipse(130, 130), "human:ada"), (1600, 400), box)
+    assert square is not None
+    mask = mask_of_png_of_any_size(square)
+    assert mask.shape == (400, 1600) and (mask[70:330, 270:530] == ellipse(260, 260)).mean() > 0.99
+    mask[70:330, 270:530] = False
+    assert not mask.any()
+    assert mask_file(drawn, (600, 600), None) is None
+
+
+def mask_of_png_of_any_size(data: bytes) -> np.ndarray:
+    return np.asarray(Image.open(io.BytesIO(data)).convert("L")) > 127
 
 
 @pytest.mark.parametrize("box_px", [(), (100.0, 100.0, 500.0, 500.0)])

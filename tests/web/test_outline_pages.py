@@ -15,12 +15,14 @@ from doubted_photos import write_doubted
 from PIL import Image
 from starlette.applications import Starlette
 
+import manitwin
 from manitwin.dataset.review.outlines import OutlineSession
 from manitwin.engine.amendments import read_amendments, write_amendments
 from manitwin.errors import UsageError
 from manitwin.pipeline.cutout import CONFIRMED
 from manitwin.pipeline.drawn_outline import DRAWN, drawn_outline
 from manitwin.pipeline.photo import PhotoStage
+from manitwin.pipeline.settings import stored_config
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import read_record
 from manitwin.web.outline_application import MOST_BODY_BYTES, outline_application
@@ -136,7 +138,7 @@ def test_empty_outlines_full_ones_and_those_of_two_things_are_not_kept(app: Star
     assert session.kept == ()
 
 
-def test_what_was_drawn_becomes_a_twin_that_says_so(session: OutlineSession) -> None:
+def test_what_was_drawn_becomes_a_twin_that_says_so(session: OutlineSession, tmp_path: Path) -> None:
     first, second, bare = session.photos
     kept = session.mask(first)
     session.keep(first, kept)
@@ -146,6 +148,14 @@ def test_what_was_drawn_becomes_a_twin_that_says_so(session: OutlineSession) -> 
     assert record.status == "accepted"
     [matte] = [check for check in record.quality.checks if check.name == "matte"]
     assert "cut out as human:ada drew its outline" in matte.message
+    folder = Path(str(session.root.local)) / session.root.twin_name(first)
+    assert record.source.mask == "source_mask.png" and set(record.files) >= {"source.jpg", "source_mask.png"}
+    again = manitwin.build(
+        folder / "source.jpg", tmp_path / "again", mask=folder / "source_mask.png", name="bottle",
+        config=stored_config(session.root), executor="inline",
+    ).results  # fmt: skip
+    assert again[0].status == "accepted" and again[0].folder is not None
+    assert read_record(again[0].folder).physical == record.physical, "its own files make it again"
     assert read_record(Path(str(session.root.local)) / session.root.twin_name(second)).status == "rejected"
     assert first not in OutlineSession(session.root, "ben").photos
     again = OutlineSession(session.root, "ben", [first[:6]])

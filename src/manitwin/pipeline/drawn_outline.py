@@ -13,9 +13,11 @@ import numpy as np
 from PIL import Image
 
 from manitwin.errors import Rejected
+from manitwin.geometry.pixel_boxes import PixelBox
 from manitwin.models.matting.matte import TRANSPARENT_SHARE
 from manitwin.pipeline.cutout import SHOWN_PX
 from manitwin.pipeline.given_alpha import Given
+from manitwin.pipeline.stated_place import window_of
 
 DRAWN = "outline"
 """Key of the photo stage's amendment: ``{png, source}``, the outline as a PNG file in base64, and who drew it."""
@@ -30,6 +32,15 @@ class DrawnOutline:
 
     mask: np.ndarray
     source: str
+
+    def is_of(self, shape: tuple[int, int]) -> bool:
+        """Tell whether a picture of a ``shape`` (rows, columns) has these proportions."""
+        return abs(self.mask.shape[0] * shape[1] / (self.mask.shape[1] * shape[0]) - 1) <= _BOUND
+
+    def scaled(self, shape: tuple[int, int]) -> np.ndarray:
+        """Return how far each pixel of a picture of a ``shape`` (rows, columns) is the thing's: ``(H, W) uint8``."""
+        grey = Image.fromarray(np.where(self.mask, 255, 0).astype(np.uint8))
+        return np.asarray(grey.resize(shape[::-1], Image.Resampling.BILINEAR))
 
     def to_json(self) -> dict[str, str]:
         """Return it as it is kept."""
@@ -76,13 +87,30 @@ def as_drawn(given: Given, drawn: DrawnOutline, name: str) -> Given:
     Raises Rejected where the outline is of a picture of other proportions, is empty, or leaves nothing out.
     """
     height, width = given.pixels.shape[:2]
-    if abs(drawn.mask.shape[0] * width / (drawn.mask.shape[1] * height) - 1) > _BOUND:
+    if not drawn.is_of((height, width)):
         raise _refused(f"{name}: {drawn.source} drew the outline on another picture; {_REMEDY}")
     if (why := why_no_outline(drawn.mask)) is not None:
         raise _refused(f"{name}: the outline that {drawn.source} drew {why}; {_REMEDY}")
-    grey = Image.fromarray(np.where(drawn.mask, 255, 0).astype(np.uint8))
-    alpha = np.asarray(grey.resize((width, height), Image.Resampling.BILINEAR))
+    alpha = drawn.scaled((height, width))
     return Given(np.dstack([given.pixels[..., :3], alpha]), (f"cut out as {drawn.source} drew its outline",))
+
+
+def mask_file(drawn: DrawnOutline, size_px: tuple[int, int], box_px: PixelBox | None) -> bytes | None:
+    """Return an outline as a mask of the whole photo of ``size_px`` (width, height), upright: a PNG file, as ``--mask`` takes it.
+
+    ``box_px`` is where in the photo the thing is: the outline was drawn on what lies around that. None where it was drawn on
+    another part of the photo (within a frame that was cut off).
+    """
+    width, height = size_px
+    left, top, right, bottom = (0, 0, width, height) if box_px is None else window_of(box_px, size_px, "the photo")
+    window = (bottom - top, right - left)
+    if not drawn.is_of(window):
+        return None
+    whole = np.zeros((height, width), np.uint8)
+    whole[top:bottom, left:right] = drawn.scaled(window)
+    encoded = io.BytesIO()
+    Image.fromarray(whole).save(encoded, "PNG")
+    return encoded.getvalue()
 
 
 def _refused(detail: str) -> Rejected:
