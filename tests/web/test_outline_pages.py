@@ -16,6 +16,7 @@ from PIL import Image
 from starlette.applications import Starlette
 
 import manitwin
+from manitwin.dataset.review.cutouts import confirm
 from manitwin.dataset.review.outlines import OutlineSession
 from manitwin.engine.amendments import read_amendments, write_amendments
 from manitwin.errors import UsageError
@@ -162,6 +163,18 @@ def test_what_was_drawn_becomes_a_twin_that_says_so(session: OutlineSession, tmp
     assert list(again.photos) == [first, second, bare] and again.mask(first) == kept
     with pytest.raises(UsageError, match=r"^zz: no photo; "):
         OutlineSession(session.root, "ben", ["zz"])
+
+
+def test_cut_out_that_is_confirmed_takes_the_place_of_an_outline(session: OutlineSession) -> None:
+    second = list(session.photos)[1]
+    size_px = Image.open(io.BytesIO(session.picture(second))).size
+    session.keep(second, png(box_in(size_px, 0.3, 0.7)))
+    _, run = confirm(session.root, [second], "ben", jobs=1, executor="inline")
+    assert run.counts_of_given == {"accepted": 1}
+    assert set(read_amendments(session.root, second)[PhotoStage.name]) == {CONFIRMED}
+    record = read_record(Path(str(session.root.local)) / session.root.twin_name(second))
+    [matte] = [check for check in record.quality.checks if check.name == "matte"]
+    assert "human:ben confirmed the cut-out" in matte.message and record.source.mask is None
 
 
 def test_photo_that_is_gone_is_said_to_be(session: OutlineSession, tmp_path: Path) -> None:
