@@ -63,6 +63,18 @@ def test_a_manifest_behind_a_wrong_one_is_read_too(tmp_path: Path, monkeypatch: 
         collect_items([Path("a.csv"), Path("b.csv")])
 
 
+def test_a_group_that_contradicts_itself_is_told_with_the_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("front.jpg", "side.jpg"):
+        Path(name).write_bytes(b"x")
+    rows = ["file,name,group", "gone.glb,,", "front.jpg,mug,1", "side.jpg,spoon,1"]
+    Path("list.csv").write_text("\n".join(rows) + "\n")
+    with pytest.raises(
+        UsageError, match=r"^list.csv:2: .*gone.glb is not there.* 1 more cannot be used: list.csv: group '1'"
+    ):
+        list(iterate_items([Path("list.csv")], {}, Notes()))
+
+
 def test_of_very_many_the_rest_are_told_by_their_rows() -> None:
     refused = RefusedInputs()
     for row in range(2, 2 + 1 + TOLD + ROWS_NAMED + 5):

@@ -226,9 +226,10 @@ def _manifest_items(
             item = None if groups.takes(line, row) else item_of(row, path.parent, defaults, where, unknown)
         if item is not None:
             yield from _allowed(item, where, refusal, refused)
-    for item, where in groups.items(lambda row, where: item_of(row, path.parent, defaults, where, unknown)):
-        notes.remarks.extend(_thinned(item, where))
-        yield from _allowed(item, where, refusal, refused)
+    with refused.noted():  # a group that contradicts itself is told with the rows before, and ends the groups
+        for item, where in groups.items(lambda row, where: item_of(row, path.parent, defaults, where, unknown)):
+            notes.remarks.extend(_thinned(item, where))
+            yield from _allowed(item, where, refusal, refused)
     if line is None:
         raise UsageError(
             f"{path}: no rows; a manifest has a column 'file' or 'text', and optionally {', '.join(COLUMNS[2:])}"

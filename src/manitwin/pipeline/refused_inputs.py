@@ -29,6 +29,8 @@ class RefusedInputs:
         try:
             yield
         except UsageError as error:
+            if len(self.lines) >= MOST:  # of all already
+                raise
             self.lines.append(str(error))
         if len(self.lines) >= MOST:
             self.tell()

@@ -187,11 +187,7 @@ def review(
         app = review_application(pages, twins, session)
         server = PageServer(app, host, port, lambda _: on_used_link(running[0]), tokens)
         running.append(server)
-        try:
-            on_ready(server)
-            server.run()
-        finally:
-            server.socket.close()
+        _run(server, on_ready)
 
 
 def draw_outlines(
@@ -202,12 +198,7 @@ def draw_outlines(
     on_new_link: Callable[[str], None],
 ) -> None:
     """Serve the pages on which outlines are drawn until interrupted; ``on_ready`` is called when it listens."""
-    server = PageServer(outline_application(session), host, port, on_new_link)
-    try:
-        on_ready(server)
-        server.run()
-    finally:
-        server.socket.close()
+    _run(PageServer(outline_application(session), host, port, on_new_link), on_ready)
 
 
 def serve(
@@ -220,9 +211,12 @@ def serve(
 ) -> None:
     """Serve the pages that ``pages_of`` gives until interrupted; ``on_ready`` is called when it listens."""
     with tempfile.TemporaryDirectory(prefix="manitwin-view-") as cache, TrialPlayer() as trials:
-        server = PageServer(pages_of(place, Path(cache), twins, trials), host, port, on_new_link)
-        try:
-            on_ready(server)
-            server.run()
-        finally:
-            server.socket.close()
+        _run(PageServer(pages_of(place, Path(cache), twins, trials), host, port, on_new_link), on_ready)
+
+
+def _run(server: PageServer, on_ready: Callable[[PageServer], None]) -> None:
+    try:
+        on_ready(server)
+        server.run()
+    finally:
+        server.socket.close()

@@ -66,7 +66,7 @@ def review(
     """Judge a sample of twins in the browser, by keyboard, until interrupted; without --sample the last one that was drawn."""
     import webbrowser
 
-    from manitwin.cli.commands.view import has_screen, interruptible, tell_link
+    from manitwin.cli.commands.view import has_screen, interruptible, tell_link, warn_if_open
     from manitwin.dataset.index.query import Index
     from manitwin.dataset.review.plan import draw_plan, require_annotator
     from manitwin.dataset.review.session import ReviewSession
@@ -90,10 +90,7 @@ def review(
 
         def ready(server: PageServer) -> None:
             ends_with(server)
-            if server.names.open:
-                error_console.print(
-                    "it listens beyond this machine, and what it sends is not encrypted", style="yellow"
-                )
+            warn_if_open(server)
             tell(server)
             if browser and has_screen():
                 webbrowser.open(server.link(PATH, names[0]))

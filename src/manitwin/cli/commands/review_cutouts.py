@@ -9,7 +9,7 @@ import typer
 
 from manitwin.cli import options
 from manitwin.cli.commands.review import Dataset
-from manitwin.cli.console import error_console, out_console, print_error
+from manitwin.cli.console import out_console, print_error
 
 if TYPE_CHECKING:
     from manitwin.dataset.review.outlines import OutlineSession
@@ -74,7 +74,7 @@ def review_cutouts(
     if draw:
         from manitwin.dataset.review.outlines import OutlineSession
 
-        _draw(dataset, OutlineSession(root, name, redraw or ()), host, port, browser, jobs)
+        raise typer.Exit(_draw(dataset, OutlineSession(root, name, redraw or ()), host, port, browser, jobs))
     photos = doubted_photos(root)
     if sheet is not None:
         for written in write_sheets(root, photos, sheet):
@@ -89,11 +89,11 @@ def review_cutouts(
     raise typer.Exit(_told(dataset, run, f"{len(confirmed)} cut-outs are confirmed by {name}"))
 
 
-def _draw(dataset: str, session: OutlineSession, host: str, port: int, browser: bool, jobs: int | None) -> None:
-    """Serve the pages until interrupted, then build what was drawn; ends the command."""
+def _draw(dataset: str, session: OutlineSession, host: str, port: int, browser: bool, jobs: int | None) -> int:
+    """Serve the pages until interrupted, then build what was drawn; returns the exit status."""
     import webbrowser
 
-    from manitwin.cli.commands.view import has_screen, interruptible, tell_link
+    from manitwin.cli.commands.view import has_screen, interruptible, tell_link, warn_if_open
     from manitwin.cli.progress import WatchedRun
     from manitwin.errors import UsageError
     from manitwin.web.serve import draw_outlines
@@ -105,10 +105,7 @@ def _draw(dataset: str, session: OutlineSession, host: str, port: int, browser: 
 
         def ready(server: PageServer) -> None:
             ends_with(server)
-            if server.names.open:
-                error_console.print(
-                    "it listens beyond this machine, and what it sends is not encrypted", style="yellow"
-                )
+            warn_if_open(server)
             tell_link(server.link(), remark)
             if browser and has_screen():
                 webbrowser.open(server.link())
@@ -116,10 +113,10 @@ def _draw(dataset: str, session: OutlineSession, host: str, port: int, browser: 
         draw_outlines(session, host, port, ready, lambda link: tell_link(link, remark))
     if not session.kept:
         out_console.print("stopped; nothing was drawn")
-        raise typer.Exit(0)
+        return 0
     with WatchedRun("photos", dataset) as watched:
         run = session.build(jobs=jobs, **watched.callbacks)
-    raise typer.Exit(_told(dataset, run, f"{len(session.kept)} outlines are drawn by {session.annotator}"))
+    return _told(dataset, run, f"{len(session.kept)} outlines are drawn by {session.annotator}")
 
 
 def _told(dataset: str, run: RunReport, begun: str) -> int:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from manitwin.cli import choices, options
-from manitwin.cli.console import err_console, out_console
+from manitwin.cli.console import err_console, error_console, out_console
 from manitwin.cli.interrupt import first_interrupt_calls
 
 if TYPE_CHECKING:
@@ -72,8 +72,7 @@ def view(
 
     def ready(server: PageServer) -> None:
         ends_with(server)
-        if server.names.open:
-            err_console.print("it listens beyond this machine, and what it sends is not encrypted", style="yellow")
+        warn_if_open(server)
         tell_link(server.link(), "until interrupted (Ctrl-C)")
         if browser and has_screen():
             webbrowser.open(server.link())
@@ -114,6 +113,12 @@ def _write(source: str, out: Path, sample: int | None, seed: int, where: str, tr
         f"{pages}{done.twins:,} twins, {done.size_bytes / 1e6:,.1f} MB, in {out}; open {out / 'index.html'}"
     )
     raise typer.Exit(3 if done.left_out else 0)
+
+
+def warn_if_open(server: PageServer) -> None:
+    """Warn where a server can be reached from other machines."""
+    if server.names.open:
+        error_console.print("it listens beyond this machine, and what it sends is not encrypted", style="yellow")
 
 
 def tell_link(link: str, remark: str) -> None:

@@ -66,7 +66,7 @@ def shape_without_name(
         return _of_likely_name(fitted)
     turned = _turned(rgba, lifted, focal_mm)
     if turned is not None:
-        return _round(turned, fitted, plain)
+        return _best_round(turned, fitted, plain)
     if plain.close is not None:
         return _cheaper(fitted, plain.close)
     if fitted is not None and _is_preferred(fitted, lifted):
@@ -97,7 +97,7 @@ def _turned(rgba: np.ndarray, lifted: Lifted, focal_mm: float | None) -> Fitted 
     return turned
 
 
-def _round(turned: Fitted, fitted: Fitted | None, plain: PlainSolids) -> Alone:
+def _best_round(turned: Fitted, fitted: Fitted | None, plain: PlainSolids) -> Alone:
     """Return a body of revolution, or what explains the photo better than it."""
     near = plain.nearest if plain.nearest is not None and is_rather(plain.nearest, "revolution") else None
     solid = plain.close or near

@@ -27,7 +27,7 @@ from manitwin.models.generators.templates.fitting.evidence import Evidence, evid
 from manitwin.models.generators.templates.fitting.fit import Fitted, first_built
 from manitwin.models.generators.templates.fitting.least_squares import Placed, Problem
 from manitwin.models.generators.templates.fitting.residual import residual
-from manitwin.models.generators.templates.fitting.search import Candidate
+from manitwin.models.generators.templates.fitting.search import Candidate, steep_cost
 from manitwin.models.generators.templates.fitting.shape import Family
 from manitwin.models.generators.templates.fitting.view import LEAST_PERSPECTIVE, MOST_PERSPECTIVE, View, boxed
 from manitwin.models.generators.templates.template import Measure, Model, Template
@@ -45,8 +45,6 @@ SPREAD = 0.12  # of a radius, by which the hull's may be off
 STRETCH = (0.5, 1.0, 2.0)  # of all radii to the height: that of an elevation which is off
 _AXIS = 1e-3  # of the height: no ring is a point
 _ROUNDS, _ENOUGH = 12, 0.9995
-_USUAL_ELEVATION_DEG, _STEEP_COST = 30.0, 0.0005  # a degree more, as in ``templates.fitting.search``
-_OUTLINE, _EDGES = 6.0, 0.1  # as in ``Residual.cost``
 
 
 @dataclass(frozen=True)
@@ -139,6 +137,4 @@ def _refined(start: _Start, evidence: Evidence) -> Candidate | None:
 
 def _unexplained(candidate: Candidate) -> float:
     """Return what a candidate leaves of outline and edges: how it is shaded tells a body from a view of it, not its elevation."""
-    left = candidate.residual
-    steep = max(0.0, float(np.degrees(candidate.view.elevation_rad)) - _USUAL_ELEVATION_DEG)
-    return (1 - left.iou) + _OUTLINE * left.outline + _EDGES * left.edges + _STEEP_COST * steep
+    return candidate.residual.outline_cost + steep_cost(candidate.view)

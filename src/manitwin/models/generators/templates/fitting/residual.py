@@ -43,9 +43,14 @@ class Residual:
     edge_px: int
 
     @property
+    def outline_cost(self) -> float:
+        """The part of ``cost`` that outlines and edges have."""
+        return (1 - self.iou) + 6.0 * self.outline + 0.10 * self.edges
+
+    @property
     def cost(self) -> float:
         """The weighted sum by which fits are compared."""
-        return (1 - self.iou) + 6.0 * self.outline + 0.10 * self.edges + 0.15 * self.shading + 0.15 * self.hidden
+        return self.outline_cost + 0.15 * self.shading + 0.15 * self.hidden
 
 
 def outline_difference(solid: CoarseSolid, view: View, evidence: Evidence) -> np.ndarray:

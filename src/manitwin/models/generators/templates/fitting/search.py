@@ -112,10 +112,14 @@ def _refined(found: list[_Start], usual: dict[int, _Start]) -> list[_Start]:
     return [*said, *rivals, *(usual[number] for number in (0, *(rival.number for rival in rivals)) if number in usual)]
 
 
+def steep_cost(view: View) -> float:
+    """Return what a fit of something that stands has to explain better for being seen from higher up than most things are."""
+    return _STEEP_COST * max(0.0, float(np.degrees(view.elevation_rad)) - _USUAL_ELEVATION_DEG)
+
+
 def _prejudice(family: Family, said: Family, view: View, upright: bool) -> float:
     """Return what a fit has to explain better for being a rarer view, or another kind or other measures than are said."""
-    steep = max(0.0, float(np.degrees(view.elevation_rad)) - _USUAL_ELEVATION_DEG)
-    rare = _STEEP_COST * steep if family.stands and upright else 0.0
+    rare = steep_cost(view) if family.stands and upright else 0.0
     other = 0.0 if family is said else _OTHER_KIND_COST
     if family is not said and family.template is said.template:
         other = _OTHER_MEASURES_COST
