@@ -47,6 +47,7 @@ def literal(section: type, name: str) -> set[str]:
         (choices.SURFACES, literal(LayoutSettings, "surface")),
         (choices.CLUTTER, literal(LayoutSettings, "clutter")),
         (choices.CODECS, literal(PicturesConfig, "codec")),
+        (choices.RATES_HZ, {str(rate) for rate in literal(PicturesConfig, "rate_hz")}),
         (choices.EPISODE_FORMATS, set(collect.FORMATS)),
         (choices.EXPORT_FORMATS, {"all", *formats()}),
         (choices.SEGMENTATION_FORMATS, set(SEGMENTATIONS)),

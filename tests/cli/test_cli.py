@@ -210,6 +210,7 @@ WRONG_VALUES = [
     "vqa . -o out --points polar",
     "render . --cameras behind",
     "render . --codec h266",
+    "render . --rate-hz 15",
     "render nothing_here",
     "export . -o out --to obj",
     "import . -o out --from obj",

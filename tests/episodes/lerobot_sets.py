@@ -11,6 +11,7 @@ from synthetic_episodes import episode
 from manitwin.episodes.film_encoders import Codec
 from manitwin.episodes.lerobot.videos import CameraVideos, Clip
 from manitwin.episodes.lerobot.write import LeRobotSummary, write_lerobot
+from manitwin.episodes.lower_rates import at_rate
 from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.episodes.video import EpisodesVideo
 
@@ -38,15 +39,17 @@ def picture(number: int, frame: int, steps: int) -> np.ndarray:
     return image
 
 
-def camera(folder: Path, given: Sequence[StoredEpisode], name: str = "front", codec: Codec = "av1") -> CameraVideos:
+def camera(
+    folder: Path, given: Sequence[StoredEpisode], name: str = "front", codec: Codec = "av1", rate_hz: int = 20
+) -> CameraVideos:
     """Pictures of all episodes, two an mp4, with an extra picture of the last state behind each."""
     folder.mkdir(parents=True, exist_ok=True)
     clips: dict[str, Clip] = {}
     for number in range(0, len(given), 2):
         path = folder / f"{name}_{number}.mp4"
-        with EpisodesVideo(path, width_px=WIDTH_PX, height_px=HEIGHT_PX, codec=codec) as video:
+        with EpisodesVideo(path, width_px=WIDTH_PX, height_px=HEIGHT_PX, codec=codec, rate_hz=rate_hz) as video:
             for offset, one in enumerate(given[number : number + 2]):
-                steps = one.recording.steps
+                steps = at_rate(one.recording, rate_hz).steps
                 span = video.add(picture(number + offset, t, steps) for t in range(steps + 1))
                 clips[one.attempt.episode_id] = Clip(path, span.first_frame)
     return CameraVideos(name, clips)

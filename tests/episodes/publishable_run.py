@@ -14,6 +14,7 @@ from manitwin.episodes.batch import BATCH_RECORD, BatchRecord
 from manitwin.episodes.episode_pictures import PICTURES_RECORD, PicturesRecord, batch_name
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import write_episodes
+from manitwin.episodes.lower_rates import at_rate
 from manitwin.episodes.settings import TrajectoriesConfig
 from manitwin.episodes.stored_episode import RecordedObject, StoredEpisode
 from manitwin.episodes.video import EpisodesVideo
@@ -49,8 +50,8 @@ def write_twins(root: Path) -> None:
         seal(folder, record)
 
 
-def write_run(root: Path, twins: Path, *, drawn: bool) -> None:
-    """What a finished run leaves: six kept episodes in three batches, and three failed attempts."""
+def write_run(root: Path, twins: Path, *, drawn: bool, rate_hz: int = 20) -> None:
+    """What a finished run leaves: six kept episodes in three batches, drawn so many times a second, and three failed attempts."""
     config = TrajectoriesConfig(seed=7).model_dump(mode="json")
     root.mkdir(parents=True)
     said = {"kind": "trajectories", "dataset": str(twins), "scenes": None, **config}
@@ -69,10 +70,11 @@ def write_run(root: Path, twins: Path, *, drawn: bool) -> None:
         write_record(folder, TwinSource(twins), {each for ids in OBJECTS[2 * number : 2 * number + 2] for each in ids})
         files.append(folder / ATTEMPTS)
         if drawn:
-            draw(root / "pictures" / batch_name(folder.name), both)
+            draw(root / "pictures" / batch_name(folder.name), both, rate_hz)
     merge_attempts(files, root / ATTEMPTS)
     if drawn:
-        (root / "pictures" / "config.json").write_text(json.dumps({"kind": "pictures", "cameras": ["front"]}))
+        drawings = {"kind": "pictures", "cameras": ["front"], "rate_hz": rate_hz}
+        (root / "pictures" / "config.json").write_text(json.dumps(drawings))
 
 
 def write_record(folder: Path, source: TwinSource, twin_ids: set[str]) -> None:
@@ -88,11 +90,11 @@ def write_record(folder: Path, source: TwinSource, twin_ids: set[str]) -> None:
 PINHOLE = {"camera.intrinsics_px": [[80.0, 0.0, 32.0], [0.0, 80.0, 24.0], [0.0, 0.0, 1.0]], "camera.frame": "world"}
 
 
-def draw(folder: Path, both: list[StoredEpisode]) -> None:
+def draw(folder: Path, both: list[StoredEpisode], rate_hz: int) -> None:
     first_frames = {}
-    with EpisodesVideo(folder / "front.mp4", width_px=WIDTH_PX, height_px=HEIGHT_PX) as film:
+    with EpisodesVideo(folder / "front.mp4", width_px=WIDTH_PX, height_px=HEIGHT_PX, rate_hz=rate_hz) as film:
         for each in both:
-            number, steps = each.facts["number"], each.recording.steps
+            number, steps = each.facts["number"], at_rate(each.recording, rate_hz).steps
             span = film.add(picture(number, t, steps) for t in range(steps))
             first_frames[each.attempt.episode_id] = span.first_frame
     record = PicturesRecord(

@@ -162,18 +162,19 @@ def test_a_skill_that_no_pair_of_twins_suits_is_said_before_anything_is_made(bri
 
 def test_pictures_are_drawn_afterwards_and_join_the_set(bricks: Path, tmp_path: Path) -> None:
     make_episodes(bricks, tmp_path, 2, CONFIG, executor="inline")
-    config = PicturesConfig(cameras=("front", "wrist"), size_px=64)
+    config = PicturesConfig(cameras=("front", "wrist"), size_px=64, rate_hz=10)
     assert draw_episodes(tmp_path, config, executor="inline").exit_code == 0
     opened: list[int] = []
     draw_episodes(tmp_path, config, executor="inline", on_start=lambda items, todo: opened.append(todo))
     assert opened == [0]
-    written = write_with_pictures(tmp_path, config.cameras)
+    written = write_with_pictures(tmp_path, config.cameras, config.rate_hz)
     loaded = read_lerobot(tmp_path / "lerobot", decode_videos=True)
     assert written.episodes == len(loaded.episodes) == 2
     for camera in named_cameras(config.cameras, load_robot("panda")):
         told = loaded.info["features"][f"observation.images.{camera.name}"]["info"]
         assert told.items() >= camera.to_json(64, 64).items()
-    assert written.frames == sum(e.recording.steps for e in stored_episodes(batch_folders(tmp_path)))
+    assert loaded.info["fps"] == 10
+    assert written.frames == sum(e.recording.steps // 2 for e in stored_episodes(batch_folders(tmp_path)))
 
 
 def test_statistics_of_a_run_name_what_was_kept(episodes: Path) -> None:

@@ -208,6 +208,30 @@ def test_videos_are_where_the_rows_say(tmp_path: Path) -> None:
         assert np.abs(dark[number] - color_rgb(number)).max() < 12
 
 
+def test_a_set_of_a_lower_rate_tells_every_second_state_and_the_actions_that_lead_to_them(tmp_path: Path) -> None:
+    given = episodes(3)
+    pictures = camera(tmp_path / "pictures", given, rate_hz=10)
+    write_lerobot(given, tmp_path / "set", videos=[pictures], rate_hz=10)
+    found = read_lerobot(tmp_path / "set", decode_videos=True)
+    assert found.info["fps"] == 10 and found.info["features"]["observation.images.front"]["info"]["video.fps"] == 10
+    for number, one in enumerate(given):
+        frames, recording = found.frames(number), one.recording
+        count = recording.steps // 2
+        assert found.episodes[number]["length"] == count
+        joints = recording.joint_positions_rad[: 2 * count + 1 : 2]
+        assert np.array_equal(frames["observation.state"][:, :-1], joints[:-1])
+        assert np.allclose(frames["action"][:, :-1], joints[1:], atol=1e-6), "they are reached at the next state"
+        assert np.allclose(frames["action.joint_delta"][:, :-1], np.diff(joints, axis=0), atol=1e-6)
+        assert np.allclose(np.diff(frames["timestamp"]), 0.1, atol=1e-6)
+        assert frames["next.done"].tolist() == [False] * (count - 1) + [True]
+
+
+def test_pictures_of_another_rate_than_the_sets_are_refused(tmp_path: Path) -> None:
+    given = episodes(1)
+    with pytest.raises(EpisodesError, match="20 frames a second, not 10; render the pictures again"):
+        write_lerobot(given, tmp_path / "set", videos=[camera(tmp_path / "pictures", given)], rate_hz=10)
+
+
 def test_pictures_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     given = episodes(2)
     good = camera(tmp_path / "pictures", given)

@@ -50,6 +50,15 @@ def test_strict_reader_reads_what_went_out(published: tuple[Path, PublishedEpiso
         assert np.array_equal(frames["action"][:, :-1], wanted)
 
 
+def test_what_was_drawn_at_a_lower_rate_goes_out_at_it(run: Path, tmp_path: Path) -> None:
+    slow = tmp_path / "run"
+    write_run(slow, Path(json.loads((run / "config.json").read_text())["dataset"]), drawn=True, rate_hz=5)
+    publish_episodes(slow, tmp_path / "cups", license_allow=["cc-by-4.0", "CC0-1.0"])
+    found = read_lerobot(tmp_path / "cups", decode_videos=True)
+    assert found.info["fps"] == 5
+    assert [row["length"] for row in found.episodes] == [stored(n).recording.steps // 4 for n in ALLOWED]
+
+
 def test_episodes_of_other_licences_are_in_no_file(published: tuple[Path, PublishedEpisodes]) -> None:
     out, _ = published
     gone = [stored(n) for n in range(6) if n not in ALLOWED]

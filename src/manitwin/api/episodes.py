@@ -90,5 +90,5 @@ def render_episodes(
         require_encoder(settings.codec)
     report = draw_episodes(Path(episodes), settings, twins=twins, **run)
     if report.exit_code != 4:
-        on_written(write_with_pictures(Path(episodes), settings.cameras))
+        on_written(write_with_pictures(Path(episodes), settings.cameras, settings.rate_hz))
     return report

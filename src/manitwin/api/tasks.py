@@ -61,14 +61,15 @@ def make_env(
     cameras: Sequence[str] = (),
     picture_px: int = 128,
     max_steps: int = 1200,
+    rate_hz: int = 20,
     start_noise: StartNoise | None = None,
 ) -> TaskEnvironment:
     """Return the Gymnasium environment of a task of a file or folder of tasks; the only one needs no ``task_id``.
 
     Observations are states, with pictures of ``cameras`` besides; docs/policies.md says what is in them and what an action is.
-    ``twins``: where the twins are now. An episode is cut off after ``max_steps`` steps of 1/20 s. With ``start_noise`` the
-    seeds of ``reset`` draw other starts. Raises UsageError for an unknown task or camera, and for a scene that is another one
-    than the task's.
+    ``twins``: where the twins are now. There are ``rate_hz`` actions a second, 20, 10 or 5: as many as in the data that a policy
+    learned from. An episode is cut off after ``max_steps`` steps. With ``start_noise`` the seeds of ``reset`` draw other starts.
+    Raises UsageError for an unknown task or camera, another rate, and a scene that is another one than the task's.
     """
     from manitwin.episodes.environment.make import make_env as make
 
@@ -80,5 +81,6 @@ def make_env(
         cameras=cameras,
         picture_px=picture_px,
         max_steps=max_steps,
+        rate_hz=rate_hz,
         start_noise=start_noise,
     )

@@ -133,6 +133,7 @@ SURFACES = Choices("surface", _of("table", "shelf", "tray"))
 CLUTTER = Choices("clutter", _of("sparse", "medium", "dense"))
 CAMERAS = Choices("camera", _of("front", "side", "top", "wrist"), listed=True)
 CODECS = Choices("codec", _of("av1", "mpeg4", "vp9"))
+RATES_HZ = Choices("rate", _of("20", "10", "5"))
 EPISODE_FORMATS = Choices("format", _of("lerobot", "maniskill"), listed=True)
 EXPORT_FORMATS = Choices("format", lambda: ["all", *_backends("exporter")()], listed=True)
 IMPORT_FORMATS = Choices(

@@ -32,6 +32,7 @@ from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import EpisodeFile
 from manitwin.episodes.lerobot.videos import CameraVideos, Clip
 from manitwin.episodes.lerobot.write import LeRobotSummary, write_lerobot
+from manitwin.episodes.lower_rates import rows_per_frame
 from manitwin.episodes.replay_pictures import EpisodeReplay, twin_drawable
 from manitwin.episodes.settings import PicturesConfig
 from manitwin.episodes.stored_episode import StoredEpisode
@@ -106,7 +107,7 @@ class EpisodeFilmsStage:
         (folder / FILMS).mkdir()
         with ExitStack() as stack, EpisodeFile(self._episodes / batch_name(draft.payload.batch_id) / EPISODES) as file:
             films = [stack.enter_context(self._film(folder / FILMS, camera)) for camera in cameras if len(file)]
-            self._drawn, self._to_draw = 0, sum(episode.recording.steps for episode in file)
+            self._drawn, self._to_draw = 0, sum(self._frames(episode) for episode in file)
             for episode in file:
                 pictures = self.pictures_of(episode, cameras)
                 spans = [film.add(shown) for film, shown in zip(films, pictures, strict=True)]
@@ -116,10 +117,14 @@ class EpisodeFilmsStage:
 
     def _film(self, folder: Path, camera: NamedCamera) -> EpisodesVideo:
         size = self.settings.size_px
-        return EpisodesVideo(folder / f"{camera.name}.mp4", width_px=size, height_px=size, codec=self.settings.codec)
+        path, rate_hz = folder / f"{camera.name}.mp4", self.settings.rate_hz
+        return EpisodesVideo(path, width_px=size, height_px=size, codec=self.settings.codec, rate_hz=rate_hz)
+
+    def _frames(self, episode: StoredEpisode) -> int:
+        return episode.recording.steps // rows_per_frame(self.settings.rate_hz)
 
     def pictures_of(self, episode: StoredEpisode, cameras: list[NamedCamera]) -> list[list[np.ndarray]]:
-        """Return the pictures ``(H, W, 3) uint8`` of each camera, one a state of the recording."""
+        """Return the pictures ``(H, W, 3) uint8`` of each camera, one a state of the recording at the settings' rate."""
         room, size = episode_room(episode), self.settings.size_px
         pictures: list[list[np.ndarray]] = [[] for _ in cameras]
         with EpisodeReplay(
@@ -132,8 +137,9 @@ class EpisodeFilmsStage:
             seed=episode.attempt.seed % 2**31,
             picture_px=size,
         ) as replay:
-            states = replay.frames(episode.recording, cameras, width_px=size, height_px=size)
-            for frames in islice(states, episode.recording.steps):
+            every = rows_per_frame(self.settings.rate_hz)
+            states = replay.frames(episode.recording, cameras, width_px=size, height_px=size, every=every)
+            for frames in islice(states, self._frames(episode)):
                 for shown, frame in zip(pictures, frames, strict=True):
                     shown.append(frame.rgb)
                 self._drawn += 1
@@ -228,8 +234,8 @@ def draw_episodes(
     )  # fmt: skip
 
 
-def write_with_pictures(out: Path, cameras: tuple[str, ...]) -> LeRobotSummary:
-    """Write the LeRobot data set of a run again, with the films of these cameras."""
+def write_with_pictures(out: Path, cameras: tuple[str, ...], rate_hz: int) -> LeRobotSummary:
+    """Write the LeRobot data set of a run again, at the rate of its films of these cameras and with them."""
     folders = batch_folders(out)
     clips: dict[str, dict[str, Clip]] = {camera: {} for camera in cameras}
     pinholes: dict[str, dict[str, Any]] = {}
@@ -241,7 +247,8 @@ def write_with_pictures(out: Path, cameras: tuple[str, ...]) -> LeRobotSummary:
             for camera in cameras:
                 clips[camera][episode_id] = Clip(place / f"{camera}.mp4", first)
     videos = [CameraVideos(camera, clips[camera], pinholes.get(camera, {})) for camera in cameras]
-    return write_lerobot(stored_episodes(folders), out / LEROBOT, videos=videos, granules=any_granules(folders))
+    granules = any_granules(folders)
+    return write_lerobot(stored_episodes(folders), out / LEROBOT, videos=videos, granules=granules, rate_hz=rate_hz)
 
 
 def _said(out: Path) -> dict[str, str]:

@@ -14,7 +14,6 @@ import cv2
 import numpy as np
 from PIL import Image, features
 
-from manitwin.episodes.recording import RATE_HZ
 from manitwin.errors import UsageError
 from manitwin.formats.mp4_file import CodedPictures, Mp4Track, coded_pictures
 
@@ -51,15 +50,15 @@ def missing_encoder(codec: Codec) -> UsageError:
     )
 
 
-def opened_encoder(codec: Codec, path: Path, width_px: int, height_px: int) -> Encoder | None:
+def opened_encoder(codec: Codec, path: Path, width_px: int, height_px: int, rate_hz: int) -> Encoder | None:
     """Begin a film; None where the file cannot be written, or where this installation has no encoder for the codec."""
     if codec == "av1":
         try:
-            return _Av1(path, width_px, height_px) if features.check("avif") else None
+            return _Av1(path, width_px, height_px, rate_hz) if features.check("avif") else None
         except OSError:
             return None
     writer = cv2.VideoWriter(
-        str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*_FOURCC[codec]), float(RATE_HZ), (width_px, height_px)
+        str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*_FOURCC[codec]), float(rate_hz), (width_px, height_px)
     )
     return _OpenCV(writer) if writer.isOpened() else None
 
@@ -78,9 +77,9 @@ class _OpenCV:
 class _Av1:
     """Codes groups of pictures as AVIF sequences, and puts what is coded into one track."""
 
-    def __init__(self, path: Path, width_px: int, height_px: int):
+    def __init__(self, path: Path, width_px: int, height_px: int, rate_hz: int):
         self._stream = path.open("wb")
-        self._track = Mp4Track(self._stream, width_px=width_px, height_px=height_px, rate_hz=RATE_HZ)
+        self._track = Mp4Track(self._stream, width_px=width_px, height_px=height_px, rate_hz=rate_hz)
         self._group: list[Image.Image] = []
 
     def write(self, picture: np.ndarray) -> None:

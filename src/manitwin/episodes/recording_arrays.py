@@ -26,6 +26,11 @@ LITERAL = "active_literal"
 _OF_ACTIONS = ("phase", LITERAL)
 
 
+def is_of_actions(name: str) -> bool:
+    """Tell whether an array of a recording has a row for each action ``(T, ...)``, not for each state ``(T + 1, ...)``."""
+    return name.startswith("action_") or name in _OF_ACTIONS
+
+
 def checked(episode: StoredEpisode) -> Recording:
     """Return the recording with the types of the file: float32, phases uint8, flags bool.
 
@@ -44,7 +49,7 @@ def checked(episode: StoredEpisode) -> Recording:
         if entry.name in (*GRANULES, LITERAL) and getattr(recording, entry.name) is None:
             continue
         array = np.asarray(getattr(recording, entry.name))
-        rows = steps if entry.name.startswith("action_") or entry.name in _OF_ACTIONS else steps + 1
+        rows = steps if is_of_actions(entry.name) else steps + 1
         shape = (rows, *_widths(episode.robot, things, recording).get(entry.name, ()))
         if array.shape != shape:
             raise EpisodesError(

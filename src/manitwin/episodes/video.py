@@ -13,6 +13,7 @@ import numpy as np
 from PIL import Image
 
 from manitwin.episodes.film_encoders import CODECS, Codec, missing_encoder, opened_encoder
+from manitwin.episodes.recording import RATE_HZ
 from manitwin.errors import UsageError, choose_from
 
 ANIMATIONS = (".webp", ".gif")
@@ -20,7 +21,7 @@ ANIMATIONS = (".webp", ".gif")
 
 @dataclass(frozen=True)
 class Span:
-    """The place of an episode in its file: ``frames`` pictures from ``first_frame`` on, 20 a second."""
+    """The place of an episode in its file: ``frames`` pictures from ``first_frame`` on."""
 
     file: Path
     first_frame: int
@@ -31,7 +32,7 @@ def require_encoder(codec: Codec) -> None:
     """Raise UsageError, naming the builds that have it, where a codec cannot be written here; nothing stands in for it."""
     _require_codec(codec)
     with tempfile.TemporaryDirectory(prefix="manitwin-encoder-") as folder:
-        encoder = opened_encoder(codec, Path(folder) / "a.mp4", 64, 64)
+        encoder = opened_encoder(codec, Path(folder) / "a.mp4", 64, 64, RATE_HZ)
         if encoder is None:
             raise missing_encoder(codec)
         encoder.write(np.zeros((64, 64, 3), np.uint8))
@@ -44,7 +45,7 @@ def _require_codec(codec: str) -> None:
 
 
 class EpisodesVideo:
-    """An mp4 of episodes, one after the other, at 20 pictures a second. To be used in a ``with`` statement.
+    """An mp4 of episodes, one after the other, at ``rate_hz`` pictures a second. To be used in a ``with`` statement.
 
     ``av1`` and ``vp9`` play in browsers; ``vp9`` takes ten times as long, and plays in older ones too; ``mpeg4`` takes a fifth
     of the time of ``av1``, plays in what learning libraries decode with, and in no browser. All are read back frame by frame
@@ -52,7 +53,9 @@ class EpisodesVideo:
     another codec, and as ``require_encoder`` does.
     """
 
-    def __init__(self, path: Path, *, width_px: int, height_px: int, codec: Codec = "av1") -> None:
+    def __init__(
+        self, path: Path, *, width_px: int, height_px: int, codec: Codec = "av1", rate_hz: int = RATE_HZ
+    ) -> None:
         _require_codec(codec)
         if width_px % 2 or height_px % 2:
             raise UsageError(
@@ -61,7 +64,7 @@ class EpisodesVideo:
         self._path, self._shape, self._frames = path, (height_px, width_px, 3), 0
         self._unfinished = path.with_name(f".{path.stem}.{os.getpid()}.mp4")
         path.parent.mkdir(parents=True, exist_ok=True)
-        encoder = opened_encoder(codec, self._unfinished, width_px, height_px)
+        encoder = opened_encoder(codec, self._unfinished, width_px, height_px, rate_hz)
         if encoder is None:
             require_encoder(codec)
             raise UsageError(f"{path}: no video can be written there; check the folder and the disk")

@@ -113,6 +113,7 @@ def test_environment_of_no_known_maker_is_not_pickled(env: TaskEnvironment, monk
         ({"max_steps": 2.5}, "max_steps is 2.5"),
         ({"picture_px": 0, "cameras": ("front",)}, "picture_px is 0; give a whole number, 1 or more"),
         ({"picture_px": -3}, "picture_px is -3"),
+        ({"rate_hz": 30}, "unknown rate '30'"),
         ({"cameras": "front"}, r"cameras is 'front'; give a tuple of names: \('front',\)"),
     ],
 )

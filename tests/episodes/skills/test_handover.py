@@ -263,7 +263,7 @@ def test_an_arm_of_other_joints_than_its_robot_is_refused(tmp_path: Path) -> Non
 
 def test_frames_name_what_is_of_which_arm() -> None:
     given = stored()
-    features, frames = {each.name: each for each in features_of(given.robot)}, frames_of(given, 0, 0, 0)
+    features, frames = {each.name: each for each in features_of(given.robot)}, frames_of(given, 0, 0, 0, 20)
     for name in ("observation.state", "observation.tip_pose", "action", "action.tip_delta"):
         assert frames[name].shape[1] == features[name].width, name
     names = features["observation.state"].names

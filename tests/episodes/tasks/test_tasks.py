@@ -15,6 +15,7 @@ from grasped_twins import write_brick
 from manitwin.episodes.attempts import ATTEMPTS, read_attempts
 from manitwin.episodes.collect import batch_folders, collect, stored_episodes
 from manitwin.episodes.episodes_run import make_episodes
+from manitwin.episodes.lower_rates import at_rate
 from manitwin.episodes.recording import Recording
 from manitwin.episodes.settings import TasksConfig, TrajectoriesConfig
 from manitwin.episodes.stored_episode import StoredEpisode
@@ -218,6 +219,22 @@ def test_recorded_commands_reach_success_in_the_environment_and_wrong_ones_do_no
     env = manitwin.make_env(folder, kept[0].attempt.task_id)
     missed = replayed(env, kept[0], off_rad=0.5)
     assert not missed["success"] and missed["failure"]
+    env.close()
+
+
+@pytest.mark.parametrize("rate_hz", [10, 5])
+def test_commands_of_a_lower_rate_reach_success_in_an_environment_of_that_rate(
+    folder: Path, kept: list[StoredEpisode], rate_hz: int
+) -> None:
+    recording = at_rate(kept[0].recording, rate_hz)
+    env = manitwin.make_env(folder, kept[0].attempt.task_id, rate_hz=rate_hz)
+    assert env.metadata["render_fps"] == rate_hz
+    env.reset(seed=0)
+    for told, hand in zip(recording.action_joint_positions_rad, recording.action_hand, strict=True):
+        _, _, terminated, _, info = env.step(np.append(told, hand))
+        if terminated:
+            break
+    assert info["success"], info
     env.close()
 
 

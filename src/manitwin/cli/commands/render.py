@@ -34,6 +34,12 @@ def render(
             help="av1 (plays in browsers), vp9 (in older ones too, slow to write), or mpeg4 (in none)."
         ),
     ] = None,
+    rate_hz: Annotated[
+        str | None,
+        choices.RATES_HZ.option(
+            help="States, actions and pictures a second of the LeRobot set: 20, 10 or 5; fewer cost less."
+        ),
+    ] = None,
     twins: options.Twins = None,
     joint: Annotated[
         list[str] | None,
@@ -57,7 +63,10 @@ def render(
     from manitwin.episodes.settings import PicturesConfig
 
     names = None if cameras is None else tuple(name.strip() for name in cameras.split(","))
-    settings = options.read_settings(PicturesConfig, run, {"cameras": names, "size_px": size, "codec": codec})
+    rate = None if rate_hz is None else int(rate_hz)
+    settings = options.read_settings(
+        PicturesConfig, run, {"cameras": names, "size_px": size, "codec": codec, "rate_hz": rate}
+    )
     from manitwin.api import render_episodes
     from manitwin.cli.progress import WatchedRun
     from manitwin.episodes.episode_pictures import PICTURES

@@ -1,4 +1,4 @@
-"""The Gymnasium environment of a task: the physics of episodes, 20 actions a second, success by the evaluator of episodes."""
+"""The Gymnasium environment of a task: the physics of episodes, actions at a rate, success by the evaluator of episodes."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from manitwin.episodes.execution import REST_ROWS, STILL_ROWS, WATCH_S
 from manitwin.episodes.fixtures import to_json
 from manitwin.episodes.goals.evaluation import Evaluation, evaluate
 from manitwin.episodes.judging import is_reached_already, state_of
+from manitwin.episodes.lower_rates import rows_per_frame
 from manitwin.episodes.outcome import is_at_rest
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import PickPlaceProblem
@@ -65,7 +66,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
     it is before ``reset``: a simulation cannot be sent to another process.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": RATE_HZ}  # noqa: RUF012 (Gymnasium declares it so)
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": RATE_HZ}  # noqa: RUF012 (Gymnasium declares it so)
 
     def __init__(
         self,
@@ -75,13 +76,14 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         settings: EpisodeSettings,
         *,
         max_steps: int,
+        rate_hz: int = RATE_HZ,
         painter: Painter | None = None,
         cameras: Sequence[str] = (),
         picture_px: int = 128,
         start_noise: StartNoise | None = None,
         made_by: Callable[[], TaskEnvironment] | None = None,
     ):
-        """Take a task that is set up; nothing is simulated before ``reset``."""
+        """Take a task that is set up, and how many actions a second there are; nothing is simulated before ``reset``."""
         self._made_by = made_by
         self.task, self.instructions = setting.task, setting.task.instructions
         self.render_mode = "rgb_array" if painter is not None else None
@@ -89,7 +91,9 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         self._robot, self._max_steps, self._noise = robot, max_steps, start_noise
         self._camera_names, self._picture_px = tuple(cameras), picture_px
         self._closing = closing_of(self._robot, settings)
-        self._substeps = round(1 / RATE_HZ / settings.timestep_s)
+        self.metadata = {**type(self).metadata, "render_fps": rate_hz}
+        self._rate_hz, self._rows = rate_hz, rows_per_frame(rate_hz)
+        self._row_substeps = round(1 / RATE_HZ / settings.timestep_s)
         self._per_look = max(1, int(WATCH_S / settings.timestep_s + 1e-9))
         self._world: RobotWorld | None = None
         arms, things = len(robot.arms) or 1, len(setting.scene.objects)
@@ -166,7 +170,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         return self._observation(), info if drawn is None else info | {"start_noise": drawn.info}
 
     def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """Carry out an action for 1/20 s; the episode ends with success, or is cut off after the most steps.
+        """Carry out an action for ``1 / rate_hz`` s; the episode ends with success, or is cut off after the most steps.
 
         Raises UsageError before ``reset``, and for an action of another shape or that is not finite; nothing moves then.
         """
@@ -178,8 +182,6 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         joints = len(self._robot.arm_joints)
         self._move(world, told[:joints], told[joints:])
         self._steps += 1
-        self._poses.append(self._object_poses())
-        self._pressing.append(self._pairs())
         evaluation = self._evaluation()
         success = len(self._poses) == REST_ROWS and evaluation.reached
         truncated = self._steps >= self._max_steps and not success
@@ -236,7 +238,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
             world.__exit__(None, None, None)
 
     def _move(self, world: RobotWorld, joints_rad: np.ndarray, hand: np.ndarray) -> None:
-        arms, dt, count = self._arms, self._settings.timestep_s, self._substeps
+        arms, dt, count = self._arms, self._settings.timestep_s, self._row_substeps * self._rows
         world.expect_load(arms.may_hold(hand))
         for number in arms.towards(joints_rad, hand, count):
             last = arms.joint_positions() if number == count else None
@@ -245,7 +247,10 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
                 contacts = world.contacts.read()
                 arms.look(contacts)
                 for watch in self._watches:
-                    watch.look(world.contacts, contacts, self._steps / RATE_HZ + number * dt)
+                    watch.look(world.contacts, contacts, self._steps / self._rate_hz + number * dt)
+            if number % self._row_substeps == 0:  # rest is judged of the rows of a recording, whatever the rate
+                self._poses.append(self._object_poses())
+                self._pressing.append(self._pairs())
             if last is not None:
                 self._velocities = (arms.joint_positions() - last) / dt
 

@@ -10,7 +10,9 @@ from pathlib import Path
 from manitwin.engine.ledger.location import CONFIG
 from manitwin.episodes.environment.environment import TaskEnvironment
 from manitwin.episodes.environment.start_noise import StartNoise
+from manitwin.episodes.lower_rates import rows_per_frame
 from manitwin.episodes.planning.two_arms import planner_of
+from manitwin.episodes.recording import RATE_HZ
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.hands import check_hand
 from manitwin.episodes.skills.registry import load_skill
@@ -36,12 +38,14 @@ def make_env(
     cameras: Sequence[str] = (),
     picture_px: int = 128,
     max_steps: int = 1200,
+    rate_hz: int = RATE_HZ,
     start_noise: StartNoise | None = None,
 ) -> TaskEnvironment:
     """Return a task's environment, as ``manitwin.make_env`` says; raises UsageError for what is not there."""
     for name, number in (("max_steps", max_steps), ("picture_px", picture_px)):
         if isinstance(number, bool) or not isinstance(number, Integral) or number < 1:
             raise UsageError(f"{name} is {number!r}; give a whole number, 1 or more")
+    rows_per_frame(rate_hz)
     if isinstance(cameras, str):
         raise UsageError(f"cameras is {cameras!r}; give a tuple of names: ({cameras!r},)")
     if not (start_noise is None or isinstance(start_noise, StartNoise)):
@@ -77,6 +81,7 @@ def make_env(
         planner,
         settings,
         max_steps=max_steps,
+        rate_hz=rate_hz,
         painter=painter,
         cameras=cameras,
         picture_px=picture_px,
@@ -90,6 +95,7 @@ def make_env(
             cameras=tuple(cameras),
             picture_px=picture_px,
             max_steps=max_steps,
+            rate_hz=rate_hz,
             start_noise=start_noise,
         ),
     )

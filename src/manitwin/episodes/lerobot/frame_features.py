@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from manitwin.episodes.handled_objects import handled_objects
 from manitwin.episodes.lerobot.lerobot_format import DEFAULT_FEATURES
-from manitwin.episodes.recording import RATE_HZ, Recording, joint_delta, tip_delta, tip_poses
+from manitwin.episodes.recording import Recording, joint_delta, tip_delta, tip_poses
 from manitwin.episodes.stored_episode import RecordedRobot, StoredEpisode
 
 GRANULES = "observation.granules"
@@ -66,8 +66,10 @@ def features_of(robot: RecordedRobot, *, granules: bool = False) -> tuple[Featur
     )
 
 
-def frames_of(episode: StoredEpisode, episode_index: int, first_index: int, task_index: int) -> dict[str, np.ndarray]:
-    """Return an episode's features as arrays ``(T, width)``, single numbers ``(T,)``.
+def frames_of(
+    episode: StoredEpisode, episode_index: int, first_index: int, task_index: int, rate_hz: int
+) -> dict[str, np.ndarray]:
+    """Return the features of an episode with ``rate_hz`` states a second as arrays ``(T, width)``, single numbers ``(T,)``.
 
     Frame t is state t and the action given in it; the state after the last action is no frame.
     """
@@ -90,7 +92,7 @@ def frames_of(episode: StoredEpisode, episode_index: int, first_index: int, task
         "next.done": last,
         "phase": recording.phase.astype(np.int64),
         "active_literal": _active_literal(recording),
-        "timestamp": (number / RATE_HZ).astype(np.float32),
+        "timestamp": (number / rate_hz).astype(np.float32),
         "frame_index": number,
         "episode_index": np.full(steps, episode_index),
         "index": first_index + number,

@@ -13,7 +13,6 @@ import numpy as np
 from manitwin.episodes.film import Film, VideoFacts, video_facts
 from manitwin.episodes.lerobot.feature_statistics import Statistics
 from manitwin.episodes.lerobot.lerobot_format import CODEC, QUANTILES, VIDEO_PATH, place_of, video_key
-from manitwin.episodes.recording import RATE_HZ
 from manitwin.errors import EpisodesError
 
 _ENCODED_BY_LEROBOT = ("av1", "h264", "hevc")
@@ -25,7 +24,7 @@ _PIXEL_STEP = 4
 
 @dataclass(frozen=True)
 class Clip:
-    """The place of an episode's pictures: frame ``first_frame + t`` of an mp4 of 20 frames a second shows state t."""
+    """The place of an episode's pictures: frame ``first_frame + t`` of an mp4 shows state t at the set's rate."""
 
     file: Path
     first_frame: int = 0
@@ -43,8 +42,8 @@ class CameraVideos:
 class VideoColumns:
     """Copies a camera's files into a set, in the order in which episodes use them, and tells where each episode is."""
 
-    def __init__(self, videos: CameraVideos, root: Path):
-        self.videos, self.root, self.key = videos, root, video_key(videos.camera)
+    def __init__(self, videos: CameraVideos, root: Path, rate_hz: int):
+        self.videos, self.root, self.key, self._rate_hz = videos, root, video_key(videos.camera), rate_hz
         self.numbers: dict[Path, int] = {}
         self.facts: VideoFacts | None = None
         self._frames: dict[Path, int] = {}
@@ -71,8 +70,8 @@ class VideoColumns:
         columns = {
             f"{prefix}/chunk_index": chunk,
             f"{prefix}/file_index": place,
-            f"{prefix}/from_timestamp": clip.first_frame / RATE_HZ,
-            f"{prefix}/to_timestamp": (clip.first_frame + steps) / RATE_HZ,
+            f"{prefix}/from_timestamp": clip.first_frame / self._rate_hz,
+            f"{prefix}/to_timestamp": (clip.first_frame + steps) / self._rate_hz,
         }
         return columns, self._reader.statistics(clip, steps)
 
@@ -94,7 +93,7 @@ class VideoColumns:
                 "video.width": facts.width_px,
                 "video.pix_fmt": "yuv420p",
                 "video.is_depth_map": False,
-                "video.fps": RATE_HZ,
+                "video.fps": self._rate_hz,
                 "video.channels": 3,
                 "has_audio": False,
                 CODEC: facts.codec,
@@ -108,8 +107,10 @@ class VideoColumns:
             return self.numbers[file]
         facts = video_facts(file)
         first = self.facts or facts
-        if abs(facts.rate_hz - RATE_HZ) > 1e-6 * RATE_HZ:
-            raise EpisodesError(f"{file}: {facts.rate_hz:g} frames a second, not {RATE_HZ}; render the pictures again")
+        if abs(facts.rate_hz - self._rate_hz) > 1e-6 * self._rate_hz:
+            raise EpisodesError(
+                f"{file}: {facts.rate_hz:g} frames a second, not {self._rate_hz}; render the pictures again"
+            )
         if (facts.height_px, facts.width_px, facts.codec) != (first.height_px, first.width_px, first.codec):
             raise EpisodesError(f"{file}: {facts} differs from the camera's other files, {first}; render them alike")
         number = len(self.numbers)

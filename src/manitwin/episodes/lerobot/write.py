@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,7 @@ from manitwin.episodes.lerobot.lerobot_format import (
     write_json,
 )
 from manitwin.episodes.lerobot.videos import CameraVideos, VideoColumns
+from manitwin.episodes.lower_rates import at_rate
 from manitwin.episodes.recording import RATE_HZ
 from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.errors import EpisodesError
@@ -53,11 +54,13 @@ def write_lerobot(
     data_files_size_in_mb: int = DATA_FILES_SIZE_IN_MB,
     videos: Sequence[CameraVideos] = (),
     granules: bool = False,
+    rate_hz: int = RATE_HZ,
 ) -> LeRobotSummary:
     """Write the episodes of one robot as a data set, numbered as they come; it appears whole or not at all.
 
     Every instruction is a task; ``seed`` and the episode's id choose the one that its frames have. With ``videos`` each
     episode must have pictures of every camera; with ``granules`` frames tell where these are (zeros for an episode without).
+    Frames are ``rate_hz`` a second (``at_rate``), and so must pictures be.
     One episode is in memory at a time. The same episodes give the same bytes. Raises EpisodesError for no episode, several
     robots, an episode without instructions, and pictures that do not fit.
     """
@@ -66,8 +69,9 @@ def write_lerobot(
         with ExitStack() as stack:
             for episode in episodes:
                 if writer is None:
-                    columns = [VideoColumns(camera, root) for camera in videos]
-                    writer = stack.enter_context(_Set(root, episode, seed, data_files_size_in_mb, columns, granules))
+                    columns = [VideoColumns(camera, root, rate_hz) for camera in videos]
+                    opened = _Set(root, episode, seed, data_files_size_in_mb, columns, granules, rate_hz)
+                    writer = stack.enter_context(opened)
                 writer.add(episode)
         if writer is None:
             raise EpisodesError(f"{place}: no episode, and LeRobot reads no empty set; keep at least one episode")
@@ -86,8 +90,9 @@ class _Set:
         data_files_size_in_mb: int,
         videos: list[VideoColumns],
         granules: bool,
+        rate_hz: int,
     ):
-        self.root, self.robot, self.seed, self.videos = root, first.robot, seed, videos
+        self.root, self.robot, self.seed, self.videos, self.rate_hz = root, first.robot, seed, videos, rate_hz
         self.features: tuple[Feature, ...] = features_of(first.robot, granules=granules)
         self.schema = schema_of(self.features)
         self.data = _DataFiles(root, self.schema, data_files_size_in_mb)
@@ -107,6 +112,7 @@ class _Set:
 
     def add(self, episode: StoredEpisode) -> None:
         """Write an episode's frames and its row."""
+        episode = replace(episode, recording=at_rate(episode.recording, self.rate_hz))
         attempt, steps = episode.attempt, episode.recording.steps
         if episode.robot != self.robot:
             raise EpisodesError(
@@ -118,7 +124,7 @@ class _Set:
         for task in tasks:
             self.tasks.setdefault(task, len(self.tasks))
         chosen = self.tasks[_chosen(tasks, self.seed, attempt.episode_id)]
-        frames = frames_of(episode, self.rows.count, self.frames, chosen)
+        frames = frames_of(episode, self.rows.count, self.frames, chosen, self.rate_hz)
         frames = {feature.name: frames[feature.name] for feature in self.features}
         chunk, file = self.data.write(table_of(frames, self.features, self.schema))
         statistics = episode_statistics(frames)
@@ -157,7 +163,7 @@ class _Set:
             "chunks_size": CHUNKS_SIZE,
             "data_files_size_in_mb": self.size_mb,
             "video_files_size_in_mb": VIDEO_FILES_SIZE_IN_MB,
-            "fps": RATE_HZ,
+            "fps": self.rate_hz,
             "splits": {"train": f"0:{self.rows.count}"},
             "data_path": DATA_PATH,
             "video_path": VIDEO_PATH if self.videos else None,

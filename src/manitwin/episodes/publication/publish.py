@@ -26,8 +26,10 @@ from manitwin.episodes.film_encoders import Codec
 from manitwin.episodes.lerobot.read import LeRobotSet, read_lerobot
 from manitwin.episodes.lerobot.videos import CameraVideos, Clip
 from manitwin.episodes.lerobot.write import write_lerobot
+from manitwin.episodes.lower_rates import RATES_HZ
 from manitwin.episodes.publication.card import OF_EPISODES, TWINS_FILE, EpisodesCard, episodes_card
 from manitwin.episodes.publication.choose import Chosen, choose_episodes
+from manitwin.episodes.recording import RATE_HZ
 from manitwin.episodes.video import EpisodesVideo
 from manitwin.errors import EpisodesError, UsageError
 from manitwin.formats.installation import installed_version
@@ -49,15 +51,18 @@ _DRAW = "run manitwin render again"
 _CAMERA = re.compile(r"[0-9A-Za-z_-]+")
 
 
-def cameras_of(episodes: Path) -> tuple[str, ...]:
-    """Return the cameras that a run was drawn from; none where it was not drawn."""
+def drawn_from(episodes: Path) -> tuple[tuple[str, ...], int]:
+    """Return the cameras that a run was drawn from, and how often a second; no camera where it was not drawn."""
     path = episodes / PICTURES / CONFIG
     if not os.path.lexists(path):
-        return ()
-    cameras = read_json_object(path, EpisodesError, inside=episodes, name=str(path), remedy=_DRAW).get("cameras")
+        return (), RATE_HZ
+    said = read_json_object(path, EpisodesError, inside=episodes, name=str(path), remedy=_DRAW)
+    cameras, rate_hz = said.get("cameras"), said.get("rate_hz", RATE_HZ)
     if not isinstance(cameras, list) or not all(isinstance(each, str) and _CAMERA.fullmatch(each) for each in cameras):
         raise EpisodesError(f"{path}: cameras are no names; {_DRAW}")
-    return tuple(cameras)
+    if rate_hz not in RATES_HZ:
+        raise EpisodesError(f"{path}: rate_hz is none of {', '.join(map(str, RATES_HZ))}; {_DRAW}")
+    return tuple(cameras), int(rate_hz)
 
 
 def films_of(episodes: Path, batches: list[Path], allowed: Set[str], scratch: Path) -> list[CameraVideos]:
@@ -66,7 +71,7 @@ def films_of(episodes: Path, batches: list[Path], allowed: Set[str], scratch: Pa
     A film that shows others too is cut: what may go out of it is encoded again, with the same codec, below ``scratch``. Raises
     EpisodesError for a batch that was not drawn.
     """
-    cameras = cameras_of(episodes)
+    cameras, _ = drawn_from(episodes)
     clips: dict[str, dict[str, Clip]] = {camera: {} for camera in cameras}
     pinholes: dict[str, dict[str, Any]] = {}
     for batch in batches if cameras else ():
@@ -100,9 +105,8 @@ def _cut(film: Path, shown: Film, first_frames: dict[str, int], allowed: Set[str
     ends = [*(later for _, later in pairwise(first_frames[name] for name in order)), facts.frames]
     clips: dict[str, Clip] = {}
     pictures = iter(shown)
-    with EpisodesVideo(
-        place, width_px=facts.width_px, height_px=facts.height_px, codec=cast(Codec, facts.codec)
-    ) as cut:
+    codec, rate_hz = cast(Codec, facts.codec), round(facts.rate_hz)
+    with EpisodesVideo(place, width_px=facts.width_px, height_px=facts.height_px, codec=codec, rate_hz=rate_hz) as cut:
         for name, end in zip(order, ends, strict=True):
             episode = list(islice(pictures, end - first_frames[name]))
             if len(episode) != end - first_frames[name]:
@@ -160,7 +164,8 @@ def publish_episodes(
             made = scratch / "made"
             films = films_of(episodes, batches, chosen.episodes.published.keys(), scratch / "films")
             kept = (each for each in stored_episodes(batches) if each.attempt.episode_id in chosen.episodes.published)
-            write_lerobot(kept, made, videos=films, granules=any_granules(batches))
+            _, rate_hz = drawn_from(episodes)
+            write_lerobot(kept, made, videos=films, granules=any_granules(batches), rate_hz=rate_hz)
             checked = read_lerobot(made)
             rows = _write_tables(episodes, chosen, made)
             success = success_of(each for each in read_attempts(episodes / ATTEMPTS) if chosen.tells_of(each))

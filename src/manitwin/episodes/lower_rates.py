@@ -1,0 +1,53 @@
+"""Recordings at a lower rate than they were made at: for policies that act less often, and for pictures that cost less."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from manitwin.episodes.recording import RATE_HZ, Recording
+from manitwin.episodes.recording_arrays import is_of_actions
+from manitwin.errors import EpisodesError, UsageError, choose_from
+
+Rate = Literal[20, 10, 5]
+RATES_HZ: tuple[int, ...] = get_args(Rate)
+_OF_FRAMES = ("phase", "active_literal")
+"""What is told of an action, and is that of the time at which it begins."""
+
+
+def rows_per_frame(rate_hz: int) -> int:
+    """Return how many rows of a recording go into a frame at ``rate_hz``; raises UsageError for another than ``RATES_HZ``."""
+    if isinstance(rate_hz, bool) or rate_hz not in RATES_HZ:
+        raise UsageError(choose_from("rate", str(rate_hz), [str(each) for each in RATES_HZ]))
+    return RATE_HZ // int(rate_hz)
+
+
+def at_rate(recording: Recording, rate_hz: int) -> Recording:
+    """Return a recording as it would have been made at ``rate_hz``: every k-th state, and the actions that lead to them.
+
+    Action i is what is told to be reached by state i + 1, which is the last one told before it. Rows at the end that make no
+    whole frame, k - 1 at most, are left out: kept episodes end with half a second of rest. Raises UsageError as
+    ``rows_per_frame``, EpisodesError for a recording that is shorter than a frame.
+    """
+    every = rows_per_frame(rate_hz)
+    if every == 1:
+        return recording
+    count = recording.steps // every
+    if count == 0:
+        raise EpisodesError(f"{recording.steps} steps are less than one at {rate_hz} Hz; take a higher rate")
+    thinned: dict[str, Any] = {}
+    for entry in fields(Recording):
+        array = getattr(recording, entry.name)
+        if not isinstance(array, np.ndarray):
+            continue
+        if entry.name in _OF_FRAMES:
+            thinned[entry.name] = array[: count * every : every]
+        elif is_of_actions(entry.name):
+            thinned[entry.name] = array[every - 1 : count * every : every]
+        else:
+            thinned[entry.name] = array[: count * every + 1 : every]
+    since = recording.unplanned_contact[1 : count * every + 1].reshape(count, every)
+    thinned["unplanned_contact"] = np.append(recording.unplanned_contact[:1], since.any(1))
+    return replace(recording, **thinned)
