@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import shutil
 from pathlib import Path
 
@@ -20,10 +21,19 @@ from manitwin.engine.stage import Draft
 from manitwin.engine.stage_runner import stage_key
 from manitwin.errors import BadReply, UsageError
 from manitwin.geometry.boxes import upright_extents
-from manitwin.pipeline.human_corrections import STAGES, corrected_category, corrected_points
+from manitwin.pipeline.guesses import naming_checks
+from manitwin.pipeline.human_corrections import (
+    CATEGORY,
+    NAME,
+    NAME_STAGES,
+    STAGES,
+    corrected_category,
+    corrected_points,
+    name_by_person,
+)
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import object_name
-from manitwin.pipeline.recipe import TwinRecipe
+from manitwin.pipeline.recipe import TwinRecipe, stages_for
 from manitwin.pipeline.stage_order import STAGE_ORDER
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import read_record
@@ -159,3 +169,27 @@ def test_a_moved_point_that_is_gone_is_never_guessed() -> None:
     move = {"moves": {"f0": {"candidate": 1, "label": "spout", "source": "human:ada"}}}
     with pytest.raises(BadReply, match=r"f0 \(spout\) was moved by human:ada, and is no point now"):
         corrected_points(SelectedPoints((), ()), None, move)  # type: ignore[arg-type]
+
+
+def test_name_that_a_person_said_since_counts_before_the_given_one_and_a_corrected_category_before_both() -> None:
+    item, named = Item("/photos/a.jpg", name="cup"), {NAME: {"value": "mug", "source": "human:ada"}}
+    draft: Draft[Item] = Draft("t", item, seed=0)
+    assert name_by_person(draft) == "cup" and name_by_person(Draft("t", Item("/photos/a.jpg"), seed=0)) is None
+    draft.amendments = {"finish": named}
+    assert name_by_person(draft) == "mug" == object_name(draft)
+    [check] = naming_checks(draft)
+    assert check.passed and (check.name, check.value, check.message) == ("named", "mug", "human:ada says what it is")
+    draft.amendments = {"finish": {**named, CATEGORY: "beaker"}}
+    assert name_by_person(draft) == "beaker" and naming_checks(draft) == []
+
+
+def test_every_stage_that_asks_for_a_name_is_told_the_one_that_a_person_said() -> None:
+    """A stage whose module asks for the name, by itself or in the subject that it reads, is among ``NAME_STAGES``."""
+    asking = ("object_name(", "read_subject(", "read_scaled_subject(", "likely_names(", "name_by_person(", "said_name(")
+    stages = {
+        stage.name
+        for kind in ("image", "photos", "mesh")
+        for stage in stages_for(kind, BuildConfig())  # type: ignore[arg-type]
+        if any(call in inspect.getsource(inspect.getmodule(type(stage)) or type(stage)) for call in asking)
+    }
+    assert stages <= set(NAME_STAGES)

@@ -17,6 +17,7 @@ from manitwin.geometry.grasp_diversity import farthest_grasps
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.pipeline.grasps import GRASP_POINTS
 from manitwin.pipeline.guesses import filled_in
+from manitwin.pipeline.human_corrections import said_name
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.joint_checks import joint_checks
 from manitwin.pipeline.object_state import load_hulls, load_solid, load_visual, object_name
@@ -118,6 +119,8 @@ def card_text(draft: Draft[Item], solid: trimesh.Trimesh) -> CardText:
     said, seen = (draft.fields.get("naming") or {}).get("name"), filled_in(draft)
     if said is not None and said == object_name(draft):
         made_by += f"   named by {draft.field('naming')['probability']['source']}"
+    elif (stated := said_name(draft)) is not None and stated.value == object_name(draft):
+        made_by += f"   named by {stated.source}"
     elif seen is not None:
         made_by += f"   template by {seen['source']}"
     footer = f"{draft.item_id}   {made_by}   mass: {mass['source']}   friction: {friction['source']}"

@@ -13,6 +13,7 @@ from manitwin.engine.stage import Draft
 from manitwin.models.generators.generated_mesh import as_glb
 from manitwin.models.generators.protocol import GenerationRequest, Generator, PhotoView
 from manitwin.models.generators.run import run_generator
+from manitwin.pipeline.human_corrections import name_by_person
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import likely_names, object_name
 from manitwin.pipeline.photo_groups import told_apart
@@ -48,7 +49,7 @@ class GenerateStage:
             text=draft.payload.text,
             name=object_name(draft),
             seed=generator_seed(draft),
-            guessed=draft.payload.name is None,
+            guessed=name_by_person(draft) is None,
             views=views if takes_views else (),
             focal_mm=draft.field("matte")["focal_mm"] if "matte" in draft.fields else None,
             likely=likely_names(draft),

@@ -9,6 +9,7 @@ from manitwin.engine.stage import Draft
 from manitwin.models.annotators.likely_names import OF_LIKELY_NAMES
 from manitwin.models.annotators.prior_names import names_with, normalised
 from manitwin.models.annotators.priors import load_priors
+from manitwin.pipeline.human_corrections import SIZE, corrected_category, said_name
 from manitwin.twin.record_values import Check
 
 PRIOR = "prior:"
@@ -32,8 +33,11 @@ MOST_NAMES = 3
 def naming_checks(draft: Draft) -> list[Check]:
     """Return what a thing is taken for that nobody has named, by a model or a classifier: a finding, unless one is sure.
 
-    None for others.
+    Of an input that a person has named since who that was; none for others.
     """
+    said = None if corrected_category(draft) is not None else said_name(draft)
+    if said is not None:
+        return [Check(name="named", passed=True, value=said.value, message=f"{said.source} says what it is")]
     naming = draft.fields.get("naming")
     if naming is None:
         return []
@@ -50,8 +54,14 @@ def naming_checks(draft: Draft) -> list[Check]:
 
 
 def size_checks(draft: Draft) -> list[Check]:
-    """Return the failed check of a size that is only what is usual of anything; none where somebody said it or what it is."""
-    size = draft.fields.get("size")
+    """Return the failed check of a size that is only what is usual of anything; none where somebody said it or what it is.
+
+    Of an input whose size a person has stated since, who that was.
+    """
+    size, stated = draft.fields.get("size"), (draft.fields.get("geometry") or {}).get(SIZE)
+    if stated is not None and size is None:
+        message = f"{stated['source']} says how long it is: {100 * stated['value']:.4g} cm"
+        return [Check(name="size_known", passed=True, value=stated["value"], message=message)]
     if size is None or size["source"] not in OF_NO_NAME:
         return []
     message = f"{SIZE_UNSAID}: {unknown_size_words(size)}, and its mass is for that size; say what it is with --name"
@@ -76,13 +86,16 @@ def unsaid_size_words(draft: Draft) -> str | None:
     return f"{SIZE_UNSAID}: {unknown_size_words(size)}"
 
 
-def unknown_name_words(name: str) -> str:
-    """Say that a name is not among the priors', and the names that it is a word of, else those that are spelt like it."""
+def unknown_name_words(name: str, remedy: str = "say what kind of thing it is with --name, in English") -> str:
+    """Say that a name is not among the priors', and the names that it is a word of, else those that are spelt like it.
+
+    ``remedy`` ends it where there are no such names.
+    """
     known = sorted({word for prior in load_priors().values() for word in (prior.category, *prior.aliases)})
     near = names_with(name)[:MOST_NAMES] or get_close_matches(normalised(name), known, n=2, cutoff=SPELT_ALIKE)
     *others, last = map(repr, near) if near else ("",)
     meant = f"{', '.join(others)} or {last}" if others else last
-    asked = f"; did you mean {meant}?" if near else "; say what kind of thing it is with --name, in English"
+    asked = f"; did you mean {meant}?" if near else f"; {remedy}"
     return f"the priors (docs/priors.md) know no {name!r}: mass and friction are those of any object{asked}"
 
 

@@ -1,4 +1,4 @@
-"""What people have put right of a twin takes the place of what was estimated or chosen: ``source`` human:<annotator>."""
+"""What people have said or put right of a twin takes the place of what was estimated or chosen: ``source`` human:<annotator>."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manitwin.models.annotators.protocol import PhysicalEstimates, PointsRequest
 from manitwin.pipeline.item import Item
 from manitwin.twin.point_records import FunctionalPoint, GraspPoint
 from manitwin.twin.record import Language
-from manitwin.twin.record_values import Estimate
+from manitwin.twin.record_values import Estimate, Record
 
 HUMAN = "human:"
 CATEGORY, MASS, SIZE, MOVES = "category", "mass_kg", "longest_side_m", "moves"
@@ -24,6 +24,18 @@ STAGES = {
     MOVES: ("points",),
 }
 """The stages that a correction concerns: the category is a name, as the user's is, of all that comes after the mesh."""
+NAME = "name"
+NAME_STAGES = ("photo", "name", "generate", "mesh", "gate", *STAGES[CATEGORY])
+"""Key of the amendments that name an input, and their stages: a ``SaidName``, which counts as --name does, from the photo on."""
+SIZE_STAGE = "mesh"
+"""Its amendment ``SIZE``, an Estimate, is the longest side as --longest-side states it; one of ``physical`` is applied after."""
+
+
+class SaidName(Record):
+    """What a person calls an input that was built without a name, or with another; ``source`` is who."""
+
+    value: str
+    source: str
 
 
 def is_human(source: str) -> bool:
@@ -34,6 +46,27 @@ def is_human(source: str) -> bool:
 def corrected_category(draft: Draft[Item]) -> str | None:
     """Return the category that a person has given, as far as the stage that runs is concerned."""
     return next((str(each[CATEGORY]) for each in draft.amendments.values() if CATEGORY in each), None)
+
+
+def said_name(draft: Draft[Item]) -> SaidName | None:
+    """Return the name that a person has given an input since, as far as the stage that runs is concerned."""
+    said = next((each[NAME] for each in draft.amendments.values() if NAME in each), None)
+    return None if said is None else SaidName.model_validate(said)
+
+
+def name_by_person(draft: Draft[Item]) -> str | None:
+    """Return what people call the object: the word of whoever has corrected it counts before the user's; None: nobody says."""
+    corrected = corrected_category(draft)
+    if corrected is not None:
+        return corrected
+    said = said_name(draft)
+    return draft.payload.name if said is None else said.value
+
+
+def said_size(draft: Draft[Item]) -> Estimate | None:
+    """Return the longest side (m) that a person has stated of an input since, where the mesh stage runs."""
+    said = draft.amendments.get(SIZE_STAGE, {}).get(SIZE)
+    return None if said is None else Estimate.model_validate(said)
 
 
 def corrected_estimates(estimates: PhysicalEstimates, amendment: Mapping[str, Any]) -> PhysicalEstimates:

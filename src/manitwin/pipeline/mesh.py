@@ -28,6 +28,7 @@ from manitwin.geometry.repair.components import connected_parts
 from manitwin.geometry.repair.welding import weld_equal
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.prior_records import Prior
+from manitwin.pipeline.human_corrections import SIZE, said_size
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import let_go_of_textures, object_name
 from manitwin.pipeline.stated_volume import factor_to_hold, stated_volume_m3
@@ -89,6 +90,8 @@ class MeshStage:
         if is_stated:
             unit = LengthUnit(larger * unit.factor, True, "user", None)
         geometry = _geometry(file, unit, chosen, result, solid, larger)
+        if (said_by_person := said_size(draft)) is not None:
+            geometry[SIZE] = said_by_person.model_dump()
         known = draft.field("generation").get("known") if generated else None
         if known is not None:
             to_mesh = to_object @ np.diag([unit.factor / larger] * 3 + [1.0]) @ OBJECT_TO_GLTF
@@ -165,8 +168,10 @@ def _to_stated_size(
     ``may_hold``: else the volume that its name says it holds counts (``stated_volume``); not of a mesh of its own, which may
     have its walls.
     """
-    if draft.payload.longest_side_m is not None:
-        return draft.payload.longest_side_m / float(extents_along_sides(vertices).max()), True
+    said = said_size(draft)
+    longest_m = draft.payload.longest_side_m if said is None else said.value
+    if longest_m is not None:
+        return longest_m / float(extents_along_sides(vertices).max()), True
     volume_m3 = stated_volume_m3(object_name(draft), prior) if may_hold else None
     if volume_m3 is None or prior is None:
         return 1.0, False

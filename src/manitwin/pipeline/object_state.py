@@ -20,7 +20,7 @@ from manitwin.geometry.poses import OBJECT_TO_GLTF
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.models.annotators.protocol import PhysicalEstimates, SelectedPoints, Subject
-from manitwin.pipeline.human_corrections import corrected_category
+from manitwin.pipeline.human_corrections import name_by_person
 from manitwin.pipeline.item import Item
 from manitwin.render.cameras import Camera
 from manitwin.twin.grasp_table import JOINTS
@@ -161,14 +161,11 @@ def read_given(draft: Draft[Item]) -> ImportRecord | None:
 def object_name(draft: Draft[Item]) -> str | None:
     """Return what the object is called; None: nobody says.
 
-    The word of whoever has reviewed the twin counts first, then the user's, then that of a generator that knows what it made,
-    then a classifier's.
+    A person's word counts first, then that of a generator that knows what it made, then a classifier's.
     """
-    corrected = corrected_category(draft)
-    if corrected is not None:
-        return corrected
-    if draft.payload.name is not None:
-        return draft.payload.name
+    said = name_by_person(draft)
+    if said is not None:
+        return said
     known = _known(draft)
     if known is not None:
         return str(known["name"])

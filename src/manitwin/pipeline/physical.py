@@ -22,7 +22,7 @@ from manitwin.models.annotators.stated_matter import prior_as_named
 from manitwin.models.annotators.words import article
 from manitwin.pipeline.annotated_mass import annotated_mass, moments_apart
 from manitwin.pipeline.fill_states import filling_of
-from manitwin.pipeline.human_corrections import corrected_estimates, is_human
+from manitwin.pipeline.human_corrections import SIZE, corrected_estimates, is_human
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.mass_by_parts import mass_by_parts
 from manitwin.pipeline.object_state import findings_of, object_name, read_subject
@@ -181,9 +181,9 @@ def _to_check(draft: Draft[Item], *, rescaled: bool) -> str:
 
     A mesh's numbers that were read by a guess are then likely at fault.
     """
-    if draft.payload.longest_side_m is not None:
-        return "check the stated longest side (in metres) and the name"
     geometry = draft.field("geometry")
+    if draft.payload.longest_side_m is not None or SIZE in geometry:
+        return "check the stated longest side (in metres) and the name"
     guessed = not rescaled and geometry.get("units") == "guessed"
     return "check units and name" + (f": {geometry['unit_finding']}" if guessed else "")
 
