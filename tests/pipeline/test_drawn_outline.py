@@ -14,10 +14,19 @@ from PIL import Image
 from manitwin.config import MattingConfig
 from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
-from manitwin.pipeline.drawn_outline import DRAWN, DrawnOutline, as_drawn, drawn_outline, mask_file, mask_of_png
+from manitwin.pipeline.drawn_outline import (
+    DRAWN,
+    DRAWN_OF_SEVERAL,
+    DrawnOutline,
+    as_drawn,
+    drawn_outline,
+    mask_file,
+    mask_of_png,
+    with_outline,
+)
 from manitwin.pipeline.given_alpha import Given
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.photo import PhotoStage
+from manitwin.pipeline.photo import PhotosStage, PhotoStage
 
 
 def ellipse(height: int, width: int) -> np.ndarray:
@@ -114,3 +123,31 @@ def test_photo_that_shows_nothing_is_cut_out_as_drawn(tmp_path: Path, box_px: tu
     alpha = np.asarray(Image.open(tmp_path / "photo.png"))[..., 3] > 127
     assert (alpha == ellipse(*alpha.shape)).mean() > 0.99
     assert field["method"] == "alpha" and "cut out as human:ada drew its outline" in field["findings"]
+
+
+def test_outlines_of_several_photos_are_kept_by_their_places() -> None:
+    front, side = DrawnOutline(ellipse(200, 300), "human:ada"), DrawnOutline(ellipse(300, 200), "human:ben")
+    said = with_outline(with_outline({"other": 1}, front, 0), side, 11)
+    assert set(said) == {"other", DRAWN_OF_SEVERAL} and set(said[DRAWN_OF_SEVERAL]) == {"0", "11"}
+    read = drawn_outline(said, "side.jpg", 11)
+    assert read is not None and read.source == "human:ben" and drawn_outline(said, "back.jpg", 1) is None
+    assert drawn_outline(said, "a.jpg") is None, "one of a photo by itself is another"
+    with pytest.raises(Rejected, match=r"a\.jpg: the outline that was drawn of it cannot be read"):
+        drawn_outline({DRAWN_OF_SEVERAL: ["no object"]}, "a.jpg", 0)
+
+
+def test_each_of_several_photos_is_cut_out_as_drawn_and_one_that_is_not_is_left_out(tmp_path: Path) -> None:
+    files = [str(tmp_path / name) for name in ("front.png", "side.png", "back.png")]
+    for seed, file in enumerate(files):
+        Image.fromarray(np.random.default_rng(seed).integers(120, 136, (600, 600, 3), np.uint8)).save(file)
+    item = Item(files[0], name="bottle", views=tuple(files[1:]), turns_deg=(0.0, 90.0, 180.0))
+    said: dict[str, Any] = with_outline({}, DrawnOutline(ellipse(300, 300), "human:ada"), 1)
+    said[DRAWN_OF_SEVERAL]["2"] = "mask.png"
+    field = PhotosStage(MattingConfig()).run(Draft("t", item, seed=0, amendments={PhotosStage.name: said}), tmp_path)[
+        "matte"
+    ]
+    assert [picture.name for picture in (tmp_path / "photos").iterdir()] == ["01.png"]
+    alpha = np.asarray(Image.open(tmp_path / "photos" / "01.png"))[..., 3] > 127
+    assert (alpha == ellipse(600, 600)).mean() > 0.99
+    assert "side.png: cut out as human:ada drew its outline" in field["findings"]
+    assert any(each.startswith("left out: back.png: the outline that was drawn") for each in field["findings"])

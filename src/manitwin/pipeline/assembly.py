@@ -16,12 +16,12 @@ from manitwin.engine.stage import Draft, Stage
 from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import InputError, Rejected
 from manitwin.formats.camera_poses.transforms_json import transforms_of
-from manitwin.formats.image_file import full_size
 from manitwin.formats.installation import installed_version
 from manitwin.formats.npy_file import labels_to_npy
 from manitwin.formats.packed_source import mask_name, mask_names, masks_beside, pack_photos, pack_source, photo_names
 from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.models.annotators.prior_names import lookup
+from manitwin.pipeline.drawn_masks import drawn_mask, with_drawn_masks
 from manitwin.pipeline.grasps import GRASP_POINTS
 from manitwin.pipeline.guesses import (
     OF_NO_NAME,
@@ -37,7 +37,6 @@ from manitwin.pipeline.links import link_table, read_articulation, visual_labels
 from manitwin.pipeline.object_state import object_name
 from manitwin.pipeline.parts import PARTS_FILE
 from manitwin.pipeline.quality import rehearsal_checks
-from manitwin.pipeline.stated_place import as_box
 from manitwin.pipeline.stated_poses import StatedPoses, poses_of
 from manitwin.pipeline.suspicious_size import suspicious_size_words
 from manitwin.twin.link_records import FACE_LINKS
@@ -141,9 +140,10 @@ def _write_source(draft: Draft[Item], kind: str, folder: Path, keep: bool) -> di
         sha256 = hashlib.sha256(content).hexdigest()
     elif item.views:
         paths = [Path(file) for file in item.files]
-        poses = _readable_poses(item)
         with TemporaryDirectory() as place:
-            beside = masks_beside(item.masks)
+            masked = with_drawn_masks(draft, Path(place)) if keep else item
+            poses = _readable_poses(masked)
+            beside = masks_beside(masked.masks)
             cameras = None if poses is None else Path(place) / "transforms.json"
             if poses is not None and cameras is not None:
                 masks = list(dict.fromkeys(camera.mask for camera in poses.cameras if camera.mask is not None))
@@ -154,7 +154,7 @@ def _write_source(draft: Draft[Item], kind: str, folder: Path, keep: bool) -> di
             name, sha256 = pack_photos(paths, folder, keep=keep, beside=beside)
     else:
         given = [] if item.given is None else [Path(item.given)]
-        drawn = _drawn_mask(draft) if keep else None
+        drawn = drawn_mask(draft) if keep else None
         outline = Path(item.masks[0]) if item.masks and drawn is None else None
         name, sha256 = pack_source(Path(item.file), folder, given, keep=keep, mask=outline)
         mask = mask_name(outline) if outline is not None and keep else None
@@ -174,21 +174,6 @@ def _write_source(draft: Draft[Item], kind: str, folder: Path, keep: bool) -> di
         "license": item.license or "unknown",
         "attribution": item.attribution,
     }
-
-
-def _drawn_mask(draft: Draft[Item]) -> bytes | None:
-    """Return the outline that a person drew of a photo as a mask of it; None where nobody did, or none that can be used."""
-    item, said = draft.payload, draft.amendments.get("photo")
-    if said is None:
-        return None
-    # what cuts photos out takes half a CPU-second to import, and few photos are amended
-    from manitwin.pipeline.drawn_outline import drawn_outline, mask_file
-
-    try:
-        drawn = drawn_outline(said, item.title)
-        return None if drawn is None else mask_file(drawn, full_size(Path(item.file or ""))[:2], as_box(item.box_px))
-    except (Rejected, InputError):  # as the photo was rejected for
-        return None
 
 
 def _readable_poses(item: Item) -> StatedPoses | None:

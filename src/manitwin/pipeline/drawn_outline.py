@@ -21,6 +21,8 @@ from manitwin.pipeline.stated_place import window_of
 
 DRAWN = "outline"
 """Key of the photo stage's amendment: ``{png, source}``, the outline as a PNG file in base64, and who drew it."""
+DRAWN_OF_SEVERAL = "outlines"
+"""Its key for several photos of one thing: such an object by the photo's place among them, '0' the first."""
 _REMEDY = "remove its file below DATASET/amendments, build again and draw it anew"
 _BOUND = 0.02
 """By which the proportions of an outline and of its photo may differ, relative: both are of whole pixels."""
@@ -49,18 +51,26 @@ class DrawnOutline:
         return {"png": base64.b64encode(encoded.getvalue()).decode("ascii"), "source": self.source}
 
 
-def drawn_outline(amendment: Mapping[str, Any], name: str) -> DrawnOutline | None:
+def drawn_outline(amendment: Mapping[str, Any], name: str, place: int | None = None) -> DrawnOutline | None:
     """Return the outline among the photo stage's amendments, None where there is none.
 
-    Raises Rejected where it is none that was kept here: the photo ``name`` is not cut out as nobody meant it.
+    ``place`` is that of the photo, from 0, where it is one of several of a thing. Raises Rejected where it is none that was kept
+    here: the photo ``name`` is not cut out as nobody meant it.
     """
-    said = amendment.get(DRAWN)
-    if said is None:
-        return None
     try:
+        said = amendment.get(DRAWN) if place is None else amendment.get(DRAWN_OF_SEVERAL, {}).get(str(place))
+        if said is None:
+            return None
         return DrawnOutline(mask_of_png(base64.b64decode(said["png"], validate=True)), str(said["source"]))
-    except (KeyError, TypeError, ValueError, binascii.Error) as error:
+    except (AttributeError, KeyError, TypeError, ValueError, binascii.Error) as error:
         raise _refused(f"{name}: the outline that was drawn of it cannot be read; {_REMEDY}") from error
+
+
+def with_outline(amendment: Mapping[str, Any], drawn: DrawnOutline, place: int | None = None) -> dict[str, Any]:
+    """Return the photo stage's amendment with an outline, in place of an earlier one of the same photo."""
+    if place is None:
+        return {**amendment, DRAWN: drawn.to_json()}
+    return {**amendment, DRAWN_OF_SEVERAL: {**amendment.get(DRAWN_OF_SEVERAL, {}), str(place): drawn.to_json()}}
 
 
 def mask_of_png(data: bytes) -> np.ndarray:

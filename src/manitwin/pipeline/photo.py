@@ -23,6 +23,7 @@ from manitwin.pipeline.box_check import require_in_box
 from manitwin.pipeline.cutout import confirmed_or_rejected
 from manitwin.pipeline.drawn_outline import DrawnOutline, as_drawn, drawn_outline
 from manitwin.pipeline.given_alpha import doubted_rectangle
+from manitwin.pipeline.human_corrections import name_by_person
 from manitwin.pipeline.item import Item, masks_of
 from manitwin.pipeline.photo_groups import copies_told, told_apart
 from manitwin.pipeline.photo_pixels import pixels_of_photo
@@ -54,7 +55,7 @@ class PhotoStage:
         path = Path(draft.payload.file)
         rgba, field = self.cut_out(
             path,
-            draft.payload.name,
+            name_by_person(draft),
             lambda doubted: confirmed_or_rejected(doubted, path.name, amendment),
             mask=next(iter(masks_of(draft.payload))),
             box_px=as_box(draft.payload.box_px),
@@ -136,10 +137,12 @@ class PhotosStage(PhotoStage):
         (folder / "photos").mkdir()
         kept: list[tuple[str, dict[str, Any]]] = []
         doubts: list[Rejected] = []
-        files, masks = draft.payload.files, masks_of(draft.payload)
+        files, masks, name = draft.payload.files, masks_of(draft.payload), name_by_person(draft)
+        amendment = draft.amendments.get(self.name, {})
         for number, (file, called, mask) in enumerate(zip(files, told_apart(files), masks, strict=True)):
             try:
-                rgba, field = self.cut_out(Path(file), draft.payload.name, refused, called, mask)
+                drawn = drawn_outline(amendment, called, number)
+                rgba, field = self.cut_out(Path(file), name, refused, called, mask, drawn=drawn)
             except InputError:  # no photo: what was given is not what was meant
                 raise
             except Rejected as answer:
@@ -154,7 +157,7 @@ class PhotosStage(PhotoStage):
             raise Rejected(doubts[0].reason, "; ".join(answer.detail for answer in doubts), doubts[0].stage)
         if len(kept) == 1:
             left_out.append(f"{kept[0][0]} is the only photo that could be cut out: the rest is a guess")
-        findings = [f"{name}: {finding}" for name, field in kept for finding in field["findings"]]
+        findings = [f"{called}: {finding}" for called, field in kept for finding in field["findings"]]
         worst = min((field for _, field in kept), key=lambda field: field["confidence"])
         matte = worst | {
             "findings": [*copies_told(draft.payload.files), *left_out, *findings],
