@@ -9,7 +9,7 @@
     manitwin review DATASET --no-browser
     python docs/make_view_pictures.py LINK TWIN_ID --review
     manitwin review cutouts DATASET --draw --no-browser
-    python docs/make_view_pictures.py LINK TWIN_ID --outline 60,29 83,32 81,48 77,71 66,68
+    python docs/make_view_pictures.py LINK TWIN_ID --outline 60,29 83,32 81,48 77,71 66,68 --said "playing cards" 9
 
 ``LINK`` is the link of one use that the command prints.
 """
@@ -60,11 +60,18 @@ def judged(page: Any, address: str) -> Image.Image:
     return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
 
 
-def drawn(page: Any, address: str, corners: list[str]) -> Image.Image:
-    """Return what the page of an outline looks like while ``corners``, in percent of the photo, are drawn."""
+def drawn(page: Any, address: str, corners: list[str], said: list[str]) -> Image.Image:
+    """Return what the page of an outline looks like while ``corners``, in percent of the photo, are drawn.
+
+    ``said`` is what is typed before: a name, and a longest side in centimetres.
+    """
     page.set_viewport_size(WIDE)
     page.goto(address, wait_until="networkidle")
     page.wait_for_selector("#outline[data-ready]")
+    for field, typed in zip(("#name", "#longest_side_cm"), said, strict=True):
+        page.fill(field, typed)
+        page.locator(field).blur()
+    page.wait_for_selector("#known:has-text('known as')")
     box = page.locator("#canvas").bounding_box()
     for corner in corners:
         x, y = (float(number) / 100 for number in corner.split(","))
@@ -94,6 +101,7 @@ def main() -> None:
         "--review", action="store_true", help="the picture of a review's page alone, of a twin of its sample"
     )
     parser.add_argument("--outline", nargs="+", metavar="X,Y", help="the page of an outline alone, with these corners")
+    parser.add_argument("--said", nargs=2, metavar=("NAME", "CM"), help="what is typed into the fields of --outline")
     parser.add_argument("--episode", action="store_true", help="the picture of an episode's page alone, by its number")
     given = parser.parse_args()
     address = given.link.split("/enter")[0]
@@ -108,7 +116,7 @@ def main() -> None:
         elif given.review:
             pictures = {"review": judged(page, f"{address}/review/{given.id}")}
         elif given.outline:
-            pictures = {"outline": drawn(page, f"{address}/outline/{given.id}", given.outline)}
+            pictures = {"outline": drawn(page, f"{address}/outline/{given.id}", given.outline, given.said)}
         elif given.episode:
             pictures = {"view_episode": shown(page, f"{address}/episode/{given.id}#t={MOMENT_S}", EPISODE, "light")}
         else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import json
 import shutil
@@ -55,6 +56,14 @@ def png(mask: np.ndarray) -> bytes:
     return encoded.getvalue()
 
 
+def kept_by(app: Starlette, key: str, mask: bytes | None, **typed: object) -> tuple[int, dict[str, str]]:
+    """Send what a page sends; return the status and what is answered."""
+    encoded = None if mask is None else base64.b64encode(mask).decode()
+    sent = json.dumps({"png": encoded, "name": None, "longest_side_cm": None, **typed}).encode()
+    answer = asked(app, f"/outline/{key}", method="POST", body=sent)
+    return int(answer[0]["status"]), json.loads(body(answer))
+
+
 def box_in(size_px: tuple[int, int], least: float, most: float) -> np.ndarray:
     width, height = size_px
     mask = np.zeros((height, width), bool)
@@ -89,18 +98,18 @@ def test_outline_is_fitted_kept_and_shown_again(app: Starlette, session: Outline
     fitted = asked(app, f"/outline/{first}/fit", method="POST", body=drawn)
     assert fitted[0]["status"] == 200 and Image.open(io.BytesIO(body(fitted))).size == size_px
     assert read_amendments(root, first) == amendments, "to fit keeps nothing"
-    kept = asked(app, f"/outline/{first}", method="POST", body=drawn)
-    assert json.loads(body(kept)) == {"next": f"/outline/{second}"} and session.kept == (first,)
+    status, kept = kept_by(app, first, drawn)
+    assert status == 200 and kept == {"next": f"/outline/{second}", "name": "bottle", "longest_side_cm": ""}
+    assert session.kept == (first,) and session.said == ()
     said = read_amendments(root, first)[PhotoStage.name]
     assert set(said) == {DRAWN} and said[DRAWN]["source"] == "human:ada"
     found = drawn_outline(said, "first.jpg")
     assert found is not None and (found.mask == box_in(size_px, 0.3, 0.7)).all()
     assert body(asked(app, f"/outline/{first}/mask.png")) == drawn
     assert "drawn, to be built" in body(asked(app, "/")).decode()
-    kept = asked(app, f"/outline/{second}", method="POST", body=drawn)
-    assert json.loads(body(kept)) == {"next": f"/outline/{bare}"}
+    assert kept_by(app, second, drawn)[1]["next"] == f"/outline/{bare}"
     session.keep(bare, png(box_in((400, 300), 0.3, 0.7)))
-    assert json.loads(body(asked(app, f"/outline/{second}", method="POST", body=drawn))) == {"next": "/"}
+    assert kept_by(app, second, drawn)[1]["next"] == "/"
 
 
 @pytest.mark.parametrize(
@@ -117,9 +126,10 @@ def test_what_is_no_outline_is_refused_and_nothing_is_kept(
     app: Starlette, session: OutlineSession, sent: bytes, why: str
 ) -> None:
     first = next(iter(session.photos))
-    for address in (f"/outline/{first}", f"/outline/{first}/fit"):
-        answer = asked(app, address, method="POST", body=sent)
-        assert answer[0]["status"] == 400 and why in json.loads(body(answer))["error"]
+    answer = asked(app, f"/outline/{first}/fit", method="POST", body=sent)
+    assert answer[0]["status"] == 400 and why in json.loads(body(answer))["error"]
+    status, told = kept_by(app, first, sent)
+    assert status == 400 and ("its JSON is broken" if len(sent) > MOST_BODY_BYTES else why) in told["error"]
     assert session.kept == () and read_amendments(session.root, first) == {}
 
 
@@ -132,11 +142,9 @@ def test_empty_outlines_full_ones_and_those_of_two_things_are_not_kept(app: Star
         (np.ones(size_px[::-1], bool), "leaves nothing of the photo out"),
         (two, "separate objects"),
     ):
-        answer = asked(app, f"/outline/{first}", method="POST", body=png(mask))
-        assert answer[0]["status"] == 400
-        error = json.loads(body(answer))["error"]
-        assert error.startswith("not kept: ") and why in error
-    assert session.kept == ()
+        status, told = kept_by(app, first, png(mask), name="jar")
+        assert status == 400 and told["error"].startswith("not kept: ") and why in told["error"]
+    assert session.kept == session.said == () and read_amendments(session.root, first) == {}
 
 
 def test_what_was_drawn_becomes_a_twin_that_says_so(session: OutlineSession, tmp_path: Path) -> None:

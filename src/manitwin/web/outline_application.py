@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import base64
+import binascii
 from collections.abc import Callable
+from typing import Any
 
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
@@ -11,13 +14,17 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.routing import Route
 
 from manitwin.dataset.review.outlines import OutlineSession
-from manitwin.errors import ManiTwinError
+from manitwin.dataset.review.said_words import name_remark, read_name
+from manitwin.errors import ManiTwinError, UsageError
+from manitwin.formats.json_file import parse_json_object
 from manitwin.web.application import LINKS, NOT_KEPT, PACKAGE_FILES, answered
-from manitwin.web.outline_page import MASK, PATH, PICTURE, list_page, next_address, outline_page
+from manitwin.web.outline_page import MASK, NAME_PATH, PATH, PICTURE, list_page, next_address, outline_page
 from manitwin.web.request_body import request_body
 
 MOST_BODY_BYTES = 2 << 20
-"""Of an outline as a PNG file: one of 1024 x 1024 pixels takes some 20 kB, of noise 130 kB."""
+"""Of an outline as a PNG file, in base64 where words go with it: one of 1024 x 1024 pixels takes some 20 kB, of noise 130 kB."""
+SENT = ("png", "name", "longest_side_cm")
+"""What a page sends to be kept: an outline in base64, null where none is drawn, and what is typed."""
 
 
 def outline_application(session: OutlineSession) -> Starlette:
@@ -27,43 +34,68 @@ def outline_application(session: OutlineSession) -> Starlette:
         return await answered(lambda: HTMLResponse(list_page(session, LINKS), headers=NOT_KEPT))
 
     async def show(request: Request) -> Response:
-        twin_id = request.path_params["twin_id"]
-        return await answered(
-            lambda: HTMLResponse(outline_page(session, session.photo(twin_id), LINKS), headers=NOT_KEPT)
-        )
+        key = request.path_params["key"]
+        return await answered(lambda: HTMLResponse(outline_page(session, session.photo(key), LINKS), headers=NOT_KEPT))
 
     async def give_picture(request: Request) -> Response:
-        twin_id = request.path_params["twin_id"]
-        return await answered(lambda: Response(session.picture(twin_id), media_type="image/webp", headers=NOT_KEPT))
+        key = request.path_params["key"]
+        return await answered(lambda: Response(session.picture(key), media_type="image/webp", headers=NOT_KEPT))
 
     async def give_mask(request: Request) -> Response:
-        twin_id = request.path_params["twin_id"]
-        return await answered(lambda: Response(session.mask(twin_id), media_type="image/png", headers=NOT_KEPT))
+        key = request.path_params["key"]
+        return await answered(lambda: Response(session.mask(key), media_type="image/png", headers=NOT_KEPT))
 
     async def fit(request: Request) -> Response:
-        twin_id, png = request.path_params["twin_id"], await request_body(request, MOST_BODY_BYTES)
-        return await _told(lambda: Response(session.fitted(twin_id, png), media_type="image/png", headers=NOT_KEPT))
+        key, png = request.path_params["key"], await request_body(request, MOST_BODY_BYTES)
+        return await _told(lambda: Response(session.fitted(key, png), media_type="image/png", headers=NOT_KEPT))
 
     async def keep(request: Request) -> Response:
-        twin_id, png = request.path_params["twin_id"], await request_body(request, MOST_BODY_BYTES)
+        key, body = request.path_params["key"], await request_body(request, MOST_BODY_BYTES)
 
         def work() -> Response:
-            session.keep(twin_id, png)
-            return JSONResponse({"next": next_address(session, twin_id)}, headers=NOT_KEPT)
+            sent = _sent(body, SENT)
+            png = None if sent["png"] is None else _png(sent["png"])
+            session.keep(key, png, sent["name"], sent["longest_side_cm"])
+            return JSONResponse({"next": next_address(session, key), **vars(session.words(key))}, headers=NOT_KEPT)
+
+        return await _told(work)
+
+    async def tell_name(request: Request) -> Response:
+        body = await request_body(request, MOST_BODY_BYTES)
+
+        def work() -> Response:
+            told = name_remark(read_name(_sent(body, ("name",))["name"]))
+            return JSONResponse({"told": told}, headers=NOT_KEPT)
 
         return await _told(work)
 
     return Starlette(
         routes=[
             Route("/", show_list),
-            Route(f"{PATH}/{{twin_id}}", show),
-            Route(f"{PATH}/{{twin_id}}", keep, methods=["POST"]),
-            Route(f"{PATH}/{{twin_id}}/fit", fit, methods=["POST"]),
-            Route(f"{PATH}/{{twin_id}}/{PICTURE}", give_picture),
-            Route(f"{PATH}/{{twin_id}}/{MASK}", give_mask),
+            Route(f"{PATH}/{{key}}", show),
+            Route(f"{PATH}/{{key}}", keep, methods=["POST"]),
+            Route(f"{PATH}/{{key}}/fit", fit, methods=["POST"]),
+            Route(NAME_PATH, tell_name, methods=["POST"]),
+            Route(f"{PATH}/{{key}}/{PICTURE}", give_picture),
+            Route(f"{PATH}/{{key}}/{MASK}", give_mask),
             PACKAGE_FILES,
         ]
     )
+
+
+def _sent(body: bytes, names: tuple[str, ...]) -> dict[str, Any]:
+    """Return what a page sends; raises UsageError where it is not an object with these names alone."""
+    sent = parse_json_object(body, "what was sent", UsageError, remedy="reload the page")
+    if set(sent) != set(names):
+        raise UsageError(f"what was sent has other names than {', '.join(names)}; reload the page")
+    return sent
+
+
+def _png(said: object) -> bytes:
+    try:
+        return base64.b64decode(said if isinstance(said, str) else "?", validate=True)
+    except (ValueError, binascii.Error) as error:
+        raise UsageError("what was sent is no outline in base64; reload the page") from error
 
 
 async def _told(work: Callable[[], Response]) -> Response:

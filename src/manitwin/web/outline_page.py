@@ -1,4 +1,4 @@
-"""The pages on which a person draws the outlines of things in their photos: a list, and a photo with what is cut away tinted."""
+"""The pages on which a person draws and names the things in their photos: a list, and a photo with what is cut away tinted."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ from urllib.parse import quote
 
 from manitwin.dataset.review.cutouts import DoubtedPhoto
 from manitwin.dataset.review.outlines import OutlineSession
+from manitwin.dataset.review.said_words import Words, known_names, name_remark
+from manitwin.pipeline.manifest_item import LONGEST
 from manitwin.web.html import OUTLINE, page, text
 from manitwin.web.links import Links
 
-PATH = "/outline"
+PATH, NAME_PATH = "/outline", "/name"
 PICTURE, MASK = "photo.webp", "mask.png"
 HINT = "What is tinted is cut away. Hold h to see the photo alone."
 LARGEST_BRUSH_PX = 200
@@ -21,6 +23,10 @@ WAYS = (
     ("add", "a", "belongs to it"),
     ("remove", "x", "does not belong to it"),
 )
+FIELDS = (
+    ("name", "c", "name"),
+    ("longest_side_cm", "l", "longest side, cm"),
+)
 ACTS = (
     ("fit", "f", "Fit to edges"),
     ("undo", "z", "Undo"),
@@ -29,30 +35,31 @@ ACTS = (
     ("closer", "+", "Closer"),
     ("farther", "-", "Farther"),
     ("keep", "Enter", "Use this outline"),
+    ("words", "k", "Keep name and size alone"),
     ("later", "s", "Next photo"),
 )
 
 
-def address_of(twin_id: str, name: str = "") -> str:
+def address_of(key: str, name: str = "") -> str:
     """Return the address of a photo's page, or of a file of it."""
-    return f"{PATH}/{quote(twin_id, safe='')}{name and f'/{name}'}"
+    return f"{PATH}/{quote(key, safe='')}{name and f'/{name}'}"
 
 
-def next_address(session: OutlineSession, twin_id: str) -> str:
+def next_address(session: OutlineSession, key: str) -> str:
     """Return the page of the next photo without an outline behind this one, around the end too; the list where none is left."""
-    ids = list(session.photos)
-    at = ids.index(twin_id)
-    left = [each for each in (*ids[at + 1 :], *ids[:at]) if each not in session.kept]
+    keys = list(session.photos)
+    at = keys.index(key)
+    left = [each for each in (*keys[at + 1 :], *keys[:at]) if each not in session.kept]
     return address_of(left[0]) if left else "/"
 
 
 def list_page(session: OutlineSession, links: Links) -> str:
     """Return the page of all doubted photos of a data set."""
     cards = "".join(
-        f'<li class="card"><a href="{address_of(twin_id)}"><img src="{address_of(twin_id, PICTURE)}" alt="" loading="lazy">'
-        f'<span class="name">{text(_called(photo))}</span><p class="under">'
-        f"{'drawn, to be built' if twin_id in session.kept else text(photo.detail)}</p></a></li>\n"
-        for twin_id, photo in session.photos.items()
+        f'<li class="card"><a href="{address_of(key)}"><img src="{address_of(key, PICTURE)}" alt="" loading="lazy">'
+        f'<span class="name">{text(_called(session, key))}</span><p class="under">'
+        f"{text(_state(session, photo))}</p></a></li>\n"
+        for key, photo in session.photos.items()
     )
     left = len(session.photos) - len(session.kept)
     body = (
@@ -66,26 +73,26 @@ def list_page(session: OutlineSession, links: Links) -> str:
 
 def outline_page(session: OutlineSession, photo: DoubtedPhoto, links: Links) -> str:
     """Return the page of one photo."""
-    twin_id = photo.twin_id
+    key, words = photo.key, session.words(photo.key)
     tools = "".join(
-        f'<label title="{text(hint)}"><input type="radio" name="tool" value="{name}"{_checked(name == TOOLS[0][0])}> {words}'
-        f" <kbd>{key}</kbd></label>"
-        for name, key, words, hint in TOOLS
+        f'<label title="{text(hint)}"><input type="radio" name="tool" value="{name}"{_checked(name == TOOLS[0][0])}> {called}'
+        f" <kbd>{press}</kbd></label>"
+        for name, press, called, hint in TOOLS
     )
     ways = "".join(
-        f'<label><input type="radio" name="way" value="{name}"{_checked(name == WAYS[0][0])}> {words} <kbd>{key}</kbd></label>'
-        for name, key, words in WAYS
+        f'<label><input type="radio" name="way" value="{name}"{_checked(name == WAYS[0][0])}> {called} <kbd>{press}</kbd></label>'
+        for name, press, called in WAYS
     )
     acts = "".join(
-        f'<button type="button" data-act="{name}" data-press="{text(key)}">{words} <kbd>{text(key)}</kbd></button>'
-        for name, key, words in ACTS
+        f'<button type="button" data-act="{name}" data-press="{text(press)}">{called} <kbd>{text(press)}</kbd></button>'
+        for name, press, called in ACTS
     )
     body = (
         f'{_head(session)}<main id="main" class="outlining">\n'
         '<div class="drawing"><canvas id="canvas" role="img" aria-label="The photo, what is cut away tinted"></canvas></div>\n'
-        f'<form id="outline" data-page="{address_of(twin_id)}" data-photo="{address_of(twin_id, PICTURE)}"'
-        f' data-mask="{address_of(twin_id, MASK)}" data-next="{next_address(session, twin_id)}">\n'
-        f"<h2>{text(_called(photo))}</h2>\n"
+        f'<form id="outline" data-page="{address_of(key)}" data-photo="{address_of(key, PICTURE)}"'
+        f' data-mask="{address_of(key, MASK)}" data-next="{next_address(session, key)}">\n'
+        f"<h2>{text(photo.title)}</h2>\n{_fields(words)}"
         f'<div class="controls" role="radiogroup" aria-label="Tool">{tools}'
         f'<label>size <input type="range" id="size" min="2" max="{LARGEST_BRUSH_PX}" value="24"></label></div>\n'
         f'<div class="controls" role="radiogroup" aria-label="What is drawn">{ways}</div>\n'
@@ -93,7 +100,7 @@ def outline_page(session: OutlineSession, photo: DoubtedPhoto, links: Links) -> 
         f'<p class="said" id="said" role="status" aria-live="polite">{HINT}</p>\n'
         f'<p class="note">{text(photo.detail)}</p>\n</form></main>\n'
     )
-    return page(f"Outline of {_called(photo)}", body, links, scripts=[OUTLINE])
+    return page(f"Outline of {photo.title}", body, links, scripts=[OUTLINE])
 
 
 def _head(session: OutlineSession) -> str:
@@ -103,8 +110,39 @@ def _head(session: OutlineSession) -> str:
     )
 
 
-def _called(photo: DoubtedPhoto) -> str:
-    return photo.item.title
+def _fields(words: Words) -> str:
+    """Return the fields for what the thing is and how long; their order and keys are those of ``FIELDS``."""
+    more = {
+        "name": f'list="names" maxlength="{LONGEST["name"]}" placeholder="what it is"',
+        "longest_side_cm": 'inputmode="decimal" maxlength="40" placeholder="as usual"',
+    }
+    fields = "".join(
+        f'<label><span>{called} <kbd>{press}</kbd></span><input id="{name}" data-focus="{press}"'
+        f' value="{text(getattr(words, name))}" autocomplete="off" spellcheck="false" {more[name]}></label>'
+        for name, press, called in FIELDS
+    )
+    names = "".join(f'<option value="{text(name)}">' for name in known_names())
+    return (
+        f'<div class="stated">{fields}<datalist id="names">{names}</datalist>\n'
+        f'<p class="note" id="known" aria-live="polite" data-asked="{NAME_PATH}">{text(name_remark(words.name))}</p></div>\n'
+    )
+
+
+def _called(session: OutlineSession, key: str) -> str:
+    name, title = session.words(key).name, session.photos[key].title
+    return f"{title}: {name}" if name else title
+
+
+def _state(session: OutlineSession, photo: DoubtedPhoto) -> str:
+    done = [
+        word
+        for word, is_done in (
+            ("drawn", photo.key in session.kept),
+            ("named or measured", photo.twin_id in session.said),
+        )
+        if is_done
+    ]
+    return f"{', '.join(done)}, to be built" if done else photo.detail
 
 
 def _checked(is_chosen: bool) -> str:

@@ -37,7 +37,8 @@ def review_cutouts(
     draw: Annotated[
         bool,
         typer.Option(
-            "--draw", help="Draw the outlines anew in the browser, until interrupted; then what was drawn is built."
+            "--draw",
+            help="Draw outlines anew in the browser, and say what the things are, until interrupted; then they are built.",
         ),
     ] = False,
     redraw: Annotated[
@@ -111,12 +112,13 @@ def _draw(dataset: str, session: OutlineSession, host: str, port: int, browser: 
                 webbrowser.open(server.link())
 
         draw_outlines(session, host, port, ready, lambda link: tell_link(link, remark))
-    if not session.kept:
+    if not session.kept and not session.said:
         out_console.print("stopped; nothing was drawn")
         return 0
     with WatchedRun("photos", dataset) as watched:
         run = session.build(jobs=jobs, **watched.callbacks)
-    return _told(dataset, run, f"{len(session.kept)} outlines are drawn by {session.annotator}")
+    said = f", {len(session.said)} things are named or measured," if session.said else ""
+    return _told(dataset, run, f"{len(session.kept)} outlines are drawn{said} by {session.annotator}")
 
 
 def _told(dataset: str, run: RunReport, begun: str) -> int:

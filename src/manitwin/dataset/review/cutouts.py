@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Unpack
 
@@ -12,6 +12,7 @@ import numpy as np
 from PIL import Image
 
 from manitwin.dataset.review.making_again import made_again
+from manitwin.dataset.review.photos_left_out import PhotosLeftOut
 from manitwin.engine.amendments import read_amendments, write_amendments
 from manitwin.engine.drive import RunOptions, RunReport
 from manitwin.engine.ledger.location import local_ledger
@@ -23,6 +24,7 @@ from manitwin.pipeline.drawn_outline import DRAWN
 from manitwin.pipeline.human_corrections import HUMAN
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.photo import PhotoStage
+from manitwin.pipeline.photo_groups import told_apart
 from manitwin.render.contact_sheet import TILE_PX, contact_sheet
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import RECORD, parse_record
@@ -38,13 +40,35 @@ DIMMED = 0.25
 
 @dataclass(frozen=True)
 class DoubtedPhoto:
-    """A photo: its number in the ledger, why it was rejected, and the digest of the cut-out beside that, None where none is."""
+    """A photo: its number in the ledger, why it was rejected, and the digest of the cut-out beside that, None where none is.
+
+    ``place`` is that of one of several photos of a thing, from 0; None of a photo by itself.
+    """
 
     twin_id: str
     number: int
     item: Item
     detail: str
     sha256: str | None
+    place: int | None = None
+
+    @property
+    def key(self) -> str:
+        """What tells it from all others here: the twin's id, of one of several photos with its number, counted from 1."""
+        return self.twin_id if self.place is None else f"{self.twin_id}-{self.place + 1}"
+
+    @property
+    def file(self) -> Path:
+        """The photo's file."""
+        return Path(self.item.files[self.place or 0])
+
+    @property
+    def title(self) -> str:
+        """What it is called; of one of several photos, which of them it is."""
+        if self.place is None:
+            return self.item.title
+        files = self.item.files
+        return f"{told_apart(files)[self.place]}, photo {self.place + 1} of {len(files)}"
 
 
 def doubted_photos(root: DatasetRoot) -> list[DoubtedPhoto]:
@@ -58,18 +82,22 @@ def doubted_photos(root: DatasetRoot) -> list[DoubtedPhoto]:
 def photos_to_draw(root: DatasetRoot, redraw: Iterable[str] = ()) -> list[DoubtedPhoto]:
     """Return the photos that were rejected for their cut-out, those in which nothing was found too, in the order of the items.
 
-    ``redraw`` are beginnings of the ids of others, whose cut-outs were believed. Several photos of one thing are left out.
-    Raises UsageError where the data set has no ledger, and for an id that is no photo's there.
+    Of several photos of a thing these are the ones that were left out, where it was rejected; all, where none could be cut out.
+    ``redraw`` are beginnings of the ids of others, whose cut-outs were believed. Raises UsageError where the data set has no
+    ledger, and for an id that is no photo's there.
     """
     path, found = local_ledger(root), []
     with read_ledger(path) as ledger:
         rows = ledger.execute(
             "SELECT number, twin_id, item, state = 'rejected' AND reason IN ('low_confidence_matte', 'several_objects',"
-            " 'no_object') FROM items WHERE twin_id IS NOT NULL AND kind = 'image' ORDER BY number"
+            " 'no_object'), state = 'rejected' AND kind = 'photos' FROM items WHERE twin_id IS NOT NULL AND kind IN ('image',"
+            " 'photos') ORDER BY number"
         ).fetchall()
     chosen = {_only(root, begun, [str(row[1]) for row in rows], "no photo") for begun in redraw}
-    for number, twin_id, said, is_refused in rows:
-        if not is_refused and twin_id not in chosen:
+    groups = PhotosLeftOut(root)
+    for number, twin_id, said, is_refused, may_lack in rows:
+        is_shown = is_refused or twin_id in chosen
+        if not is_shown and not may_lack:
             continue
         try:
             record = parse_record(root.read_bytes(f"{root.twin_name(twin_id)}/{RECORD}"))
@@ -77,7 +105,12 @@ def photos_to_draw(root: DatasetRoot, redraw: Iterable[str] = ()) -> list[Doubte
             continue
         detail = BELIEVED if record.rejection is None else record.rejection.detail
         item = Item.from_json(parse_json_object(said, f"{path}: item {number}", UsageError, file_names=True))
-        found.append(DoubtedPhoto(twin_id, int(number), item, detail, record.files.get(CUTOUT)))
+        shown = DoubtedPhoto(twin_id, int(number), item, detail, record.files.get(CUTOUT))
+        if not item.views:
+            found.append(shown)
+            continue
+        places = groups.of(twin_id, item) or (range(len(item.files)) if is_shown else ())
+        found += [replace(shown, place=place, sha256=None) for place in places]
     return found
 
 

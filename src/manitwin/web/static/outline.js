@@ -1,4 +1,4 @@
-// Drawing the outline of a thing in its photo: with corners or a brush, by mouse, pen or finger, every tool also by a key.
+// Drawing the outline of a thing in its photo and saying what it is: by mouse, pen or finger, every tool and field also by a key.
 "use strict";
 (() => {
   const form = document.getElementById("outline");
@@ -7,6 +7,8 @@
   const canvas = document.getElementById("canvas");
   const size = document.getElementById("size");
   const said = document.getElementById("said");
+  const fields = { name: document.getElementById("name"), longest_side_cm: document.getElementById("longest_side_cm") };
+  const known = document.getElementById("known");
   const shown = canvas.getContext("2d");
   const photo = new Image();
   const mask = document.createElement("canvas"); // opaque where the thing is, transparent elsewhere
@@ -21,6 +23,7 @@
   let zoom = 1;
   let bare = false;
   let changed = false;
+  let retyped = false; // a field
   let busy = false;
   let first = null; // the mask as it came
 
@@ -163,7 +166,7 @@
   });
 
   // ---- what is asked of the server
-  function png() {
+  function whole() { // the mask as a black and white picture
     const whole = document.createElement("canvas");
     whole.width = mask.width;
     whole.height = mask.height;
@@ -171,16 +174,32 @@
     context.fillStyle = "#000";
     context.fillRect(0, 0, whole.width, whole.height);
     context.drawImage(mask, 0, 0);
-    return new Promise((done) => whole.toBlob(done, "image/png"));
+    return whole;
   }
-  async function sent(address) {
-    const reply = await fetch(address, { method: "POST", headers: { "content-type": "image/png" }, body: await png() });
+  function typed() { // null: as it is
+    return Object.fromEntries(Object.entries(fields).map(([name, { value, defaultValue }]) => [name, value === defaultValue ? null : value]));
+  }
+  async function sent(address, type, body) {
+    const reply = await fetch(address, { method: "POST", headers: { "content-type": type }, body });
     if (reply.ok) return reply;
     let error = `the server says ${reply.status}`;
     try {
       error = (await reply.json()).error || error;
     } catch { /* it said so in no words of its own */ }
     throw new Error(error);
+  }
+  async function kept(png) { // the outline in base64, null: none
+    return (await sent(page, "application/json", JSON.stringify({ png, ...typed() }))).json();
+  }
+  async function tellName() {
+    const name = fields.name.value;
+    let told;
+    try {
+      told = (await (await sent(known.dataset.asked, "application/json", JSON.stringify({ name }))).json()).told;
+    } catch (error) {
+      told = error instanceof TypeError ? "" : error.message;
+    }
+    if (name === fields.name.value) known.textContent = told;
   }
   async function busily(words, work) {
     if (busy) return;
@@ -208,7 +227,8 @@
   }
   const acts = {
     fit: () => busily("looking for edges ...", async () => {
-      const reply = await sent(`${page}/fit`);
+      const png = await new Promise((done) => { whole().toBlob(done, "image/png"); });
+      const reply = await sent(`${page}/fit`, "image/png", png);
       const fitted = await createImageBitmap(await reply.blob());
       remember();
       taken(fitted);
@@ -237,13 +257,20 @@
         return;
       }
       busily("keeping it ...", async () => {
-        const reply = await (await sent(page)).json();
-        changed = false;
+        const reply = await kept(whole().toDataURL("image/png").split(",")[1]);
+        changed = retyped = false;
         location.assign(reply.next);
       });
     },
+    words: () => busily("keeping them ...", async () => {
+      const reply = await kept(null);
+      for (const [name, field] of Object.entries(fields)) field.value = field.defaultValue = reply[name];
+      retyped = false;
+      tellName();
+      say("name and size are kept, to be built; s leads to the next photo");
+    }),
     later: () => {
-      changed = false;
+      changed = retyped = false;
       location.assign(next);
     },
   };
@@ -256,9 +283,19 @@
   const choices = { p: ["tool", "polygon"], b: ["tool", "brush"], a: ["way", "add"], x: ["way", "remove"] };
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (Object.values(fields).includes(event.target)) { // here keys are letters, but for those that lead out of it
+      if (event.key !== "Enter" && event.key !== "Escape") return;
+      event.preventDefault();
+      event.target.blur();
+      return;
+    }
+    const field = form.querySelector(`[data-focus="${CSS.escape(event.key)}"]`);
     const button = form.querySelector(`[data-press="${CSS.escape(event.key)}"]`);
     if (event.key === "Enter" && event.target instanceof HTMLButtonElement) return; // its own
-    if (choices[event.key]) choose(...choices[event.key]);
+    if (field) {
+      field.focus();
+      field.select();
+    } else if (choices[event.key]) choose(...choices[event.key]);
     else if (button) acts[button.dataset.act]();
     else if (event.key === "Escape") corners = [];
     else if (event.key === "[" || event.key === "]") size.value = Number(size.value) * (event.key === "[" ? 0.8 : 1.25);
@@ -274,8 +311,10 @@
   });
   form.addEventListener("submit", (event) => event.preventDefault());
   form.addEventListener("change", draw);
+  form.addEventListener("input", (event) => { retyped ||= Object.values(fields).includes(event.target); });
+  fields.name.addEventListener("change", tellName);
   window.addEventListener("beforeunload", (event) => {
-    if (changed) event.preventDefault();
+    if (changed || retyped) event.preventDefault();
   });
   window.addEventListener("resize", () => enlarge(1));
 

@@ -1,0 +1,47 @@
+"""Which of several photos of one thing were not cut out, by what the photo stage left in the data set's work."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+from manitwin.config import BuildConfig
+from manitwin.engine.amendments import read_amendments
+from manitwin.engine.stage import Draft
+from manitwin.engine.stage_runner import is_whole, stage_key
+from manitwin.models.matting.learned import find_networks
+from manitwin.pipeline.item import Item
+from manitwin.pipeline.photo import PhotosStage
+from manitwin.pipeline.settings import stored_config
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.store import WORK
+
+
+class PhotosLeftOut:
+    """The photos of a data set's groups that its configuration leaves out."""
+
+    def __init__(self, root: DatasetRoot):
+        self._root = root
+
+    def of(self, twin_id: str, item: Item) -> list[int]:
+        """Return the places, from 0, of the photos of a thing that were left out where others were cut out.
+
+        Empty where all or none were cut out, and where the stage's result is not kept here, or is of another version. Raises
+        UsageError where the data set's networks cannot be found.
+        """
+        if self._root.local is None:
+            return []
+        draft = Draft(twin_id, item, self._config.seed, amendments=read_amendments(self._root, twin_id))
+        place = self._root.local / WORK / twin_id / self._stage.name / stage_key(self._stage, draft)
+        if not is_whole(place, digests=False):
+            return []
+        cut_out = {int(picture.stem) for picture in (place / "photos").glob("*.png")}
+        return [number for number in range(len(item.files)) if number not in cut_out]
+
+    @cached_property
+    def _config(self) -> BuildConfig:
+        return stored_config(self._root)
+
+    @cached_property
+    def _stage(self) -> PhotosStage:
+        named = self._config.matting.network
+        return PhotosStage(self._config.matting, () if named is None else find_networks(named))

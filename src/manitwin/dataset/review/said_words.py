@@ -1,0 +1,134 @@
+"""What a person says of a photo's thing while its outline is drawn: its name and longest side, read, checked and kept."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from manitwin.config import GateConfig
+from manitwin.engine.amendments import Amendments
+from manitwin.errors import UsageError
+from manitwin.formats.printable import printable_line
+from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.priors import load_priors
+from manitwin.pipeline.guesses import unknown_name_words
+from manitwin.pipeline.human_corrections import CATEGORY, NAME, NAME_STAGES, SIZE, SIZE_STAGE, STAGES, SaidName
+from manitwin.pipeline.item import Item
+from manitwin.pipeline.manifest_item import unusable
+from manitwin.pipeline.stated_size import COLUMN, stated_size_m
+from manitwin.twin.record_values import Estimate
+
+_DIGITS = 6
+"""Of a length in a field: what is typed no finer is the same length."""
+_SHOWN_CHARACTERS = 60
+
+
+@dataclass(frozen=True)
+class Words:
+    """A thing's name, and its longest side (cm) as it is typed; '' where nobody says it."""
+
+    name: str = ""
+    longest_side_cm: str = ""
+
+
+def given_words(item: Item) -> Words:
+    """Return what was said of an input when it was given."""
+    return Words(item.name or "", "" if item.longest_side_m is None else _centimetres(item.longest_side_m))
+
+
+def words_of(item: Item, amendments: Amendments) -> Words:
+    """Return what is said of an input now: what people have said since goes before what it was given with."""
+    given = given_words(item)
+    name = _first(amendments, STAGES[CATEGORY], CATEGORY)
+    if name is None:
+        said = _first(amendments, NAME_STAGES, NAME)
+        name = given.name if said is None else SaidName.model_validate(said).value
+    size = _first(amendments, (*STAGES[SIZE], SIZE_STAGE), SIZE)
+    side_cm = given.longest_side_cm if size is None else _centimetres(Estimate.model_validate(size).value)
+    return Words(str(name), side_cm)
+
+
+def read_name(typed: object) -> str:
+    """Return a name as it was typed, '' where nothing was; raises UsageError for what a manifest's column takes for none."""
+    if not isinstance(typed, str):
+        raise UsageError("a name is a text, empty where nobody says it")
+    name = typed.strip()
+    why = unusable("name", name)
+    if why is not None:
+        raise UsageError(f"not kept: the name: {why}")
+    return name
+
+
+def read_side_cm(typed: object, gate: GateConfig) -> str:
+    """Return a longest side (cm) as it was typed, '' where nothing was; raises UsageError for what ``gate`` takes no thing of."""
+    if not isinstance(typed, str):
+        raise UsageError("a longest side is a text, empty where nobody says it")
+    number = typed.strip().replace(",", ".")
+    if not number:
+        return ""
+    try:
+        length_m = float(number) / 100
+    except ValueError:
+        length_m = math.nan
+    if not gate.min_longest_side_m <= length_m <= gate.max_longest_side_m:
+        shown = printable_line(typed.strip(), max_characters=_SHOWN_CHARACTERS)
+        least, most = _centimetres(gate.min_longest_side_m), _centimetres(gate.max_longest_side_m)
+        raise UsageError(
+            f"not kept: the longest side is {shown!r}; give centimetres from {least} to {most}, such as 12"
+        )
+    return _centimetres(length_m)
+
+
+def with_words(amendments: Amendments, item: Item, words: Words, source: str) -> Amendments:
+    """Return an input's amendments with what ``source`` says of it; what is not said anew stays as it is.
+
+    An empty field, or what the input was given with, takes back what people have said since. Raises UsageError for a length
+    where a unit was stated, as a manifest's row does.
+    """
+    after: dict[str, dict[str, Any]] = {stage: dict(said) for stage, said in amendments.items()}
+    before, given = words_of(item, amendments), given_words(item)
+    if words.name != before.name:
+        _take_back(after, STAGES[CATEGORY], CATEGORY)
+        _take_back(after, NAME_STAGES, NAME)
+        if words.name not in ("", given.name):
+            for stage in NAME_STAGES:
+                after.setdefault(stage, {})[NAME] = SaidName(value=words.name, source=source).model_dump()
+    if words.longest_side_cm != before.longest_side_cm:
+        _take_back(after, (*STAGES[SIZE], SIZE_STAGE), SIZE)
+        if words.longest_side_cm not in ("", given.longest_side_cm):
+            typed_m = float(words.longest_side_cm) / 100
+            length_m = stated_size_m({COLUMN: typed_m, "units": item.units}, "not kept")
+            said = Estimate.model_validate({"value": length_m, "low": length_m, "high": length_m, "source": source})
+            after.setdefault(SIZE_STAGE, {})[SIZE] = said.model_dump()
+    return {stage: said for stage, said in after.items() if said}
+
+
+def known_names() -> list[str]:
+    """Return the categories that the priors know, in the order of the alphabet."""
+    return sorted(prior.category for prior in load_priors().values() if prior.category != "unknown")
+
+
+def name_remark(name: str) -> str:
+    """Say what is known of a name: how long such things are, or the nearest names where the priors know none; '' of no name."""
+    if not name:
+        return ""
+    prior = lookup(name)
+    if prior is None:
+        return unknown_name_words(name, "say what kind of thing it is, in English")
+    low, high = (_centimetres(length_m) for length_m in (prior.longest_axis_m.low, prior.longest_axis_m.high))
+    return f"known as: {prior.category}, {low} to {high} cm long as a rule"
+
+
+def _first(amendments: Amendments, stages: Iterable[str], key: str) -> Any:
+    return next((amendments[stage][key] for stage in stages if key in amendments.get(stage, {})), None)
+
+
+def _take_back(amendments: Amendments, stages: Iterable[str], key: str) -> None:
+    for stage in stages:
+        amendments.get(stage, {}).pop(key, None)
+
+
+def _centimetres(length_m: float) -> str:
+    return f"{100 * length_m:.{_DIGITS}g}"
