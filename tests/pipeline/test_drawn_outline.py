@@ -14,6 +14,7 @@ from PIL import Image
 from manitwin.config import MattingConfig
 from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
+from manitwin.pipeline.drawn_masks import with_drawn_masks
 from manitwin.pipeline.drawn_outline import (
     DRAWN,
     DRAWN_OF_SEVERAL,
@@ -151,3 +152,16 @@ def test_each_of_several_photos_is_cut_out_as_drawn_and_one_that_is_not_is_left_
     assert (alpha == ellipse(600, 600)).mean() > 0.99
     assert "side.png: cut out as human:ada drew its outline" in field["findings"]
     assert any(each.startswith("left out: back.png: the outline that was drawn") for each in field["findings"])
+
+
+def test_drawn_outlines_of_several_photos_take_the_places_of_their_masks(tmp_path: Path) -> None:
+    files = [str(tmp_path / name) for name in ("front.png", "side.png", "back.png")]
+    for file in files:
+        Image.new("RGB", (600, 400)).save(file)
+    item = Item(files[0], name="bottle", views=tuple(files[1:]), masks=("given_0.png", "", "given_2.png"))
+    drawn = with_outline({}, DrawnOutline(ellipse(200, 300), "human:ada"), 0)
+    drawn = with_outline(drawn, DrawnOutline(ellipse(300, 300), "human:ada"), 2)  # of another picture
+    masked = with_drawn_masks(Draft("t", item, seed=0, amendments={PhotosStage.name: drawn}), tmp_path)
+    assert masked.masks == (str(tmp_path / "drawn_00.png"), "", "given_2.png")
+    assert (mask_of_png_of_any_size(Path(masked.masks[0]).read_bytes()) == ellipse(400, 600)).mean() > 0.99
+    assert with_drawn_masks(Draft("t", item, seed=0), tmp_path) == item

@@ -75,6 +75,9 @@ def test_page_shows_what_was_given_and_suggests_known_names(app: Starlette, sess
 
 def test_name_and_size_are_kept_at_once_shown_again_and_taken_back(app: Starlette, session: OutlineSession) -> None:
     first, second, _ = session.photos
+    assert said(app, first, "", "")[1]["name"] == "bottle" and session.said == (), (
+        "nothing is taken back of what was given"
+    )
     status, kept = said(app, first, " ketchup bottle ", "12,5")
     assert status == 200 and kept["name"] == "ketchup bottle" and kept["longest_side_cm"] == "12.5"
     amendments = read_amendments(session.root, first)

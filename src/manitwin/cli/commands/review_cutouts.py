@@ -118,15 +118,16 @@ def _draw(dataset: str, session: OutlineSession, host: str, port: int, browser: 
     with WatchedRun("photos", dataset) as watched:
         run = session.build(jobs=jobs, **watched.callbacks)
     said = f", {len(session.said)} things are named or measured," if session.said else ""
-    return _told(dataset, run, f"{len(session.kept)} outlines are drawn{said} by {session.annotator}")
+    begun = f"{len(session.kept)} outlines are drawn{said} by {session.annotator}"
+    return _told(dataset, run, begun, "; `--draw --redraw ID` shows one of them again")
 
 
-def _told(dataset: str, run: RunReport, begun: str) -> int:
-    """Print what became of the photos; returns the exit status."""
+def _told(dataset: str, run: RunReport, begun: str, remedy: str = "") -> int:
+    """Print what became of the photos, and the ``remedy`` where some are not accepted; returns the exit status."""
     counts = run.counts_of_given
     told = ", ".join(f"{counts[state]} {state}" for state in ("accepted", "rejected", "failed") if counts.get(state))
     out_console.print(f"{begun}: {told}")
     unfinished = bool(run.open or counts.get("failed"))
     if unfinished or counts.get("rejected"):
-        print_error(f"`manitwin status {dataset}` says why not all are accepted")
+        print_error(f"`manitwin status {dataset}` says why not all are accepted{remedy}")
     return 4 if unfinished else 3 if counts.get("rejected") else 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import threading
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Unpack
 
 import numpy as np
@@ -112,13 +113,15 @@ class OutlineSession:
             )
             after = with_words(before, photo.item, words, source)
             if drawn is not None:
-                confirmed = {name: said for name, said in after.get(PhotoStage.name, {}).items() if name != CONFIRMED}
-                after[PhotoStage.name] = with_outline(confirmed, drawn, photo.place)
+                said = {key: each for key, each in after.get(PhotoStage.name, {}).items() if key != CONFIRMED}
+                after[PhotoStage.name] = with_outline(said, drawn, photo.place)
             if {words.name, now.name} != {photo.item.name or ""}:
-                self._require_same_picture(photo, words.name, after)
+                is_renamed = words.name != now.name and photo.place is not None
+                for place in range(len(photo.item.files)) if is_renamed else (photo.place,):
+                    self._require_same_picture(replace(photo, place=place), words.name, after)
             if after != before:
                 write_amendments(self.root, photo.twin_id, after)
-            if words != now:
+            if words_of(photo.item, after) != now:
                 self._said[photo.twin_id] = None
             if drawn is not None:
                 self._kept[key] = None
