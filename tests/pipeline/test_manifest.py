@@ -59,6 +59,7 @@ def test_a_row_says_its_size_by_its_longest_side_or_by_its_unit(folder: Path) ->
         ("photo.jpg,,12 cm", r"list\.csv:2: longest_side_m is 12 cm; give metres, more than 0"),
         ("photo.jpg,,0", "longest_side_m is 0; give metres"),
         ("photo.jpg,,inf", "longest_side_m is inf; give metres"),
+        ("photo.jpg,,1e-290", "longest_side_m is 1e-290; give metres"),
     ):
         manifest.write_text(f"file,units,longest_side_m\n{row}\n")
         with pytest.raises(UsageError, match=told):

@@ -14,6 +14,8 @@ MEANT = frozenset(
     f"{word}{unit}" for word in ("size", "length", "longest", "longest_side", "height", "width") for unit in ("", "_m")
 )
 """Columns that people give for it."""
+LEAST_M, MOST_M = 1e-6, 1e6
+"""Of a stated length: numbers beyond are no lengths of things, and a mesh scaled to them has no numbers any more."""
 _NO_UNIT = ("auto", "none")
 _SHOWN_CHARACTERS = 60
 
@@ -40,7 +42,7 @@ def stated_size_m(values: Mapping[str, Any], where: str) -> float | None:
         length_m = float(said)
     except ValueError:
         length_m = math.nan
-    if not 0 < length_m < math.inf:
+    if not LEAST_M <= length_m <= MOST_M:
         shown = printable_line(str(said), max_characters=_SHOWN_CHARACTERS)
         raise UsageError(f"{where}: {COLUMN} is {shown}; give metres, more than 0, such as 0.12")
     if values.get("text") is not None:
