@@ -15,7 +15,7 @@ import numpy as np
 
 from manitwin.geometry.solids.shapes import box, cylinder, prism, rectangle
 from manitwin.models.generators.lift.hint import ShapeHint
-from manitwin.models.generators.templates.fitting.evidence import evidence_of
+from manitwin.models.generators.templates.fitting.evidence import Evidence, evidence_of
 from manitwin.models.generators.templates.fitting.fit import Fitted, first_built
 from manitwin.models.generators.templates.fitting.residual import Residual
 from manitwin.models.generators.templates.fitting.search import Candidate, search
@@ -36,6 +36,10 @@ MOST_DISC = 0.15
 """Thickness of a disc over its width: what is thicker may as well be a bowl seen from above."""
 PRIMITIVES = {"box": "box", "cutting board": "slab", "can": "cylinder", "coaster": "disc"}
 """What the solids are, by the category of things that stand or lie as each does."""
+EXPECTED: dict[str, tuple[dict[str, float], ...]] = {
+    "box": ({}, {"width": 0.5, "depth": 0.4}, {"width": 1.7, "depth": 1.1})
+}
+"""Proportions that a fit begins with beside the usual ones: from a cube's no fit finds a tall carton or a flat box."""
 _EDGE = 0.02  # radius of a block's edges over its least side
 _ROUNDED = 0.2  # radius of a slab's upper and lower edges over its thickness
 
@@ -57,10 +61,17 @@ def plain_solids(rgba: np.ndarray, hint: ShapeHint, focal_mm: float | None = Non
     if not tried or _solidity(rgba[..., 3] > 127) < LEAST_SOLIDITY:
         return PlainSolids()
     evidence = evidence_of(rgba, focal_mm)
-    found = [best for solid in tried for best in search([Family(solid)], evidence, settled=True)[:1]]
+    found = [best for solid in tried for best in _fits(solid, evidence)]
     possible = sorted(filter(_is_possible, found), key=lambda each: each.residual.cost)
     close = [each for each in possible if explains_closely(each.residual)]
     return PlainSolids(first_built(close, evidence), first_built(possible, evidence))
+
+
+def _fits(solid: Template, evidence: Evidence) -> list[Candidate]:
+    """Return the best fit of a solid from each of the proportions that it may be expected to have."""
+    expected = EXPECTED.get(PRIMITIVES[solid.category], ({},))
+    starts = [Family(solid, proportions) for proportions in expected]
+    return [best for start in starts for best in search([start], evidence, settled=True, rolled=False)[:1]]
 
 
 @cache
