@@ -8,6 +8,7 @@ import trimesh
 
 from handmade import cup, subject
 from manitwin.models.annotators.prior_names import lookup
+from manitwin.models.annotators.prior_records import Interval
 from manitwin.models.annotators.priors import load_materials
 from manitwin.models.annotators.rules import estimate_physical
 from manitwin.models.annotators.walls import density_by_wall, wall_materials
@@ -32,6 +33,15 @@ def test_what_the_wall_leaves_open_stays_in_the_priors_interval() -> None:
         found = density_by_wall(prior, bin_of(wall_m), 0)
         assert found is not None and prior.bulk_density_kg_m3 is not None
         assert prior.bulk_density_kg_m3.low <= found.low <= found.typical <= found.high <= prior.bulk_density_kg_m3.high
+
+
+def test_walls_of_materials_that_are_all_denser_than_such_things_are_as_dense_as_the_densest() -> None:
+    """Where all materials are taken for the end of the interval their mean was beyond it by rounding, which stopped a build."""
+    prior, solid = lookup("container"), bin_of(0.003)
+    for high in np.linspace(300, 700, 41):
+        held = Interval(low=80, typical=200, high=float(high))
+        found = density_by_wall(prior.model_copy(update={"bulk_density_kg_m3": held}), solid, 0)
+        assert found is not None and found.low <= found.typical <= found.high == held.high
 
 
 def test_a_wall_says_nothing_of_one_matter_of_a_solid_and_of_what_is_no_open_ware() -> None:

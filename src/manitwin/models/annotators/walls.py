@@ -118,4 +118,7 @@ def _left_open(options: Sequence[WallMaterial], thickness_m: float, within: Inte
     beyond = float(np.exp(DEVIATIONS_ACROSS / 2 * MEASURED_SPREAD))
     ends = [min(each.low for each in likely) / beyond, max(each.high for each in likely) * beyond]
     low, high = np.clip(ends, within.low, within.high)
-    return Interval(low=float(low), typical=float(np.exp(shares @ np.log(typical))), high=float(high))
+    mean = float(
+        np.clip(np.exp(shares @ np.log(typical)), low, high)
+    )  # rounding may carry the mean of equal ends past them
+    return Interval(low=float(low), typical=mean, high=float(high))
