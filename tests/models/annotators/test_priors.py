@@ -251,7 +251,7 @@ def test_what_is_used_or_made_otherwise_is_no_alias(said: str, category: str) ->
     ("said", "category"),
     [
         ("mug_1", "mug"), ("Mug 01", "mug"), ("pitcher blue", "pitcher"), ("ice_guard_pitcher_blue_2", "pitcher"),
-        ("bottle b", "bottle"), ("orange", "orange"), ("orange 2", "orange"), ("Wood cube 2.5cm", "building block"),
+        ("bottle b", "bottle"), ("orange", "orange"), ("orange 2", "orange"), ("Wood cube 2.5cm", "cube"),
         ("Marble 1.5 cm", "marble"), ("wood block 10 x 2.5 x 1 cm", "wood block"), ("screw 3.5x40mm", "screw"),
         ("bottle 500ml", "bottle"), ("nail 3 inch", "nail"),
     ],

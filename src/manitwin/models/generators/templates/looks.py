@@ -173,6 +173,7 @@ FOODS: dict[str, Look] = {
         _look("fruit flesh and skin", "food skin", "e8b04a", 0.5, 970),
         _look("berry flesh", "food skin", "c41f2b", 0.4, 850),
         _look("vegetable flesh", "food skin", "c8a878", 0.6, 1050),
+        _look("hollow vegetable flesh", "food skin", "b3261e", 0.3, 450),
         _look("onion layers", "food skin", "b8752e", 0.4, 950),
         _look("spongy flesh", "food skin", "e8e0d0", 0.6, 680),
         _look("pumpkin with its hollow", "food skin", "d9721c", 0.55, 720),

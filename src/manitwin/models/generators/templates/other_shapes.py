@@ -30,19 +30,20 @@ KIN_OF_ANOTHER_SHAPE = _listed(
 """Kin in the priors of what a template makes, of another shape or look: a kettlebell is no dumbbell, a lime no lemon."""
 _NAMES_OF_OTHERS = _listed(
     """
-    cherry tomato, baguette, cube, wooden cube, jenga block, alphabet block, tile, disc, chess king, chess queen, chess
-    knight, rook, game piece, boot, high heel, sandal, slipper, clog, flip flop, pump shoe, high top, beanie, binder,
+    cherry tomato, baguette, jenga block, alphabet block, cuboid, tile, disc, game piece, timber,
+    plank, lumber, boot, high heel, sandal, slipper, clog, flip flop, pump shoe, high top, beanie, binder,
     ring binder, laptop charger, power supply, joystick, stand, fitness band, fitness tracker, card holder, tetra pak,
-    9v battery, button cell, coin cell, button cell battery, coin cell battery,
+    button cell, coin cell, button cell battery, coin cell battery,
     coin battery, button battery
     """
 )
-"""Other names in the priors of a template's category, of what it does not make: a boot is no low shoe, of chess pieces it makes
-the pawn."""
+"""Other names in the priors of a template's category, of what it does not make: a boot is no low shoe."""
 _COMPOUNDS = _listed(
     """
     cookie cutter, biscuit cutter, glass cutter, pipe cutter, bolt cutter, tile cutter, cigar cutter, fried egg, scrambled
-    egg, poached egg, horse shoe, snow shoe, brake shoe, onion ring, boxing ring, piston ring,
+    egg, poached egg,
+    ice cube, sugar cube, stock cube, bouillon cube, candy corn, baby corn, hose clamp, pipe
+    clamp, horse shoe, snow shoe, brake shoe, onion ring, boxing ring, piston ring,
     socket wrench, socket spanner, torque wrench, pipe wrench, strap wrench
     """
 )

@@ -227,24 +227,6 @@ def light_bulb(*, length_m: float, width: float) -> Model:
     return model.point("bulb", "surface", "bulb", (0.0, 0.0, h), (0.0, 0.0, 1.0))
 
 
-@template("battery")
-def battery(*, length_m: float, width: float) -> Model:
-    """Build a cell lying along X, its positive pole towards +X."""
-    r = 0.5 * width * length_m
-    body = lathe(
-        rounded(
-            [(0, -0.5 * length_m), (r, -0.5 * length_m), (r, 0.5 * length_m - 0.0012), (0, 0.5 * length_m - 0.0012)],
-            0.0006,
-        )
-    )
-    model = (
-        Model()
-        .add("body", body.rotate((0, 90, 0)))
-        .add("pole", cylinder(0.36 * r, 0.0022).rotate((0, 90, 0)).translate((0.5 * length_m - 0.0022, 0, 0)), "pole")
-    )
-    return model.point("pole", "tip", "pole", (0.5 * length_m, 0.0, 0.0), (1.0, 0.0, 0.0)).laid()
-
-
 @template("electric toothbrush")
 def electric_toothbrush(*, height_m: float, width: float, head: float) -> Model:
     """Build a toothbrush that stands on its foot, the bristles towards -Y."""

@@ -5,7 +5,19 @@ from __future__ import annotations
 import numpy as np
 from manifold3d import Manifold
 
-from manitwin.geometry.solids.shapes import Point, box, cylinder, lathe, polygon, prism, rectangle, rounded, union
+from manitwin.geometry.solids.shapes import (
+    Point,
+    box,
+    chords,
+    cylinder,
+    ellipsoid,
+    lathe,
+    polygon,
+    prism,
+    rectangle,
+    rounded,
+    union,
+)
 from manitwin.geometry.solids.sweep import arc, sweep
 from manitwin.models.generators.templates.template import Model, template
 
@@ -163,3 +175,74 @@ def test_tube(*, length_m: float, width: float, wall_m: float) -> Model:
     model.region("bottom", "body", lambda centers: centers[:, 0] < -end + r)
     model.point("opening", "opening", "rim", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
     return model.point("body", "surface", "body", (-0.1 * end, 0.0, r), (0.0, 0.0, 1.0)).laid()
+
+
+@template("alarm clock")
+def alarm_clock(*, height_m: float, width: float, depth: float, bell: float) -> Model:
+    """Build a clock with two bells that stands on two feet, its dial towards -Y; ``bell`` is a bell's width over the case's."""
+    h = height_m
+    r, deep = 0.5 * width * h, depth * h
+    middle = 0.08 * h + r
+    case = [
+        (0, 0),
+        (0.9 * r, 0),
+        (r, 0.08 * deep),
+        (r, 0.94 * deep),
+        (0.97 * r, deep),
+        (0.9 * r, deep),
+        (0.88 * r, 0.94 * deep),
+    ]
+
+    def facing(solid: Manifold) -> Manifold:  # drawn upward from its back, turned to look towards -Y
+        return solid.rotate((90, 0, 0)).translate((0, 0.5 * deep, middle))
+
+    model = Model().add("body", facing(lathe(rounded([*case, (0, 0.94 * deep)], 0.004), sides=chords(72))))
+    face = 0.94 * deep
+    model.add("dial", facing(cylinder(0.885 * r, 0.0012, sides=chords(72)).translate((0, 0, face - 0.0004))), "dial")
+    marks = []
+    for hour in range(12):
+        long = 0.13 * r if hour % 3 == 0 else 0.08 * r
+        mark = box(0.05 * r, long, 0.0012).translate((0, 0.8 * r - 0.5 * long, face + 0.0002))
+        marks.append(mark.rotate((0, 0, 30 * hour)))
+    model.add("hands", facing(union(marks)), "hands")
+    for angle, long, wide in ((55.0, 0.42 * r, 0.07 * r), (-60.0, 0.62 * r, 0.05 * r)):  # ten past ten
+        hand = box(wide, long + 0.1 * r, 0.0016, radius_m=0.0004).translate((0, 0.5 * long - 0.05 * r, face + 0.0004))
+        model.add("hands", facing(hand.rotate((0, 0, angle))), "hands")
+    model.add("hands", facing(cylinder(0.06 * r, 0.0034, sides=chords(24)).translate((0, 0, face))), "hands")
+    cup = 0.5 * bell * 2 * r
+    dome = [(0, 0), (cup, 0), (cup, 0.12 * cup), (0.88 * cup, 0.42 * cup), (0.55 * cup, 0.68 * cup), (0, 0.78 * cup)]
+    for side in (-1.0, 1.0):
+        lean = side * 33.0
+        rod = cylinder(0.05 * r + 0.0008, 0.3 * r, sides=chords(20)).translate((0, 0, 0.94 * r))
+        dish = lathe(rounded(dome, 0.1 * cup), sides=chords(48)).translate((0, 0, 1.1 * r))
+        nut = ellipsoid(0.22 * cup, 0.22 * cup, 0.3 * cup, sides=chords(20)).translate((0, 0, 1.1 * r + 0.8 * cup))
+        model.add("bells", union([rod, dish, nut]).rotate((0, lean, 0)).translate((0, 0, middle)), "bells")
+        foot = cylinder(0.05 * r + 0.001, 0.42 * r, top_radius_m=0.06 * r + 0.002, sides=chords(24))
+        tilted = foot.translate((0, 0, -1.3 * r)).rotate((0, side * -30, 0)).translate((0, 0, middle))
+        model.add("feet", tilted, "bells")
+        heel = ellipsoid(0.22 * r, 0.3 * r, 0.16 * r, sides=chords(24))
+        place = (
+            -side * -1.28 * r * float(np.sin(np.radians(30))),
+            0.0,
+            middle - 1.26 * r * float(np.cos(np.radians(30))),
+        )
+        model.add("feet", heel.translate(place), "bells")
+    prop = cylinder(0.045 * r + 0.001, 1.1 * r, sides=chords(24)).translate((0, 0, -1.1 * r)).rotate((24, 0, 0))
+    model.add(
+        "feet",
+        prop.translate((0, 0.36 * deep, middle - 0.86 * r * 0.3))
+        ^ box(4 * r, 4 * r, 8 * r).translate((0, 0, middle - 1.171 * r)),
+        "bells",
+    )
+    hammer = cylinder(0.035 * r + 0.0006, 0.42 * r, sides=chords(16)).translate((0, 0, middle + 0.95 * r))
+    model.add(
+        "hammer",
+        hammer + ellipsoid(0.3 * r, 0.16 * r, 0.16 * r, sides=chords(24)).translate((0, 0, middle + 1.36 * r)),
+        "bells",
+    )
+    knob = facing(cylinder(0.16 * r, 0.1 * deep, sides=chords(24)).translate((0, 0, -0.09 * deep)))
+    model.add("knob", knob, "bells")
+    front = -0.5 * deep + 0.06 * deep - 0.0008
+    model.point("dial", "face", "dial", (0.0, front, middle - 0.3 * r), (0.0, -1.0, 0.0))
+    model.point("knob", "button", "knob", (0.0, 0.59 * deep, middle), (0.0, 1.0, 0.0))
+    return model.point("body", "surface", "body", (r, 0.0, middle), (1.0, 0.0, 0.0)).laid()

@@ -5,7 +5,18 @@ from __future__ import annotations
 import numpy as np
 from manifold3d import Manifold
 
-from manitwin.geometry.solids.shapes import box, cylinder, ellipsoid, lathe, polygon, prism, rectangle, rounded, union
+from manitwin.geometry.solids.shapes import (
+    box,
+    chords,
+    cylinder,
+    ellipsoid,
+    lathe,
+    polygon,
+    prism,
+    rectangle,
+    rounded,
+    union,
+)
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -206,3 +217,80 @@ def glasses_case(*, length_m: float, width: float, thick: float) -> Model:
     model.add("clasp", clasp, "clasp")
     model.point("lid", "surface", "lid", (0.0, 0.0, high), (0.0, 0.0, 1.0))
     return model.point("clasp", "surface", "clasp", (0.0, -0.5 * across - 0.004, 0.45 * high), (0.0, -1.0, 0.0))
+
+
+@template("matchbox")
+def matchbox(*, length_m: float, width: float, thick: float, drawn: float) -> Model:
+    """Build a matchbox lying flat, its drawer pulled out towards +X by ``drawn`` of its length, matches in it."""
+    n, y, z = length_m, width * length_m, thick * length_m
+    card, out = 0.0006, drawn * length_m
+    model = Model().add("body", box(n, y, z, radius_m=0.0004))
+    for side in (-1.0, 1.0):
+        strip = box(n - 0.002, 0.0006, 0.8 * z).translate((0, side * (0.5 * y - 0.0002), 0.1 * z))
+        model.add("striking side", strip, "striking side")
+    inner_y, inner_z = y - 2 * card, z - 2 * card
+    for side in (-1.0, 1.0):  # the drawer's end stands back at -X, and is seen at +X
+        model.cut("mouth", box(0.004, inner_y, inner_z).translate((side * 0.5 * n, 0, card)), "drawer")
+    drawer = box(out + 0.006, inner_y - 0.0004, inner_z - 0.0004).translate((0.5 * n + 0.5 * out - 0.003, 0, card))
+    model.add("drawer", drawer, "drawer")
+    hollow = box(out - card + 0.001, inner_y - 0.0022, z).translate(
+        (0.5 * n + 0.5 * out - 0.5 * card - 0.0005, 0, card + 0.55 * inner_z)
+    )
+    model.cut("inside", hollow, "drawer")
+    stick, pitch = 0.0021, 0.0028
+    count = int((inner_y - 0.004) / pitch)
+    level, end = card + 0.55 * inner_z - 0.0002, 0.5 * n + out - card - 0.0016
+    for number in range(count):
+        across = (number - 0.5 * (count - 1)) * pitch
+        back = end - 0.0012 * ((7 * number) % 3)
+        rod = box(out + 0.0014, stick, stick).translate((back - 0.5 * out, across, level))
+        model.add("matches", rod, "matches")
+        ball = ellipsoid(0.0052, 0.0027, 0.0027, sides=chords(16))
+        model.add("heads", ball.translate((back - 0.0022, across, level + 0.5 * stick)), "heads")
+    model.region("base", "body", lambda centers: centers[:, 2] < 1e-5)
+    model.region("top", "body", lambda centers: centers[:, 2] > z - 1e-5)
+    model.point("drawer", "face", "drawer", (0.5 * n + out, 0.0, card + 0.25 * inner_z), (1.0, 0.0, 0.0))
+    model.point("striking side", "face", "striking side", (0.0, -0.5 * y - 0.0001, 0.5 * z), (0.0, -1.0, 0.0))
+    return model.point("top", "face", "top", (0.0, 0.0, z), (0.0, 0.0, 1.0))
+
+
+@template("food container")
+def food_container(*, length_m: float, width: float, height: float, taper: float, lid: float) -> Model:
+    """Build a closed container with a lid that four clips hold; ``taper`` is its floor over its mouth, ``lid`` a share."""
+    n, y, h = length_m, width * length_m, height * length_m
+    brim = (1 - lid) * h
+    radius = 0.16 * y
+
+    def layer(x_m: float, y_m: float, low_m: float, high_m: float) -> Manifold:
+        return prism(rectangle(x_m, y_m, radius_m=radius), high_m - low_m).translate((0, 0, low_m))
+
+    rim, floor = (0.94 * n, y - 0.06 * n), (taper * 0.94 * n, taper * (y - 0.06 * n))
+    tub = Manifold.batch_hull(
+        [
+            layer(*rim, brim - 0.001, brim),
+            layer(*floor, 0.004, 0.005),
+            layer(0.96 * floor[0], 0.95 * floor[1], 0, 0.001),
+        ]
+    )
+    model = Model().add("body", tub)
+    flange = (0.965 * n, y - 0.035 * n)
+    model.add("body", layer(*flange, brim - 0.0035, brim))
+    cover = prism(rectangle(*flange, radius_m=radius), lid * h, radius_m=0.25 * lid * h).translate(
+        (0, 0, brim - 0.0002)
+    )
+    model.add("lid", cover, "lid")
+    well = prism(rectangle(0.8 * n, y - 0.2 * n, radius_m=0.8 * radius), h, radius_m=0.001).translate(
+        (0, 0, h - 0.3 * lid * h)
+    )
+    model.cut("panel", well, "lid")
+    thick, long = 0.0175 * n + 0.0006, 0.42 * y
+    down = brim - 0.012
+    for turn, reach in ((0, 0.5 * flange[0]), (180, 0.5 * flange[0]), (90, 0.5 * flange[1]), (270, 0.5 * flange[1])):
+        clip = box(thick, long, h - 0.25 * lid * h - down, radius_m=0.0012).translate(
+            (reach + 0.5 * thick - 0.0008, 0, down)
+        )
+        model.add("clips", clip.rotate((0, 0, turn)), "lid")
+    model.region("base", "body", lambda centers: centers[:, 2] < 1e-5)
+    model.point("lid", "face", "panel", (0.0, 0.0, h - 0.3 * lid * h - 0.0002), (0.0, 0.0, 1.0))
+    model.point("clip", "surface", "clips", (0.5 * flange[0] + thick - 0.0008, 0.0, 0.5 * (down + h)), (1.0, 0.0, 0.0))
+    return model.point("base", "face", "base", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))

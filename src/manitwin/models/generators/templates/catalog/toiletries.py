@@ -213,3 +213,78 @@ def umbrella(*, length_m: float, width_m: float, grip: float) -> Model:
     model.add("tip", cylinder(0.004, 0.01).rotate((0, 90, 0)).translate((end - 0.01, 0, 0)), "handle")
     model.point("tip", "tip", "tip", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
     return model.point("handle", "surface", "handle", (0.5 * (start - end), 0.0, 0.67 * r), (0.0, 0.0, 1.0)).laid()
+
+
+@template("nail clipper")
+def nail_clipper(*, length_m: float, width: float, thick_m: float, lever: float) -> Model:
+    """Build a closed nail clipper lying on its lower bar, its jaws towards +X, the lever folded down towards -X.
+
+    ``lever`` is the lever's length over the whole.
+    """
+    n, end, y = length_m, 0.5 * length_m, width * length_m
+    gap = 0.0031
+    plan = [
+        (-end, -0.36 * y),
+        (-0.3 * end, -0.42 * y),
+        (0.55 * end, -0.5 * y),
+        (0.86 * end, -0.5 * y),
+        (end, -0.46 * y),
+    ]
+    plan += [(x, -wide) for x, wide in reversed(plan)]
+    within = prism(polygon(plan, radius_m=0.0016), 0.1).translate((0, 0, -0.05))
+    low = [
+        (-0.96 * end, 0, 0.0003),
+        (-0.5 * end, 0, 0.6 * gap),
+        (0.2 * end, 0, gap),
+        (0.76 * end, 0, 0.95 * gap),
+        (0.985 * end, 0, 0.0012),
+    ]
+    inner = [*((float(x), float(z)) for x, _, z in arc(low, samples=22)), (end, 0.0)]
+    rise = [
+        (-end, 0, thick_m),
+        (-0.5 * end, 0, 0.6 * gap + thick_m),
+        (0.2 * end, 0, gap + thick_m),
+        (0.76 * end, 0, 0.95 * gap + thick_m),
+    ]
+    outer = [*((float(x), float(z)) for x, _, z in arc([*rise, (end, 0, 0.0016)], samples=22)[::-1]), (-end, 0.0)]
+    arm = prism(polygon([*inner, *outer]), 2 * y).rotate((90, 0, 0)).translate((0, y, 0)) ^ within
+    model = Model().add("body", arm).add("body", arm.mirror((0, 0, 1)))
+    model.region("jaws", "body", lambda centers: centers[:, 0] > 0.8 * end)
+    top = gap + thick_m
+    pin = 0.56 * end
+    model.add("pin", cylinder(0.0021, 2 * top + 0.0052, sides=24).translate((pin, 0, -top - 0.0012)), "pin")
+    model.add(
+        "pin",
+        lathe([(0, 0), (0.0034, 0), (0.0034, 0.0008), (0.0022, 0.0016), (0, 0.0016)], sides=24).translate(
+            (pin, 0, -top - 0.0012)
+        ),
+        "pin",
+    )
+    start = pin + 0.07 * n
+    back = start - lever * n
+    bend = [
+        (start, 0, top + 0.0018),
+        (pin, 0, top + 0.0024),
+        (pin - 0.16 * n, 0, top + 0.0012),
+        (0.45 * back + 0.55 * pin, 0, top + 0.0006),
+    ]
+    curve = arc(
+        [*bend, (back + 0.14 * n, 0, 0.62 * gap + thick_m + 0.0016), (back, 0, 0.5 * gap + thick_m + 0.004)], samples=26
+    )
+    bar = [(float(x), float(z) + 0.0009) for x, _, z in curve] + [
+        (float(x), float(z) - 0.0009) for x, _, z in curve[::-1]
+    ]
+    tongue = [
+        (back, -0.3 * y),
+        (back + 0.1 * n, -0.4 * y),
+        (pin - 0.1 * n, -0.36 * y),
+        (pin, -0.26 * y),
+        (start, -0.24 * y),
+    ]
+    tongue += [(x, -wide) for x, wide in reversed(tongue)]
+    flat = prism(polygon(bar), 2 * y).rotate((90, 0, 0)).translate((0, y, 0))
+    model.add("lever", flat ^ prism(polygon(tongue, radius_m=0.0012), 0.1).translate((0, 0, -0.05)), "lever")
+    model.cut("hole", cylinder(0.0016, 0.1, sides=24).translate((-end + 0.0045, 0, -0.05)))
+    model.point("jaws", "edge", "jaws", (end, 0.0, 0.0006), (1.0, 0.0, 0.0))
+    at = curve[19]
+    return model.point("lever", "surface", "lever", (float(at[0]), 0.0, float(at[2]) + 0.0009), (0.0, 0.0, 1.0)).laid()

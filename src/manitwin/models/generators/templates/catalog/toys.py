@@ -20,10 +20,10 @@ from manitwin.geometry.solids.shapes import (
     torus,
     union,
 )
+from manitwin.geometry.solids.sweep import arc, tube
 from manitwin.models.generators.templates.catalog.hand_tools import grip
 from manitwin.models.generators.templates.catalog.rings import ring_radii, with_both_sides
 from manitwin.models.generators.templates.catalog.vessel import bulge
-from manitwin.models.generators.templates.standard_sizes import BRICK_GAP_M, STUD_PITCH_M
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -153,26 +153,6 @@ def chess_piece(*, height_m: float, width: float, head: float, waist: float) -> 
     ).laid()
 
 
-@template("building block")
-def building_block(*, length_m: float, height: float, wall_m: float) -> Model:
-    """Build a brick with two rows of four studs, hollow from below, a fortieth of a pitch less than their places."""
-    pitch = length_m * STUD_PITCH_M / (4 * STUD_PITCH_M - BRICK_GAP_M)
-    y, h = pitch * (2 - BRICK_GAP_M / STUD_PITCH_M), height * length_m
-    stud, raised = 0.3 * pitch, 0.22 * pitch
-    model = Model().add("body", box(length_m, y, h, radius_m=0.0003))
-    model.cut("inside", box(length_m - 2 * wall_m, y - 2 * wall_m, h).translate((0, 0, -wall_m)))
-    tubes = [cylinder(0.41 * pitch, h - 0.5 * wall_m).translate((i * pitch, 0, 0)) for i in (-1, 0, 1)]
-    model.add("tubes", union(tubes))
-    bores = [cylinder(0.3 * pitch, h - wall_m + 0.001).translate((i * pitch, 0, -0.001)) for i in (-1, 0, 1)]
-    model.cut("tubes", union(bores))
-    top = lathe(rounded([(0, 0), (stud, 0), (stud, raised + 0.001), (0, raised + 0.001)], 0.0003), sides=chords(32))
-    places = product((-1.5, -0.5, 0.5, 1.5), (-0.5, 0.5))
-    model.add("studs", union([top.translate((i * pitch, j * pitch, h - 0.001)) for i, j in places]))
-    model.point("top", "surface", "studs", (0.5 * pitch, 0.5 * pitch, h + raised), (0.0, 0.0, 1.0))
-    model.point("side", "face", "body", (0.0, -0.5 * y, 0.5 * h), (0.0, -1.0, 0.0))
-    return model.point("base", "opening", "inside", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
-
-
 @template("toy car")
 def toy_car(*, length_m: float, width: float, height: float, cabin: float, wheel: float) -> Model:
     """Build a car, its front towards -Y; ``cabin`` is the cabin's share of the length, ``wheel`` a wheel's width over it."""
@@ -267,3 +247,39 @@ def table_tennis_paddle(*, length_m: float, blade: float, width: float, thick_m:
     model.point("forehand", "face", "forehand", (at, 0.0, top), (0.0, 0.0, 1.0))
     model.point("handle", "surface", "handle", (0.5 * (start + end), 0.0, 0.0119), (0.0, 0.0, 1.0))
     return model.laid()
+
+
+@template("rubber duck")
+def rubber_duck(*, length_m: float, width: float, height: float, head: float) -> Model:
+    """Build a bath duck that looks towards -Y, flat below; ``head`` is its head's width over the length."""
+    n, wide, tall = length_m, width * length_m, height * length_m
+    ball = 0.5 * head * n
+    low = 0.62 * tall
+    ahead = -0.16 * n
+    trunk = ellipsoid(wide, 0.86 * n, 1.16 * low, sides=chords(72)).translate((0, 0, 0.47 * low))
+    tail = arc(
+        [(0, 0.1 * n, 0.45 * low), (0, 0.34 * n, 0.58 * low), (0, 0.45 * n, 0.76 * low), (0, 0.5 * n, 0.95 * low)]
+    )
+    along = np.linspace(0, 1, len(tail))
+    plume = tube(
+        tail, wide * np.interp(along, [0, 0.4, 0.75, 1], [0.4, 0.27, 0.13, 0.03]), flatten=0.8, across=(1, 0, 0)
+    )
+    ground = box(2 * n, 2 * n, 2 * n)
+    model = Model().add("body", (trunk + plume) ^ ground)
+    neck = cylinder(1.02 * ball, 0.5 * low, top_radius_m=0.7 * ball, sides=chords(56))
+    model.add("body", neck.translate((0, ahead, 0.62 * low)))
+    at = tall - ball
+    model.add("head", ellipsoid(2 * ball, 2 * ball, 2 * ball, sides=chords(64)).translate((0, ahead, at)))
+    for side in (-1.0, 1.0):
+        wing = ellipsoid(0.18 * wide, 0.48 * n, 0.34 * low, sides=chords(48)).rotate((20, 0, 0))
+        model.add("wings", wing.rotate((0, 0, 9 * side)).translate((side * 0.45 * wide, 0.08 * n, 0.6 * low)))
+        eye = ellipsoid(0.3 * ball, 0.16 * ball, 0.38 * ball, sides=chords(24)).rotate((-16, 0, 24 * side))
+        model.add("eyes", eye.translate((side * 0.4 * ball, ahead - 0.82 * ball, at + 0.36 * ball)), "eyes")
+    for lean, thick, high in ((12.0, 0.34, 0.0), (-12.0, 0.26, -0.14)):
+        half = ellipsoid(1.0 * ball, 1.3 * ball, thick * ball, sides=chords(36)).rotate((lean, 0, 0))
+        model.add("beak", half.translate((0, ahead - 1.0 * ball, at - (0.1 - high) * ball)), "beak")
+    model.region("base", "body", lambda centers: centers[:, 2] < 1e-5)
+    model.point("head", "surface", "head", (0.0, ahead, tall), (0.0, 0.0, 1.0))
+    tip = (0.0, ahead - 1.64 * ball, at - 0.22 * ball)
+    model.point("beak", "tip", "beak", tip, (0.0, -1.0, 0.0))
+    return model.point("base", "face", "base", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))

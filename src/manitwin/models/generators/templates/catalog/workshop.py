@@ -71,55 +71,6 @@ def spirit_level(*, length_m: float, height_m: float, thick: float) -> Model:
     ).laid()
 
 
-@template("c clamp")
-def c_clamp(*, opening_m: float, throat: float, bar_m: float) -> Model:
-    """Build a clamp lying on its side: the fixed jaw towards +X, the screw along X through the other arm.
-
-    ``opening_m`` is from jaw to boss, ``throat`` the depth of the frame over it, ``bar_m`` how wide the frame's bar is.
-    """
-    gap, deep, thick = opening_m, throat * opening_m, 0.8 * bar_m
-    right, left = 0.5 * gap, -0.5 * gap
-    outer = [(left - bar_m, 0.5 * bar_m), (left - bar_m, -0.6 * bar_m), (left, -0.6 * bar_m), (left, deep - bar_m)]
-    outer += [
-        (right, deep - bar_m),
-        (right, -0.6 * bar_m),
-        (right + 0.8 * bar_m, -0.6 * bar_m),
-        (right + 0.8 * bar_m, 0.0),
-    ]
-    outer += [(right + 1.1 * bar_m, deep - 0.7 * bar_m), (right + 0.4 * bar_m, deep), (left - 0.4 * bar_m, deep)]
-    outer += [(left - 1.3 * bar_m, deep - 0.7 * bar_m)]
-    frame = prism(polygon(outer, radius_m=0.0025), thick, radius_m=0.0025).translate((0, 0, -0.5 * thick))
-    model = Model().add("frame", frame, "frame")
-    r, boss = 0.3 * bar_m, 0.52 * bar_m
-    model.add("frame", cylinder(boss, 1.1 * bar_m).rotate((0, 90, 0)).translate((left - 1.1 * bar_m, 0, 0)), "frame")
-    jaw = cylinder(0.5 * bar_m, 0.4 * bar_m).rotate((0, 90, 0)).translate((right - 0.3 * bar_m, 0, 0))
-    model.add("jaw", jaw, "frame")
-    start, end = left - 1.05 * gap - bar_m, left + 0.32 * gap
-    ridges = [(0.0, start)]
-    for number in range(28):
-        z = start + (end - start) * (number + 0.5) / 28
-        ridges += [(0.88 * r, z - 0.3 * (end - start) / 28), (r, z)]
-    screw = lathe([*ridges, (0.88 * r, end), (0.0, end)]).rotate((0, 90, 0))
-    pad = cylinder(0.62 * bar_m, 0.32 * bar_m, top_radius_m=0.55 * bar_m).rotate((0, 90, 0))
-    model.add("screw", screw, "screw").add("pad", pad.translate((end - 0.05 * bar_m, 0, 0)), "screw")
-    across = 0.85 * deep
-    bar = cylinder(0.2 * bar_m, across).rotate((90, 0, 0)).translate((start + 0.3 * bar_m, 0.5 * across, 0))
-    model.add("handle", cylinder(0.5 * bar_m, 0.6 * bar_m).rotate((0, 90, 0)).translate((start, 0, 0)), "screw")
-    model.add("handle", bar, "screw")
-    for side in (-1.0, 1.0):
-        model.add(
-            "handle",
-            ellipsoid(0.62 * bar_m, 0.62 * bar_m, 0.62 * bar_m).translate(
-                (start + 0.3 * bar_m, side * 0.5 * across, 0)
-            ),
-            "screw",
-        )
-    model.point("fixed jaw", "face", "jaw", (right - 0.3 * bar_m, 0.0, 0.0), (-1.0, 0.0, 0.0))
-    model.point("pad", "face", "pad", (end + 0.27 * bar_m, 0.0, 0.0), (1.0, 0.0, 0.0))
-    model.point("handle", "surface", "handle", (start + 0.3 * bar_m, -0.3 * across, 0.2 * bar_m), (0.0, 0.0, 1.0))
-    return model.point("frame", "surface", "frame", (0.0, deep - 0.5 * bar_m, 0.5 * thick), (0.0, 0.0, 1.0)).laid()
-
-
 @template("magnet")
 def magnet(*, length_m: float, width: float, thick: float) -> Model:
     """Build a horseshoe magnet lying flat, its poles towards +X."""
