@@ -63,6 +63,30 @@ def test_card_shows_the_photo_or_the_prompt_in_the_first_column() -> None:
     assert not (with_prompt == (0, 0, 255)).all(2).any()
 
 
+def test_what_was_made_of_words_and_stands_is_seen_from_its_front_though_more_is_seen_from_behind() -> None:
+    def leaning(side: float) -> trimesh.Trimesh:
+        board = trimesh.creation.box([0.08, 0.006, 0.06]).apply_translation([0, 0, 0.03])
+        return board.apply_transform([[1, 0, 0, 0], [0, 1, side * 0.9, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+
+    def rendered(side: float, **source: object) -> np.ndarray:
+        solid = leaning(side)
+        drawn = card(
+            parts=[plain_part(solid, (180, 120, 60))], solid=solid, hulls=[np.asarray(solid.vertices)], **source
+        )
+        left = 24 + PANEL + (WIDTH - 48 - 4 * PANEL) // 3
+        return np.asarray(Image.open(io.BytesIO(drawn)), dtype=np.int64)[:, left : left + PANEL]
+
+    photo = np.zeros((300, 200, 3), dtype=np.uint8)
+    towards, away = -1.0, 1.0
+    assert (rendered(towards, prompt="a board") == rendered(towards, photo=photo)).mean() > 0.95, (
+        "as a photo's thing is"
+    )
+    assert (rendered(away, prompt="a board") == rendered(away)).mean() > 0.95, (
+        "of a mesh the side of which more is seen"
+    )
+    assert (rendered(towards, prompt="a board") == rendered(towards)).mean() < 0.95
+
+
 def test_photo_keeps_its_shape_and_its_matte() -> None:
     photo = np.zeros((1000, 500, 4), dtype=np.uint8)
     photo[300:500, 200:300] = (255, 0, 0, 255)

@@ -27,7 +27,7 @@ ORBIT_ASPECTS = (1.0, 1.62, 2.62, 4.24)
 HERO_ELEVATION_DEG, HERO_FLAT_ELEVATION_DEG = 26.0, 50.0
 FLAT = 0.3  # height, in the longer side of the footprint, below which a thing lies rather than stands
 HERO_AZIMUTHS_DEG = np.arange(-60.0, 300.0, 30.0)
-HERO_FRONT_AZIMUTHS_DEG = np.array([-60.0, -90.0, -120.0])  # about -Y, the front of what was made of a photo
+HERO_FRONT_AZIMUTHS_DEG = np.array([-60.0, -90.0, -120.0])  # about -Y, the front of what was made of a photo or a text
 FILL = 0.88  # share of the picture's half width that the silhouette may reach
 
 
@@ -181,8 +181,7 @@ def hero_camera(
     picture's diagonal: there the area in the picture counts too. ``from_front``: seen from the side of
     -Y, where a photo showed what stands, and from where what lies is the right way up.
     """
-    extents = np.ptp(points, axis=0)
-    flat = extents[2] < FLAT * extents[:2].max()
+    flat = not stands(points)
     elevation = HERO_FLAT_ELEVATION_DEG if flat else HERO_ELEVATION_DEG
     best: tuple[float, Camera] | None = None
     for azimuth in HERO_FRONT_AZIMUTHS_DEG if from_front else HERO_AZIMUTHS_DEG:
@@ -201,6 +200,12 @@ def hero_camera(
             best = score, camera
     assert best is not None
     return best[1]
+
+
+def stands(points: np.ndarray) -> bool:
+    """Tell whether a thing of points ``(N, 3)`` in the object frame is too high to be seen from above."""
+    extents = np.ptp(points, axis=0)
+    return bool(extents[2] >= FLAT * extents[:2].max())
 
 
 def silhouette_area_px(points: np.ndarray, camera: Camera) -> float:

@@ -16,7 +16,7 @@ import trimesh
 from PIL import Image, ImageDraw
 
 from manitwin.geometry.hulls.reduction import convex_corners
-from manitwin.render.cameras import hero_camera
+from manitwin.render.cameras import hero_camera, stands
 from manitwin.render.card_panels import (
     DRAWN_GRASPS,
     FUNCTIONAL,
@@ -73,13 +73,15 @@ def make_card(
     """Draw a twin's card and return it as PNG.
 
     ``parts`` are the textured meshes, ``solid`` the repaired one, ``hulls`` the vertices ``(V, 3)`` of each collision
-    hull, all in the object frame in metres; ``mass`` is drawn over the hulls. The first column shows
+    hull, all in the object frame in metres; ``mass`` is drawn over the hulls. What stands is seen from its front, but of a mesh,
+    whose front nobody told. The first column shows
     ``photo (H, W, 3 or 4) uint8``, whose side the next two show, or ``prompt``; where the input was a mesh it shows the bare
     shape. Raises RendererMissing where nothing renders.
     """
     mesh = merged(list(parts))
     outline = convex_corners(np.asarray(mesh.vertices))[0]  # all that a camera's choice depends on
-    hero = hero_camera(outline, fov_y_deg=FOV_Y_DEG, width_px=PANEL, height_px=PANEL, from_front=photo is not None)
+    from_front = photo is not None or (prompt is not None and stands(outline))
+    hero = hero_camera(outline, fov_y_deg=FOV_Y_DEG, width_px=PANEL, height_px=PANEL, from_front=from_front)
     if photo is not None:
         first, caption = input_panel(photo, PANEL), "input photo, cut out"
     elif prompt is not None:
