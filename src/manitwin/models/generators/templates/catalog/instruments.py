@@ -245,4 +245,5 @@ def alarm_clock(*, height_m: float, width: float, depth: float, bell: float) -> 
     front = -0.5 * deep + 0.06 * deep - 0.0008
     model.point("dial", "face", "dial", (0.0, front, middle - 0.3 * r), (0.0, -1.0, 0.0))
     model.point("knob", "button", "knob", (0.0, 0.59 * deep, middle), (0.0, 1.0, 0.0))
-    return model.point("body", "surface", "body", (r, 0.0, middle), (1.0, 0.0, 0.0)).laid()
+    top = middle + 1.44 * r
+    return model.point("hammer", "surface", "hammer", (0.0, 0.0, top), (0.0, 0.0, 1.0)).laid()

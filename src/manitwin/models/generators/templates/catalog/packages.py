@@ -292,5 +292,6 @@ def food_container(*, length_m: float, width: float, height: float, taper: float
         model.add("clips", clip.rotate((0, 0, turn)), "lid")
     model.region("base", "body", lambda centers: centers[:, 2] < 1e-5)
     model.point("lid", "face", "panel", (0.0, 0.0, h - 0.3 * lid * h - 0.0002), (0.0, 0.0, 1.0))
-    model.point("clip", "surface", "clips", (0.5 * flange[0] + thick - 0.0008, 0.0, 0.5 * (down + h)), (1.0, 0.0, 0.0))
+    middle = 0.5 * (down + h - 0.25 * lid * h)
+    model.point("clip", "face", "clips", (0.5 * flange[0] + thick - 0.0008, 0.0, middle), (1.0, 0.0, 0.0))
     return model.point("base", "face", "base", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))

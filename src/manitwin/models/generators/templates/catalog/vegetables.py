@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from manifold3d import Manifold
 
 from manitwin.geometry.solids.shapes import chords, cylinder, lathe
 from manitwin.geometry.solids.sweep import arc, tube
@@ -34,11 +35,31 @@ def avocado(*, length_m: float, width: float, neck: float) -> Model:
     wide = width * length_m
     profile = [(0, 0.0), (0.3, 0.012), (0.72, 0.1), (0.95, 0.26), (1, 0.38), (0.9, 0.56), (0.5 * (0.9 + neck), 0.68)]
     profile += [(neck, 0.8), (0.74 * neck, 0.92), (0.38 * neck, 0.985), (0, 1.0)]
-    model = Model().add("body", lying(turned(profile, wide, length_m, sides=56).translate((0, 0, -0.5 * length_m))))
-    nub = lying(cylinder(0.07 * wide, 0.04 * length_m, top_radius_m=0.085 * wide, sides=chords(16)))
-    model.add("stem", nub.translate((0.475 * length_m, 0, 0)), "stem")
-    model.point("stem end", "tip", "stem", (0.515 * length_m, 0.0, 0.0), (1.0, 0.0, 0.0))
-    return model.point("side", "surface", "body", (-0.12 * length_m, -0.5 * wide, 0.0), (0.0, -1.0, 0.0)).laid()
+    tilt = _resting_tilt(np.array(profile) * [0.5 * wide, length_m])
+
+    def laid(solid: Manifold) -> Manifold:
+        return lying(solid.translate((0, 0, -0.5 * length_m))).rotate((0, float(np.degrees(tilt)), 0))
+
+    model = Model().add("body", laid(turned(profile, wide, length_m, sides=56)))
+    nub = cylinder(0.07 * wide, 0.04 * length_m, top_radius_m=0.085 * wide, sides=chords(16))
+    model.add("stem", laid(nub.translate((0, 0, 0.975 * length_m))), "stem")
+    ahead = (float(np.cos(tilt)), 0.0, -float(np.sin(tilt)))
+    end, broad = 0.515 * length_m, -0.12 * length_m
+    model.point("stem end", "tip", "stem", (end * ahead[0], 0.0, end * ahead[2]), ahead)
+    place = (broad * ahead[0], -0.5 * wide, broad * ahead[2])
+    return model.point("side", "surface", "body", place, (0.0, -1.0, 0.0)).laid()
+
+
+def _resting_tilt(profile_m: np.ndarray) -> float:
+    """Return how far (rad) a solid of a profile (radius, z) that lies along +X is turned about Y when it is at rest.
+
+    It rests where its centre of mass is lowest: of the directions near the radial one, that in which it reaches out least.
+    """
+    radius, z = arc([(r, 0.0, at) for r, at in profile_m], samples=200)[:, [0, 2]].T
+    center_m = np.trapezoid(radius**2 * z, z) / np.trapezoid(radius**2, z)
+    angles = np.linspace(-0.5, 0.5, 401)
+    reach = np.max(np.cos(angles)[:, None] * radius + np.sin(angles)[:, None] * (z - center_m), axis=1)
+    return float(angles[reach.argmin()])
 
 
 @template("cucumber")
