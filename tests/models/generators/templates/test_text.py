@@ -120,7 +120,15 @@ def test_what_a_thing_smells_or_is_of_is_not_the_thing(text: str, category: str)
         *("a lemon squeezer", "apple sauce", "an egg carton", "a chess board", "an egg slicer"),
         *("a banana split", "a basketball", "a chess set", "a brake disc", "an ice cube", "a lime", "a toy truck"),
         *("a cherry tomato", "a garlic bulb", "an apple pie", "a ball of yarn", "a golf club"),
-        *("a sugar cube", "a stock cube", "candy corn", "a hose clamp", "a wooden plank", "an engine block"),
+        *(
+            "a sugar cube",
+            "a stock cube",
+            "candy corn",
+            "a hose clamp",
+            "a wooden plank",
+            "an engine block",
+            "black pepper",
+        ),
     ],
 )
 def test_a_thing_is_no_food_or_ball_that_its_name_names(text: str) -> None:

@@ -170,7 +170,8 @@ def test_a_noun_behind_a_name_makes_it_another_thing(text: str) -> None:
         ("a steel garlic press with a red handle", "garlic press"), ("chrome nail clippers", "nail clipper"),
         ("a box of matches", "matchbox"), ("a lunch box with a green lid", "food container"), ("an ear of corn", "corn"),
         ("a red bell pepper", "bell pepper"), ("a spring clamp with orange pads", "clamp"),
-        ("a red alarm clock with brass bells", "alarm clock"),
+        ("a red alarm clock with brass bells", "alarm clock"), ("an oak block 10 x 5 x 3 cm", "wood block"),
+        ("a cube of cheese", "cheese"), ("a tupperware with a red lid, 500 ml", "food container"),
     ],
 )  # fmt: skip
 def test_what_robots_handle_has_templates_of_its_own(text: str, category: str) -> None:

@@ -30,7 +30,7 @@ _PARTED = frozenset({"of", "in", "from"})
 """What a thing is, the words before these say: a box of pencils is a box."""
 _SHOWN_AS = frozenset(
     {"piece", "kind", "sort", "type", "style", "model", "photo", "picture", "image"}
-    | {"rendering", "render", "twin", "replica", "roll", "bar", "tube", "stick", "sheet", "block"}
+    | {"rendering", "render", "twin", "replica", "roll", "bar", "tube", "stick", "sheet", "block", "cube"}
 )
 """What is behind 'of' is meant: a photo of a mug, a roll of duct tape."""
 _GROUPS = frozenset(
