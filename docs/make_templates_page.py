@@ -119,9 +119,9 @@ are verified (96.7 %). 111 of them were built before openings and poses were las
 Rejected are two speakers wider than the gripper opens, two rolling pins, which roll, and a trash
 can and a serving tray that fell from every grip at their rims.
 
-`python benchmarks/text_sizes.py`: with two sides of another such thing stated, length and height, 260 of 278 categories are
-made, with three 251, each side within 0.2 %; the others, knives and brushes most of all, have a side that no measure of
-theirs changes, and say so. All of 55 vessels but a nail polish bottle can be told that they hold 400 ml. It costs 0.08 CPU-s
+`python benchmarks/text_sizes.py`: with two sides of another such thing stated, length and height, 263 of 278 categories are
+made, with three 253, each side within 0.2 %; the others, knives and brushes most of all, have a side that no measure of
+theirs changes, and say so. All of 57 vessels but a nail polish bottle can be told that they hold 400 ml. It costs 0.09 CPU-s
 in the median.
 
 `python benchmarks/points.py --held-out`: the annotator `rules`, which is told none of a template's points, puts 97.8 % of
@@ -147,7 +147,8 @@ notes (0.61 to 0.93).
 
 Of the 21 kinds made last (chess pieces to bell peppers; three of each, `--quick`, seed 5) 63 of 63 are verified. The rules
 put 164 of 169 of their points at their place (3 seeds), those of eight of them by labels written for them. French presses are
-heavy for their handles: 172 of 312 of their grasps hold.
+heavy for their handles: 172 of 312 of their grasps hold. Of 18 rendered photos of six of them, named, 17 are accepted,
+with volumes that overlap the true ones by 0.97 in the median.
 
 `python benchmarks/frames.py --held-out`: frames from geometry, asked for at the candidate nearest to a known point, are
 right (opening 5 mm and 3 degrees, face 3 mm and 3, hole 2 mm and 5, edge 10 degrees, tip 5 mm and 10, button 3 mm and 10)
