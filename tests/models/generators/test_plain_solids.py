@@ -63,6 +63,29 @@ def test_a_nameless_slab_on_a_table_lies_and_is_as_thick_as_it_looks() -> None:
     assert job.notes["view"]["elevation_deg"] == pytest.approx(30, abs=5)
 
 
+@pytest.mark.parametrize("elevation_deg", [30.0, 55.0])
+@pytest.mark.parametrize("yaw_rad", [0.15, 0.7])
+@pytest.mark.parametrize(
+    "sides", [(0.22, 0.10, 0.06), (0.10, 0.07, 0.20), (0.12, 0.09, 0.05), (0.11, 0.11, 0.11)], ids=str
+)
+def test_a_block_has_the_proportions_that_it_shows_from_whatever_side(
+    sides: tuple[float, float, float], yaw_rad: float, elevation_deg: float
+) -> None:
+    width, depth, height = sides
+    found = plain_solids(
+        _seen(_rounded(width, depth, 0.002), height, elevation_deg, yaw_rad=yaw_rad), ShapeHint()
+    ).close
+    assert found is not None and found.category in ("box", "cutting board") and found.upright
+    extents = np.ptp(found.made.mesh.vertices, axis=0)
+    across = np.sort(extents[:2])[::-1] / extents[2]
+    assert across == pytest.approx(np.sort([width, depth])[::-1] / height, rel=0.12)
+
+
+def test_a_block_seen_from_a_corner_is_no_body_of_revolution() -> None:
+    job = from_photo(_seen(_rounded(0.11, 0.11, 0.002), 0.11, 30, yaw_rad=0.7), None)
+    assert job.notes["primitive"] == "box" and job.notes["rests"] == "standing"
+
+
 def test_the_side_that_the_photo_shows_is_the_front() -> None:
     """A slab whose narrow side is towards the camera, whatever side of a slab the solid has there."""
     job = from_photo(_seen(_rounded(0.13, 0.20, 0.02), 0.016, 35, yaw_rad=0.1), None)

@@ -7,19 +7,23 @@ from which they are is believed with it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 
 import cv2
 import numpy as np
 
 from manitwin.geometry.solids.shapes import box, cylinder, prism, rectangle
+from manitwin.models.generators.lift.block_views import BlockView, block_views
 from manitwin.models.generators.lift.hint import ShapeHint
 from manitwin.models.generators.templates.fitting.evidence import Evidence, evidence_of
 from manitwin.models.generators.templates.fitting.fit import Fitted, first_built
-from manitwin.models.generators.templates.fitting.residual import Residual
+from manitwin.models.generators.templates.fitting.least_squares import Placed, Problem
+from manitwin.models.generators.templates.fitting.residual import Residual, residual
 from manitwin.models.generators.templates.fitting.search import Candidate, search
 from manitwin.models.generators.templates.fitting.shape import Family
+from manitwin.models.generators.templates.fitting.view import View
 from manitwin.models.generators.templates.template import Measure, Model, Template
 
 LEAST_IOU, MOST_OUTLINE = 0.985, 0.0022
@@ -36,10 +40,9 @@ MOST_DISC = 0.15
 """Thickness of a disc over its width: what is thicker may as well be a bowl seen from above."""
 PRIMITIVES = {"box": "box", "cutting board": "slab", "can": "cylinder", "coaster": "disc"}
 """What the solids are, by the category of things that stand or lie as each does."""
-EXPECTED: dict[str, tuple[dict[str, float], ...]] = {
-    "box": ({}, {"width": 0.5, "depth": 0.4}, {"width": 1.7, "depth": 1.1})
-}
-"""Proportions that a fit begins with beside the usual ones: from a cube's no fit finds a tall carton or a flat box."""
+_ROUNDS = 6  # of least squares, from a block with sharp edges
+_NEAR = 1.1  # about which proportions of a block are looked for
+_THICKEST_SLAB = 0.3  # of its length: what is thicker is a block
 _EDGE = 0.02  # radius of a block's edges over its least side
 _ROUNDED = 0.2  # radius of a slab's upper and lower edges over its thickness
 
@@ -61,17 +64,52 @@ def plain_solids(rgba: np.ndarray, hint: ShapeHint, focal_mm: float | None = Non
     if not tried or _solidity(rgba[..., 3] > 127) < LEAST_SOLIDITY:
         return PlainSolids()
     evidence = evidence_of(rgba, focal_mm)
-    found = [best for solid in tried for best in _fits(solid, evidence)]
+    blocks = block_views(rgba[..., 3] > 127, evidence.perspective, evidence.focal_spread)
+    found = [best for solid in tried for best in _fits(solid, evidence, blocks)]
     possible = sorted(filter(_is_possible, found), key=lambda each: each.residual.cost)
     close = [each for each in possible if explains_closely(each.residual)]
     return PlainSolids(first_built(close, evidence), first_built(possible, evidence))
 
 
-def _fits(solid: Template, evidence: Evidence) -> list[Candidate]:
-    """Return the best fit of a solid from each of the proportions that it may be expected to have."""
-    expected = EXPECTED.get(PRIMITIVES[solid.category], ({},))
-    starts = [Family(solid, proportions) for proportions in expected]
-    return [best for start in starts for best in search([start], evidence, settled=True, rolled=False)[:1]]
+def _fits(solid: Template, evidence: Evidence, blocks: Sequence[BlockView]) -> list[Candidate]:
+    """Return fits of a solid: of a block those of its outline, of a slab what they lead to beside what a search finds."""
+    kind = PRIMITIVES[solid.category]
+    if kind == "box":
+        return [_block_of(solid, each, evidence) for each in blocks]
+    found = [each for each in search([Family(solid)], evidence, settled=True) if each.upright][:1]
+    if kind == "slab":
+        found += [
+            _slab_of(solid, each, evidence) for each in blocks if max(each.width, each.depth) * _THICKEST_SLAB >= 1
+        ]
+    return found
+
+
+def _block_of(template: Template, block: BlockView, evidence: Evidence) -> Candidate:
+    """Return the block whose edges are round that a sharp one's outline leads to."""
+    near = {
+        name: Measure(usual / _NEAR, usual, usual * _NEAR, "")
+        for name, usual in (("width", block.width), ("depth", block.depth))
+    }
+    family = Family(replace(template, measures={**template.measures, **near}))
+    return _refined(family, block.view, evidence)
+
+
+def _slab_of(template: Template, block: BlockView, evidence: Evidence) -> Candidate:
+    """Return the slab, its corners and edges round, that a block's outline leads to."""
+    length, across = max(block.width, block.depth), min(block.width, block.depth)
+    family = Family(template, {"width": across / length, "thick": 1 / length})
+    turn = 0.0 if block.width >= block.depth else np.pi / 2  # a slab's length is its width, seen from the front
+    return _refined(family, replace(block.view, yaw_rad=block.view.yaw_rad + turn), evidence)
+
+
+def _refined(family: Family, view: View, evidence: Evidence) -> Candidate:
+    """Return a family's fit from its expected measures and a view, of a camera that is not rolled."""
+    start, begin = np.zeros(len(family.free)), [Placed(view, upright=True)]
+    problem = Problem(family, [evidence], turns=False)
+    at, (placed,) = problem.solve(start, begin, measures=True, rounds=_ROUNDS)
+    solid = family.solid(at)
+    assert solid is not None  # measures that give none are no step of the fit
+    return Candidate(family, at, placed.view, True, residual(solid, placed.view, evidence))
 
 
 @cache

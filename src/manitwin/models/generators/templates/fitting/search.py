@@ -43,14 +43,12 @@ class Candidate:
     residual: Residual
 
 
-def search(
-    families: Sequence[Family], evidence: Evidence, *, settled: bool = False, rolled: bool = True
-) -> list[Candidate]:
+def search(families: Sequence[Family], evidence: Evidence, *, settled: bool = False) -> list[Candidate]:
     """Return fits to a photo, the best first; empty where no usual measures give a solid.
 
     The first family is what the photo is said to show, the others what may be meant: they have to explain it better; less so
     where only the expected measures are others. ``settled``: measures are followed until they hardly change, which what is
-    fitted together with other photos need not be. ``rolled``: the camera may be, as of what does not lie as such things do.
+    fitted together with other photos need not be.
     """
     found: list[_Start] = []
     usual: dict[int, _Start] = {}
@@ -62,7 +60,7 @@ def search(
         turns = is_round(solid)
         problem = Problem(family, [evidence], turns)
         same_kind = family.template is families[0].template
-        for start, upright in grid(solid, evidence, turns, rolled)[: _STARTS if same_kind else _STARTS_OF_OTHERS]:
+        for start, upright in grid(solid, evidence, turns)[: _STARTS if same_kind else _STARTS_OF_OTHERS]:
             _, (placed,) = problem.solve(spreads, [Placed(start, upright)], measures=False, rounds=2)
             view = placed.view
             cost = residual(solid, view, evidence).cost + _prejudice(family, families[0], view, upright)
@@ -139,11 +137,8 @@ def is_round(solid: CoarseSolid) -> bool:
     return min(shared) > _ROUND_IOU
 
 
-def grid(solid: CoarseSolid, evidence: Evidence, turns: bool, rolled: bool = True) -> list[tuple[View, bool]]:
-    """Return views of a solid by how well its outline agrees with the photo's, the best first, whether upright beside each.
-
-    Those of a camera that was rolled are tried too where it may be ``rolled``.
-    """
+def grid(solid: CoarseSolid, evidence: Evidence, turns: bool) -> list[tuple[View, bool]]:
+    """Return views of a solid by how well its outline agrees with the photo's, the best first, whether upright beside each."""
     lean = principal_angle(evidence.mask)
     scored: list[tuple[float, View, bool]] = []
     perspective = float(np.clip(evidence.perspective / 1.6, LEAST_PERSPECTIVE, MOST_PERSPECTIVE))
@@ -155,10 +150,10 @@ def grid(solid: CoarseSolid, evidence: Evidence, turns: bool, rolled: bool = Tru
             mask = silhouette(to_pixels(flat * scale + (x, y), SIDE_PX, BOX_SHARE), solid.faces, solid.edges, SIDE_PX)
             scored.append((iou(mask, evidence), replace(upright, scale=scale, x=x, y=y), True))
             turn = lean - principal_angle(mask > 0)
-            for roll in (turn, turn + np.pi) if rolled else ():
-                leaning = replace(upright, roll_rad=float((roll + np.pi) % (2 * np.pi) - np.pi))
-                scale_r, x_r, y_r = boxed(leaning.project(solid.vertices)[0])
-                placed = replace(leaning, scale=scale_r, x=x_r, y=y_r)
+            for roll in (turn, turn + np.pi):
+                rolled = replace(upright, roll_rad=float((roll + np.pi) % (2 * np.pi) - np.pi))
+                scale_r, x_r, y_r = boxed(rolled.project(solid.vertices)[0])
+                placed = replace(rolled, scale=scale_r, x=x_r, y=y_r)
                 turned = _turned(mask, replace(upright, scale=scale, x=x, y=y), placed)
                 scored.append((iou(turned, evidence) - _TILTED_COST, placed, False))
     scored.sort(key=lambda each: -each[0])

@@ -1,0 +1,173 @@
+"""The blocks, and the views of them, whose outline is that of a photo: what fits of boxes begin with.
+
+A block's outline is convex, and a convex outline is told in full by its support function: how far it reaches each way (Schneider
+1993, "Convex Bodies", 1.7). That of a block is the largest of its eight corners', so that hundreds of fits by least squares, from
+all around, cost less than one that draws. Several blocks have nearly one outline: which it is, the photo's inner edges tell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import cv2
+import numpy as np
+
+from manitwin.models.generators.templates.fitting.view import LEAST_PERSPECTIVE, MOST_PERSPECTIVE, View
+
+WAYS = 72
+"""In which the outlines are compared."""
+ELEVATIONS_DEG, YAWS_DEG = (5.0, 14.0, 27.0, 42.0, 58.0, 76.0), (-36.0, -12.0, 12.0, 36.0)
+PROPORTIONS = (0.4, 1.0, 2.4, 8.0)
+"""Of width and of depth to height, to begin with."""
+LEAST_PROPORTION, MOST_PROPORTION = 0.05, 50.0
+MOST_VIEWS = 6
+MOST_OFF, WORSE = 0.005, 2.5
+"""Root mean square distance of the outlines, of the longer side, up to which a block may be it; and over that of the nearest."""
+_ROUNDS, _COARSE_ROUNDS, _KEPT = 24, 6, 48
+_ROLL_RAD = np.radians(4.0)
+_PRIOR = 0.0015  # a standard deviation of lens or roll, as a distance of the outlines in one way
+_STEPS = np.array([0.01, 0.01, 0.005, 0.02, 0.01, 0.01, 0.003, 0.002, 0.002])
+_SIGNS = np.array(list(product((-0.5, 0.5), repeat=3)))
+_ALIKE = 0.06  # of a logarithm of proportions
+_ALIKE_RAD = np.radians(4.0)
+
+
+@dataclass(frozen=True)
+class BlockView:
+    """A block by its ``width`` and ``depth`` over its height, the ``view`` of it, and how far its outline is ``off`` (root mean
+    square, of the longer side)."""
+
+    width: float
+    depth: float
+    view: View
+    off: float
+
+
+def block_views(mask: np.ndarray, perspective: float, focal_spread: float) -> list[BlockView]:
+    """Return the blocks whose outline is about that of a ``mask (H, W) bool``, the nearest first; empty where none is.
+
+    The camera is above the block and not rolled. ``perspective`` and ``focal_spread`` are those of ``Evidence``.
+    """
+    reach = _support(outline_points(mask))
+    usual = float(np.log(np.clip(perspective / 1.6, LEAST_PERSPECTIVE, MOST_PERSPECTIVE)))
+    at = _starts(usual)
+    damping = np.full(len(at), 0.01)
+    value = _residuals(at, reach, usual, focal_spread)
+    for number in range(_ROUNDS):
+        if number == _COARSE_ROUNDS:
+            best = np.argsort((value**2).sum(1), kind="stable")[:_KEPT]
+            at, damping, value = at[best], damping[best], value[best]
+        at, value, damping = _improved(at, value, damping, reach, usual, focal_spread)
+    off = np.sqrt((value[:, :WAYS] ** 2).mean(1))
+    found: list[BlockView] = []
+    for number in np.argsort((value**2).sum(1), kind="stable"):
+        each = _block_view(at[number], float(off[number]))
+        near = each.off <= min(MOST_OFF, WORSE * (found[0].off if found else MOST_OFF) + 1e-3)
+        if near and not any(_is_alike(each, other) for other in found):
+            found.append(each)
+    return found[:MOST_VIEWS]
+
+
+def outline_points(mask: np.ndarray) -> np.ndarray:
+    """Return the corners ``(N, 2)`` of the convex hull of a mask that is not empty, in the photo frame of ``View``."""
+    contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    hull = cv2.convexHull(max(contours, key=len))[:, 0].astype(float)
+    low, high = hull.min(0) - 0.5, hull.max(0) + 0.5
+    middle = (low + high) / 2
+    away = hull - middle
+    # a contour goes through the middles of pixels, an outline around them
+    return np.asarray((away + 0.5 * np.sign(away)) / (high - low).max())
+
+
+def _ways() -> np.ndarray:
+    angles = 2 * np.pi * np.arange(WAYS) / WAYS
+    return np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def _support(points: np.ndarray) -> np.ndarray:
+    return np.asarray((points @ _ways().T).max(axis=-2))
+
+
+def _starts(usual: float) -> np.ndarray:
+    """Return what fits begin with ``(S, 9)``: yaw, elevation, roll, the logarithms of perspective, width, depth, scale; x, y."""
+    grid = product(np.radians(YAWS_DEG), np.radians(ELEVATIONS_DEG), np.log(PROPORTIONS), np.log(PROPORTIONS))
+    at = np.array([[yaw, elevation, 0.0, usual, width, depth, 0.0, 0.0, 0.0] for yaw, elevation, width, depth in grid])
+    flat = _projected(at)
+    low, high = flat.min(1), flat.max(1)
+    scale = 1 / (high - low).max(1)
+    at[:, 6] = np.log(scale)
+    at[:, 7:] = -scale[:, None] * (low + high) / 2
+    return at
+
+
+def _projected(at: np.ndarray) -> np.ndarray:
+    """Return the places ``(S, 8, 2)`` of blocks' corners in the photo frame; as ``View.project``, many at a time."""
+    sides = np.column_stack([np.exp(at[:, 4]), np.exp(at[:, 5]), np.ones(len(at))])
+    corners = _SIGNS * (sides / (np.linalg.norm(sides, axis=1, keepdims=True) / 2))[:, None]
+    (cos_y, cos_e, cos_r), (sin_y, sin_e, sin_r) = np.cos(at[:, :3]).T, np.sin(at[:, :3]).T
+    ahead_x = cos_y[:, None] * corners[..., 0] - sin_y[:, None] * corners[..., 1]
+    ahead_y = sin_y[:, None] * corners[..., 0] + cos_y[:, None] * corners[..., 1]
+    up = sin_e[:, None] * ahead_y + cos_e[:, None] * corners[..., 2]
+    near = -cos_e[:, None] * ahead_y + sin_e[:, None] * corners[..., 2]
+    right = cos_r[:, None] * ahead_x + sin_r[:, None] * up
+    up = -sin_r[:, None] * ahead_x + cos_r[:, None] * up
+    enlarged = np.exp(at[:, 6])[:, None] / (1 - np.exp(at[:, 3])[:, None] * near)
+    return np.stack([right * enlarged + at[:, 7:8], -up * enlarged + at[:, 8:9]], axis=2)
+
+
+def _residuals(at: np.ndarray, reach: np.ndarray, usual: float, focal_spread: float) -> np.ndarray:
+    prior = _PRIOR * np.column_stack([(at[:, 3] - usual) / focal_spread, at[:, 2] / _ROLL_RAD])
+    return np.hstack([_support(_projected(at)) - reach, prior])
+
+
+def _improved(
+    at: np.ndarray, value: np.ndarray, damping: np.ndarray, reach: np.ndarray, usual: float, focal_spread: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return all fits a step of Levenberg and Marquardt further, where that is nearer; else with more damping."""
+    count, width = at.shape
+    moved = np.repeat(at[:, None], width, axis=1) + np.diag(_STEPS)
+    ahead = _residuals(moved.reshape(-1, width), reach, usual, focal_spread).reshape(count, width, -1)
+    slopes = (ahead - value[:, None]) / _STEPS[:, None]
+    gram, slope = slopes @ slopes.transpose(0, 2, 1), (slopes @ value[..., None])[..., 0]
+    diagonal = np.eye(width) * (damping[:, None] * np.diagonal(gram, axis1=1, axis2=2) + 1e-12)[:, None]
+    step = -np.linalg.solve(gram + diagonal, slope[..., None])[..., 0]
+    trial = _bounded(at + np.clip(step, -0.5, 0.5))
+    tried = _residuals(trial, reach, usual, focal_spread)
+    nearer = (tried**2).sum(1) < (value**2).sum(1)
+    return (
+        np.where(nearer[:, None], trial, at),
+        np.where(nearer[:, None], tried, value),
+        np.clip(np.where(nearer, damping / 3, damping * 8), 1e-6, 1e6),
+    )
+
+
+def _bounded(at: np.ndarray) -> np.ndarray:
+    low = np.full(at.shape[1], -np.inf)
+    high = -low
+    low[1], high[1] = np.radians([1.0, 89.0])
+    low[3], high[3] = np.log([LEAST_PERSPECTIVE, MOST_PERSPECTIVE])
+    low[4:6], high[4:6] = np.log([LEAST_PROPORTION, MOST_PROPORTION])
+    return np.clip(at, low, high)
+
+
+def _block_view(at: np.ndarray, off: float) -> BlockView:
+    """Return a fit, its front within 45 degrees of the camera: turned by 90 degrees it is a block whose sides are exchanged."""
+    quarters = round(float(at[0]) / (np.pi / 2))
+    width, depth = np.exp(at[4:6] if quarters % 2 == 0 else at[5:3:-1])
+    view = View(
+        yaw_rad=float(at[0]) - quarters * np.pi / 2,
+        elevation_rad=float(at[1]),
+        roll_rad=float(at[2]),
+        perspective=float(np.exp(at[3])),
+        scale=float(np.exp(at[6])),
+        x=float(at[7]),
+        y=float(at[8]),
+    )
+    return BlockView(float(width), float(depth), view, off)
+
+
+def _is_alike(one: BlockView, other: BlockView) -> bool:
+    sides = np.abs(np.log([one.width / other.width, one.depth / other.depth]))
+    angles = np.abs([one.view.elevation_rad - other.view.elevation_rad, one.view.yaw_rad - other.view.yaw_rad])
+    return bool(sides.max() < _ALIKE and angles.max() < _ALIKE_RAD)
