@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from viewed_twins import write_viewed
 
 from drawn_episodes import attempt, write_run
+from manitwin.models.matting import matte
+from manitwin.models.matting.learned import Network
+from manitwin.models.matting.study import Study, study_in_turn
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome-stable", "google-chrome")
 
@@ -78,3 +83,19 @@ def visitor(chromium: Any) -> Iterator[Callable[..., Any]]:
     yield come
     for context in contexts:
         context.close()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def photos_studied_once() -> Iterator[None]:
+    """Study a photo once a process: the same ones are built again and again, and what is found in one is always the same."""
+    studies: dict[tuple[object, ...], Study] = {}
+
+    def studied(rgb: np.ndarray, networks: Sequence[Network], **settings: float) -> Study:
+        key = (hashlib.sha256(rgb.tobytes()).digest(), rgb.shape, *networks, *sorted(settings.items()))
+        if key not in studies:
+            studies[key] = study_in_turn(rgb, networks, **settings)  # type: ignore[arg-type]
+        return studies[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(matte, "study_in_turn", studied)
+        yield

@@ -192,6 +192,7 @@ def is_framed(picture: bytes) -> bool:
     return Image.open(io.BytesIO(picture)).size == (400, 240)
 
 
+@pytest.mark.slow
 def test_nameless_photo_that_is_named_is_built_as_one_that_was_given_the_name(tmp_path: Path, doubted: Path) -> None:
     photo = doubted.parent / "photos" / "first.jpg"
     config = stored_config(DatasetRoot(doubted))

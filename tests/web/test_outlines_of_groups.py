@@ -91,6 +91,7 @@ def test_each_photo_is_shown_kept_by_its_place_and_built(root: DatasetRoot) -> N
     assert whole.shape == photo.size[::-1] and 0.02 < (whole > 127).mean() < 0.8
 
 
+@pytest.mark.slow
 def test_photo_that_was_left_out_alone_is_shown_again_on_request(root: DatasetRoot) -> None:
     session = OutlineSession(root, "ada")
     front, side = session.photos
