@@ -91,6 +91,7 @@ def test_a_robot_with_another_hand_gets_tasks_and_repeats_them_in_their_environm
     env.close()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*symmetric and normalized")
 def test_two_arms_get_tasks_of_both_and_of_the_first_and_repeat_them(tmp_path: Path) -> None:
     kept = made(tmp_path, "two_pandas", 8)
