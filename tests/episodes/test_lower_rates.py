@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 import pytest
 from synthetic_episodes import recording
 
-from manitwin.episodes.lower_rates import at_rate, rows_per_frame
+from manitwin.episodes.lower_rates import RATES_HZ, at_rate, rows_per_frame
 from manitwin.episodes.recording import joint_delta
+from manitwin.episodes.settings import PicturesConfig
 from manitwin.errors import EpisodesError, UsageError
 
 
@@ -49,6 +51,10 @@ def test_the_recorded_rate_changes_nothing() -> None:
 def test_other_rates_are_refused_with_those_that_are_valid(rate_hz: int) -> None:
     with pytest.raises(UsageError, match="5"):
         rows_per_frame(rate_hz)
+
+
+def test_pictures_may_have_these_rates() -> None:
+    assert get_args(PicturesConfig.model_fields["rate_hz"].annotation) == RATES_HZ
 
 
 def test_what_is_shorter_than_a_frame_is_refused() -> None:

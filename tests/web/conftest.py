@@ -11,12 +11,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from doubted_photos import write_doubted
+from starlette.applications import Starlette
 from viewed_twins import write_viewed
 
 from drawn_episodes import attempt, write_run
+from manitwin.dataset.review.outlines import OutlineSession
 from manitwin.models.matting import matte
 from manitwin.models.matting.learned import Network
 from manitwin.models.matting.study import Study, study_in_turn
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.web.outline_application import outline_application
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome-stable", "google-chrome")
 
@@ -99,3 +104,21 @@ def photos_studied_once() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(matte, "study_in_turn", studied)
         yield
+
+
+@pytest.fixture(scope="session")
+def doubted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A data set with photos whose cut-outs are doubted; nothing may write there."""
+    return write_doubted(tmp_path_factory.mktemp("doubted"))
+
+
+@pytest.fixture
+def outlines(doubted: Path, tmp_path: Path) -> OutlineSession:
+    """Outlines of a copy of that data set, to be drawn."""
+    return OutlineSession(DatasetRoot(shutil.copytree(doubted, tmp_path / "twins")), "ada")
+
+
+@pytest.fixture
+def outlining(outlines: OutlineSession) -> Starlette:
+    """The pages on which they are drawn."""
+    return outline_application(outlines)

@@ -11,7 +11,12 @@ import manitwin
 from manitwin.config import BuildConfig, MattingConfig
 
 SAMPLE = Path(__file__).resolve().parents[2] / "samples" / "bottle.jpg"
-DOUBTING = MattingConfig(min_confidence=0.985)
+DOUBTING = BuildConfig(
+    matting=MattingConfig(min_confidence=0.985).model_dump(),
+    grasps={"simulated": 8, "unfiltered": 0, "least_per_point": 2, "tries_per_point": 4},
+    second_opinion={"enabled": False}, robustness={"enabled": False},
+)  # fmt: skip
+"""Believes in no cut-out, and tries few grasps of what is drawn."""
 
 
 def write_doubted(folder: Path) -> Path:
@@ -23,10 +28,6 @@ def write_doubted(folder: Path) -> Path:
     Image.new("RGB", (400, 300), (200, 200, 200)).save(photos / "bare.png")
     manifest = folder / "list.csv"
     manifest.write_text("file,name\nphotos/first.jpg,bottle\nphotos/second.jpg,water bottle\nphotos/bare.png,cup\n")
-    config = BuildConfig(
-        matting=DOUBTING.model_dump(), grasps={"simulated": 8, "unfiltered": 0, "least_per_point": 2, "tries_per_point": 4},
-        second_opinion={"enabled": False}, robustness={"enabled": False},
-    )  # fmt: skip
-    results = manitwin.build(manifest, folder / "twins", config=config, executor="inline").results
+    results = manitwin.build(manifest, folder / "twins", config=DOUBTING, executor="inline").results
     assert [each.status for each in results] == ["rejected"] * 3
     return folder / "twins"

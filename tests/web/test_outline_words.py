@@ -5,17 +5,15 @@ from __future__ import annotations
 import base64
 import io
 import json
-import shutil
 from pathlib import Path
 
 import pytest
 from access_requests import asked
-from doubted_photos import DOUBTING, write_doubted
+from doubted_photos import DOUBTING
 from PIL import Image
 from starlette.applications import Starlette
 
 import manitwin
-from manitwin.config import BuildConfig
 from manitwin.dataset.review.cutouts import photos_to_draw
 from manitwin.dataset.review.outlines import OutlineSession
 from manitwin.engine.amendments import read_amendments, write_amendments
@@ -24,23 +22,6 @@ from manitwin.pipeline.settings import stored_config
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.record import TwinRecord
 from manitwin.twin.store import read_record
-from manitwin.web.outline_application import outline_application
-
-
-@pytest.fixture(scope="module")
-def doubted(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A data set with doubted photos; nothing may write there."""
-    return write_doubted(tmp_path_factory.mktemp("doubted"))
-
-
-@pytest.fixture
-def session(doubted: Path, tmp_path: Path) -> OutlineSession:
-    return OutlineSession(DatasetRoot(shutil.copytree(doubted, tmp_path / "twins")), "ada")
-
-
-@pytest.fixture
-def app(session: OutlineSession) -> Starlette:
-    return outline_application(session)
 
 
 def answer_to(app: Starlette, address: str, sent: object, *, raw: bytes | None = None) -> tuple[int, dict[str, str]]:
@@ -65,34 +46,36 @@ def checks_of(record: TwinRecord) -> dict[str, tuple[bool | None, str]]:
     return {check.name: (check.passed, check.message) for check in record.quality.checks}
 
 
-def test_page_shows_what_was_given_and_suggests_known_names(app: Starlette, session: OutlineSession) -> None:
-    first = next(iter(session.photos))
-    page = page_of(app, f"/outline/{first}")
+def test_page_shows_what_was_given_and_suggests_known_names(outlining: Starlette, outlines: OutlineSession) -> None:
+    first = next(iter(outlines.photos))
+    page = page_of(outlining, f"/outline/{first}")
     assert 'id="name" data-focus="c" value="bottle"' in page and '<option value="mug">' in page
     assert 'id="longest_side_cm" data-focus="l" value=""' in page and "known as: bottle, " in page
     assert '<option value="unknown">' not in page
 
 
-def test_name_and_size_are_kept_at_once_shown_again_and_taken_back(app: Starlette, session: OutlineSession) -> None:
-    first, second, _ = session.photos
-    assert said(app, first, "", "")[1]["name"] == "bottle" and session.said == (), (
+def test_name_and_size_are_kept_at_once_shown_again_and_taken_back(
+    outlining: Starlette, outlines: OutlineSession
+) -> None:
+    first, second, _ = outlines.photos
+    assert said(outlining, first, "", "")[1]["name"] == "bottle" and outlines.said == (), (
         "nothing is taken back of what was given"
     )
-    status, kept = said(app, first, " ketchup bottle ", "12,5")
+    status, kept = said(outlining, first, " ketchup bottle ", "12,5")
     assert status == 200 and kept["name"] == "ketchup bottle" and kept["longest_side_cm"] == "12.5"
-    amendments = read_amendments(session.root, first)
+    amendments = read_amendments(outlines.root, first)
     assert amendments["photo"] == amendments["generate"] == {"name": {"value": "ketchup bottle", "source": "human:ada"}}
     assert amendments["mesh"]["longest_side_m"] == {"value": 0.125, "low": 0.125, "high": 0.125, "source": "human:ada"}
-    assert session.said == (first,) and session.kept == ()
-    page = page_of(app, f"/outline/{first}")
+    assert outlines.said == (first,) and outlines.kept == ()
+    page = page_of(outlining, f"/outline/{first}")
     assert 'value="ketchup bottle"' in page and 'value="12.5"' in page
-    listed = page_of(app, "/")
+    listed = page_of(outlining, "/")
     assert "first.jpg: ketchup bottle" in listed and "named or measured, to be built" in listed
-    assert OutlineSession(session.root, "ben").words(first).name == "ketchup bottle"
-    assert said(app, first, None, "12.50") == (200, {**kept, "next": f"/outline/{second}"})
-    assert read_amendments(session.root, first) == amendments, "what is not said anew stays as who said it"
-    assert said(app, first, "bottle", "")[1]["name"] == "bottle"
-    assert read_amendments(session.root, first) == {}
+    assert OutlineSession(outlines.root, "ben").words(first).name == "ketchup bottle"
+    assert said(outlining, first, None, "12.50") == (200, {**kept, "next": f"/outline/{second}"})
+    assert read_amendments(outlines.root, first) == amendments, "what is not said anew stays as who said it"
+    assert said(outlining, first, "bottle", "")[1]["name"] == "bottle"
+    assert read_amendments(outlines.root, first) == {}
 
 
 @pytest.mark.parametrize(
@@ -111,15 +94,15 @@ def test_name_and_size_are_kept_at_once_shown_again_and_taken_back(app: Starlett
     ],
 )
 def test_what_is_no_name_or_size_is_refused_and_nothing_is_kept(
-    app: Starlette, session: OutlineSession, name: object, longest_side_cm: object, why: str
+    outlining: Starlette, outlines: OutlineSession, name: object, longest_side_cm: object, why: str
 ) -> None:
-    first = next(iter(session.photos))
-    status, told = said(app, first, name, longest_side_cm)
+    first = next(iter(outlines.photos))
+    status, told = said(outlining, first, name, longest_side_cm)
     assert status == 400 and why in told["error"]
-    outline = base64.b64encode(session.mask(first)).decode()
+    outline = base64.b64encode(outlines.mask(first)).decode()
     sent = {"png": outline, "name": name, "longest_side_cm": longest_side_cm}
-    assert answer_to(app, f"/outline/{first}", sent)[0] == 400
-    assert session.said == session.kept == () and read_amendments(session.root, first) == {}
+    assert answer_to(outlining, f"/outline/{first}", sent)[0] == 400
+    assert outlines.said == outlines.kept == () and read_amendments(outlines.root, first) == {}
 
 
 @pytest.mark.parametrize(
@@ -134,25 +117,29 @@ def test_what_is_no_name_or_size_is_refused_and_nothing_is_kept(
         (b"[" * 100_000, "nested too deep"),
     ],
 )
-def test_what_no_page_sends_is_refused_in_words(app: Starlette, session: OutlineSession, raw: bytes, why: str) -> None:
-    first = next(iter(session.photos))
-    status, told = answer_to(app, f"/outline/{first}", None, raw=raw)
-    assert status == 400 and why in told["error"] and read_amendments(session.root, first) == {}
+def test_what_no_page_sends_is_refused_in_words(
+    outlining: Starlette, outlines: OutlineSession, raw: bytes, why: str
+) -> None:
+    first = next(iter(outlines.photos))
+    status, told = answer_to(outlining, f"/outline/{first}", None, raw=raw)
+    assert status == 400 and why in told["error"] and read_amendments(outlines.root, first) == {}
 
 
-def test_unknown_name_is_kept_and_the_nearest_known_ones_are_told(app: Starlette, session: OutlineSession) -> None:
-    first = next(iter(session.photos))
+def test_unknown_name_is_kept_and_the_nearest_known_ones_are_told(
+    outlining: Starlette, outlines: OutlineSession
+) -> None:
+    first = next(iter(outlines.photos))
     for name, told in (
         ("botle", "did you mean"),
         ("xyzzy", "say what kind of thing it is, in English"),
         ("red mug", "known as: mug, "),
         ("", ""),
     ):
-        status, answer = answer_to(app, "/name", {"name": name})
+        status, answer = answer_to(outlining, "/name", {"name": name})
         assert status == 200 and told in answer["told"] and "--name" not in answer["told"]
-    assert answer_to(app, "/name", {"name": "a\0"})[0] == 400
-    assert said(app, first, "xyzzy")[0] == 200
-    assert "the priors (docs/priors.md) know no &#x27;xyzzy&#x27;" in page_of(app, f"/outline/{first}")
+    assert answer_to(outlining, "/name", {"name": "a\0"})[0] == 400
+    assert said(outlining, first, "xyzzy")[0] == 200
+    assert "the priors (docs/priors.md) know no &#x27;xyzzy&#x27;" in page_of(outlining, f"/outline/{first}")
 
 
 def test_outline_that_a_name_would_have_of_another_picture_is_not_kept(tmp_path: Path) -> None:
@@ -160,8 +147,7 @@ def test_outline_that_a_name_would_have_of_another_picture_is_not_kept(tmp_path:
     picture = Image.new("RGBA", (400, 400), (0, 0, 0, 0))
     picture.paste(Image.effect_noise((400, 240), 20).convert("RGBA"), (0, 80))
     picture.save(tmp_path / "barred.png")
-    config = BuildConfig(matting=DOUBTING.model_dump())
-    built = manitwin.build(tmp_path / "barred.png", tmp_path / "twins", config=config, executor="inline").results[0]
+    built = manitwin.build(tmp_path / "barred.png", tmp_path / "twins", config=DOUBTING, executor="inline").results[0]
     session = OutlineSession(DatasetRoot(tmp_path / "twins"), "ada")
     [key] = session.photos
     assert key == built.twin_id and not is_framed(session.picture(key))

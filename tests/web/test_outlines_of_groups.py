@@ -14,7 +14,6 @@ from doubted_photos import DOUBTING, SAMPLE
 from PIL import Image, ImageOps
 
 import manitwin
-from manitwin.config import BuildConfig
 from manitwin.dataset.review.cutouts import doubted_photos
 from manitwin.dataset.review.outlines import OutlineSession
 from manitwin.engine.amendments import read_amendments
@@ -38,11 +37,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (tmp_path / "list.csv").write_text(
         "file,name,group,turn_deg\nphotos/front.png,bottle,a,0\nphotos/side.png,bottle,a,90\n"
     )
-    config = BuildConfig(
-        matting=DOUBTING.model_dump(), grasps={"simulated": 8, "unfiltered": 0, "least_per_point": 2, "tries_per_point": 4},
-        second_opinion={"enabled": False}, robustness={"enabled": False},
-    )  # fmt: skip
-    [result] = manitwin.build(tmp_path / "list.csv", tmp_path / "twins", config=config, executor="inline").results
+    [result] = manitwin.build(tmp_path / "list.csv", tmp_path / "twins", config=DOUBTING, executor="inline").results
     assert result.status == "rejected"
     return tmp_path / "twins"
 

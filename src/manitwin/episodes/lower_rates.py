@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 
@@ -11,8 +11,7 @@ from manitwin.episodes.recording import RATE_HZ, Recording
 from manitwin.episodes.recording_arrays import is_of_actions
 from manitwin.errors import EpisodesError, UsageError, choose_from
 
-Rate = Literal[20, 10, 5]
-RATES_HZ: tuple[int, ...] = get_args(Rate)
+RATES_HZ = (RATE_HZ, 10, 5)
 _OF_FRAMES = ("phase", "active_literal")
 """What is told of an action, and is that of the time at which it begins."""
 

@@ -65,13 +65,14 @@ def drawn_from(episodes: Path) -> tuple[tuple[str, ...], int]:
     return tuple(cameras), int(rate_hz)
 
 
-def films_of(episodes: Path, batches: list[Path], allowed: Set[str], scratch: Path) -> list[CameraVideos]:
-    """Return each camera's films with the pictures of ``allowed`` episodes alone.
+def films_of(
+    episodes: Path, cameras: tuple[str, ...], batches: list[Path], allowed: Set[str], scratch: Path
+) -> list[CameraVideos]:
+    """Return the films of ``cameras`` with the pictures of ``allowed`` episodes alone.
 
     A film that shows others too is cut: what may go out of it is encoded again, with the same codec, below ``scratch``. Raises
     EpisodesError for a batch that was not drawn.
     """
-    cameras, _ = drawn_from(episodes)
     clips: dict[str, dict[str, Clip]] = {camera: {} for camera in cameras}
     pinholes: dict[str, dict[str, Any]] = {}
     for batch in batches if cameras else ():
@@ -162,9 +163,9 @@ def publish_episodes(
     try:
         with publication.scratch() as scratch:
             made = scratch / "made"
-            films = films_of(episodes, batches, chosen.episodes.published.keys(), scratch / "films")
+            cameras, rate_hz = drawn_from(episodes)
+            films = films_of(episodes, cameras, batches, chosen.episodes.published.keys(), scratch / "films")
             kept = (each for each in stored_episodes(batches) if each.attempt.episode_id in chosen.episodes.published)
-            _, rate_hz = drawn_from(episodes)
             write_lerobot(kept, made, videos=films, granules=any_granules(batches), rate_hz=rate_hz)
             checked = read_lerobot(made)
             rows = _write_tables(episodes, chosen, made)

@@ -60,11 +60,11 @@ def plain_solids(rgba: np.ndarray, hint: ShapeHint, focal_mm: float | None = Non
 
     Of solids that ``hint`` speaks against none is tried. ``focal_mm`` is the lens as 35 mm equivalent, where it is known.
     """
-    tried = [solid for solid in solids() if _may_be(solid, hint)]
-    if not tried or _solidity(rgba[..., 3] > 127) < LEAST_SOLIDITY:
+    tried, mask = [solid for solid in solids() if _may_be(solid, hint)], rgba[..., 3] > 127
+    if not tried or _solidity(mask) < LEAST_SOLIDITY:
         return PlainSolids()
     evidence = evidence_of(rgba, focal_mm)
-    blocks = block_views(rgba[..., 3] > 127, evidence.perspective, evidence.focal_spread)
+    blocks = block_views(mask, evidence.perspective, evidence.focal_spread)
     found = [best for solid in tried for best in _fits(solid, evidence, blocks)]
     possible = sorted(filter(_is_possible, found), key=lambda each: each.residual.cost)
     close = [each for each in possible if explains_closely(each.residual)]
