@@ -72,7 +72,7 @@ def test_a_block_has_the_proportions_that_it_shows_from_whatever_side(
 ) -> None:
     width, depth, height = sides
     found = plain_solids(
-        _seen(_rounded(width, depth, 0.002), height, elevation_deg, yaw_rad=yaw_rad), ShapeHint()
+        _seen(_rounded(width, depth, 0.002), height, elevation_deg, yaw_rad=yaw_rad), ShapeHint(boxy=True)
     ).close
     assert found is not None and found.category in ("box", "cutting board") and found.upright
     extents = np.ptp(found.made.mesh.vertices, axis=0)
