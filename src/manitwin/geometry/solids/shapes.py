@@ -29,12 +29,17 @@ class SolidError(ManiTwinError):
 
 @contextmanager
 def coarser(share: float) -> Iterator[None]:
-    """Cut full circles into this share of their usual chords: for solids that are drawn small and thrown away."""
+    """Cut full circles into this share of their usual chords, and no small holes: solids that are drawn small and thrown away."""
     token = _coarseness.set(share)
     try:
         yield
     finally:
         _coarseness.reset(token)
+
+
+def is_coarse() -> bool:
+    """Tell whether solids are made coarser now (``coarser``)."""
+    return _coarseness.get() < 1.0
 
 
 def chords(usual: int) -> int:

@@ -14,6 +14,7 @@ import numpy as np
 from manifold3d import Manifold
 
 from manitwin.geometry.solids.parts import Assembly
+from manitwin.geometry.solids.shapes import is_coarse
 
 Group = Literal["kitchen", "tools", "electronics", "personal", "office", "household"]
 """The paper's six groups of categories."""
@@ -55,6 +56,7 @@ class Model:
     assembly: Assembly = field(default_factory=Assembly)
     slots: dict[str, str] = field(default_factory=dict)
     points: list[KnownPoint] = field(default_factory=list)
+    perforated: bool = False
 
     def add(self, part: str, solid: Manifold, slot: str = "") -> Model:
         """Join a solid as a part; without a slot it wears the first one."""
@@ -67,6 +69,11 @@ class Model:
         self.assembly.cut(part, solid)
         self.slots.setdefault(part, slot)
         return self
+
+    def perforate(self, part: str, holes: Callable[[], Manifold], slot: str = "") -> Model:
+        """Cut many small holes; they are left out of solids that are drawn small, where they are of a pixel or two."""
+        self.perforated = True
+        return self if is_coarse() else self.cut(part, holes(), slot)
 
     def region(self, part: str, of: str, where: Callable[[np.ndarray], np.ndarray], slot: str | None = None) -> Model:
         """Give the faces of another part whose centres ``(N, 3)`` are ``where`` a name of their own."""
@@ -85,7 +92,7 @@ class Model:
         points = [
             replace(p, position_m=(p.position_m[0], p.position_m[1], p.position_m[2] + by_m)) for p in self.points
         ]
-        return Model(self.assembly.moved((0.0, 0.0, by_m)), dict(self.slots), points)
+        return Model(self.assembly.moved((0.0, 0.0, by_m)), dict(self.slots), points, self.perforated)
 
 
 Builder = Callable[..., Model]

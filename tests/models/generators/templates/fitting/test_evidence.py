@@ -6,7 +6,13 @@ import cv2
 import numpy as np
 import pytest
 
-from manitwin.models.generators.templates.fitting.evidence import FINE, REACH, SIDE_PX, signed_distance
+from manitwin.models.generators.templates.fitting.evidence import (
+    FINE,
+    REACH,
+    SIDE_PX,
+    signed_distance,
+    without_small_holes,
+)
 
 SIDE = FINE * SIDE_PX
 MASKS = {
@@ -32,3 +38,13 @@ def test_a_distance_is_that_of_the_whole_picture(name: str) -> None:
     away = cv2.distanceTransform(mask, cv2.DIST_L2, 3) - cv2.distanceTransform(1 - mask, cv2.DIST_L2, 3)
     whole = np.clip(away[1 :: 2 * FINE, 1 :: 2 * FINE] / (REACH * SIDE), -1, 1)
     assert np.array_equal(signed_distance(mask), whole)
+
+
+def test_small_holes_are_filled_and_a_loop_is_not() -> None:
+    mask = np.zeros((SIDE, SIDE), bool)
+    mask[40:180, 40:180] = True
+    whole = mask.copy()
+    mask[60:66, 60:66] = mask[100:104, 90:98] = False
+    mask[120:160, 120:160] = whole[120:160, 120:160] = False
+    assert np.array_equal(without_small_holes(mask), whole)
+    assert without_small_holes(whole) is whole

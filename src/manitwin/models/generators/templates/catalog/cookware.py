@@ -74,6 +74,14 @@ def colander(*, width_m: float, height: float, wall_m: float, ears: float) -> Mo
     wide = max(2 * wall_m, 0.0022)
     ring = lathe([(0.44 * r - wide, 0.0), (0.44 * r, 0.0), (0.46 * r, 1.25 * foot), (0.46 * r - wide, 1.25 * foot)])
     model.add("base", ring - cylinder(0.44 * r - wide, foot + 0.5 * wall_m))
+    model.perforate("holes", lambda: _colander_holes(r, high, foot))
+    for part in ("body", "inside"):
+        model.region("rim", part, lambda centers: centers[:, 2] > 0.965 * high)
+    return model.point("opening", "opening", "rim", (0.0, 0.0, high), (0.0, 0.0, 1.0)).laid()
+
+
+def _colander_holes(r: float, high: float, foot: float) -> Manifold:
+    """Return five rings of pins through the side of a bowl of radius ``r``, and a grid of them through its base."""
     holes: list[Manifold] = []
     size, steps = 0.019 * r + 0.0012, 5
     for row in range(steps):
@@ -93,10 +101,7 @@ def colander(*, width_m: float, height: float, wall_m: float, ears: float) -> Mo
         for v in range(-6, 7):
             if np.hypot(u, v) * pitch < 0.37 * r:
                 holes.append(cylinder(size, 0.04, sides=10).translate((u * pitch, v * pitch, foot - 0.02)))
-    model.cut("holes", union(holes))
-    for part in ("body", "inside"):
-        model.region("rim", part, lambda centers: centers[:, 2] > 0.965 * high)
-    return model.point("opening", "opening", "rim", (0.0, 0.0, high), (0.0, 0.0, 1.0)).laid()
+    return union(holes)
 
 
 @template("grater")
@@ -109,21 +114,9 @@ def grater(*, height_m: float, width: float, depth: float, taper: float) -> Mode
     model = Model().add("body", prism(rectangle(2 * x, 2 * y, radius_m=0.006), high, top=taper), "body")
     hollow = prism(rectangle(2 * (x - wall), 2 * (y - wall), radius_m=0.0055), high, top=taper)
     model.cut("inside", hollow.translate((0, 0, -2 * wall)), "body")
-    lean = np.degrees(np.arctan((1 - taper) * y / high))
-    rasps: list[Manifold] = []
-    for face, radius, pitch in ((-1.0, 0.0042, 0.0135), (1.0, 0.0016, 0.0072)):
-        columns = int(1.5 * x * (0.5 + 0.5 * taper) / pitch)
-        for row in range(int(0.72 * high / pitch)):
-            z = 0.1 * high + (row + 0.5) * pitch
-            out = y * (1 - (1 - taper) * z / high)
-            for column in range(columns - row % 2):
-                at = ((column - 0.5 * (columns - 1 - row % 2)) * pitch, face * out, z)
-                hole = cylinder(radius, 0.012, sides=12 if face < 0 else 6).translate((0, 0, -0.006))
-                rasps.append(hole.rotate((90 - face * lean, 0, 0)).translate(at))
-    model.cut("holes", union(rasps), "body")
-    for number in range(3):
-        slot = box(0.02, 0.95 * y, 0.0045, radius_m=0.0015).translate((x, 0, (0.28 + 0.2 * number) * high))
-        model.cut("slots", slot, "body")
+    lean = float(np.degrees(np.arctan((1 - taper) * y / high)))
+    model.perforate("holes", lambda: _rasps(x, y, high, taper, lean), "body")
+    model.perforate("slots", lambda: _slots(x, y, high), "body")
     reach = 0.92 * taper * x
     path = arc(
         [
@@ -143,6 +136,27 @@ def grater(*, height_m: float, width: float, depth: float, taper: float) -> Mode
         "grating face", "face", "body", (0.0, -out, 0.45 * high), (0.0, -float(np.cos(tilt)), float(np.sin(tilt)))
     )
     return model.point("handle", "surface", "handle", (0.0, 0.0, float(path[:, 2].max()) + 0.006), (0.0, 0.0, 1.0))
+
+
+def _rasps(x: float, y: float, high: float, taper: float, lean_deg: float) -> Manifold:
+    """Return pins through the front and back of a grater, coarse and fine; ``x`` and ``y`` are half the sides of its foot."""
+    rasps: list[Manifold] = []
+    for face, radius, pitch in ((-1.0, 0.0042, 0.0135), (1.0, 0.0016, 0.0072)):
+        columns = int(1.5 * x * (0.5 + 0.5 * taper) / pitch)
+        for row in range(int(0.72 * high / pitch)):
+            z = 0.1 * high + (row + 0.5) * pitch
+            out = y * (1 - (1 - taper) * z / high)
+            for column in range(columns - row % 2):
+                at = ((column - 0.5 * (columns - 1 - row % 2)) * pitch, face * out, z)
+                hole = cylinder(radius, 0.012, sides=12 if face < 0 else 6).translate((0, 0, -0.006))
+                rasps.append(hole.rotate((90 - face * lean_deg, 0, 0)).translate(at))
+    return union(rasps)
+
+
+def _slots(x: float, y: float, high: float) -> Manifold:
+    """Return three slots across one side of a grater."""
+    slot = box(0.02, 0.95 * y, 0.0045, radius_m=0.0015)
+    return union([slot.translate((x, 0, (0.28 + 0.2 * number) * high)) for number in range(3)])
 
 
 @template("casserole dish")
@@ -236,6 +250,13 @@ def tea_infuser(*, length_m: float, ball_m: float) -> Model:
     half = 0.0042 * np.interp(np.linspace(0, 1, len(path)), [0, 0.1, 0.6, 0.96, 1], [0.8, 0.9, 1.1, 2.4, 1.8])
     model.add("handle", tube(path, half, flatten=0.28), "ball")
     model.cut("inside", ellipsoid(2 * (r - wall), 2 * (r - wall), 2 * (r - wall)).translate((at, 0, 0)), "ball")
+    model.perforate("holes", lambda: _infuser_holes(r).rotate((0, 90, 0)).translate((at, 0, 0)), "ball")
+    model.point("ball", "surface", "ball", (at, 0.0, r), (0.0, 0.0, 1.0))
+    return model.point("handle", "surface", "handle", (-0.5 * end, 0.0, 0.0065), (0.0, 0.0, 1.0)).laid()
+
+
+def _infuser_holes(r: float) -> Manifold:
+    """Return pins from the middle of a ball of radius ``r`` all around, but for its seam and where the handle begins."""
     count, holes = 90, []
     for number in range(count):
         z = 1 - 2 * (number + 0.5) / count
@@ -245,9 +266,7 @@ def tea_infuser(*, length_m: float, ball_m: float) -> Model:
         level = np.degrees(np.arccos(z))
         pin = cylinder(0.0011, r, sides=8).translate((0, 0, 0.5 * r)).rotate((0, float(level), float(np.degrees(turn))))
         holes.append(pin)
-    model.cut("holes", union(holes).rotate((0, 90, 0)).translate((at, 0, 0)), "ball")
-    model.point("ball", "surface", "ball", (at, 0.0, r), (0.0, 0.0, 1.0))
-    return model.point("handle", "surface", "handle", (-0.5 * end, 0.0, 0.0065), (0.0, 0.0, 1.0)).laid()
+    return union(holes)
 
 
 @template("baking tray")

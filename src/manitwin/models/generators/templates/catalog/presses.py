@@ -76,7 +76,7 @@ def garlic_press(*, length_m: float, spread: float, chamber_m: float) -> Model:
         for u, v in places
         if np.hypot(u / (1.05 * r - 0.004), v / (0.85 * r - 0.004)) < 1.0
     ]
-    model.cut("holes", union(holes))
+    model.perforate("holes", lambda: union(holes))
     apart, low = spread * length_m, 0.0048
     hinge = (end - 0.0065, 0.0, deep + 0.0025)
     lower = arc(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -14,6 +14,8 @@ BOX_SHARE = 0.82
 """How much of the small picture the object's box fills: what is larger than the photo says is seen beyond it."""
 REACH = 0.06
 """Of the picture's side: distances to the outline are told up to here."""
+LARGEST_PERFORATION = 0.008
+"""Of a mask's area: larger holes, between a handle and a bowl, are compared also where a thing is perforated."""
 _RIM_PX = 3  # the outline's own gradient is no inner edge
 _EDGE_LAB = 14.0  # a gradient of this many units of Lab a pixel, after smoothing, is half an edge
 _DIAGONAL_35MM = 43.27
@@ -28,6 +30,7 @@ class Evidence:
     """A photo's object in a square picture ``SIDE_PX`` wide.
 
     ``mask (S, S) bool``; ``outline`` the signed distance to its outline over the reach, in -1..1, positive inside;
+    ``filled_mask`` and ``filled_outline`` the same without small holes, for what is perforated;
     ``edge (S, S)`` how much of an inner edge lies at each pixel or next to it, 0..1; ``lab (S, S, 3) float32``; ``inner (S, S)
     bool`` well inside; ``perspective`` the object's size over its distance for the known or a usual lens, ``focal_spread`` the
     standard deviation of its logarithm; ``center_px`` and ``box_px`` the box in the photo: its centre (x, y) and its longer side.
@@ -35,6 +38,8 @@ class Evidence:
 
     mask: np.ndarray
     outline: np.ndarray
+    filled_mask: np.ndarray
+    filled_outline: np.ndarray
     edge: np.ndarray
     lab: np.ndarray
     inner: np.ndarray
@@ -42,6 +47,10 @@ class Evidence:
     focal_spread: float
     center_px: tuple[float, float]
     box_px: float
+
+    def of_perforated(self) -> Evidence:
+        """Return what the photo says of a thing whose small holes are not compared."""
+        return replace(self, mask=self.filled_mask, outline=self.filled_outline)
 
 
 def evidence_of(rgba: np.ndarray, focal_mm: float | None = None) -> Evidence:
@@ -57,9 +66,12 @@ def evidence_of(rgba: np.ndarray, focal_mm: float | None = None) -> Evidence:
     lab = np.asarray(cv2.cvtColor(np.ascontiguousarray(small[..., :3] / 255), cv2.COLOR_RGB2Lab))
     depth = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
     focal_px = (focal_mm or TYPICAL_FOCAL_MM) / _DIAGONAL_35MM * float(np.hypot(*rgba.shape[:2]))
+    outline, filled = signed_distance(whole), without_small_holes(whole)
     return Evidence(
         mask=mask,
-        outline=signed_distance(whole),
+        outline=outline,
+        filled_mask=without_small_holes(mask),
+        filled_outline=outline if filled is whole else signed_distance(filled),
         edge=_edges(lab, depth > _RIM_PX),
         lab=lab,
         inner=depth > _RIM_PX,
@@ -86,6 +98,16 @@ def signed_distance(mask: np.ndarray) -> np.ndarray:
     top, left = rows.start // step, columns.start // step
     found[top : top + some.shape[0], left : left + some.shape[1]] = some
     return found
+
+
+def without_small_holes(mask: np.ndarray) -> np.ndarray:
+    """Return a mask ``(H, W) bool`` with holes of up to ``LARGEST_PERFORATION`` of its area filled; itself where it has none."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats((~mask).astype(np.uint8), connectivity=4)
+    small = stats[:, cv2.CC_STAT_AREA] <= LARGEST_PERFORATION * mask.sum()
+    small[0] = False  # the mask itself
+    if count <= 2 or not small.any():
+        return mask
+    return np.asarray(mask | small[labels])
 
 
 def _within_reach(drawn: np.ndarray, reach_px: int, step: int) -> slice:

@@ -57,7 +57,8 @@ def outline_difference(solid: CoarseSolid, view: View, evidence: Evidence) -> np
     """Return the differences of signed distances ``(N,)`` to both outlines, of whose squares the fit makes the least."""
     flat, _ = view.project(solid.vertices)
     drawn = silhouette(to_pixels(flat, FINE * SIDE_PX, BOX_SHARE), solid.faces, solid.edges, FINE * SIDE_PX)
-    return np.asarray((signed_distance(drawn) - evidence.outline).ravel())
+    seen = evidence.filled_outline if solid.perforated else evidence.outline
+    return np.asarray((signed_distance(drawn) - seen).ravel())
 
 
 def iou(mask: np.ndarray, evidence: Evidence) -> float:
@@ -68,6 +69,8 @@ def iou(mask: np.ndarray, evidence: Evidence) -> float:
 
 def residual(solid: CoarseSolid, view: View, evidence: Evidence) -> Residual:
     """Compare a solid seen from a view with a photo."""
+    if solid.perforated:
+        evidence = evidence.of_perforated()
     flat, distance = view.project(solid.vertices)
     pixels = to_pixels(flat, FINE * SIDE_PX, BOX_SHARE)
     face = seen_faces(pixels, distance, solid.faces, FINE * SIDE_PX)[::FINE, ::FINE]

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from manitwin.geometry.solids.parts import PartedMesh
 from manitwin.geometry.solids.shapes import SolidError, coarser
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.generators.templates.fitting.drawing import edges_between
@@ -23,19 +24,20 @@ _LEAST_SPREAD = 0.04  # of the usual value
 class CoarseSolid:
     """A solid with normalised ``vertices (V, 3)``, ``faces (F, 3)``, ``part (F,)`` and its ``names``.
 
-    ``edges`` are those of ``edges_between``."""
+    ``edges`` are those of ``edges_between``. What is ``perforated`` is without its small holes."""
 
     vertices: np.ndarray
     faces: np.ndarray
     part: np.ndarray
     names: tuple[str, ...]
     edges: tuple[np.ndarray, np.ndarray]
+    perforated: bool = False
 
     @classmethod
-    def of(cls, vertices: np.ndarray, faces: np.ndarray, part: np.ndarray, names: tuple[str, ...]) -> CoarseSolid:
+    def of(cls, mesh: PartedMesh, *, perforated: bool = False) -> CoarseSolid:
         """Normalise a closed mesh and find its edges."""
-        unit, _, _ = normalised(vertices)
-        return cls(unit, faces, part, names, edges_between(faces))
+        unit, _, _ = normalised(mesh.vertices)
+        return cls(unit, mesh.faces, mesh.part, mesh.names, edges_between(mesh.faces), perforated)
 
     @property
     def normals(self) -> np.ndarray:
@@ -120,7 +122,8 @@ class Family:
     def _build(self, spreads: np.ndarray) -> CoarseSolid | None:
         try:
             with coarser(_COARSE):
-                mesh = self.template.build(**self.measures(spreads)).assembly.mesh()
+                model = self.template.build(**self.measures(spreads))
+                mesh = model.assembly.mesh()
         except SolidError:
             return None
-        return CoarseSolid.of(mesh.vertices, mesh.faces, mesh.part, mesh.names)
+        return CoarseSolid.of(mesh, perforated=model.perforated)
