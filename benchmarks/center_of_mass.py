@@ -21,7 +21,7 @@ from manitwin.geometry.mass_properties import solid_mass_properties
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.known import mass_properties
-from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.text import read_text
 from manitwin.pipeline.mass_by_parts import mass_by_parts
 

@@ -32,7 +32,8 @@ from manitwin.geometry.sampling import sample_surface
 from manitwin.models.annotators.surface_color import lab_from_srgb, named_colors, seen_from_outside
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.looks import COLORS
-from manitwin.models.generators.templates.made import Made, make
+from manitwin.models.generators.templates.made import Made
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.text import read_text
 
 SAMPLES = 3000

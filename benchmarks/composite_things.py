@@ -12,7 +12,8 @@ from composite_categories import COMPOSITE_CATEGORIES
 from manitwin.errors import ManiTwinError
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.described import Wish
-from manitwin.models.generators.templates.made import make, visual_parts
+from manitwin.models.generators.templates.made import visual_parts
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.text import Wanted
 from manitwin.render.cameras import Camera, framing_camera
 from manitwin.render.renderer import shared_renderer

@@ -27,7 +27,8 @@ from manitwin.geometry.sampling import farthest_point_sampling, sample_surface
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.known import mass_properties
 from manitwin.models.generators.templates.known_frames import known_frame
-from manitwin.models.generators.templates.made import Made, make
+from manitwin.models.generators.templates.made import Made
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.template import KnownPoint
 from manitwin.models.generators.templates.text import read_text
 

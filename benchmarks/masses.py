@@ -18,7 +18,7 @@ from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.protocol import Subject
 from manitwin.models.annotators.rules import estimate_physical
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.text import Wanted
 from manitwin.twin.record_values import Estimate
 

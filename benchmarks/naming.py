@@ -33,7 +33,8 @@ from manitwin.models.classifiers.efficientnet_lite import SIDE_PX, logits
 from manitwin.models.classifiers.imagenet import load_names
 from manitwin.models.classifiers.object_pictures import object_pictures
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.made import make, visual_parts
+from manitwin.models.generators.templates.made import visual_parts
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.text import read_text
 from manitwin.models.matting import matte_photo
 from manitwin.pipeline.naming import VIEWS_FROM_ABOVE, cut_view

@@ -26,7 +26,7 @@ from manitwin.geometry.parts.segmentation import segmented
 from manitwin.geometry.parts.shape import measure_shape
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.text import read_text
 
 TRUE_ROLES: dict[PartRule, tuple[str, dict[str, str]]] = {

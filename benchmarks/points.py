@@ -29,7 +29,8 @@ from manitwin.models.annotators.rules import RulesAnnotator
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.known import mass_properties
 from manitwin.models.generators.templates.known_frames import known_frame
-from manitwin.models.generators.templates.made import Made, make, visual_parts
+from manitwin.models.generators.templates.made import Made, visual_parts
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.text import read_text
 from manitwin.pipeline.frames import with_frames
 from manitwin.pipeline.refinement import away_from_feature_m, refined_points

@@ -12,7 +12,8 @@ import trimesh
 from manitwin.geometry.poses import transform
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.described import Wish
-from manitwin.models.generators.templates.made import Made, make, visual_parts
+from manitwin.models.generators.templates.made import Made, visual_parts
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.text import Wanted
 from manitwin.render.cameras import Camera, framing_camera
 from manitwin.render.procedural_textures import procedural_texture, textured_box

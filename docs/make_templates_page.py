@@ -13,7 +13,7 @@ import numpy as np
 
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.looks import COLORS, MATERIALS, SAME_MATERIAL, SHADES
-from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.template import Template
 from manitwin.models.generators.templates.text import DIRECTIONS, Wanted
 from manitwin.models.generators.templates.vocabulary import RELATIVE

@@ -11,7 +11,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.made import make, visual_parts
+from manitwin.models.generators.templates.made import visual_parts
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.text import Wanted
 from manitwin.render.cameras import hero_camera
 from manitwin.render.renderer import shared_renderer

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 import re
 import tomllib
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from graphlib import TopologicalSorter
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +70,34 @@ def test_every_path_on_the_page_is_there() -> None:
     said = set(re.findall(r"`((?:[a-z_]+/)+(?:[a-z_]+\.py)?)`", PAGE))
     assert len(said) > 10
     assert [name for name in said if not (PACKAGE / name).exists()] == []
+
+
+def modules_by_name() -> dict[str, Path]:
+    names = {}
+    for path in PACKAGE.rglob("*.py"):
+        dotted = ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)
+        names[dotted.removesuffix(".__init__")] = path
+    return names
+
+
+def imported_anywhere(source: str, modules: Mapping[str, Path]) -> set[str]:
+    """Return the modules that one imports: at its top, inside functions, and for types alone."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        if isinstance(node, ast.ImportFrom):
+            assert node.level == 0 and node.module is not None, "imports name the whole path"
+            members = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= {member if member in modules else node.module for member in members}
+    return found & modules.keys()
+
+
+def test_no_modules_import_each_other_not_even_in_functions_or_for_types() -> None:
+    modules = modules_by_name()
+    graph = {name: imported_anywhere(path.read_text(), modules) - {name} for name, path in modules.items()}
+    order = list(TopologicalSorter(graph).static_order())  # a circle raises CycleError, which names its modules
+    assert set(order) == set(modules) and sum(map(len, graph.values())) > len(modules)
 
 
 Stacks = dict[str, list[str]]

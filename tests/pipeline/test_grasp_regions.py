@@ -11,7 +11,7 @@ import trimesh
 from manitwin.geometry.poses import transform
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.text import read_text
 from manitwin.pipeline.grasp_regions import PartedSolid, region_columns
 

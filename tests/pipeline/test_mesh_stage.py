@@ -19,7 +19,7 @@ from manitwin.formats.meshes.triangles import with_creased_normals
 from manitwin.geometry.cavity import find_opening
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.known import known_of
-from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.text import Wanted
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.mesh import MeshStage

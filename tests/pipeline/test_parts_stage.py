@@ -18,7 +18,8 @@ from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.priors import load_priors
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.known import known_of
-from manitwin.models.generators.templates.made import make, visual_parts
+from manitwin.models.generators.templates.made import visual_parts
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.text import read_text
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.parts import PARTS_FILE, PartsStage

@@ -67,13 +67,13 @@ class Scene:
         """
         from manitwin.scenes.sapien_scene import add_to_sapien
 
-        return add_to_sapien(scene, self, visual=visual)
+        return add_to_sapien(scene, self.record, self.static_boxes(), self.placed_objects(), self.twin, visual=visual)
 
     def to_mujoco(self) -> mujoco.MjModel:
         """Return a MuJoCo model: the objects are free bodies of their names, ``qpos0`` is the recorded scene."""
         from manitwin.scenes.mujoco_scene import to_mujoco
 
-        return to_mujoco(self)
+        return to_mujoco(self.static_boxes(), self.placed_objects())
 
 
 def object_pose(placed: SceneObject) -> np.ndarray:

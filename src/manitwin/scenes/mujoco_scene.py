@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import mujoco
 
-from manitwin.geometry.rigid_body import FURNITURE_FRICTION
+from manitwin.geometry.rigid_body import FURNITURE_FRICTION, PlacedObject, StaticBox
 from manitwin.physics.mujoco.body import (
     SOFT_SOLREF,
     TIMESTEP_S,
@@ -14,20 +16,19 @@ from manitwin.physics.mujoco.body import (
     contact_parameters,
     new_spec,
 )
-from manitwin.scenes.loaded_scene import Scene
 
 
-def to_mujoco(scene: Scene) -> mujoco.MjModel:
-    """Return the model; the objects are bodies with a free joint of the same name, ``qpos0`` is the recorded scene.
+def to_mujoco(boxes: Iterable[StaticBox], placed_objects: Iterable[PlacedObject]) -> mujoco.MjModel:
+    """Return the model of furniture and objects: each object a body with a free joint of its name, ``qpos0`` the poses given.
 
     MuJoCo takes the larger friction of two that touch, where PhysX takes the mean.
     """
     spec = new_spec(TIMESTEP_S)
     contact = contact_parameters(FURNITURE_FRICTION, SOFT_SOLREF)
-    for box in scene.static_boxes():
+    for box in boxes:
         add_box(spec.worldbody, box.box_to_world, box.half_extents_m, contact, name=box.name)
     meshes: dict[str, list[str]] = {}
-    for placed in scene.placed_objects():
+    for placed in placed_objects:
         body = placed.body
         if placed.twin_id not in meshes:
             meshes[placed.twin_id] = add_hulls(spec, placed.twin_id, body)

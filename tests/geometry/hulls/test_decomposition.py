@@ -13,7 +13,7 @@ from manitwin.geometry.hulls.error import hull_error
 from manitwin.geometry.hulls.reduction import convex_corners, hull_to_obj, hull_volume
 from manitwin.geometry.repair.cascade import repair
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.text import read_text
 from real_meshes import VESSELS, cup, load_real_mesh, mesh_rows
 

@@ -11,7 +11,7 @@ from manitwin.geometry.parts.features import feature_scores
 from manitwin.geometry.parts.part_rules import membership
 from manitwin.geometry.parts.shape import SurfacePoints, measure_shape
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.text import read_text
 
 

@@ -13,7 +13,7 @@ from manitwin.geometry.parts.shape import measure_shape, surface_points
 from manitwin.geometry.parts.stem import find_stem
 from manitwin.geometry.sampling import sample_surface
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.text import read_text
 
 

@@ -13,7 +13,8 @@ from manitwin.models.classifiers.imagenet import CLASSES, load_limits, load_name
 from manitwin.models.classifiers.object_pictures import object_pictures
 from manitwin.models.classifiers.size_evidence import size_likelihoods
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.made import make, visual_parts
+from manitwin.models.generators.templates.made import visual_parts
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.text import read_text
 from manitwin.render.cameras import framing_camera
 from manitwin.render.renderer import shared_renderer

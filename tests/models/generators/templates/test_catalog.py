@@ -13,7 +13,8 @@ import trimesh
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.looks import look_of
-from manitwin.models.generators.templates.made import Made, make, visual_parts
+from manitwin.models.generators.templates.made import Made, visual_parts
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.template import IN_THE_OPEN
 from manitwin.models.generators.templates.text import Wanted
 

@@ -9,7 +9,7 @@ from manitwin.geometry.solids.shapes import box, cylinder
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.known import known_of, mass_properties, material_words
-from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.text import read_text
 
 TEMPLATES = load_templates()

@@ -10,7 +10,7 @@ from manitwin.errors import UsageError
 from manitwin.models.annotators.priors import load_priors
 from manitwin.models.generators.templates.described import Wish
 from manitwin.models.generators.templates.looks import COLORS, MATERIALS
-from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.making import make
 
 
 def test_words_before_and_after_the_thing_describe_it() -> None:

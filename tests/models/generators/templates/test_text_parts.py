@@ -9,7 +9,7 @@ from told_templates import TEMPLATES, made_of, read, whole
 from manitwin.errors import UsageError
 from manitwin.models.generators.templates.described import Wish
 from manitwin.models.generators.templates.looks import COLORS, MATERIALS
-from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.making import make
 
 
 def test_parts_are_described_by_their_name() -> None:

@@ -8,7 +8,7 @@ import trimesh
 from told_templates import TEMPLATES, made_of, read
 
 from manitwin.errors import UsageError
-from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.making import make
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,8 @@ from manitwin.geometry.solids.shapes import SolidError
 from manitwin.models.generators.lift.made_photo import Job
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.known import known_of
-from manitwin.models.generators.templates.made import Made, make, visual_parts
+from manitwin.models.generators.templates.made import Made, visual_parts
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.text import read_text
 
 

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from manifold3d import CrossSection, Manifold, OpType
 
 from manitwin.errors import UsageError
 from manitwin.models.annotators.priors import load_materials, load_priors
-
-if TYPE_CHECKING:
-    from manitwin.models.generators.templates.made import Made
-    from manitwin.models.generators.templates.stated_amounts import Amount
+from manitwin.models.generators.templates.made import Made
+from manitwin.models.generators.templates.stated_amounts import Amount
 
 CLOSED_WALLS_M = {"glass": 0.003, "plastic": 0.0005, "aluminium": 0.0001, "steel": 0.0003, "cardboard": 0.0005}
 """Of containers by what they look like: bottles and jars of glass 2 to 4 mm, PET 0.3 to 0.7, cans 0.1 to 0.3, drink cartons and

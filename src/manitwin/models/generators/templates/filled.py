@@ -14,7 +14,8 @@ from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.described import Wish
 from manitwin.models.generators.templates.fitting.fit import Fitted
 from manitwin.models.generators.templates.looks import SHADES, color_of, shaded
-from manitwin.models.generators.templates.made import Made, make
+from manitwin.models.generators.templates.made import Made
+from manitwin.models.generators.templates.making import make
 from manitwin.models.generators.templates.stated_lengths import lengths_in
 from manitwin.models.generators.templates.template import Template
 from manitwin.models.generators.templates.text import Wanted, read_text

@@ -1,38 +1,23 @@
-"""Make what a text asks for: measures drawn within the category's intervals, scaled to the stated size, dressed in looks."""
+"""A thing that was made from a template: its mesh by parts, its looks, its masses, and the meshes that show it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import trimesh
 from manifold3d import Manifold
-from scipy.spatial import ConvexHull
-from scipy.spatial.distance import pdist
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
-from manitwin.errors import UsageError
 from manitwin.formats.meshes.textures import srgb_to_linear
 from manitwin.formats.meshes.triangles import with_creased_normals
 from manitwin.geometry.seams import has_three_places
 from manitwin.geometry.solids.parts import PartedMesh
-from manitwin.models.annotators.prior_names import lookup
-from manitwin.models.annotators.walls import METALS
-from manitwin.models.generators.templates.capacity import held_m3, scale_with
-from manitwin.models.generators.templates.described import Wish
-from manitwin.models.generators.templates.looks import Look, look_of
-from manitwin.models.generators.templates.proportions import Holds, proportioned
-from manitwin.models.generators.templates.template import KnownPoint, Model, Template
-from manitwin.models.generators.templates.text import Wanted
+from manitwin.models.generators.templates.looks import Look
+from manitwin.models.generators.templates.template import KnownPoint
 from manitwin.twin.import_record import GivenParts
-
-LEAST_WALL_M = 0.0008
-SHEET_M = 0.0009
-"""The wall of hollow handles and stands of sheet metal: 0.8 to 1 mm of stainless steel."""
-SIZE_MARGIN = 2.0
-"""A stated size beyond the category's interval by more than this factor is taken for a mistake."""
 
 
 @dataclass(frozen=True)
@@ -49,111 +34,6 @@ class Made:
     solids: list[tuple[Manifold, float]]
     masses_kg: dict[str, float]
     densities_kg_m3: dict[str, float]
-
-
-def make(template: Template, wanted: Wanted, rng: np.random.Generator, said: Mapping[str, float] | None = None) -> Made:
-    """Make one thing of a template; raises UsageError for a size that no such thing has or a part that it has not.
-
-    ``said`` are measures that are known, in place of drawn ones.
-    """
-    looks_by_slot = _looks(template, wanted, rng)
-    measures = template.drawn(rng) | dict(said or {}) | dict(wanted.measures)
-    if wanted.nominal_m is not None:
-        called_m = template.nominal_times * float(np.prod([measures[name] for name in template.nominal]))
-        measures[template.nominal[0]] *= wanted.nominal_m / called_m
-    if "wall_m" in measures:
-        measures["wall_m"] = max(LEAST_WALL_M, measures["wall_m"] * _wall(template, next(iter(looks_by_slot.values()))))
-    if wanted.solves_measures:
-        holds = _holds(template, wanted, looks_by_slot)
-        measures = proportioned(template, measures, wanted.lengths_m, wanted.part_lengths_m, holds)
-    model = template.build(**measures)
-    apart = _told_apart(model, _looks_of(template, model, model.slots, looks_by_slot, wanted.wishes))
-    mesh = model.assembly.mesh(apart)
-    _check_parts(template, wanted, mesh)
-
-    def made_at(scale: float) -> Made:
-        walled, its_model, its_mesh = measures, model, mesh
-        if measures.get("wall_m", 1.0) * scale < LEAST_WALL_M:
-            walled = measures | {"wall_m": LEAST_WALL_M / scale}
-            its_model = template.build(**walled)
-            its_mesh = its_model.assembly.mesh(apart)
-            scale = _scale(template, wanted, its_model, its_mesh) if wanted.scaling_amount is None else scale
-        return dressed(template, its_model, its_mesh, walled, looks_by_slot, wanted.wishes, scale)
-
-    if wanted.scaling_amount is None:
-        return made_at(_scale(template, wanted, model, mesh))
-    scale = scale_with(wanted.scaling_amount, made_at)
-    _check_size(template, float(np.ptp(mesh.vertices, axis=0).max()) * scale)
-    return made_at(scale)
-
-
-def _holds(template: Template, wanted: Wanted, looks: Mapping[str, Look]) -> Holds | None:
-    """Return the volume that is said beside lengths, and how what a thing of some measures holds is found; None where none is."""
-    amount = wanted.amount
-    if amount is None or amount.volume_m3 is None:
-        return None
-
-    def held(model: Model, mesh: PartedMesh, measures: Mapping[str, float]) -> float:
-        return held_m3(dressed(template, model, mesh, measures, looks, wanted.wishes, 1.0), amount)
-
-    return Holds(amount.volume_m3, amount.said, held)
-
-
-def _wall(template: Template, look: Look) -> float:
-    """Return how thick a wall of a look is, over the one that the template states."""
-    return 1.0 if template.of_plate and look.surface in METALS else look.wall
-
-
-def dressed(
-    template: Template,
-    model: Model,
-    mesh: PartedMesh,
-    measures: Mapping[str, float],
-    looks_by_slot: Mapping[str, Look],
-    wishes: Mapping[str, Wish],
-    scale: float,
-) -> Made:
-    """Return a built model and its mesh, scaled, with the looks of its slots and what is wished for single parts."""
-    looks = _looks_of(template, model, mesh.names, looks_by_slot, wishes)
-    solids, masses, densities = list[tuple[Manifold, float]](), dict[str, float](), dict[str, float]()
-    for part, built in model.assembly.solids():
-        solid = built.scale((scale, scale, scale))
-        density = template.contents_kg_m3.get(part, looks[part].density_kg_m3)
-        if part in template.of_sheet and looks[part].surface in METALS and "cast" not in looks[part].material:
-            density *= min(1.0, SHEET_M * float(solid.surface_area()) / float(solid.volume()))
-        solids.append((solid, density))
-        masses[part] = masses.get(part, 0.0) + density * float(solid.volume())
-        densities[part] = max(densities.get(part, 0.0), density)
-    return Made(
-        template.category,
-        PartedMesh(mesh.vertices * scale, mesh.faces, mesh.part, mesh.names),
-        looks,
-        tuple(_scaled(point, scale) for point in model.points),
-        {name: value * (scale if template.measures[name].unit == "m" else 1.0) for name, value in measures.items()},
-        solids,
-        masses,
-        densities,
-    )
-
-
-def _looks_of(
-    template: Template,
-    model: Model,
-    parts: Iterable[str],
-    looks_by_slot: Mapping[str, Look],
-    wishes: Mapping[str, Wish],
-) -> dict[str, Look]:
-    """Return the look of each part: that of its slot, with what is wished for the part."""
-    looks = {part: looks_by_slot[model.slots[part] or next(iter(template.slots))] for part in parts}
-    for part, wish in wishes.items():
-        if part in looks and part not in template.slots:
-            looks[part] = wish.of(looks[part])
-    return looks
-
-
-def _told_apart(model: Model, looks: Mapping[str, Look]) -> list[tuple[str, str]]:
-    """Return the regions, by name and part, that look unlike the part which they are of: their borders are seen."""
-    return [(name, of) for name, of in model.assembly.regions() if looks[name] != looks[of]]
 
 
 def visual_parts(made: Made) -> list[trimesh.Trimesh]:
@@ -202,92 +82,3 @@ def _by_look(made: Made) -> list[tuple[Look, list[str], np.ndarray]]:
         for look, names in by_look.items()
     ]
     return [each for each in numbered if len(each[2])]
-
-
-def _looks(template: Template, wanted: Wanted, rng: np.random.Generator) -> dict[str, Look]:
-    """Return the look of each slot: what the text says, else drawn; a slot of '' looks like the first."""
-    looks: dict[str, Look] = {}
-    first = next(iter(template.slots))
-    for slot, choices in template.slots.items():
-        wish = wanted.wishes.get(slot, Wish())
-        if slot == first:
-            wish = wish.over(wanted.wishes.get("", Wish()))
-        usual = wish.choices([look_of(words) if words else looks[first] for words in choices])
-        if slot != first and wish == Wish() and _is_whole(wanted, looks[first], usual):
-            usual = [looks[first]]
-        looks[slot] = wish.of(usual[int(rng.integers(len(usual)))])
-    return looks
-
-
-def _is_whole(wanted: Wanted, first: Look, usual: Sequence[Look]) -> bool:
-    """Tell whether a material that is said of the whole is that of a further part too: all of a wooden spatula is of wood."""
-    said = wanted.wishes.get("", Wish()).material
-    return (
-        said is not None and said.surface in ("wood", "plastic") and first.surface in {look.surface for look in usual}
-    )
-
-
-def _check_parts(template: Template, wanted: Wanted, mesh: PartedMesh) -> None:
-    known = sorted({*template.slots, *mesh.names})
-    for part in wanted.wishes:
-        if part and part not in known and f"{part}s" not in known:
-            raise UsageError(f"a {template.category} has no {part!r} here. Its parts: {', '.join(known)}")
-
-
-def _scale(template: Template, wanted: Wanted, model: Model, mesh: PartedMesh) -> float:
-    """Return the scale that gives the stated size, or the relative one; 1 where the text says neither, or several lengths.
-
-    Which side is meant by width is told by the size: of a keyboard of 40 cm the longer one.
-    """
-    extents = np.ptp(mesh.vertices, axis=0)
-    meant = _places(model, mesh, template.length_of) if template.length_of else mesh.vertices
-    now = {
-        "": [np.ptp(meant, axis=0).max()],
-        "diagonal": [_diagonal_m(_places(model, mesh, template.diagonal_of))] if template.diagonal_of else [],
-        "height": [extents[2]],
-        "width": [extents[:2].min(), extents[:2].max()],
-        "length": [extents.max()],
-        "depth": [extents[:2].min()],
-    }
-    prior = lookup(template.category)
-    assert prior is not None, template.category
-    interval = prior.longest_axis_m
-    if wanted.lengths_m or wanted.part_lengths_m or wanted.nominal_m is not None or wanted.measures:
-        scale = 1.0
-        if wanted.lengths_m and not wanted.solves_measures:
-            direction, length = next(iter(wanted.lengths_m.items()))
-            scales = [length / float(side) for side in now[direction]]
-            usual = [scale for scale in scales if interval.low <= float(extents.max()) * scale <= interval.high]
-            scale = [*usual, *scales][0]
-        _check_size(template, float(extents.max()) * scale)
-        return scale
-    if wanted.relative is None:
-        return 1.0
-    return float(interval.low + wanted.relative * (interval.high - interval.low)) / float(extents.max())
-
-
-def _places(model: Model, mesh: PartedMesh, part: str) -> np.ndarray:
-    """Return the vertices ``(N, 3)`` of a part, or of the parts that wear its slot."""
-    names = [at for at, name in enumerate(mesh.names) if part in (name, model.slots[name])]
-    return np.asarray(mesh.vertices[np.unique(mesh.faces[np.isin(mesh.part, names)])])
-
-
-def _diagonal_m(vertices: np.ndarray) -> float:
-    """Return the largest distance of two of some vertices ``(N, 3)``."""
-    hull = vertices[ConvexHull(vertices).vertices]
-    return float(pdist(hull).max())
-
-
-def _check_size(template: Template, longest_m: float) -> None:
-    prior = lookup(template.category)
-    assert prior is not None, template.category
-    interval = prior.longest_axis_m
-    if not interval.low / SIZE_MARGIN <= longest_m <= interval.high * SIZE_MARGIN:
-        raise UsageError(
-            f"a {template.category} of {longest_m:.3g} m: such are {interval.low:g} to {interval.high:g} m; check the unit"
-        )
-
-
-def _scaled(point: KnownPoint, scale: float) -> KnownPoint:
-    x, y, z = point.position_m
-    return KnownPoint(point.label, point.kind, point.part, (x * scale, y * scale, z * scale), point.direction)

@@ -19,7 +19,8 @@ from manitwin.models.generators.templates.fitting.search import Candidate, searc
 from manitwin.models.generators.templates.fitting.shape import Family
 from manitwin.models.generators.templates.fitting.view import View
 from manitwin.models.generators.templates.looks import Look, look_of
-from manitwin.models.generators.templates.made import Made, dressed
+from manitwin.models.generators.templates.made import Made
+from manitwin.models.generators.templates.making import dressed
 from manitwin.models.generators.templates.other_shapes import KIN_OF_ANOTHER_SHAPE
 from manitwin.models.generators.templates.template import Template
 
