@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import h5py
@@ -9,13 +10,17 @@ import numpy as np
 import pytest
 
 from manitwin.errors import EpisodesError
-from manitwin.formats.hdf5_file import Hdf5, open_hdf5
+from manitwin.formats.hdf5_file import Hdf5
 
 REMEDY = "write the episodes again"
 
 
+def opened(path: Path) -> closing[Hdf5]:
+    return closing(Hdf5(path, EpisodesError, remedy=REMEDY))
+
+
 def refused(path: Path, ask: Callable[[Hdf5], object]) -> str:
-    with pytest.raises(EpisodesError) as caught, open_hdf5(path, EpisodesError, remedy=REMEDY) as file:
+    with pytest.raises(EpisodesError) as caught, opened(path) as file:
         ask(file)
     said = str(caught.value)
     assert "\n" not in said and said.startswith(str(path))
@@ -32,7 +37,7 @@ def sound(path: Path) -> Path:
 
 
 def test_sound_file_is_read(tmp_path: Path) -> None:
-    with open_hdf5(sound(tmp_path / "a.h5"), EpisodesError, remedy=REMEDY) as file:
+    with opened(sound(tmp_path / "a.h5")) as file:
         assert file.names() == ["a"] and file.names("a") == ["b", "flags", "packed"]
         assert file.array("a/b").tolist() == [[0, 1, 2], [3, 4, 5]] and file.length("a/b") == 2
         assert file.array("a/packed").shape == (10_000,) and file.array("a/flags").dtype == bool
@@ -137,7 +142,7 @@ def test_altered_bytes_are_read_or_refused(tmp_path: Path) -> None:
             content[place] = rng.integers(256)
         path.write_bytes(content)
         try:
-            with open_hdf5(path, EpisodesError, remedy=REMEDY) as file:
+            with opened(path) as file:
                 file.group("a")
                 for name in file.names("a"):
                     file.array(f"a/{name}")

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import cv2
 import numpy as np
 import pytest
 
 from manitwin.errors import UsageError
-from manitwin.formats.onnx_file import parse_onnx, read_onnx
+from manitwin.formats.onnx_file import parse_onnx
 from tiny_networks import field, tensor_info, tiny_network
 
 
-def test_nodes_are_put_in_order_and_what_no_output_needs_is_left_out(tmp_path: Path) -> None:
-    path = tmp_path / "tiny.onnx"
-    path.write_bytes(tiny_network())
-    read = read_onnx(path, UsageError)
+def test_nodes_are_put_in_order_and_what_no_output_needs_is_left_out() -> None:
+    read = parse_onnx(tiny_network(), "tiny.onnx", UsageError)
     assert [(tensor.name, tensor.shape) for tensor in read.inputs] == [("picture", (1, 3, 64, 64))]
     assert read.outputs[0].name == "mask"
     assert read.content.index(b"Conv") < read.content.index(b"Sigmoid")

@@ -12,7 +12,7 @@ from PIL import Image
 
 from manitwin.errors import InputError
 from manitwin.formats.sniff import Sniffed, sniff
-from manitwin.pipeline.inspection import why_no_input
+from manitwin.pipeline.inspection import why_no_inputs
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def test_single_file_is_refused_with_the_reason_of_a_folder(tmp_path: Path, name
     path.write_bytes(content)
     with pytest.raises(InputError) as refused:
         sniff(path)
-    assert refused.value.reason == "wrong_type" and str(refused.value).endswith(f"{name}: {why_no_input(path)}")
+    assert refused.value.reason == "wrong_type" and str(refused.value).endswith(f"{name}: {why_no_inputs([path])[0]}")
 
 
 def test_image_under_such_a_name_is_an_image(tmp_path: Path) -> None:

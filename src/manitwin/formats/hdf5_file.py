@@ -34,16 +34,6 @@ _FAILURES = (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError
 """What h5py raises for files that are none, cut off or altered."""
 
 
-@contextmanager
-def open_hdf5(path: Path, refuse: Refusal, *, remedy: str, inside: Path | None = None) -> Iterator[Hdf5]:
-    """Open a regular HDF5 file for reading; raises what ``refuse`` makes of one line, which ends in the remedy."""
-    opened = Hdf5(path, refuse, remedy=remedy, inside=inside)
-    try:
-        yield opened
-    finally:
-        opened.close()
-
-
 class Hdf5:
     """An open file: arrays and texts by their paths in it, each looked at before it is read."""
 

@@ -10,10 +10,9 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from manitwin.formats.bounded_file import Refusal, read_bytes
+from manitwin.formats.bounded_file import Refusal
 from manitwin.formats.printable import printable_line
 
 MAX_ONNX_BYTES = 1 << 30
@@ -45,11 +44,6 @@ class OnnxFile:
 
 class _Broken(Exception):
     pass
-
-
-def read_onnx(path: Path, refuse: Refusal, *, name: str | None = None) -> OnnxFile:
-    """Read an ONNX file of at most ``MAX_ONNX_BYTES``; raises what ``refuse`` makes of one line with cause and remedy."""
-    return parse_onnx(read_bytes(path, MAX_ONNX_BYTES, refuse, name=name), name or path.name, refuse)
 
 
 def parse_onnx(content: bytes, name: str, refuse: Refusal, *, output: str | None = None) -> OnnxFile:

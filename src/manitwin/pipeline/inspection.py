@@ -57,11 +57,6 @@ def why_no_inputs(files: Collection[Path]) -> list[str | None]:
     return [known[file] for file in files]
 
 
-def why_no_input(file: Path) -> str | None:
-    """Return why a file that has no suffix of an input is none, None for an image under another name."""
-    return why_no_inputs([file])[0]
-
-
 def are_twins(records: Iterable[Path]) -> Iterator[bool]:
     """Yield of each file called twin.json whether it is a twin's record."""
     for _, answer in iterate_isolated(f"{_THIS}:read_whether_twin", records, LIMITS):

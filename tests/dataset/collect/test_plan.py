@@ -46,7 +46,7 @@ def test_groups_get_equal_shares_and_their_sizes_and_categories_take_turns() -> 
     assert plan.wanted == dict.fromkeys(GROUPS, 10)
     assert plan.there == {**dict.fromkeys(GROUPS, 0), "kitchen": 10, "tools": 10}
     assert Counter(each.category for each in plan.chosen) == {"mug": 5, "spoon": 5, "hammer": 10}
-    assert Counter(prompt.category_group for prompt in plan.prompts) == dict.fromkeys(GROUPS[2:], 10)
+    assert Counter(facts_of(prompt.category, None).group for prompt in plan.prompts) == dict.fromkeys(GROUPS[2:], 10)
     assert plan.chosen == plan_inputs(rows[::-1], 60).chosen, "in whatever order they were added"
     assert plan.chosen != plan_inputs(rows, 60, seed=5).chosen
     assert shares(10, 6) == [2, 2, 2, 2, 1, 1]

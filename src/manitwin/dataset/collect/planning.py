@@ -24,7 +24,6 @@ class Prompt:
 
     text: str
     category: str
-    category_group: str
 
 
 @dataclass(frozen=True)
@@ -143,7 +142,7 @@ def _prompts(group: str, count: int, there: Sequence[Row], seed: int) -> list[Pr
             if have[prior.category] + asked[prior.category] == least:
                 number = asked[prior.category]
                 asked[prior.category] += 1
-                made.append(Prompt(sentence(prior, number % len(SENTENCES), rng), prior.category, group))
+                made.append(Prompt(sentence(prior, number % len(SENTENCES), rng), prior.category))
     return made
 
 

@@ -67,10 +67,6 @@ class ReviewSession:
             places = {twin_id: place for place, twin_id in enumerate(later)}
         return sorted(queue, key=lambda twin_id: places.get(twin_id, -1))
 
-    def next_twin(self, annotator: str, after: str | None = None) -> str | None:
-        """Return the first id of ``queue``; None: nothing is left."""
-        return next(iter(self.queue(annotator, after)), None)
-
     def progress(self, annotator: str) -> Progress:
         """Return an annotator's progress."""
         now, judged = self._revisions(), self.store.judged()

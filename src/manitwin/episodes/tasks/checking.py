@@ -13,7 +13,7 @@ from manitwin.episodes.goals.evaluation import judge
 from manitwin.episodes.goals.goal import Goal, Literal
 from manitwin.episodes.pick_place_tasks import MIN_GAP_M
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
-from manitwin.episodes.sequence import GoalSequence, Step, course_of, goal_of_later_step, merged, problem_of
+from manitwin.episodes.sequence import GoalSequence, Step, course_of, goal_of_later_step, problem_of
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.registry import SKILLS
 from manitwin.episodes.skills.skill import SkillGoal
@@ -100,11 +100,6 @@ def whole_goal(scene: TaskScene, sequence: GoalSequence) -> Goal:
     apart = tuple(Literal("undisturbed", name) for name in scene.names if name not in taking_part)
     kept = tuple(each for each in said.stays if each.subject not in sequence.moved or len(sequence.steps) == 1)
     return Goal(said.literals, tuple(dict.fromkeys((*kept, *apart))))
-
-
-def skill_goal_of(scene: TaskScene, sequence: GoalSequence) -> SkillGoal:
-    """Return all that an episode's end is judged by."""
-    return replace(merged([step.goal for step in sequence.steps]), goal=whole_goal(scene, sequence))
 
 
 def _goal_there(

@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import tempfile
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 from manitwin.errors import UsageError
@@ -80,11 +80,6 @@ def read_stored(weights: StoredWeights) -> bytes:
 def all_weights() -> list[tuple[KnownWeights, StoredWeights | None]]:
     """Return all known weights by name, each with its record where it was added."""
     return [(KNOWN_WEIGHTS[name], stored(name)) for name in sorted(KNOWN_WEIGHTS)]
-
-
-def record_json(weights: StoredWeights) -> dict[str, str]:
-    """Return a record as JSON values."""
-    return {key: str(value) for key, value in asdict(weights).items()}
 
 
 def _write(path: Path, content: bytes) -> None:

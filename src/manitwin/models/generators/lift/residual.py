@@ -13,7 +13,6 @@ import cv2
 import numpy as np
 import trimesh
 
-from manitwin.geometry.poses import transform_points
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.render.cameras import Camera
 from manitwin.render.raycast import cast_camera
@@ -83,15 +82,6 @@ def parallel_camera(mask_shape: tuple[int, int], *, elevation_deg: float = 0.0) 
     middle = np.array([(width - 1) / 2, (1 - height) / 2])
     pose[:3, 3] = pose[:3, :2] @ middle + distance * pose[:3, 2]
     return Camera(pose, TELESCOPE_FOV_RAD, width, height)
-
-
-def moved_camera(camera: Camera, matrix: np.ndarray) -> Camera:
-    """Return the camera that sees a solid moved by a similarity ``matrix (4, 4)`` as ``camera`` saw it before."""
-    scale = float(np.cbrt(np.linalg.det(matrix[:3, :3])))
-    pose = camera.camera_to_object.copy()
-    pose[:3, :3] = matrix[:3, :3] @ pose[:3, :3] / scale
-    pose[:3, 3] = transform_points(matrix, pose[None, :3, 3])[0]
-    return Camera(pose, camera.fov_y_rad, camera.width_px, camera.height_px)
 
 
 def _edge_support(creases: np.ndarray, object_px: np.ndarray, rgb: np.ndarray) -> float | None:

@@ -11,9 +11,6 @@ from manitwin.models.generators.templates.template import Model
 
 RIM_SHARE = 0.05
 """Of the height: the uppermost part of a wall is its rim."""
-GLAZED = (
-    "white ceramic", "red ceramic", "blue ceramic", "navy stoneware", "green ceramic", "yellow ceramic", "black ceramic",
-)  # fmt: skip
 _ROWS = 24
 
 
