@@ -16,6 +16,13 @@ import numpy as np
 import trimesh
 
 from manitwin.geometry.cavity import Opening
+from manitwin.geometry.hulls.cutting_planes import (
+    CoarsePart,
+    best_plane,
+    normal_across,
+    own_and_principal_axes,
+    surface_of,
+)
 from manitwin.geometry.hulls.reduction import DECIMALS, convex_corners, hull_volume, reduced_hull
 
 _SIMPLIFY_SHARE = 1e-3  # of the longest side: detail that no collision needs; 2e-3 already opened a mug's 4 mm wall
@@ -26,9 +33,6 @@ _FREE_MERGE_SHARE = 2.5e-4  # of the mesh's volume: a merge that adds less is ma
 _SECTORS = 8  # first cuts of a vessel, through its axis; without them the search leaves it filled, 12 and 16 were worse
 # Times that of the best plane: what three cuts, crosswise through a hole, must gain to be made instead.
 _CROSS_GAIN = 4.5
-_COARSE_SHARE = 7e-3  # of a part's longest side: detail that does not decide where it is cut
-_POSITIONS = (0.2, 0.5, 0.8)  # of a part's width along a cutting normal
-_MORE_POSITIONS = (0.1, 0.35, 0.65, 0.9)  # along the two normals whose first positions were the best
 _INNER_SHARE = 1 - 1e-9
 """Of the volume of manifold3d's hull, which may leave out corners and adds none: what a hull has at least, but for rounding."""
 _TOUCH_SHARE = 1e-3  # of the longest side: parts farther apart than this are not merged
@@ -101,50 +105,8 @@ class _Part:
 
     def __init__(self, solid: manifold3d.Manifold):
         self.solid = solid
-        self.hull_vertices, self.hull_volume = convex_corners(_surface(solid)[0])
+        self.hull_vertices, self.hull_volume = convex_corners(surface_of(solid)[0])
         self.excess = self.hull_volume - solid.volume()
-
-
-class _CoarsePart:
-    """A part's vertices and edges without its finest detail, on which planes are compared."""
-
-    def __init__(self, part: _Part):
-        coarse = part.solid.simplify(_COARSE_SHARE * float(np.ptp(part.hull_vertices, axis=0).max()))
-        kept = coarse.status() == manifold3d.Error.NoError and not coarse.is_empty()
-        self.vertices, triangles = _surface(coarse if kept else part.solid)
-        edges = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-        once = edges[:, 0] < edges[:, 1]  # every edge of a closed surface is there in both directions
-        self.starts, self.ends = edges[once, 0], edges[once, 1]
-
-    def hull_volume_after(self, normal: np.ndarray, offset: float) -> float:
-        """Return the summed hull volumes of both sides of a plane, infinity where it misses the part."""
-        return self._hull_volume_after(self.vertices @ normal - offset)
-
-    def _hull_volume_after(self, height: np.ndarray) -> float:
-        below = height < 0
-        crossing = np.flatnonzero(below.take(self.starts) != below.take(self.ends))
-        if not len(crossing):
-            return np.inf
-        start, end = self.starts.take(crossing), self.ends.take(crossing)
-        high, first = height.take(start), self.vertices.take(start, axis=0)
-        along = (high / (high - height.take(end)))[:, None]
-        section = first + along * (self.vertices.take(end, axis=0) - first)
-        sides = (np.concatenate([self.vertices.compress(side, axis=0), section]) for side in (below, ~below))
-        # manifold3d's hull is the faster one; it can be some per cent off on nearly flat clouds: it only ranks planes
-        return sum(float(manifold3d.Manifold.hull_points(side).volume()) for side in sides)
-
-    def cuts_across(self, normal: np.ndarray, positions: Sequence[float]) -> list[tuple[float, float]]:
-        """Return (summed hull volumes after, offset) of cuts at positions in [0, 1] of the part's width."""
-        along = self.vertices @ normal
-        low, high = float(along.min()), float(along.max())
-        offsets = [low + (high - low) * position for position in positions]
-        return [(self._hull_volume_after(along - offset), offset) for offset in offsets]
-
-
-def _surface(solid: manifold3d.Manifold) -> tuple[np.ndarray, np.ndarray]:
-    """Return vertices ``(V, 3)`` and triangles ``(F, 3)`` of a solid."""
-    surface = solid.to_mesh64()
-    return np.asarray(surface.vert_properties)[:, :3], np.asarray(surface.tri_verts, dtype=np.int64)
 
 
 def _cut(solid: manifold3d.Manifold, count: int, opening: Opening | None) -> list[np.ndarray]:
@@ -153,7 +115,7 @@ def _cut(solid: manifold3d.Manifold, count: int, opening: Opening | None) -> lis
     parts = [_Part(piece) for piece in _pieces([solid], volume)]
     if opening is not None:
         for angle in np.arange(_SECTORS // 2) * (2 * np.pi / _SECTORS):
-            normal = _across(opening.axis, angle)
+            normal = normal_across(opening.axis, angle)
             parts = [new for part in parts for new in _split(part, normal, float(normal @ opening.center_m), volume)]
     done: list[_Part] = []
     while parts and len(parts) + len(done) < count:
@@ -162,7 +124,7 @@ def _cut(solid: manifold3d.Manifold, count: int, opening: Opening | None) -> lis
         if worst.excess < _CONVEX_SHARE * volume:
             done.append(worst)
             break
-        total, normal, offset = _best_plane(_CoarsePart(worst), opening)
+        total, normal, offset = best_plane(CoarsePart(worst.solid, np.ptp(worst.hull_vertices, axis=0)), opening)
         gain = worst.hull_volume - total
         helps = gain > worst.hull_volume * 1e-6
         across = None
@@ -199,7 +161,7 @@ def _through_hole(part: _Part, least_gain: float) -> list[manifold3d.Manifold] |
             continue
         quarters = [solid]
         for angle in (0.0, np.pi / 2):
-            normal = _across(axis, angle)
+            normal = normal_across(axis, angle)
             quarters = [
                 half for each in quarters for half in each.split_by_plane(tuple(normal), float(normal @ middle))
             ]
@@ -211,7 +173,7 @@ def _through_hole(part: _Part, least_gain: float) -> list[manifold3d.Manifold] |
 
 def _hole_middle(solid: manifold3d.Manifold, axis: np.ndarray) -> np.ndarray | None:
     """Return the middle of the largest hole in the section half-way along an axis, None where there is none."""
-    frame = np.stack([_across(axis, np.pi / 2), -_across(axis, 0.0), axis])
+    frame = np.stack([normal_across(axis, np.pi / 2), -normal_across(axis, 0.0), axis])
     turned = solid.transform(np.hstack([frame, np.zeros((3, 1))]))
     low, high = np.reshape(turned.bounding_box(), (2, 3))
     height = (low[2] + high[2]) / 2
@@ -221,52 +183,6 @@ def _hole_middle(solid: manifold3d.Manifold, axis: np.ndarray) -> np.ndarray | N
         return None
     hole = rings[int(np.argmin(areas))]
     return frame.T @ np.array([*((hole.min(0) + hole.max(0)) / 2), height])
-
-
-def _best_plane(part: _CoarsePart, opening: Opening | None) -> tuple[float, np.ndarray, float]:
-    """Return the summed hull volumes after the best cut, and its plane as normal and offset.
-
-    Tried are planes across the object's and the part's axes, and planes through the vessel's axis.
-    """
-    normals = own_and_principal_axes(part.vertices)
-    first = [part.cuts_across(normal, _POSITIONS) for normal in normals]
-    leading = sorted(range(len(normals)), key=lambda index: (min(first[index])[0], index))[:2]
-    axis = np.array([0.0, 0, 1]) if opening is None else opening.axis
-    center = part.vertices.mean(0) if opening is None else opening.center_m
-    cuts = [(*cut, normal) for normal, tried in zip(normals, first, strict=True) for cut in tried]
-    cuts += [(*cut, normals[index]) for index in leading for cut in part.cuts_across(normals[index], _MORE_POSITIONS)]
-    for normal in _sectorown_and_principal_axes(part.vertices - center, axis):
-        offset = float(normal @ center)
-        cuts.append((part.hull_volume_after(normal, offset), offset, normal))
-    total, offset, normal = min(cuts, key=lambda cut: cut[0])
-    return total, normal, offset
-
-
-def own_and_principal_axes(vertices: np.ndarray) -> list[np.ndarray]:
-    """Return the object's axes and those principal axes of vertices ``(V, 3)`` that are no such axis, each ``(3,)``."""
-    centered = vertices - vertices.mean(0)
-    principal = np.linalg.eigh(np.einsum("ni,nj->ij", centered, centered))[1].T
-    return [*np.eye(3), *(axis for axis in principal if np.abs(axis).max() < 0.995)]
-
-
-def _sectorown_and_principal_axes(offsets: np.ndarray, axis: np.ndarray) -> list[np.ndarray]:
-    """Return normals of planes through the axis that divide the angle a part spans around it, in quarters."""
-    first, second = _across(axis, np.pi / 2), -_across(axis, 0.0)
-    angles = np.sort(np.arctan2(offsets @ second, offsets @ first))
-    gaps = np.append(np.diff(angles), angles[0] + 2 * np.pi - angles[-1])
-    widest = int(gaps.argmax())
-    start, span = angles[(widest + 1) % len(angles)], 2 * np.pi - gaps[widest]
-    shares = (
-        (0.25, 0.5, 0.75) if span < 1.2 * np.pi else (0.125, 0.25, 0.375, 0.5)
-    )  # a whole ring: half a turn cuts twice
-    return [_across(axis, start + span * share) for share in shares]
-
-
-def _across(axis: np.ndarray, angle: float) -> np.ndarray:
-    """Return the unit normal of the plane that holds ``axis`` and is turned by ``angle`` about it."""
-    first = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
-    first /= np.linalg.norm(first)
-    return -np.sin(angle) * first + np.cos(angle) * np.cross(axis, first)
 
 
 def _merged(clouds: list[np.ndarray], max_hulls: int, free_m3: float, touch_m: float) -> list[np.ndarray]:

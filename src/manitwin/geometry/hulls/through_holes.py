@@ -8,7 +8,7 @@ import manifold3d
 import numpy as np
 import trimesh
 
-from manitwin.geometry.hulls.decomposition import own_and_principal_axes
+from manitwin.geometry.hulls.cutting_planes import own_and_principal_axes
 
 _LEAST_SHARE = 0.01  # of the outline's area: smaller holes are of scans, or of no use
 
