@@ -9,6 +9,8 @@ import typer
 
 from manitwin.cli import choices, options
 from manitwin.cli.console import err_console, write_json, write_text
+from manitwin.cli.output_file import write_output
+from manitwin.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,39 +53,49 @@ def audit(
     explain: Annotated[str | None, typer.Option(help="Say what a rule is about, and stop.", metavar="CODE")] = None,
 ) -> None:
     """Find what is wrong with assets of any tool: mass, inertia, collision, scale, frames, grasps. Exit 1 on errors."""
-    from manitwin.errors import UsageError
-
-    if explain is None and not paths:
-        raise UsageError("no PATH given: name assets or folders of them, or --explain CODE")
-    from manitwin.assets.audit.report import explanation
+    if explain is not None:
+        _explain(explain)
+        return
+    if not paths:
+        raise UsageError("no PATH given; name assets or folders of them, or --explain CODE")
+    from manitwin.assets.audit.baseline import read_baseline
     from manitwin.assets.audit.run import audit_all, check_engines, find_all, rules_selected
     from manitwin.assets.read import VALID_ASSETS
 
-    if explain is not None:
-        from manitwin.assets.audit.selection import rule_of
-
-        write_text(explanation(rule_of(explain)) + "\n")
-        return
-    known = None
-    if baseline is not None:
-        from manitwin.assets.audit.baseline import read_baseline
-
-        known = read_baseline(baseline)
+    known = None if baseline is None else read_baseline(baseline)
     rules = rules_selected((select or "").split(","), (ignore or "").split(","))
     if not rules:
         raise UsageError("--select and --ignore leave no rule; leave one of them out")
     run_in = check_engines((engines or "").split(",") if engines else ())
     fragments: list[Path] = []
     templates: list[Path] = []
-    assets = find_all(paths or [], fragments, templates)
+    assets = find_all(paths, fragments, templates)
     if not assets:
-        raise UsageError(f"{', '.join(map(str, paths or []))}: holds no asset of a known format; {VALID_ASSETS}")
+        raise UsageError(f"{', '.join(map(str, paths))}: holds no asset of a known format; {VALID_ASSETS}")
     audited = []
-    for each in audit_all(assets, rules, jobs=jobs, fix=fix, named=paths or [], engines=run_in, engine=engine):
+    for each in audit_all(assets, rules, jobs=jobs, fix=fix, named=paths, engines=run_in, engine=engine):
         each = each if known is None else known.without_known(each)
         audited.append(each)
         if format == "text":
             _write_text(each, len(assets) > 1)
+    _say_left_alone(fragments, templates)
+    _write_end(audited, rules, format)
+    if html is not None:
+        _write_page(audited, rules, html, paths)
+    if write_baseline is not None:
+        _write_baseline(audited, write_baseline)
+        return
+    raise typer.Exit(1 if any(f.severity == "error" for each in audited for f in each.findings) else 0)
+
+
+def _explain(code: str) -> None:
+    from manitwin.assets.audit.report import explanation
+    from manitwin.assets.audit.selection import rule_of
+
+    write_text(explanation(rule_of(code)) + "\n")
+
+
+def _say_left_alone(fragments: Sequence[Path], templates: Sequence[Path]) -> None:
     if fragments:
         err_console.print(
             f"{len(fragments)} descriptions without a shape, or layers of others, are no assets and were left alone"
@@ -93,13 +105,6 @@ def audit(
             f"{len(templates)} templates, whose numbers are words for a program to fill in, are no assets and were left alone:"
             f" {', '.join(file.name for file in templates[:3])}{' ...' if len(templates) > 3 else ''}"
         )
-    _write_end(audited, rules, format)
-    if html is not None:
-        _write_page(audited, rules, html, paths or [])
-    if write_baseline is not None:
-        _write_baseline(audited, write_baseline)
-        return
-    raise typer.Exit(1 if any(f.severity == "error" for each in audited for f in each.findings) else 0)
 
 
 def _write_text(each: Audited, one_of_several: bool) -> None:
@@ -112,19 +117,14 @@ def _write_text(each: Audited, one_of_several: bool) -> None:
 
 def _write_baseline(audited: Sequence[Audited], file: Path) -> None:
     from manitwin.assets.audit.baseline import baseline_text
-    from manitwin.errors import UsageError
 
-    try:
-        file.write_text(baseline_text(audited, file), encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"{file}: cannot be written ({error.strerror}); give another file") from error
+    write_output(file, baseline_text(audited, file))
     err_console.print(f"{file}: a baseline of what was found; --baseline takes it")
 
 
 def _write_page(audited: Sequence[Audited], rules: Sequence[RuleText], file: Path, named: Sequence[Path]) -> None:
     from manitwin.assets.audit.picture import audited_picture
     from manitwin.assets.root import root_of
-    from manitwin.errors import UsageError
     from manitwin.web.audit_page import audit_page, shown_assets
 
     pictures = {}
@@ -132,10 +132,7 @@ def _write_page(audited: Sequence[Audited], rules: Sequence[RuleText], file: Pat
         picture = audited_picture(Path(each.asset), root_of(Path(each.asset), named))
         if picture is not None:
             pictures[each.asset] = picture
-    try:
-        file.write_bytes(audit_page(audited, rules, pictures))
-    except OSError as error:
-        raise UsageError(f"{file}: cannot be written ({error.strerror}); give another file") from error
+    write_output(file, audit_page(audited, rules, pictures))
     err_console.print(f"{file}: a page of all findings")
 
 

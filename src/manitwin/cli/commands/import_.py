@@ -9,6 +9,7 @@ import typer
 
 from manitwin.cli import choices, options
 from manitwin.cli.console import err_console, out_console, print_error
+from manitwin.cli.output_file import write_output
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -97,10 +98,6 @@ def import_(
 
 def _write_report(every: Sequence[Imported], file: Path) -> None:
     from manitwin.assets.importers.report import report_of
-    from manitwin.errors import UsageError
 
-    try:
-        file.write_text(report_of(every), encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"{file}: cannot be written ({error.strerror}); give another file") from error
+    write_output(file, report_of(every))
     err_console.print(f"{file}: what was kept and dropped of each asset")

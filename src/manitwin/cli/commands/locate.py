@@ -11,11 +11,13 @@ from manitwin.cli import choices, options
 from manitwin.cli.console import error_console
 from manitwin.cli.documents import Json, print_document
 from manitwin.cli.location_lines import print_frames, print_grasps, print_layout, print_size, print_thing
+from manitwin.cli.view_files import ViewFiles
+from manitwin.errors import UsageError
 
 if TYPE_CHECKING:
-    import numpy as np
+    from collections.abc import Sequence
 
-    from manitwin.scenes.locate.depth_view import DepthView
+    from manitwin.scenes.locate.recognition import Thing
 
 
 def _file(help: str, remedy: str) -> Any:
@@ -92,10 +94,11 @@ def locate(
     json_: Json = False,
 ) -> None:
     """Find where a twin is in a depth picture: its pose, several that look the same, or that it is not what is seen."""
+    files = ViewFiles(depth, camera, mask, rgb, cloud, base)
     if seen is not None:
-        depth, camera, rgb, base = _of_folder(seen, depth, camera, rgb, base, cloud)
+        files = files.with_captured(seen)
     grasps = grasps or robot is not None
-    _check(depth, camera, mask, rgb, cloud, base, robot, grasps)
+    files.check(grasps=grasps, robot=robot)
     from manitwin.cli.locating import find_twin, find_twin_of_any_size, find_twins, scene_of
     from manitwin.config import ServicesConfig
     from manitwin.episodes.located_view import LocatedView
@@ -109,12 +112,14 @@ def locate(
     from manitwin.twin.store import RECORD
 
     model = None if estimator is None else pose_estimator(estimator, ServicesConfig())
-    camera_to_base = None if base is None else read_base(base)
+    camera_to_base = None if files.base is None else read_base(files.base)
     one = Twin(source) if (source / RECORD).exists() else None
     dataset = DatasetRoot(source).absolute() if one is None else dataset_of_twin(source)
-    if fit_size:
-        _check_fit(one is not None, estimator)
-    view, masks = _view(depth, camera, mask, rgb, cloud, seed)
+    if fit_size and (one is None or estimator is not None):
+        raise UsageError(
+            "--fit-size: looks for the size of one twin by the built-in search; name a twin, without --estimator"
+        )
+    view, masks = files.read(seed)
     if one is None:
         found = find_twins(DatasetRoot(source), view, masks, model, tried=tried, seed=seed, on_twin=_drawn)
     elif fit_size:
@@ -142,91 +147,20 @@ def locate(
     if json_:
         print_document(document)
     else:
-        for thing, said in zip(things, [document] if one is not None else document["things"], strict=True):
-            print_thing(thing, said["name"] or said["twin_id"], one is None)
-            print_size(said.get("size"), grasps)
-            print_grasps(said["grasps"])
-            print_frames(said["functional"], said["placements"] if usable else None)
+        _print_things(things, [document] if one is not None else document["things"], one is None, grasps, usable)
         print_layout(layout, out)
     raise typer.Exit(0 if any(thing.location.status != "none" for thing in things) else 3)
 
 
-def _of_folder(
-    folder: Path, depth: Path | None, camera: Path | None, rgb: Path | None, base: Path | None, cloud: Path | None
-) -> tuple[Path | None, Path | None, Path | None, Path | None]:
-    """Return the files of a captured folder; what is given by hand counts more. Raises UsageError with a cloud."""
-    from manitwin.errors import UsageError
-    from manitwin.scenes.locate.captured import capture_files
-
-    if cloud is not None:
-        raise UsageError("--cloud: is a view by itself; leave out --view")
-    there = capture_files(folder)
-    return (
-        depth or there.get("depth"),
-        camera or there.get("camera"),
-        rgb or there.get("rgb"),
-        base or there.get("base"),
-    )
-
-
-def _check(
-    depth: Path | None,
-    camera: Path | None,
-    mask: Path | None,
-    rgb: Path | None,
-    cloud: Path | None,
-    base: Path | None,
-    robot: str | None,
-    grasps: bool,
+def _print_things(
+    things: Sequence[Thing], told: Sequence[dict[str, Any]], of_many: bool, grasps: bool, usable: bool
 ) -> None:
-    """Raise UsageError for options that do not go together."""
-    from manitwin.errors import UsageError
-
-    if cloud is not None and any(each is not None for each in (depth, camera, mask, rgb)):
-        raise UsageError("--cloud: is a view by itself; leave out --depth, --camera, --mask and --rgb")
-    if cloud is not None and (grasps or base is not None):
-        raise UsageError(
-            f"{'--grasps' if grasps else '--base'}: a cloud of the thing alone does not show what is beside it; give --depth"
-            " and --camera"
-        )
-    if robot is not None and base is None:
-        raise UsageError(
-            "--robot: what its arm reaches depends on where it stands; give --base, the camera's calibration"
-        )
-    needed = {"--depth": depth, "--camera": camera}
-    if cloud is None and (missing := [name for name, each in needed.items() if each is None]):
-        raise UsageError(f"{', '.join(missing)}: missing; give --depth and --camera, or --cloud")
-
-
-def _check_fit(one: bool, estimator: str | None) -> None:
-    from manitwin.errors import UsageError
-
-    if not one or estimator is not None:
-        raise UsageError(
-            "--fit-size: looks for the size of one twin by the built-in search; name a twin, without --estimator"
-        )
-
-
-def _view(
-    depth: Path | None, camera: Path | None, mask: Path | None, rgb: Path | None, cloud: Path | None, seed: int
-) -> tuple[DepthView, list[np.ndarray]]:
-    """Return what is seen, and the masks of the things in it."""
-    import numpy as np
-
-    from manitwin.errors import UsageError
-    from manitwin.scenes.locate.input_files import read_cloud, read_view
-    from manitwin.scenes.locate.proposals import proposals, table_plane
-
-    if cloud is not None:
-        view, shown = read_cloud(cloud)
-        return view, [shown]
-    assert depth is not None and camera is not None
-    view, told = read_view(depth, camera, rgb, mask)
-    if told is None:
-        return view, proposals(view, table_plane(view, np.random.default_rng(seed)))
-    if not told.any():
-        raise UsageError(f"{mask}: is empty: it shows no pixel of a thing; give a mask of the thing to locate")
-    return view, [told]
+    """Say what was found of each thing; ``usable``: grasps and placements were asked for, and hold at the size that it has."""
+    for thing, said in zip(things, told, strict=True):
+        print_thing(thing, said["name"] or said["twin_id"], of_many)
+        print_size(said.get("size"), grasps)
+        print_grasps(said["grasps"])
+        print_frames(said["functional"], said["placements"] if usable else None)
 
 
 def _drawn(twin_id: str) -> None:
