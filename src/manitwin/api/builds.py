@@ -55,14 +55,13 @@ def build(
     becomes one twin; ``turns_deg`` is the camera's turn about the vertical in each, counter-clockwise seen from above, or
     ``poses`` a transforms.json or the folder of a COLMAP model that states their cameras, whose unit and up axis are then
     ``units`` and ``up``. With ``strict`` a manifest's column that nobody knows is an error. ``config`` None: what the data set
-    was built with, else the defaults.
-    ``flags`` are said on top of it: ``seed``; ``grippers``, names or .toml files, the first one's grasps are the twin's own;
-    ``vlm``, ``generator`` and ``grasper`` choose backends (docs/backends.md); once services
+    was built with, else the defaults. ``flags`` are said on top of it: ``seed``; ``grippers``, names or .toml files, the first
+    one's grasps are the twin's own; ``vlm``, ``generator`` and ``grasper`` choose backends (docs/backends.md); once services
     have charged ``max_cost_usd``, items that would cost more are left unfinished; ``record`` is a file that a VLM's answers are
-    added to; ``require_agreement`` verifies only what a second engine holds too; ``second_opinion`` "sample" tries 20 of
-    the held grasps there instead of all; ``quick`` leaves out second engine and robustness; ``link`` asks of things with joints,
-    which are locked, for grasps that touch this link with both fingertips.
-    ``executor`` is local (``jobs`` processes), ray (a cluster at ``address``), or inline, in this process.
+    added to; ``require_agreement`` verifies only what a second engine holds too; ``second_opinion`` "sample" tries 20 of the
+    held grasps there instead of all; ``quick`` leaves out second engine and robustness; ``link`` asks of things with joints,
+    which are locked, for grasps that touch this link with both fingertips. ``executor`` is local (``jobs`` processes), ray (a
+    cluster at ``address``), or inline, in this process.
 
     Raises UsageError for wrong arguments, and where another build is at work there; what happens to one item is in the report
     and never raised.

@@ -91,14 +91,13 @@ class Asset:
     """One asset; ``path`` is the file or folder that was given, ``files`` all that belong to it, sorted.
 
     ``up`` is the axis that stands up by the format's rule or the file's word; ``unit_m`` the length of a file's unit, None
-    where it declares none. ``missing_files`` are named and not there; ``remarks`` are what the reader had to note, one line each;
-    ``lenient`` those of them that a loader which goes by the letter of the format would refuse, or not find. ``joints`` are all
-    of the file, those of bodies that were left out too.
-    ``rests`` are declared resting poses, asset to plane ``(4, 4)``. ``static``: it is said to stand fast, as buildings do, and is
-    no object that moves. ``partial``: other bodies of the file, such as a robot's links, were left out; its name is of
-    them all. ``soft``: it deforms; what is
-    asked of rigid bodies is not asked of it. ``articulation``: the links that were read with the joints between them; the
-    rest of the asset is of all of them as they stand.
+    where it declares none. ``missing_files`` are named and not there; ``remarks`` are what the reader had to note, one line
+    each; ``lenient`` those of them that a loader which goes by the letter of the format would refuse, or not find. ``joints``
+    are all of the file, those of bodies that were left out too. ``rests`` are declared resting poses, asset to plane ``(4,
+    4)``. ``static``: it is said to stand fast, as buildings do, and is no object that moves. ``partial``: other bodies of the
+    file, such as a robot's links, were left out; its name is of them all. ``soft``: it deforms; what is asked of rigid bodies
+    is not asked of it. ``articulation``: the links that were read with the joints between them; the rest of the asset is of all
+    of them as they stand.
     """
 
     format: Format

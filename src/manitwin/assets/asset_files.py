@@ -35,9 +35,8 @@ class AssetFiles:
     """The files that an asset names, looked up below ``root`` and nowhere else, links resolved.
 
     ``own`` is the folder of the asset itself; what is read from above it is remarked. ``used`` are the files that were found,
-    ``missing`` the names that were not, ``remarks`` one line each, of which ``lenient``
-    are those of ``took_leniently``. ``partial``: bodies were left out. ``limits`` are those of each mesh, and say whether its
-    looks are wanted.
+    ``missing`` the names that were not, ``remarks`` one line each, of which ``lenient`` are those of ``took_leniently``.
+    ``partial``: bodies were left out. ``limits`` are those of each mesh, and say whether its looks are wanted.
     """
 
     root: Path

@@ -24,7 +24,7 @@ SCAN_METADATA = "metadata.pbtxt"
 _HEAD_BYTES, _FRAGMENT_BYTES = 1 << 16, 1 << 23
 _FIRST_TAG = re.compile(rb"<([A-Za-z][\w.:-]*)[\s/>]")
 _SHAPES = (b"<geom", b"<visual", b"<collision", b"<include", b"<replicate", b"<composite", b"<flexcomp", b"<attach")
-"""What shapes are, or come from, in MJCF, URDF and SDF."""
+"""Elements of MJCF, URDF and SDF that are shapes, or bring some in."""
 _MODEL = re.compile(rb"<model\s")
 """Plug-ins name models in elements without a name of their own."""
 _WORLD_BODY = re.compile(rb"<worldbody[\s>].*?</worldbody>", re.DOTALL)
@@ -36,12 +36,12 @@ _USD_SHAPE = re.compile(
 )
 _USD_ROOT = re.compile(rb"^def\b", re.MULTILINE)
 _COMPOSED = (b"references", b"payload", b"subLayers")
-"""What brings prims of other layers into one without any."""
+"""Composition arcs that bring prims of other layers into one that has none."""
 _NUMBERS = re.compile(rb"""\b(?:xyz|rpy|rgba|size|scale|radius|length|value|pos|quat)=["']([^"'<>]*)["']""")
 _TO_FILL_IN = re.compile(
     rb"(?<![\w.])(?!NAN\b|INF\b|INFINITY\b)[A-Z][A-Z_]{2,}[0-9]*(?![\w.])|\{\{?\s*[A-Za-z_]\w*\s*\}|\$[({]"
 )
-"""Words and brackets that stand for numbers, which a program puts in their place."""
+"""Words and brackets in the place of numbers: a template that a program fills in."""
 _MARKS = re.compile(rb"<extra_info[\s/>]|<custom_data[\s/>]")
 _ROBOTWIN_DATA = re.compile(r"model_data\d*\.json")
 
@@ -49,7 +49,7 @@ VALID_ASSETS = (
     "valid are twin folders, RoboTwin, ManiTwin-100K, EmbodiedGen and Google Scanned Objects folders, .urdf, .sdf, MJCF"
     " .xml and USD files; a plain mesh goes to `manitwin build`"
 )
-"""What a person is told who gave something else."""
+"""The end of a message to a person who gave something else."""
 _NAME_FILES = ("urdf", "mjcf", "sdf", "gso", "embodiedgen", "usd")
 """Descriptions that name meshes of other folders."""
 WITH_JOINTS = ("urdf", "mjcf", "sdf", "usd")
@@ -277,7 +277,7 @@ def is_file_below(file: Path, folder: Path) -> bool:
 
 def _require_there(path: Path) -> None:
     if not os.path.exists(path):
-        raise AssetError(f"{path}: no such file or folder")
+        raise AssetError(f"{path}: no such file or folder; check the path")
     if not path.is_file() and not path.is_dir():
         raise AssetError(f"{path}: is no regular file, and only such are read; give a file or a folder")
 

@@ -1,4 +1,4 @@
-"""What every command does with its arguments before it looks at any: none may be of a length or kind that nothing can take."""
+"""Checks that every command makes of its arguments first: their length and characters, and that each option is given once."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ LONGEST_TEXT = 100_000
 
 
 def check_given_once(order: Iterable[Any]) -> None:
-    """Raise UsageError for an option of one value that is given again; ``order`` has the parameters as they were given."""
+    """Raise UsageError for an option that takes one value and is given twice; ``order`` are the parameters as they were given."""
     times = Counter(each for each in order if each.param_type_name == "option" and not (each.multiple or each.is_flag))
     for option, count in times.items():
         if count > 1:
@@ -71,7 +71,7 @@ def check_given_once(order: Iterable[Any]) -> None:
 
 
 class CheckedCommand(TyperCommand):
-    """A command whose texts and places are looked at before they are converted; of numbers their own types say the range."""
+    """A command whose texts and paths are checked before they are converted; numbers are checked by their own types."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the command line; raises UsageError for an argument that is empty, too long, or no text, and for a second value.
@@ -94,7 +94,7 @@ class CheckedCommand(TyperCommand):
 
 
 class CommandWords(TyperGroup):
-    """Commands of which some are called by two words: ``review report`` is one, and so is ``review``."""
+    """A group of commands some of whose names are two words: ``review report`` is a command, and so is ``review``."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help of all commands."""
@@ -110,7 +110,7 @@ class CommandWords(TyperGroup):
 def check_text(called: str, value: str, *, place: bool) -> None:
     """Raise UsageError, naming the parameter, for a value that no command takes; ``place``: it names a file or folder."""
     if "\0" in value:
-        raise UsageError(f"{called}: has a NUL character in it; give it without")
+        raise UsageError(f"{called}: has a NUL character in it; give it without that")
     if len(value) > LONGEST_TEXT:
         raise UsageError(f"{called}: {len(value)} characters; give at most {LONGEST_TEXT}")
     if not place:
@@ -126,9 +126,9 @@ def check_text(called: str, value: str, *, place: bool) -> None:
 
 
 def degrees_of(value: str, photos: int) -> list[float]:
-    """Return the degrees that stand between commas; with ``...`` at their end they go on by the same step, one a photo.
+    """Return the degrees of a list with commas; one that ends in ``...`` goes on by its last step, up to one a photo.
 
-    Raises UsageError for what are none, and where no step is said.
+    Raises UsageError for what are no degrees, and where no step can be told.
     """
     said = [turn.strip() for turn in value.split(",")]
     goes_on = len(said) > 1 and said[-1] in ("...", "\N{HORIZONTAL ELLIPSIS}")

@@ -23,7 +23,7 @@ from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import RECORD
 
 ENOUGH_ITEMS = 3
-"""So many accepted items must there be before a data set's own rate is believed."""
+"""How many accepted items a data set must have before its own rate is used."""
 
 RecordOf = Callable[[str], bytes | None]
 PlannedState = Literal["to_build", "accepted", "rejected", "failed", "would_be_rejected", "duplicate"]
@@ -75,7 +75,7 @@ class Plan:
 
 
 def plan_build(items: Iterable[Item], root: DatasetRoot, config: BuildConfig, remarks: list[str]) -> Plan:
-    """Say what ``build`` would do for a data set: all its items, and new ones. Its ledger is read, a copy is worked on.
+    """Return what ``build`` would do for a data set: for all of its items, and new ones. It works on a copy of the ledger.
 
     ``remarks`` is filled while the items are read.
     """
@@ -92,7 +92,7 @@ def plan_build(items: Iterable[Item], root: DatasetRoot, config: BuildConfig, re
         try:
             given, _ = ledger.add_items(items)
             own = {kind: own_rate(ledger, kind, recipe.sha256) for kind in usd}
-            ledger.begin_run(recipe.sha256, given)  # opens again what a run would open again
+            ledger.begin_run(recipe.sha256, given)  # reopens items that a run would do again
             planned = _planned_by(ledger, _Planner(recipe, config, record_of, root))
             rates = {kind: own[kind] or measured_rate(config, kind, _photos_each(planned, kind)) for kind in usd}
             return Plan(planned, rates, usd, remarks)
@@ -101,7 +101,7 @@ def plan_build(items: Iterable[Item], root: DatasetRoot, config: BuildConfig, re
 
 
 def _planned_by(ledger: Ledger, planner: _Planner) -> list[PlannedItem]:
-    """Plan what is open; what has ended is as the ledger says, since a run does not look at it again."""
+    """Return a plan for each item: what has ended stays as the ledger has it, as in a run, and what is open is planned."""
     rows = ledger.connection.execute(
         "SELECT number, twin_id, kind, state, reason, detail FROM items ORDER BY number"
     ).fetchall()
@@ -136,7 +136,7 @@ def own_rate(ledger: Ledger, kind: str, recipe_sha256: str) -> Rate | None:
 
 
 class _Planner:
-    """Says of one input after the other what would be made of it; ``seen`` are the ids of twins that have their item."""
+    """Plans one input after the other; ``seen`` are the ids of twins that an earlier item makes."""
 
     def __init__(self, recipe: Recipe, config: BuildConfig, record_of: RecordOf, root: DatasetRoot):
         self._recipe, self._config, self._record_of, self._root = recipe, config, record_of, root

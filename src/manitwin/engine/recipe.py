@@ -1,4 +1,4 @@
-"""Recipes: what a run makes of each item. They are the engine's border to the pipeline, and to the applications.
+"""Recipes: what a run makes of each item. They are the interface between the engine and what it runs: twins, layouts, episodes.
 
 A twin, a layout, a batch of episodes and its pictures are each a folder that is finished once its record is in it.
 """
@@ -19,9 +19,9 @@ from manitwin.twin.dataset_root import DatasetRoot
 
 @dataclass(frozen=True)
 class Ending:
-    """The end of an item: ``reason`` is the code of a rejection; ``revision`` that of the folder that says so.
+    """How an item ended: ``reason`` is the code of a rejection, ``revision`` that of its finished folder.
 
-    ``hint`` says what would make more of the same input.
+    ``hint`` says what would give a better result from the same input.
     """
 
     status: Literal["accepted", "rejected"]
@@ -66,7 +66,7 @@ class Recipe(Protocol):
 
     @property
     def sha256(self) -> str:
-        """The digest of everything in it that decides a result: items that ended under another one are done again."""
+        """The digest of everything in it that decides a result; items that ended under another digest are run again."""
         ...
 
     @property
@@ -113,9 +113,9 @@ class Recipe(Protocol):
         ...
 
     def damage(self, root: DatasetRoot, item_id: str) -> str | None:
-        """Return what is wrong with a finished folder, by what costs next to nothing to look at; None where nothing is."""
+        """Return what is wrong with a finished folder, by cheap checks alone; None where nothing is."""
         ...
 
     def ending_of(self, record: bytes, amended_sha256: str | None = None) -> Ending | None:
-        """Return how a finished folder says that its item ended; None where recipe or amendment make another one."""
+        """Return how an item ended by its folder's ``record``; None where this recipe or amendment would make another folder."""
         ...

@@ -129,7 +129,7 @@ def attempts_table(attempts: Iterable[Attempt]) -> pa.Table:
     for row in rows:
         if row["outcome"] not in OUTCOMES:
             valid = ", ".join(OUTCOMES)
-            raise EpisodesError(f"episode {row['episode_id']}: unknown outcome {row['outcome']!r}. Valid: {valid}")
+            raise EpisodesError(f"episode {row['episode_id']}: unknown outcome {row['outcome']!r}; valid: {valid}")
     return pa.Table.from_pylist(rows, schema=SCHEMA)
 
 

@@ -48,7 +48,7 @@ class Fixture:
 
     @property
     def bearing(self) -> frozenset[str]:
-        """The names of those boxes that count as furniture when something lies on them: all but where it works, and a post."""
+        """The names of its boxes that count as furniture where something lies on them: all but the box ``name`` and a post."""
         if self.kind == "holder":
             return frozenset()
         return frozenset(box.name for box in self.boxes) - {self.name, f"{self.name}_post"}
@@ -127,7 +127,10 @@ def panel(position_m: np.ndarray, yaw_rad: float, *, name: str = "button") -> Fi
 def holder(
     position_m: np.ndarray, yaw_rad: float, bore_half_m: np.ndarray, depth_m: float, *, name: str = "holder"
 ) -> Fixture:
-    """Return a holder on the table at ``position_m (3,)``: a bore of half widths ``(2,)`` that opens upward, its rim."""
+    """Return a holder on the table at ``position_m (3,)`` with a bore of half widths ``(2,)`` m that opens upward.
+
+    Its frame is in the middle of the bore's rim, Z upward; ``size_m`` is the larger half width.
+    """
     upright = transform(Rotation.from_euler("z", yaw_rad).as_matrix(), np.asarray(position_m, float))
     outer_m, half_height_m = bore_half_m + HOLDER_WALL_M, (HOLDER_FLOOR_M + depth_m) / 2
     floor_m = np.array([*outer_m, HOLDER_FLOOR_M / 2])
@@ -141,7 +144,7 @@ def holder(
 
 
 def to_json(fixture: Fixture) -> dict[str, Any]:
-    """Return a fixture as plain values: what episodes keep of it."""
+    """Return a fixture as JSON values, as records of episodes keep it."""
     boxes = [
         {
             "name": box.name,

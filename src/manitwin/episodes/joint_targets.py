@@ -1,30 +1,30 @@
-"""Where an arm is told to be between two actions: what episodes follow and what an environment's policy is followed by."""
+"""Targets of an arm at the timesteps between two actions, the same for recorded episodes and for policies in an environment."""
 
 from __future__ import annotations
 
 import numpy as np
 
 ORDER = 3  # of the polynomial between actions
-HELD = 1e-3  # m or rad, or of 1: a hand that is told so much else than it began with holds something, or is about to
+HELD = 1e-3  # m, rad or a share: a hand whose target is farther from its first one holds something, or is about to
 
 
 class JointTargets:
-    """Where an arm is told to be within a step: on the cubic through the targets ``(n,)`` rad at the ends of the last four.
+    """The targets of an arm within a step, on the cubic through the targets ``(n,)`` rad at the ends of the last four steps.
 
-    Motions are planned at every timestep, actions are samples of them; between four samples of a smooth motion a cubic is off
-    by a term of fourth order (Newton's backward differences), and so little beside its speed, which the drives' dampers follow.
-    It passes through the targets, and goes beyond them by about a quarter of a jump at most.
+    Motions are planned at every timestep and actions are samples of them. Between four samples of a smooth motion the cubic errs
+    by a term of fourth order (Newton's backward differences), and as little in its speed, which the drives' dampers follow.
+    It passes through the targets, and overshoots a jump by about a quarter of it at most.
     """
 
     def __init__(self, start_rad: np.ndarray, lowest_rad: np.ndarray, highest_rad: np.ndarray):
-        """Begin at rest; what would be beyond the joints' limits is clipped."""
+        """Begin at rest at ``start_rad (n,)``; targets are clipped to the limits ``lowest_rad`` and ``highest_rad (n,)``."""
         self._last = np.repeat(np.asarray(start_rad, float)[None], ORDER, axis=0)
         self._lowest, self._highest = lowest_rad, highest_rad
 
     def towards(self, target_rad: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the targets ``(count, n)`` at even times until the end of the step, which is ``target_rad (n,)``, and speeds.
+        """Return targets ``(count, n)`` rad at even times up to the step's end, where it is ``target_rad (n,)``, and speeds.
 
-        Speeds ``(count, n)`` are those there, rad a step; of joints at their limits 0.
+        Speeds ``(count, n)`` are in rad a step, 0 for joints at their limits.
         """
         clipped_rad = np.clip(np.asarray(target_rad, float), self._lowest, self._highest)
         samples = np.concatenate([self._last, clipped_rad[None]])
@@ -46,10 +46,13 @@ def _polynomial(samples: np.ndarray, left: np.ndarray) -> np.ndarray:
 
 
 def hand_share(number: int, per_frame: int, count: int) -> float:
-    """Return how much of its way a hand is told at timestep ``number`` (from 1) of ``count``: it is told anew once a frame."""
+    """Return the share of its way that a hand's target has gone at timestep ``number`` (from 1) of ``count``.
+
+    The target moves once in ``per_frame`` timesteps.
+    """
     return float(min(1.0, np.ceil(number / per_frame) * per_frame / count))
 
 
 def may_hold(told: np.ndarray, before: np.ndarray, began: np.ndarray) -> bool:
-    """Tell whether a hand is told, now or before, anything else than what it began with: ``(h,)`` each."""
+    """Tell whether a hand's target now or before, ``(h,)`` each, is any other than the one that it began with."""
     return bool((np.abs(np.array([told, before]) - began) > HELD).any())

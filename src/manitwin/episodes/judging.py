@@ -17,7 +17,7 @@ from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.world import RobotWorld
 
 SWINGS_S = 16.0
-"""What hangs swings and what lies in a bowl rolls for longer than what stands rocks, and is still at each turn."""
+"""How long things that hang or lie in a bowl are waited for: they swing and roll long, and stand still at each turning point."""
 
 
 def is_reached_already(start: Start, world: RobotWorld) -> bool:

@@ -76,7 +76,7 @@ class LocatedView:
         try:
             plane = self.plane
         except UsageError as error:
-            raise UsageError(f"--grasps: {error}, for the hand is to keep clear of the table") from error
+            raise UsageError(f"--grasps: {error} (the hand has to keep clear of the table)") from error
         noise_m = measured_noise_m(self.view, np.ones(self.view.depth_m.shape, bool))
         carried = carry_grasps(thing, twin, self.view, plane, noise_m)
         if carried is None or self._planner is None:

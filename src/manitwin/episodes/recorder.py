@@ -35,10 +35,10 @@ class _Action(NamedTuple):
 
 
 class Recorder:
-    """Takes a first state, then an action and the state that it led to at a time; of two arms what is of the first goes first."""
+    """Records a first state, then each action with the state that it led to; of two arms, the values of the first come first."""
 
     def __init__(self, world: RobotWorld, touches: Touches, hand: np.ndarray):
-        """Take the first state; ``hand (h,)`` is that of the hand."""
+        """Record the first state; ``hand (h,)`` is the hand's position."""
         self._world = world
         joints = sum(len(each.robot.arm_joints) for each in world.robots)
         at_rest = Speeds(  # nothing is held yet
@@ -61,7 +61,11 @@ class Recorder:
         unplanned: bool,
         literal: int | None = None,
     ) -> None:
-        """Add what the controllers were told, and the state that it led to: the world's as it is, and its speeds."""
+        """Record an action and the state that it led to, which is the world's present one with ``speeds``.
+
+        The action is what the controllers were told: joints ``(n,)`` rad and the hand ``hand_told (h,)``; ``hand (h,)`` is where
+        the hand is now, ``literal`` the number of the goal's literal that the action serves.
+        """
         self._actions.append(_Action(joint_positions_rad, hand_told, phase, literal))
         self._states.append(self._state(speeds, hand))
         self._touches.append(touches)
@@ -70,7 +74,7 @@ class Recorder:
     def recording(self, tip_poses: Callable[[np.ndarray], np.ndarray]) -> Recording:
         """Return what was recorded; quaternions never change their sign on the way (``without_sign_changes``).
 
-        ``tip_poses`` is the forward kinematics: of joints ``(n,)``, those of all arms, the tips ``(arms, 4, 4)``.
+        ``tip_poses`` is the forward kinematics: from the joints ``(n,)`` of all arms to their tips in the world ``(arms, 4, 4)``.
         """
         told = _columns(self._actions)
         states = _columns(self._states)
@@ -121,5 +125,5 @@ def _columns(rows: Sequence[_State] | Sequence[_Action]) -> dict[str, list[Any]]
 
 
 def _flat(of_arms: np.ndarray) -> np.ndarray:
-    """Return what arms have ``(T, arms, k)`` side by side, as the file has it ``(T, arms k)``."""
+    """Return values of arms ``(T, arms, k)`` side by side, as files of episodes have them, ``(T, arms * k)``."""
     return of_arms.reshape(len(of_arms), -1).astype(np.float32)

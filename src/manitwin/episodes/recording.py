@@ -15,17 +15,16 @@ class Recording:
     """States ``(T + 1, ...)`` and the actions ``(T, ...)`` between them; float32, SI, world frame, quaternions wxyz.
 
     Action t is what the controllers are told to reach by state t + 1. Speeds are those of the timestep that ended in a state,
-    of objects those of the centre of mass. Objects are in the scene's order, the target at ``target``.
-    ``hand (T + 1, h)`` is what the hand is: the opening of jaws (m), a cup's plunger (m), or the joints of other hands (rad);
-    ``action_hand (T, h)`` what it is told: the same, or 1 where a cup's vacuum is on, else 0. The tip is the twin's grasp
-    frame: its origin at the gripper's base, not between the fingertips, +Z approach, X closing. ``phase (T,)`` holds numbers
-    of ``planning.problem.Phase``.
-    ``finger_forces_n`` press on the target from two sides: the jaws, or thumb and palm and the other fingers; a cup's lip,
-    where it has sealed, presses in both with the vacuum's force less the pull. ``unplanned_contact`` says that the robot
-    touched with more than 0.5 N what it should not, since the state before.
-    Where there are granules, ``granule_positions_m (T + 1, N, 3)`` are their middles and ``granules_in_objects (T + 1, O)``
-    says how many each object holds. Of a goal of several literals ``active_literal (T,)`` is the number of the one that is
-    worked on; the target is that of the last one, while contacts are those of what is handled at the time (``handled_objects``).
+    of objects those of the centre of mass. Objects are in the scene's order, the target at ``target``. ``hand (T + 1, h)`` is
+    what the hand is: the opening of jaws (m), a cup's plunger (m), or the joints of other hands (rad); ``action_hand (T, h)``
+    what it is told: the same, or 1 where a cup's vacuum is on, else 0. The tip is the twin's grasp frame: its origin at the
+    gripper's base, not between the fingertips, +Z approach, X closing. ``phase (T,)`` holds numbers of
+    ``planning.problem.Phase``. ``finger_forces_n`` press on the target from two sides: the jaws, or thumb and palm and the
+    other fingers; a cup's lip, where it has sealed, presses in both with the vacuum's force less the pull.
+    ``unplanned_contact`` says that the robot touched with more than 0.5 N what it should not, since the state before. Where
+    there are granules, ``granule_positions_m (T + 1, N, 3)`` are their middles and ``granules_in_objects (T + 1, O)`` says how
+    many each object holds. Of a goal of several literals ``active_literal (T,)`` is the number of the one that is worked on;
+    the target is that of the last one, while contacts are those of what is handled at the time (``handled_objects``).
 
     Two arms stand side by side in all arrays of joints, hands, tips and fingers, the first one's numbers before the second's.
     """

@@ -1,4 +1,4 @@
-"""Words of others as one line, and words and numbers as Markdown."""
+"""Text from outside as one printable line and as Markdown, and tables in Markdown."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def one_line(text: str) -> str:
 
 
 def markdown_escaped(text: str) -> str:
-    """Return words of an outsider as one line that Markdown and HTML show as it is; what is not printable becomes a space."""
+    """Return text from outside as one line that Markdown and HTML show as it is; what is not printable becomes a space."""
     return re.sub(r"([\\`*_\[\]|#])", r"\\\1", html.escape(one_line(text), quote=False))
 
 

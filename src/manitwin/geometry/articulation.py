@@ -48,11 +48,11 @@ class ArticulatedJoint:
     velocity: float | None = None
 
     def motion(self, position: float) -> np.ndarray:
-        """Return how the child moves ``(4, 4)`` in the common frame, the parent held, from where it stands to a position."""
+        """Return the motion ``(4, 4)`` of the child in the common frame, the parent held, from ``stands_at`` to ``position``."""
         return axis_motion(self.origin_m, self.axis, position - self.stands_at, slides=self.kind == "prismatic")
 
     def within(self, position: float) -> float:
-        """Return the position that lies within the limits and is nearest to one."""
+        """Return the position within the limits that is nearest to ``position``."""
         low = -np.inf if self.lower is None else self.lower
         high = np.inf if self.upper is None else self.upper
         return float(np.clip(position, low, high))

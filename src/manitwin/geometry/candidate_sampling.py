@@ -1,4 +1,4 @@
-"""Candidates where functions are: farthest points of a surface, denser where it bends, and the middles and ends of its parts."""
+"""Candidate points for functions and grasps: farthest points of a surface, denser where it bends, and middles and ends."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manitwin.geometry.cavity import Opening
 _NEIGHBOURS = 16
 _OTHER_SIDE = -0.5  # cosine of normals: a neighbour through a thin wall says nothing of how the surface bends
 _BEND = 0.06  # of the mean normal's length: a right-angled edge has 0.29, a cylinder of 20 neighbour distances 0.003
-_WEIGHT = 1.0  # a sample on an edge counts as this much farther away, in its distance
+_WEIGHT = 1.0  # a sample on an edge counts as farther away by this share of its distance
 _MIDDLES, _BUMPS, _ENDS = 7, 4, 6  # of the candidates at most
 _FLAT = 0.985  # length of the mean normal: a quarter of a cylinder has 0.90, a dome 20 degrees to each side 0.97
 _SMALL_SHARE = 0.06  # of the longest side: the half width of what may be a button
@@ -69,7 +69,7 @@ def sample_candidates(
 
 
 def _floor(points_m: np.ndarray, normals: np.ndarray, opening: Opening) -> list[int]:
-    """Return the samples in the middle of a vessel's floor and of its underside, none of what has no floor, as a funnel."""
+    """Return the samples in the middle of a vessel's floor and of its underside; none for what has no floor, such as a funnel."""
     if opening.axis[2] < _UPWARD:
         return []
     offset, up = points_m - opening.center_m, normals @ opening.axis

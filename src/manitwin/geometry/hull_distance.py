@@ -1,7 +1,8 @@
 """Distances and overlaps of bodies that are made of convex hulls, and of many pairs of convex point sets at once.
 
 Source: Gilbert, Johnson and Keerthi 1988, "A fast procedure for computing the distance between complex objects"; the point of
-a simplex nearest to the origin is sought among all of its faces, which is as exact as any recursion and the same for all pairs.
+a simplex nearest to the origin is sought among all of its faces, which is as exact as their recursion and runs over all pairs
+at once.
 """
 
 from __future__ import annotations
@@ -17,16 +18,16 @@ from scipy.spatial import ConvexHull
 from manitwin.geometry.poses import transform_points
 from manitwin.geometry.rigid_body import StaticBox
 
-_AT_ONCE = 4096  # pairs in one go: bounds the memory
-_FIRST_PAIRS = 16  # where two bodies meet, the nearest boxes mostly say so
-SAME_NORMAL = 1e-4
+_AT_ONCE = 4096  # pairs of parts in one call, which bounds the memory
+_FIRST_PAIRS = 16  # tried first: where two bodies meet, it is mostly in one of the pairs whose boxes are nearest
+SAME_NORMAL = 1e-4  # normals that differ by less in each coordinate are those of one flat face
 
 MAX_ITERATIONS = 60
 TOLERANCE_M = 1e-7  # of the distance: far below any gap or overlap that is asked for
 _EDGES = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
 _FACES = np.array([(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)])
 _OPPOSITE = np.array([3, 2, 1, 0])  # the corner that a face leaves out
-_FLAT = 1e-18  # of a squared volume or area by its edges: rounding, no thickness
+_FLAT = 1e-18  # a squared volume or area, over that of its edges, that is no more than rounding
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ def is_clear_of(body: PlacedParts, others: Sequence[PlacedParts], gap_m: float) 
 
 
 def _parts_within(first: PlacedParts, second: PlacedParts, gap_m: float) -> bool:
-    """Tell whether a part of one is no farther than a gap from a part of the other; the likeliest pairs first."""
+    """Tell whether a part of one is no farther than ``gap_m`` from a part of the other; pairs of near boxes are tried first."""
     gaps = _part_gaps(first, second).ravel()
     order = np.argsort(gaps, kind="stable")
     order = order[gaps[order] <= gap_m]
@@ -175,7 +176,7 @@ def _pair_depth(first: PlacedParts, row: int, second: PlacedParts, column: int) 
 
 
 def _part_gaps(first: PlacedParts, second: PlacedParts) -> np.ndarray:
-    """Return the distances ``(H1, H2)`` of the parts' boxes: no pair of parts is nearer."""
+    """Return the distances ``(H1, H2)`` (m) of the parts' boxes, lower bounds of those of the parts."""
     return _box_gap(*(bound[:, None] for bound in first.part_bounds), *(bound[None] for bound in second.part_bounds))
 
 
@@ -186,7 +187,7 @@ def _box_gap(low_a: np.ndarray, high_a: np.ndarray, low_b: np.ndarray, high_b: n
 
 
 def _distinct(normals: np.ndarray) -> np.ndarray:
-    """Return the normals without those of other triangles of the same face."""
+    """Return the normals ``(K, 3)``, one for each flat face however many triangles it has."""
     cells = np.round(normals / SAME_NORMAL)
     return normals[np.sort(np.unique(cells, axis=0, return_index=True)[1])]
 
@@ -194,7 +195,7 @@ def _distinct(normals: np.ndarray) -> np.ndarray:
 def convex_distances(first: np.ndarray, second: np.ndarray, *, beyond_m: float = np.inf) -> np.ndarray:
     """Return the distances ``(P,)`` between the convex hulls of points ``(P, A, 3)`` and ``(P, B, 3)``; 0 where they overlap.
 
-    A distance above ``beyond_m`` need not be exact: then it is one that is surely not exceeded, and above ``beyond_m``.
+    Where the distance is above ``beyond_m``, what is returned may be a lower bound of it that is above ``beyond_m`` too.
     """
     pairs = len(first)
     result = np.zeros(pairs)

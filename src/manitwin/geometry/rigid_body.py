@@ -13,7 +13,7 @@ from manitwin.geometry.ray_caster import RayCaster
 FURNITURE_FRICTION = 0.5
 """Static and dynamic, of every piece of furniture."""
 LEAST_TABLE_M = 0.3
-"""Half of what a table is wide, at the least."""
+"""The least half extent of a table's top: a level box at the height z = 0 that is smaller is no table."""
 
 
 @dataclass(frozen=True)
@@ -67,11 +67,11 @@ class StaticBox:
 
 
 def stands_for_a_plane(box: StaticBox) -> bool:
-    """Tell whether a box's top is the plane that the robot stands on, and so large that nothing is to go beside it.
+    """Tell whether a box is a table: its top lies in z = 0, where the robot stands, and nothing gets past its edge.
 
-    It is a plane in physics, and for planners: between PhysX's boxes and hulls contacts persist from step to step, and a tall
-    box that is set down rocks by a degree or two for ever. Of six boxes of cereals let go with up to 3 degrees of tilt, one had
-    come to rest after 3 s on a box, and all on a plane.
+    Physics and planners take it for an endless plane: on a box of PhysX contacts of hulls persist from step to step, and a tall
+    box that is set down rocks by a degree or two for ever. Of six cereal boxes let go with up to 3 degrees of tilt, one had come
+    to rest after 3 s on a box, and all on a plane.
     """
     top = box.box_to_world[:3, 2] * box.half_extents_m[2] + box.box_to_world[:3, 3]
     upright = box.box_to_world[2, 2] > 1 - 1e-9

@@ -1,9 +1,9 @@
 """Backends by kind and name: the built-in ones and those of installed packages, registered in the same way.
 
 A package adds backends by an entry point of the group ``manitwin.backends`` whose module has a dictionary ``BACKENDS``:
-``{kind: {name: "module:attribute"}}``. A backend is chosen by ``name``, ``name:argument``, ``name@URL``
-or ``name:argument@URL``. An
-attribute with a method ``from_spec(argument, config)`` is created by it; any other is called without arguments.
+``{kind: {name: "module:attribute"}}``. A backend is chosen by ``name``, ``name:argument``, ``name@URL`` or
+``name:argument@URL``. An attribute with a method ``from_spec(argument, config)`` is created by it; any other is called without
+arguments.
 """
 
 from __future__ import annotations

@@ -80,8 +80,7 @@ def list_folder(folder: Path, told: Told = lambda said: None) -> FolderListing:
     """List a folder for a build, everything sorted by path; links to folders are not followed.
 
     An image is a part of a mesh where the mesh names it and the reader finds it there; one that no mesh names is an input, or
-    by its name the mask of one (``masks_beside``).
-    ``told`` hears how far it is.
+    by its name the mask of one (``masks_beside``). ``told`` hears how far it is.
     """
     found = _walk(folder, told)
     meshes = sorted(name for name in found.open if _suffix(name) in MESH_SUFFIXES)

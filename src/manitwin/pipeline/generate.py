@@ -35,7 +35,7 @@ class GenerateStage:
         self.backend: str = generator.name
         self.model: str | None = generator.model
         self.needs: Resource = generator.needs
-        # of one that asks a model itself, which is charged by its tokens
+        # a generator that asks a vision-language model is charged by tokens, and says what it expects
         self.expected_usd: float = getattr(generator, "expected_usd", generator.usd_per_job)
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:

@@ -86,9 +86,8 @@ def iterate_items(
     """Yield as ``_given_items`` does, of each text ``count`` variations; with ``views`` one item of all photos.
 
     Photos of a folder of ``views`` are in natural order (2 before 10). ``poses`` is a file that states their cameras; those of
-    a folder of which it has none are left out and noted. A mask or a box among the ``defaults`` is of one photo.
-    Raises UsageError as it does, for a photo or a mesh where more than
-    one is asked for, and for views that are not all photos.
+    a folder of which it has none are left out and noted. A mask or a box among the ``defaults`` is of one photo. Raises
+    UsageError as it does, for a photo or a mesh where more than one is asked for, and for views that are not all photos.
     """
     if any(defaults.get(column) is not None for column in (MASK, BOX)):
         inputs, texts = list(inputs), list(texts)

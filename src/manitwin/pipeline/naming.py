@@ -19,7 +19,7 @@ from manitwin.render.grounds import shown_object
 from manitwin.twin.record import Likely, Naming
 
 VIEWS_FROM_ABOVE = (0, 1, 2, 4, 5, 6)
-"""Of the eight views, those that a person has of a thing on a table (``render.cameras.ORBIT_ELEVATIONS_DEG``)."""
+"""The numbers of those of the eight views that look down, as people see a thing on a table (``ORBIT_ELEVATIONS_DEG``)."""
 
 
 class NameStage:
@@ -52,7 +52,7 @@ class NameStage:
 
 
 def known_length_m(draft: Draft[Item]) -> float | None:
-    """Return how long a mesh is as it stands; None of a photo, and of a mesh whose unit nobody knows."""
+    """Return the longest side (m) of an upright mesh; None of a photo, and of a mesh whose unit is not known."""
     if "canonical.npz" not in draft.paths:
         return None
     geometry = draft.field("geometry")
@@ -63,14 +63,14 @@ def known_length_m(draft: Draft[Item]) -> float | None:
 
 
 def cut_view(picture: np.ndarray) -> np.ndarray:
-    """Return a view ``(H, W, 3) uint8`` of a mesh with the matte that its plain ground gives, ``(H, W, 4)``."""
+    """Return a view ``(H, W, 3) uint8`` of a mesh as RGBA ``(H, W, 4)``, opaque where it differs from the plain background."""
     away = shown_object(picture)
     alpha = away if away.any() else np.ones_like(away)
     return np.dstack([picture, np.where(alpha, 255, 0).astype(np.uint8)])
 
 
 def to_record(named: Named) -> Naming:
-    """Return what twin.json says of it."""
+    """Return the record of a name for twin.json."""
     return Naming(
         name=named.name,
         probability=named.probability,

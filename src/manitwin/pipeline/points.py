@@ -34,8 +34,8 @@ class PointsStage:
     """Ask the annotator for points, see that each is one of the candidates, and give the functional ones their frames.
 
     An annotator that can looks at the functional points once more, from nearby; ``closer/`` has the pictures that it was shown.
-    ``frames_missing`` says of each functional point
-    without a frame why it has none, ``refined_candidates`` where the views have marked those that have moved since.
+    ``frames_missing`` says of each functional point without a frame why it has none, ``refined_candidates`` where the views
+    have marked those that have moved since.
     """
 
     name: ClassVar[str] = "points"

@@ -34,11 +34,10 @@ def refined_points(
     """Return the points, each at the place of a closer set around its candidate that is nearest to its frame's feature.
 
     The set is eleven places of the surface around the candidate, as far apart as can be and on its side of the matter, and the
-    feature's own. The refined place takes the candidate's row; the second list says where the views have marked it.
-    Candidates in ``kept`` stay where they are, as others lie on them; so do points without a frame, and those whose label means
-    more than the frame's feature: a handle is not the wall of its hole, an inside not the rim, bristles not
-    their end, and of a base or a front any place is as good.
-    ``is_seen`` tells of a place ``(3,)`` whether it lies on the surface that is seen.
+    feature's own. The refined place takes the candidate's row; the second list says where the views have marked it. Candidates
+    in ``kept`` stay where they are, as others lie on them; so do points without a frame, and those whose label means more than
+    the frame's feature: a handle is not the wall of its hole, an inside not the rim, bristles not their end, and of a base or a
+    front any place is as good. ``is_seen`` tells of a place ``(3,)`` whether it lies on the surface that is seen.
     """
     moved: list[FunctionalPoint] = []
     rows: list[RefinedCandidate] = []

@@ -50,7 +50,7 @@ class Flags(TypedDict, total=False):
 
 
 SAMPLE_OF_HELD = 20
-"""Of 20 that all hold, 84 % of all do at the least (95 %, Wilson)."""
+"""Where 20 of 20 hold, at least 84 % of all do (Wilson's interval of 95 %)."""
 
 
 def with_flags(settings: BuildConfig, flags: Flags) -> BuildConfig:
@@ -159,7 +159,7 @@ def request_build(
     settings = with_flags(base, flags)
     if jobs is not None:
         settings = settings.model_copy(update={"run": settings.run.model_copy(update={"cpu": jobs})})
-    # these take two CPU-seconds to import: what was given wrongly is said before
+    # these take two CPU-seconds to import, so wrong arguments are refused before
     from manitwin.pipeline.generator_input import refusal
     from manitwin.pipeline.recipe import check_names
 

@@ -67,7 +67,10 @@ def replay_trial(twin: Twin, gripper_name: str, grasp_id: str) -> ReplayedTrial:
 def _recording_trial(gripper: Gripper, engine: str) -> RecordingTrial:
     where = ENGINES.get((gripper.kind, engine))
     if where is None:
-        raise UsageError(f"trials of the engine {engine} with a {gripper.kind} gripper cannot be recorded")
+        known = ", ".join(f"{each} with {kind}" for kind, each in sorted(ENGINES))
+        raise UsageError(
+            f"trials of the engine {engine} with a {gripper.kind} gripper cannot be recorded; valid: {known}"
+        )
     module, name = where.split(":")
     return cast(RecordingTrial, getattr(import_module(module), name)())
 
@@ -79,7 +82,9 @@ def summary_of(twin: Twin, gripper_name: str) -> GraspSummary:
         return first
     other = first.other_grippers.get(gripper_name) if first is not None else None
     if other is None or other.summary is None:
-        raise UsageError(f"{twin.record.twin_id}: has no grasps of a gripper of this name")
+        raise UsageError(
+            f"{twin.record.twin_id}: has no grasps of a gripper of this name; its record names those that it has"
+        )
     return other.summary
 
 
@@ -122,7 +127,7 @@ def _grasp(twin: Twin, gripper_name: str, grasp_id: str) -> tuple[np.ndarray, np
     names = zip(table["gripper"].to_pylist(), table["grasp_id"].to_pylist(), strict=True)
     row = next((place for place, name in enumerate(names) if name == (gripper_name, grasp_id)), None)
     if row is None:
-        raise UsageError(f"{twin.record.twin_id}: has no grasp of this name")
+        raise UsageError(f"{twin.record.twin_id}: has no grasp of this name; grasps.parquet lists them")
     found = table.slice(row, 1).to_pylist()[0]
     rotation = rotation_from_quaternion_wxyz(np.array([found["quaternion_wxyz"]], float))[0]
     pose = transform(rotation, np.array(found["position_m"], float))

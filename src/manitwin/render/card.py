@@ -72,11 +72,10 @@ def make_card(
 ) -> bytes:
     """Draw a twin's card and return it as PNG.
 
-    ``parts`` are the textured meshes, ``solid`` the repaired one, ``hulls`` the vertices ``(V, 3)`` of each collision
-    hull, all in the object frame in metres; ``mass`` is drawn over the hulls. What stands is seen from its front, but of a mesh,
-    whose front nobody told. The first column shows
-    ``photo (H, W, 3 or 4) uint8``, whose side the next two show, or ``prompt``; where the input was a mesh it shows the bare
-    shape. Raises RendererMissing where nothing renders.
+    ``parts`` are the textured meshes, ``solid`` the repaired one, ``hulls`` the vertices ``(V, 3)`` of each collision hull, all
+    in the object frame in metres; ``mass`` is drawn over the hulls. What stands is seen from its front, but of a mesh, whose
+    front nobody told. The first column shows ``photo (H, W, 3 or 4) uint8``, whose side the next two show, or ``prompt``; where
+    the input was a mesh it shows the bare shape. Raises RendererMissing where nothing renders.
     """
     mesh = merged(list(parts))
     outline = convex_corners(np.asarray(mesh.vertices))[0]  # all that a camera's choice depends on

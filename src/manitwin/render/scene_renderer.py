@@ -214,7 +214,9 @@ class SceneRenderer:
 
     def _add_lights(self, lighting: Lighting, region: ShadowRegion) -> None:
         if len(lighting.lights) > MAX_LIGHTS:
-            raise UsageError(f"a scene has at most {MAX_LIGHTS} directional lights, not {len(lighting.lights)}")
+            raise UsageError(
+                f"a scene has at most {MAX_LIGHTS} directional lights; leave out some of the {len(lighting.lights)}"
+            )
         if sum(light.casts_shadow for light in lighting.lights) > 1:
             raise UsageError("of a scene's directional lights one at most casts shadows; switch it off for the others")
         lighting = lighting.exposed()

@@ -88,7 +88,7 @@ def _mount_described(tree: UrdfTree, hand: DescribedHand, gripper: MultiFingerGr
 
 
 def _find_meshes(tree: UrdfTree, find_mesh: Callable[[str], Path]) -> None:
-    """Write the meshes' absolute paths; looks whose file is not there are those of the collision shapes."""
+    """Write the meshes' absolute paths; a link whose visual meshes are not there is drawn as its collision shapes."""
     for link in tree.element.findall("link"):
         for shape in (*link.findall("visual"), *link.findall("collision")):
             for mesh in shape.iter("mesh"):

@@ -43,8 +43,7 @@ def check_settings(root: DatasetRoot, now: Mapping[str, Any], *, free: frozenset
     """Raise UsageError where finished items at a root were made with other settings, which would replace them.
 
     Also where a root holds what another command makes. ``free`` names the sections and settings that decide nothing of the
-    items. ``made`` is what they are called, in the plural.
-    Settings that the earlier version did not have are passed over.
+    items. ``made`` is what they are called, in the plural. Settings that the earlier version did not have are passed over.
     """
     earlier = earlier_settings(root)
     if earlier and earlier.get("kind") != now["kind"]:

@@ -87,7 +87,7 @@ class DatasetRoot:
     def full(self, name: str) -> str:
         """Return the name as the file system knows it. Raises UsageError for one that leaves the root."""
         if name.startswith("/") or ".." in PurePosixPath(name).parts:
-            raise UsageError(f"{name}: leaves the data set {self.url}")
+            raise UsageError(f"{name}: leaves the data set {self.url}; give a name below it")
         return f"{self.path.rstrip('/')}/{name}"
 
     def exists(self, name: str) -> bool:

@@ -194,7 +194,7 @@ class Twin:
         if name is None:
             return tried[0] if tried else ""
         if not tried:
-            raise UsageError(f"{self.folder}: has no grasps of any gripper")
+            raise UsageError(f"{self.folder}: has no grasps of any gripper; build it again with one")
         if name not in tried:
             raise UsageError(f"{self.folder}: {choose_from('gripper', name, tried)}")
         return name

@@ -173,8 +173,8 @@ def amend(
     """Give a finished twin new content of some of its files: each is renamed over the old one, twin.json last.
 
     The record gets their digests and a new revision; nothing else in it changes. ``note`` is told the new sizes before
-    twin.json is written. A crash in between leaves a twin whose
-    digests do not match, which ``verify_record`` says. Raises TwinError where the twin has no such file.
+    twin.json is written. A crash in between leaves a twin whose digests do not match, which ``verify_record`` says. Raises
+    TwinError where the twin has no such file.
     """
     record = read_record(folder).model_dump(mode="json")
     unknown = files.keys() - record["files"].keys()

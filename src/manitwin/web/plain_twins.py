@@ -18,7 +18,10 @@ Made = TypeVar("Made")
 
 @dataclass
 class Written:
-    """What was written of scenes or episodes: pages, their twins' ids, bytes, scripts that they need, and what was left out."""
+    """What was written of scenes or episodes: pages, ids and bytes of their twins, and why which were ``left_out``, by name.
+
+    ``scripts`` are those that every page needs.
+    """
 
     scripts: tuple[str, ...]
     pages: int = 0
@@ -27,7 +30,7 @@ class Written:
     left_out: dict[str, str] = field(default_factory=dict)
 
     def wholly(self, name: str, work: Callable[[], Made]) -> Made | None:
-        """Return what a work makes; what cannot be shown whole is left out, with the reason, and None."""
+        """Return what ``work`` makes; where it raises, note the reason under ``name`` in ``left_out`` and return None."""
         try:
             return work()
         except ManiTwinError as error:
@@ -35,7 +38,7 @@ class Written:
             return None
 
     def write_twins(self, out: Path, twins: TwinFolders, twin_ids: Iterable[str]) -> list[str]:
-        """Write those that are not there yet; returns the addresses of the scripts of their meshes, for a page of them.
+        """Write the twins that are not written yet; returns the addresses of the scripts with their meshes, for a page of them.
 
         Raises UsageError and TwinError for one that is gone or cannot be read whole.
         """

@@ -1,4 +1,4 @@
-"""What a page sends, up to a limit."""
+"""The body of a request, up to a limit."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from starlette.requests import Request
 
 
 async def request_body(request: Request, most_bytes: int) -> bytes:
-    """Return what was sent, of which more than ``most_bytes`` is left unread: nothing then."""
+    """Return the body of a request; empty where it has more than ``most_bytes``, the rest of which is not read."""
     parts, size = [], 0
     async for part in request.stream():
         size += len(part)

@@ -16,7 +16,7 @@ from manitwin.geometry.repair.welding import weld_equal
 from manitwin.render.simplification import simplified
 
 TOLERANCE_M = 0.0015
-"""Of simplified surfaces: about a pixel where a whole arm fills 1,000 of them."""
+"""How far simplified surfaces may be off: about a pixel where a whole arm fills 1,000 of them."""
 
 
 def shown_links(urdf: str) -> list[str]:
@@ -28,7 +28,7 @@ def shown_links(urdf: str) -> list[str]:
 def robot_glb(urdf: str) -> bytes:
     """Return a GLB in which the parts of the link number n, in its own frame, are called ``l<n>p<k>``; kept for the next call.
 
-    Textures are left out, for their colours. Parts of a link with one look are one. Raises AssetError.
+    Textures are left out: a part has the base colour of its material. Parts of a link that look alike are one. Raises AssetError.
     """
     parts = []
     for number, visuals in enumerate(link_visuals(urdf).values()):

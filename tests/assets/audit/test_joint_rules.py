@@ -42,7 +42,7 @@ LIMIT = '<limit lower="0" upper="1.5" effort="1" velocity="1"/>'
         ('<limit lower="-90" upper="90"/>', "revolute", "JNT003", "from -90 to 90 rad, which looks like degrees"),
         ('<axis xyz="0 0 1"/>', "prismatic", "JNT004", "is prismatic and has no <limit>"),
         ('<limit effort="1" velocity="1"/>', "revolute", "JNT005", "are 0: it cannot move"),
-        (f'{LIMIT}<mimic joint="gone"/>', "revolute", "JNT006", "mimics 'gone', which is nowhere"),
+        (f'{LIMIT}<mimic joint="gone"/>', "revolute", "JNT006", "mimics 'gone', which the file does not have"),
         (f'<axis xyz="0 0 2"/>{LIMIT}', "revolute", "JNT007", "has the length 2"),
     ],
 )  # fmt: skip
@@ -77,7 +77,7 @@ def test_many_joints_are_one_finding_of_a_cause(tmp_path: Path) -> None:
     path = tmp_path / "arm.urdf"
     path.write_text(f'<robot name="r">{links}{joints}</robot>')
     (found,) = [f for f in audit_path(path, RULES).findings if f.code == "JNT004"]
-    assert found.message.endswith("so 3 more") and found.values == {"joints": [f"j{n}" for n in range(6)]}
+    assert found.message.endswith("; and 3 more") and found.values == {"joints": [f"j{n}" for n in range(6)]}
 
 
 @pytest.mark.parametrize(

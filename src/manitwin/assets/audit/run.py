@@ -43,7 +43,7 @@ def find_all(
     found: dict[Path, None] = {}
     for path in paths:
         if not os.path.exists(path):
-            raise UsageError(f"{path}: no such file or folder")
+            raise UsageError(f"{path}: no such file or folder; check the path")
         found.update(dict.fromkeys(find_assets(path, fragments, templates)))
     return list(found)
 

@@ -1,4 +1,4 @@
-"""Collision shapes as an engine takes them out of an asset's files."""
+"""The collision shapes that an engine makes of an asset's meshes: one hull, a hull for each group, or the triangles."""
 
 from __future__ import annotations
 
@@ -8,21 +8,22 @@ from manitwin.assets.asset import Asset, CollisionShape
 from manitwin.assets.audit.convex_shapes import ConvexShapes
 
 ONE_HULL = ("mujoco", "sapien", "physx")
-"""Of a mesh, whatever groups it has: MuJoCo's geom mesh, SAPIEN's and Isaac's importers of URDF by default."""
+"""Engines that make one hull of a mesh, whatever groups it has: MuJoCo, and SAPIEN's and Isaac's importers of URDF by default."""
 A_HULL_EACH_GROUP = ("pybullet",)
-"""Bullet's importer of URDF makes a compound of the groups of an OBJ file."""
+"""Engines that make a hull of each group of an OBJ file: Bullet's importer of URDF makes a compound of them."""
 TRIANGLES = ("gazebo",)
-"""Gazebo's engines collide with the triangles themselves."""
+"""Engines that collide with the triangles of a mesh themselves."""
 DRAWN_FORMATS = ("sdf",)
-"""Whose own engine is one of these: without an engine that is named, concave meshes count as they are drawn."""
+"""Formats of these engines: where no engine is named, their concave meshes count as their triangles."""
 OF_HULLS = ("COL003", "COL004", "COL005", "COL006", "COL007")
-"""Rules of what convex hulls leave open or fill."""
+"""The rules about what convex hulls fill or leave open, which do not apply to triangles."""
 
 
 def as_taken_by(asset: Asset, engine: str | None) -> Asset:
-    """Return the asset with the collision shapes that an engine makes of it.
+    """Return the asset with the collision shapes that an ``engine`` makes of it.
 
-    None: as its author divided them, each group of an OBJ file a shape, where all of them are solids and no faces of one.
+    Without an engine they are what the author meant: each group of an OBJ file is a shape, unless some group has no volume, as
+    where groups are the faces of one solid.
     """
     if engine in ONE_HULL or not any(shape.groups for shape in asset.collision):
         return asset
@@ -31,7 +32,10 @@ def as_taken_by(asset: Asset, engine: str | None) -> Asset:
 
 
 def divided(shape: CollisionShape, meant: bool) -> list[CollisionShape]:
-    """Return a shape by its groups; where that is ``meant`` by its author only if all have a volume."""
+    """Return a shape for each of its groups that has a volume.
+
+    ``meant``: as its author meant it, so that it stays whole where some group has none.
+    """
     flat = set(ConvexShapes.of([vertices for vertices, _ in shape.groups]).flat)
     if not shape.groups or (meant and flat):
         return [shape]

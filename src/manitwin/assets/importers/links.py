@@ -14,15 +14,14 @@ from manitwin.geometry.poses import transform_points
 from manitwin.twin.link_records import Articulation, GivenLink, Joint
 
 _ROUNDING = 1e-4  # of the largest moment, as of a whole asset: files often hold six digits
-_UNSEEN = 4.0  # times the most that its mass has within what is seen: twice as far out, of what is not seen
+_UNSEEN = 4.0  # over the most that the mass has within its visual mesh: unseen matter may lie twice as far out
 
 
 def given_articulation(asset: Asset, to_object: np.ndarray) -> tuple[Articulation | None, list[str]]:
-    """Return links and joints in the object frame, None for an asset in which nothing moves; and what was dropped, with why.
+    """Return the links and joints in the object frame (None where nothing moves), and what was dropped, each with its cause.
 
-    A link keeps mass, centre of mass and inertia where all three are those of a body, but no inertia that is far beyond what its
-    mass has within what is seen of it. Raises AssetError for a link that shows
-    nothing: a mesh of it is missing.
+    A link keeps mass, centre of mass and inertia where a rigid body can have all three; an inertia far larger than its mass could
+    have within its visual mesh is dropped. Raises AssetError for a link that shows nothing, as where its mesh is missing.
     """
     found = asset.articulation
     if found is None:
@@ -56,7 +55,7 @@ def given_articulation(asset: Asset, to_object: np.ndarray) -> tuple[Articulatio
 
 
 def _too_large(link: GivenLink, points_m: np.ndarray) -> str | None:
-    """Say that an inertia is more than a link's mass has anywhere within its visual points ``(N, 3)``; None where it may be."""
+    """Return why an inertia is too large: its mass cannot have it within the visual points ``(N, 3)`` m; None where it can."""
     if link.mass_kg is None or link.center_of_mass_m is None or link.inertia_kg_m2 is None:
         return None
     reach_m = float(np.linalg.norm(points_m - link.center_of_mass_m, axis=1).max())
@@ -88,7 +87,7 @@ def _link(name: str, link: AssetLink, to_object: np.ndarray) -> GivenLink:
 
 
 def _distinct(names: list[str]) -> list[str]:
-    """Return names that are all there and differ: MJCF leaves bodies and joints unnamed."""
+    """Return names none of which is empty or there twice: in MJCF bodies and joints may be unnamed."""
     found: list[str] = []
     for name in names:
         kept, number = name or "unnamed", 1

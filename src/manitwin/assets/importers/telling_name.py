@@ -1,4 +1,4 @@
-"""What an imported asset is called: its own name, or that of its file or folder where its own says nothing."""
+"""What an imported asset is called: the name in its file, or that of the file or folder where the one inside says nothing."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ _SAYS_NOTHING = frozenset({
 _BETWEEN_WORDS = re.compile(r"(?<=[a-z]{2})(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z]{2})")
 _FOLDERS_UP = 1
 _OF_A_FILE = re.compile(r"(.+)\.(?:urdf|sdf|xml|mjcf|obj|stl|dae|usda?)", re.IGNORECASE)
-"""A name that is a file's, which authors leave as it is where they copy one: CLIPort's pallet.urdf is called cube.urdf."""
+"""A name inside that ends as a file's does. Authors copy files and leave it there: CLIPort's pallet.urdf says cube.urdf."""
 
 
 def telling_name(name: str, path: Path) -> str:
-    """Return an asset's own name; that of its file, else of its folder, where its own says nothing of what it is.
+    """Return what an asset at ``path`` is called: the ``name`` inside, where that says what it is.
 
-    A name that is a file's says nothing but where it is this file's. Of several names none of which says anything, its own.
-    So it is with the name of another file around it, which a description was copied from: PyBullet's plate.urdf is called cube.
+    Else the name of the file, else of its folder, whichever first says anything; where none does, the ``name`` inside. A name
+    that was copied with another file counts for nothing: one that ends as a file's does (``_OF_A_FILE``), or that is the name of
+    a file beside this one (PyBullet's plate.urdf says cube, and cube.urdf lies beside it).
     """
     place = path.resolve()
     if _is_of_another_file(name, place):
@@ -39,7 +40,7 @@ def telling_name(name: str, path: Path) -> str:
 
 
 def _is_of_another_file(name: str, place: Path) -> bool:
-    """Tell whether a file of that name lies beside a description or in the folder above, and its own name shares no word."""
+    """Tell whether a name is that of a file beside ``place`` or in the folder above, and has no word of its own file's name."""
     own, named = set(_words(place.stem)), set(_words(name))
     if not place.suffix or not named or own & named or not _says_something(place.stem) or Path(name).name != name:
         return False
@@ -48,7 +49,7 @@ def _is_of_another_file(name: str, place: Path) -> bool:
 
 
 def split_words(name: str) -> str:
-    """Return a name with spaces between words that capitals alone tell apart: CoffeeTable, TVCabinet, YcbBanana."""
+    """Return a name with spaces between words that only capitals divide: CoffeeTable, TVCabinet, YcbBanana."""
     return _BETWEEN_WORDS.sub(" ", name)
 
 

@@ -36,7 +36,9 @@ def read(path: Path) -> Asset:
     files = AssetFiles(folder)
     mesh_file = files.find(MESHES[0], [folder / name for name in MESHES])
     if mesh_file is None:
-        raise AssetError(f"{folder}: neither {' nor '.join(MESHES)} is there")
+        raise AssetError(
+            f"{folder}: has neither {' nor '.join(MESHES)}; give a folder of ManiTwin-100K that holds its mesh"
+        )
     annotations = _annotations(folder, files)
     parts = files.mesh(mesh_file).parts
     to_asset, turned = _mesh_to_annotation_axes(np.concatenate([p.vertices for p in parts]), annotations, files)
@@ -183,11 +185,11 @@ def _place(name: str, entry: dict[str, Any], what: str) -> DeclaredPlace | None:
     if circle:
         pose = json_vector(circle.get("center"), 7, f"{what} center")
         if np.linalg.norm(pose[3:]) < 1e-6:
-            raise AssetError(f"{what}: its quaternion is zero")
+            raise AssetError(f"{what}: its quaternion is zero; give one of length 1, (w, x, y, z)")
         return DeclaredPlace(name, pose[:3], rotation_from_quaternion_wxyz(pose[3:])[:, 2])
     if entry.get("position") is None or entry.get("rotation") is None:
         return None
     axis = json_vector(entry["rotation"], 3, f"{what} rotation")
     if np.linalg.norm(axis) < 1e-6:
-        raise AssetError(f"{what}: its axis is zero")
+        raise AssetError(f"{what}: its axis is zero; give one of length 1")
     return DeclaredPlace(name, json_vector(entry["position"], 3, f"{what} position"), axis / np.linalg.norm(axis))

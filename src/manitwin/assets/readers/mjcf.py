@@ -44,10 +44,10 @@ def read(
     Defaults, frames and shapes are resolved by MuJoCo; meshes and textures are read here, below ``root`` (``root_of`` the path
     by default). An <inertial> is what the file declares; a mass that follows from a geom's mass or density that the file writes
     is kept with the centre and inertia that MuJoCo computes of it, with a remark; what only, or mostly, MuJoCo's own default
-    density gives is not declared. ``joints``: what moves is left out, or held as the
-    file stands. ``number``: of the objects that free joints let go the one of this number is read, from 0 (``count_objects``),
-    and where its body has no name it has that of its mesh. A file of planes and height fields alone is shown as sheets, one
-    of soft bodies alone at rest. Raises AssetError naming what is broken. Source: the MJCF reference of MuJoCo.
+    density gives is not declared. ``joints``: what moves is left out, or held as the file stands. ``number``: of the objects
+    that free joints let go the one of this number is read, from 0 (``count_objects``), and where its body has no name it has
+    that of its mesh. A file of planes and height fields alone is shown as sheets, one of soft bodies alone at rest. Raises
+    AssetError naming what is broken. Source: the MJCF reference of MuJoCo.
     """
     file = only_file(path) if path.is_dir() else path
     files = AssetFiles(root or root_of(path), file.resolve().parent, limits)
@@ -148,7 +148,9 @@ def _soft_asset(path: Path, file: Path, files: AssetFiles) -> Asset:
     result = compiled(source, files)
     parts = tuple(soft_parts(result.model))
     if not parts and not files.missing:
-        raise AssetError(f"{file.name}: no body of it has a geom, and no soft one a surface")
+        raise AssetError(
+            f"{file.name}: none of its bodies has a geom, and no flex a surface; give an MJCF file with one"
+        )
     files.remark("it is soft: its shape at rest was read, and nothing of what rigid bodies have")
     licence, attribution = stated_licence(source.texts)
     return Asset(
@@ -199,7 +201,7 @@ def _rigid_bodies(
             return next(iter(groups.values()), world)
         if model.ngeom:
             return next((g for g in groups.values() if any(model.body_geomnum[index] for index, _ in g)), world)
-        raise AssetError(f"{file.name}: no body of it has a geom{_but(files.remarks)}")
+        raise AssetError(f"{file.name}: none of its bodies has a geom{_but(files.remarks)}; give an MJCF file with one")
     if number is not None:
         free = [group for group in shaped if _is_free(model, group[0][0])]
         if number >= len(free):

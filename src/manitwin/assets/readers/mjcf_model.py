@@ -82,7 +82,9 @@ def _specified(source: MjcfSource, files: AssetFiles) -> Any:
         except (ValueError, RuntimeError, mujoco.FatalError) as error:
             if not leave_out_unknown_to_schema(str(error), (source.root, *source.models.values()), files):
                 raise AssetError(f"{source.file.name}: MuJoCo cannot read it: {_line(error)}") from error
-    raise AssetError(f"{source.file.name}: MuJoCo knows fewer than {MOST_LEFT_OUT} of its elements and attributes")
+    raise AssetError(
+        f"{source.file.name}: MuJoCo does not know {MOST_LEFT_OUT} of its elements and attributes or more; give a file of MJCF"
+    )
 
 
 def _find_meshes(source: MjcfSource, spec: Any, files: AssetFiles) -> dict[str, Path]:

@@ -173,7 +173,7 @@ def _articulation(opened: SdfModel, moving: Tree, owners: list[int]) -> Articula
 def _only_model(file: Path, root: etree._Element, files: AssetFiles) -> etree._Element:
     models = root.findall("model") or root.findall("world/model")
     if not models:
-        raise AssetError(f"{file.name}: it holds no <model>")
+        raise AssetError(f"{file.name}: it holds no <model>; give an SDF file with one")
     if len(models) > 1:
         files.remark(f"it holds {len(models)} models; the first was read")
     model = models[0]
@@ -188,7 +188,7 @@ def _only_model(file: Path, root: etree._Element, files: AssetFiles) -> etree._E
                 f"{file.name}: its model has no <link> of its own, and the model {included[:80]!r} that it includes is not there;"
                 " give the folder that holds both"
             )
-        raise AssetError(f"{file.name}: its model has no <link>")
+        raise AssetError(f"{file.name}: its model has no <link>; give one that has")
     return model
 
 

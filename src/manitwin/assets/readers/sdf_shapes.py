@@ -63,7 +63,7 @@ class ModelFrames:
             if element.tag == "joint" and name in self._base:
                 continue  # before SDFormat 1.7 a joint might have the name of a link, and no pose was relative to it
             if not name or name in self._base:
-                raise AssetError(f"{what}: without a name, or with that of another")
+                raise AssetError(f"{what}: has no name, or that of another element; give each its own")
             default = element.get("attached_to") or MODEL_FRAME
             if element.tag == "joint":
                 default = (element.findtext("child") or "").strip()

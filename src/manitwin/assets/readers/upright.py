@@ -16,11 +16,12 @@ _SAME_M = 1e-6
 
 
 def upright_shapes(read: Callable[[bool], list[Shapes]], files: AssetFiles) -> list[Shapes]:
-    """Return the visual parts and collision shapes of each link that ``read`` gives, those of glTF turned where they fit so.
+    """Return the visual parts and collision shapes of each link, meshes of glTF turned to Z up where that fits better.
 
-    ``read`` is told whether to turn them. Drake and Gazebo do, as the format has Y up; SAPIEN does not. What collides tells which
-    of the two a file was made for, where that is no glTF too; else it is turned. Each link is compared for itself: of a robot as
-    a whole, one link that reaches far says all, and its collision shapes may be balls.
+    ``read(turn)`` reads them turned or as they are written. Drake and Gazebo turn them, as the format has Y up; SAPIEN does not.
+    Collision shapes that are no glTF tell which of the two a file was made for: the reading in which the boxes of both are
+    closer, summed over the links. Without any they are turned. One box of a whole robot would tell of nothing but the link that
+    reaches farthest.
     """
     as_written = read(False)
     if not any(file.suffix.lower().lstrip(".") in Y_UP_FORMATS for file in files.used):
@@ -40,7 +41,7 @@ def joined(by_link: list[Shapes]) -> tuple[list[trimesh.Trimesh], list[Collision
 
 
 def _apart_m(visual: list[trimesh.Trimesh], collision: list[CollisionShape]) -> float:
-    """Return how far a side of the collision's box is from the visual's; 0 where one of them has none."""
+    """Return the largest distance (m) of a side of the collision's box from the visual's; 0 where one of them has none."""
     seen = [np.asarray(part.vertices) for part in visual if len(part.vertices)]
     felt = [shape.vertices for shape in collision if len(shape.vertices)]
     if not seen or not felt:

@@ -88,7 +88,9 @@ def _as_loaders_take_it(root: etree._Element, files: AssetFiles, name: str) -> N
     for soft in root.findall(_SOFT):
         said = f"<{_SOFT}> {(soft.get('name') or '')[:60]!r} is PyBullet's for what bends: it is no rigid body"
         if root.find("link") is None:
-            raise AssetError(f"{name}: its only body, {said}, and only rigid ones are read from URDF")
+            raise AssetError(
+                f"{name}: its only body, {said}, and only rigid ones are read from URDF; give a URDF with a <link>"
+            )
         files.remark(f"{said} and was left out")
     _leave_out_pybullets_shapes(root, files)
     for geometry in root.iter("geometry"):

@@ -1,4 +1,4 @@
-"""What slows, drives and bounds a joint of a USD stage: UsdPhysics drives, and what PhysX, MuJoCo and Newton add to a joint."""
+"""Damping, friction and limits of a joint of a USD stage, from UsdPhysics drives and the schemas of PhysX, MuJoCo and Newton."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ from manitwin.formats.meshes.source import MeshSource
 
 _UNLIMITED = 1e15
 _FASTEST = 1e6
-"""PhysX's own greatest speed of a joint, where nobody says another (PhysxJointAPI)."""
+"""PhysX's default of the greatest speed of a joint (PhysxJointAPI): so great a limit is read as none."""
 _NOT_OF_TWINS = (
     "physxJoint:armature", "newton:armature", "mjc:armature", "mjc:stiffness", "physxJoint:jointFriction",
 )  # fmt: skip
-"""PhysX's friction of a joint is a share of the force that holds it, and none of its own."""
+"""Attributes that twins have no field for. PhysX's jointFriction is a coefficient that scales with the force on the joint, no
+friction force or torque of its own."""
 
 
 @dataclass(frozen=True)
 class Drive:
-    """``damping`` in N m s/rad or N s/m, ``friction`` and ``effort`` in N m or N, ``velocity`` in rad/s or m/s; None: unsaid."""
+    """``damping`` in N m s/rad or N s/m, ``friction``, ``effort`` in N m or N, ``velocity`` in rad/s or m/s; None: no limit."""
 
     damping: float = 0.0
     friction: float = 0.0
@@ -32,14 +33,14 @@ class Drive:
 
 
 def drive_of(prim: Usd.Prim, axis: str, units: StageUnits, source: MeshSource, *, slides: bool) -> Drive:
-    """Return what is said of a joint about or along ``axis`` (X, Y or Z).
+    """Return what a stage states of a joint about ``axis`` (X, Y or Z), or along it where it ``slides``.
 
-    A drive without stiffness that drives nowhere is a damper. USD's angles are degrees: a damping is a torque for each degree
-    a second. MuJoCo's values are in its own units, m, kg and rad, and so is the effort that a converter from URDF notes.
-    What twins do not have is remarked. Source: UsdPhysics schema, DriveAPI; PhysxSchema, PhysxJointAPI; MuJoCo's OpenUSD
-    documentation, MjcJointAPI; the schemas of newton-usd-schemas 0.6 and urdf-usd-converter 0.3, NewtonJointAPI.
+    A drive with neither stiffness nor a target velocity is a damper. USD's angles are degrees: a damping is a torque for each
+    degree a second. MuJoCo's values are in its own units, m, kg and rad, and so is the effort that a converter from URDF notes.
+    What twins have no field for is noted as a finding of ``source``. From: UsdPhysics schema, DriveAPI; PhysxSchema,
+    PhysxJointAPI; MuJoCo's OpenUSD documentation, MjcJointAPI; newton-usd-schemas 0.6 and urdf-usd-converter 0.3, NewtonJointAPI.
     """
-    force = units.kg * units.m if slides else units.kg * units.m**2  # of a force or a torque, over s2
+    force = units.kg * units.m if slides else units.kg * units.m**2  # of a force or a torque, without its 1/s^2
     way = units.m if slides else math.radians(1.0)
 
     def said(name: str) -> float | None:
@@ -72,12 +73,12 @@ def drive_of(prim: Usd.Prim, axis: str, units: StageUnits, source: MeshSource, *
 
 
 def _positive(prim: Usd.Prim, name: str, source: MeshSource) -> float | None:
-    """Return a number above 0 that somebody wrote; None where there is none, or one that bounds nothing."""
+    """Return an authored number above 0; None where none is authored, or one so large that it bounds nothing."""
     attribute = prim.GetAttribute(name)
     written = attribute.Get(Usd.TimeCode.EarliestTime()) if attribute and attribute.HasAuthoredValue() else None
     if written is None:
         return None
     if not isinstance(written, int | float) or math.isnan(written):
-        raise AssetError(f"{source.path}: {attribute.GetPath()} is {str(written)[:40]!r}; mend it")
-    value = float(str(np.float32(written)))  # the number as it was meant, as of masses
+        raise AssetError(f"{source.path}: {attribute.GetPath()} is {str(written)[:40]!r}; give a number")
+    value = float(str(np.float32(written)))  # the shortest decimal of the float32, as in ``authored_number``
     return value if 0 < value < _UNLIMITED else None

@@ -145,7 +145,8 @@ def _limits(joint: StageJoint, units: StageUnits, source: MeshSource) -> Limits:
     """Return the limits in rad or m; (None, None) where one of them is none."""
     if math.isnan(joint.lower) or math.isnan(joint.upper):
         raise AssetError(
-            f"{source.path}: the limits of joint {joint.prim.GetPath()} are {joint.lower} and {joint.upper}; mend them"
+            f"{source.path}: the limits of joint {joint.prim.GetPath()} are {joint.lower} and {joint.upper}; give numbers,"
+            " the lower one first"
         )
     if not joint.lower < joint.upper:
         return None
@@ -179,7 +180,7 @@ def _frame(
     point, wxyz = np.array(place, float), np.array([turn.GetReal(), *turn.GetImaginary()], float)
     if not (np.isfinite(point).all() and np.isfinite(wxyz).all()):
         raise AssetError(
-            f"{source.path}: localPos{end} or localRot{end} of joint {joint.prim.GetPath()} is not finite; mend it"
+            f"{source.path}: localPos{end} or localRot{end} of joint {joint.prim.GetPath()} is not finite; give finite numbers"
         )
     to_world = np.diag([units.m] * 3 + [1.0]) if named is None else in_metres(of_path[named.GetPath()], units.m, source)
     left, _, right = np.linalg.svd(to_world[:3, :3])

@@ -30,13 +30,15 @@ class StageUnits:
 
     @classmethod
     def of(cls, stage: Usd.Stage, source: MeshSource) -> StageUnits:
-        """Read them; raises AssetError for units that are none."""
+        """Read the units of a stage; raises AssetError for one that is no number above 0."""
         declared = bool(UsdGeom.StageHasAuthoredMetersPerUnit(stage))
         unit_m, unit_kg = UsdGeom.GetStageMetersPerUnit(stage), UsdPhysics.GetStageKilogramsPerUnit(stage)
         if not (np.isfinite(unit_m) and 0 < unit_m < _LARGEST_UNIT):
-            raise AssetError(f"{source.path}: its metersPerUnit is {unit_m}; mend it")
+            raise AssetError(
+                f"{source.path}: its metersPerUnit is {unit_m}; give a number above 0 and below {_LARGEST_UNIT:g}, such as 1"
+            )
         if not (np.isfinite(unit_kg) and unit_kg > 0):
-            raise AssetError(f"{source.path}: its kilogramsPerUnit is {unit_kg}; mend it")
+            raise AssetError(f"{source.path}: its kilogramsPerUnit is {unit_kg}; give a number above 0, such as 1")
         if not declared:
             source.find(f"it declares no metersPerUnit: USD's rule of {unit_m:g} m was taken")
         return cls(unit_m, unit_kg, declared)
@@ -175,7 +177,7 @@ def _of_prim(placed: PlacedPrim, units: StageUnits, source: MeshSource) -> Inert
     wxyz = np.array([turn.GetReal(), *turn.GetImaginary()], dtype=float)
     declared = center is not None and not np.isneginf(np.array(center)).any()  # the fallback, -inf, is unspecified
     if not np.isfinite(moments).all() or not np.isfinite(wxyz).all() or (declared and not np.isfinite(center).all()):
-        raise AssetError(f"{source.path}: the mass properties of {prim.GetPath()} are not finite; mend them")
+        raise AssetError(f"{source.path}: the mass properties of {prim.GetPath()} are not finite; give finite numbers")
     left, stretch, right = np.linalg.svd(to_world[:3, :3] / unit_m)
     if np.abs(stretch - 1).max() > 1e-5:
         source.find(
@@ -189,10 +191,10 @@ def _of_prim(placed: PlacedPrim, units: StageUnits, source: MeshSource) -> Inert
 
 
 def authored_number(attribute: Usd.Attribute, source: MeshSource) -> float | None:
-    """Return a number that somebody wrote, None for the schema's fallback."""
+    """Return an authored number, None where only the schema's fallback is there; raises AssetError for what is not finite."""
     if not attribute or not attribute.HasAuthoredValue():
         return None
     value: Any = attribute.Get(Usd.TimeCode.EarliestTime())
     if value is None or not np.isfinite(value):
-        raise AssetError(f"{source.path}: {attribute.GetPath()} is {value}; mend it")
-    return float(str(np.float32(value)))  # the number as it was meant: 0.45, not 0.44999998807907104
+        raise AssetError(f"{source.path}: {attribute.GetPath()} is {value}; give a finite number")
+    return float(str(np.float32(value)))  # the shortest decimal of the stored float32: 0.45, not 0.44999998807907104

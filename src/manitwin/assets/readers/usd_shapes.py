@@ -155,7 +155,9 @@ class StageShapes:
     def _number(self, prim: Usd.Prim, name: str) -> float:
         value = float(prim.GetAttribute(name).Get(Usd.TimeCode.EarliestTime()))
         if not 0 < value * self._unit_m <= _MAX_SIZE_M:  # NaN is neither
-            raise AssetError(f"{self._source.path}: {name} of {prim.GetPath()} is {value}; mend it")
+            raise AssetError(
+                f"{self._source.path}: {name} of {prim.GetPath()} is {value}; give more than 0, {_MAX_SIZE_M:g} m at most"
+            )
         return value
 
     def _is_shape(self, prim: Usd.Prim) -> bool:
@@ -183,7 +185,8 @@ class StageShapes:
         vertices = np.asarray(part.vertices)
         if not np.isfinite(vertices).all() or (len(vertices) and np.abs(vertices).max() > _MAX_SIZE_M):
             raise AssetError(
-                f"{self._source.path}: points of {prim.GetPath()} are not finite or beyond all size; mend them"
+                f"{self._source.path}: points of {prim.GetPath()} are not finite or too large; give finite numbers,"
+                f" {_MAX_SIZE_M:g} m at most"
             )
         return part
 
@@ -200,7 +203,10 @@ def in_metres(placed: PlacedPrim, unit_m: float, source: MeshSource) -> np.ndarr
     """Return the transform ``(4, 4)`` from a prim's own axes and unit to the stage's axes and metres."""
     matrix = np.diag([unit_m, unit_m, unit_m, 1.0]) @ placed.to_world
     if not np.isfinite(matrix).all() or np.abs(matrix).max() > _MAX_SIZE_M:
-        raise AssetError(f"{source.path}: the transform of {placed.prim.GetPath()} is {matrix[:3].tolist()}; mend it")
+        raise AssetError(
+            f"{source.path}: the transform of {placed.prim.GetPath()} is {matrix[:3].tolist()}; give finite numbers, and"
+            f" lengths of {_MAX_SIZE_M:g} m at most"
+        )
     return np.asarray(matrix)
 
 
@@ -261,7 +267,9 @@ def check_types(prim: Usd.Prim, source: MeshSource) -> None:
         for spec in attribute.GetPropertyStack(Usd.TimeCode.Default()):
             written = spec.typeName if isinstance(spec, Sdf.AttributeSpec) else "relationship"
             if written == "relationship" or _kind(written) != wanted:
-                raise AssetError(f"{source.path}: {attribute.GetPath()} is a {written}, not a {wanted}; mend it")
+                raise AssetError(
+                    f"{source.path}: {attribute.GetPath()} is a {written}, not a {wanted}; declare it as that"
+                )
 
 
 def _kind(name: Sdf.ValueTypeName) -> str:

@@ -36,7 +36,9 @@ def export(twin: TwinContent) -> Exported:
     """
     grippers = parallel_grippers_of(twin)
     if not grippers:
-        raise ExportError(f"{twin.name}: it has no grasps of a parallel gripper, and GraspGen data is nothing else")
+        raise ExportError(
+            f"{twin.name}: it has no grasps of a parallel gripper, which GraspGen data is about alone; build it with one"
+        )
     object_file = f"{twin.name}.obj"
     files = {f"objects/{object_file}": object_mesh(twin)}
     lines: list[str] = []

@@ -39,7 +39,9 @@ def export(twin: TwinContent) -> Exported:
     """
     grippers = parallel_grippers_of(twin)
     if not grippers:
-        raise ExportError(f"{twin.name}: it has no grasps of a parallel gripper, and isaac_grasp is nothing else")
+        raise ExportError(
+            f"{twin.name}: it has no grasps of a parallel gripper, which isaac_grasp is about alone; build it with one"
+        )
     object_file = f"objects/{twin.name}.obj"
     files = {object_file: object_mesh(twin)}
     names = [ASSETS[gripper].name if gripper in ASSETS else gripper for gripper in grippers]

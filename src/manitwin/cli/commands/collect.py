@@ -26,7 +26,7 @@ def collect_add(
             "a folder, or a .csv or .jsonl list",
         ),
     ],
-    source: Annotated[str | None, typer.Option(help="Whence the inputs are.", metavar="NAME")] = None,
+    source: Annotated[str | None, typer.Option(help="Where the inputs come from.", metavar="NAME")] = None,
     licence: Annotated[
         str | None, typer.Option("--licence", "--license", help="Their licence (SPDX), where a list says none.")
     ] = None,

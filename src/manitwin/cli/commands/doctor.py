@@ -73,7 +73,10 @@ def doctor(
     if what is None:
         given = [f"--{name}" for name, spec in specs.items() if spec is not None]
         if given or config is not None:
-            raise UsageError(f"doctor without {', '.join(KINDS)} looks at this machine and takes no options")
+            raise UsageError(
+                f"doctor without {', '.join(KINDS)} looks at this machine and takes no options; name one of them before"
+                " the options"
+            )
         findings, wrong = examine(), "missing"
     else:
         from manitwin.config import BuildConfig, load_config

@@ -57,7 +57,9 @@ def evaluate(
     given = {"--labels": labels, "--clip": clip, "--ulip": ulip, "--out": out}
     unused = [name for name, value in given.items() if value is not None and name not in OPTIONS[what]]
     if unused:
-        raise UsageError(f"{', '.join(unused)}: not of evaluate {what}, which takes {', '.join(sorted(OPTIONS[what]))}")
+        raise UsageError(
+            f"{', '.join(unused)}: not an option of evaluate {what}, which takes {', '.join(sorted(OPTIONS[what]))}"
+        )
     if what == "annotations":
         if labels is None:
             raise UsageError("--labels: missing; give a CSV file of labels (docs/evaluation.md)")

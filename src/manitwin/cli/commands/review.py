@@ -120,7 +120,7 @@ def review_sample(
     from manitwin.errors import UsageError
 
     if (form is None) != (not annotator):
-        raise UsageError("a form is somebody's: give --form FILE.csv and --annotator NAME together")
+        raise UsageError("a form belongs to an annotator: give --form FILE.csv and --annotator NAME together")
     from manitwin.dataset.review.plan import draw_plan, write_forms
 
     plan, strata = draw_plan(dataset, sample, seed, overlap)

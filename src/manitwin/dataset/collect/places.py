@@ -21,4 +21,6 @@ def require_place(place: Path, source: str | None, root: Path | None) -> None:
     if root is not None:
         raise UsageError("--root: is of a list, and this is a folder; leave it out")
     if not source:
-        raise UsageError("--source: missing; say whence the files of this folder are, such as --source 'my photos'")
+        raise UsageError(
+            "--source: missing; say where the files of this folder come from, such as --source 'my photos'"
+        )

@@ -112,7 +112,12 @@ def _interval(said: Mapping[str, str], low: str, high: str, where: str) -> Inter
     try:
         interval = Interval(float(said[low]), float(said[high]))
     except ValueError:
-        raise UsageError(f"{where}: {low} and {high} are {said[low]!r} and {said[high]!r}, not two numbers") from None
+        raise UsageError(
+            f"{where}: {low} and {high} are {said[low]!r} and {said[high]!r}, not two numbers; give two"
+        ) from None
     if not 0 < interval.low <= interval.high < math.inf:
-        raise UsageError(f"{where}: {low} {interval.low:g} to {high} {interval.high:g} is no interval above 0")
+        raise UsageError(
+            f"{where}: {low} {interval.low:g} to {high} {interval.high:g} is no interval above 0; give two numbers above 0,"
+            " the lower one first"
+        )
     return interval

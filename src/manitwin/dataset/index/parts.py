@@ -37,7 +37,7 @@ from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import RECORD
 
 MERGE_WIDTH = 8
-"""So many parts of one order of size are merged into one: a twin is written log8 times, and readers open few files."""
+"""So many parts of one order of size are merged into one: one of n twins is written log8(n) times, and readers open few files."""
 
 PART_ROWS = 1 << 20
 """Grasps of a merged part, about: 60 MB on disk, 0.6 GB of memory to sort."""
@@ -78,9 +78,8 @@ def write_part(root: DatasetRoot, ids: Iterable[str], *, gone: Iterable[str] = (
     """Index finished twins, new or built again, as one more part; returns it, or None where no ids are given.
 
     A twin that an older part has is taken out of it, and so are those that are ``gone``: that part is written again, under
-    another name. Where that makes
-    eight parts of about one size, they become one, and the part returned may be in that already. Raises TwinError for a
-    folder that cannot be read; the index then is what it was.
+    another name. Where that makes eight parts of about one size, they become one, and the part returned may be in that already.
+    Raises TwinError for a folder that cannot be read; the index then is what it was.
     """
     wanted = sorted(set(ids))
     changed = sorted({*wanted, *gone})

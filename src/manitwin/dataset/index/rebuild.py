@@ -52,8 +52,8 @@ def rebuild(
     """Replace a data set's index by one made of its folders alone: the same rows as one that was written as the run went.
 
     ``on_start`` is told how many twins there are, ``on_read`` how many more of them have been read. The old index stays until
-    the new one is whole. Raises UsageError where there are no twins, and TwinError where a
-    worker process dies: nothing has changed then.
+    the new one is whole. Raises UsageError where there are no twins, and TwinError where a worker process dies: nothing has
+    changed then.
     """
     if not root.has_twins:
         raise no_dataset(root)

@@ -63,8 +63,7 @@ class Published:
     """The counts of a publication: what went out, and what was left out.
 
     ``left_out`` counts accepted twins by licence; ``without_attribution`` those published whose licence asks for it,
-    ``rehearsals`` those left out because a rehearsal server had a part in them.
-    ``rows`` are those of the published tables.
+    ``rehearsals`` those left out because a rehearsal server had a part in them. ``rows`` are those of the published tables.
     """
 
     twins: int

@@ -32,7 +32,7 @@ from manitwin.twin.store import RECORD, parse_record
 SHOWN = 48
 """Cut-outs on one sheet."""
 AROUND = (200, 0, 200)
-"""Magenta, which few things and grounds have."""
+"""The colour of what a cut-out leaves away: magenta, which few things and grounds have."""
 BELIEVED = "its cut-out was believed"
 DIMMED = 0.25
 """How much of the photo is still seen where it would be cut away."""
@@ -54,7 +54,7 @@ class DoubtedPhoto:
 
     @property
     def key(self) -> str:
-        """What tells it from all others here: the twin's id, of one of several photos with its number, counted from 1."""
+        """The name of this photo alone: the twin's id, for one of several photos with the photo's number, counted from 1."""
         return self.twin_id if self.place is None else f"{self.twin_id}-{self.place + 1}"
 
     @property
@@ -64,7 +64,7 @@ class DoubtedPhoto:
 
     @property
     def title(self) -> str:
-        """What it is called; of one of several photos, which of them it is."""
+        """The title of its item; for one of several photos the name of its file, and which of them it is."""
         if self.place is None:
             return self.item.title
         files = self.item.files

@@ -69,7 +69,7 @@ class OutlineSession:
     def photo(self, key: str) -> DoubtedPhoto:
         """Return a doubted photo; raises UsageError where there is none of this key."""
         if key not in self.photos:
-            raise UsageError(f"{key}: no photo here whose cut-out is doubted")
+            raise UsageError(f"{key}: no photo here whose cut-out is doubted; reload the list")
         return self.photos[key]
 
     def words(self, key: str) -> Words:

@@ -53,7 +53,7 @@ def words_of(item: Item, amendments: Amendments) -> Words:
 def read_name(typed: object) -> str:
     """Return a name as it was typed, '' where nothing was; raises UsageError for what a manifest's column takes for none."""
     if not isinstance(typed, str):
-        raise UsageError("a name is a text, empty where nobody says it")
+        raise UsageError("a name is a text; send an empty one where nobody says it")
     name = typed.strip()
     why = unusable("name", name)
     if why is not None:
@@ -64,7 +64,7 @@ def read_name(typed: object) -> str:
 def read_side_cm(typed: object, gate: GateConfig) -> str:
     """Return a longest side (cm) as it was typed, '' where nothing was; raises UsageError for what ``gate`` takes no thing of."""
     if not isinstance(typed, str):
-        raise UsageError("a longest side is a text, empty where nobody says it")
+        raise UsageError("a longest side is a text; send an empty one where nobody says it")
     number = typed.strip().replace(",", ".")
     if not number:
         return ""

@@ -1,4 +1,4 @@
-"""What annotators do while a server runs: the next twin, a draft, a confirmed review, one taken back. Threads may share it."""
+"""A review while its server runs: the queues of the annotators, reviews confirmed and taken back. Threads may share it."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from manitwin.errors import UsageError
 from manitwin.twin.record import TwinRecord
 
 FRESH_S = 10.0
-"""So long a list of revisions is taken as it is: a twin that is built anew meanwhile enters the queue that much later."""
+"""How long the list of the twins' revisions is used again: a twin that is built anew may enter the queue so much later."""
 
 
 class Said(BaseModel):
-    """What a page sends when a review is confirmed; ``request`` is an id of the page's own, sent again with the same review."""
+    """What a page sends to confirm a review; by ``request``, an id of the page's, a review that is sent twice counts once."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -68,13 +68,13 @@ class ReviewSession:
         return sorted(queue, key=lambda twin_id: places.get(twin_id, -1))
 
     def progress(self, annotator: str) -> Progress:
-        """Return an annotator's progress."""
+        """Return how far an annotator is."""
         now, judged = self._revisions(), self.store.judged()
         done = sum(annotator in judged.get(twin_id, {}).get(now.get(twin_id, ""), ()) for twin_id in self.plan.twins)
         return Progress(done, len(self._queue(annotator, share_of)), self.store.median_seconds(annotator))
 
     def confirm(self, annotator: str, record: TwinRecord, body: Mapping[str, Any]) -> None:
-        """Keep a review; raises UsageError for what is none, or is of a twin that was built anew since it was shown."""
+        """Store a review; raises UsageError for a ``body`` that is none, or for a twin that was built anew since it was shown."""
         try:
             said = Said.model_validate(body)
             if said.revision != record.revision:

@@ -22,7 +22,7 @@ def read_twin(root: DatasetRoot, twin_id: str) -> TwinRecord:
     with local_files(root, twin_id, (RECORD,)) as folder:
         record = read_record(folder)
     if record.status != "accepted":
-        raise UsageError(f"{twin_id}: was rejected, and only accepted twins are reviewed")
+        raise UsageError(f"{twin_id}: was rejected, and only accepted twins are reviewed; go on to the next")
     return record
 
 

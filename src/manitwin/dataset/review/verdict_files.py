@@ -101,7 +101,7 @@ def _review(path: Path, root: DatasetRoot, rows: list[tuple[int, dict[str, str]]
         where = f"{path}:{line}"
         if said["dimension"] in body["answers"]:
             raise UsageError(
-                f"{where}: {said['dimension']} of {record.twin_id} is answered twice by {said['annotator']}"
+                f"{where}: {said['dimension']} of {record.twin_id} is answered twice by {said['annotator']}; leave one line"
             )
         body["answers"][said["dimension"]] = said["answer"]
         body["corrections"] |= _corrections(said, where, body["corrections"])
@@ -150,4 +150,4 @@ def _number(said: Mapping[str, str], name: str, where: str) -> float:
     try:
         return float(said[name])
     except ValueError:
-        raise UsageError(f"{where}: {name} is {said[name][:40]!r}, which is no number") from None
+        raise UsageError(f"{where}: {name} is {said[name][:40]!r}, which is no number; give one") from None

@@ -31,9 +31,9 @@ from manitwin.engine.worker_processes import WorkerContext, hidden_main_module, 
 from manitwin.errors import Unavailable
 
 RUN = logging.getLogger("manitwin.run")
-JOBS_A_PROCESS = 2000  # then a fresh one: what native code leaks stays bounded
+JOBS_A_PROCESS = 2000  # then a new process starts, which bounds what native code leaks
 LONGEST_STEP_S = 5.0
-"""So much of the time since it was looked at last counts against a job at most: this process may have been stopped itself."""
+"""At most so much of the time since the last look counts against a job: this process may itself have been stopped."""
 FAILED_POOLS = 5  # in a row, without an answer in between: then it is the installation, not one crash
 
 

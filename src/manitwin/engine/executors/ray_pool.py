@@ -17,7 +17,7 @@ from manitwin.engine.executors.ray_worker import last_words
 from manitwin.engine.jobs import Failure, Job, Reply
 from manitwin.errors import Unavailable
 
-JOBS_A_WORKER = 2000  # then a fresh one: what native code leaks stays bounded
+JOBS_A_WORKER = 2000  # then a new worker starts, which bounds what native code leaks
 START_PATIENCE_S = 120.0
 FAILED_STARTS = 5  # in a row: then it is the installation, not a node that died meanwhile
 CAUSE_CHARACTERS = 300
@@ -228,7 +228,7 @@ class RayPool:
         return Failure("timeout", f"took longer than run.stage_timeout_s = {self._timeout_s:g} s")
 
     def _stalled(self, now: float) -> Ended:
-        """Tell waiting jobs that no worker has come for them, say because no node has a GPU."""
+        """End waiting jobs for which no worker has started in time, as where no node has a GPU."""
         if not self._backlog or any(actor.node for actor in self._actors):
             self._stalled_since = None
         elif self._stalled_since is None:

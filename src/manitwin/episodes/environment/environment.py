@@ -60,10 +60,9 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
     0.5 for a cup's vacuum, or the targets of a hand's joints (rad). Of two arms there are the joints of both, then what both
     hands are told. What is beyond the limits is clipped, and a joint goes no faster than ``robot.fastest_rad_s``. Within a step
     joints move as ``JointTargets`` says, hands evenly from what they were told. Jaws that close on something press the harder
-    the smaller their target is
-    (``FINGER_STIFFNESS_N_M``). ``observation``: see docs/policies.md. ``info``: ``success``, ``failure`` (the first literal
-    that is not true, and why), ``literals`` (each with whether it holds). Pickles and copies are what ``made_by`` makes anew, as
-    it is before ``reset``: a simulation cannot be sent to another process.
+    the smaller their target is (``FINGER_STIFFNESS_N_M``). ``observation``: see docs/policies.md. ``info``: ``success``,
+    ``failure`` (the first literal that is not true, and why), ``literals`` (each with whether it holds). Pickles and copies are
+    what ``made_by`` makes anew, as it is before ``reset``: a simulation cannot be sent to another process.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": RATE_HZ}  # noqa: RUF012 (Gymnasium declares it so)

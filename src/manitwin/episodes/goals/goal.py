@@ -67,9 +67,11 @@ class Literal:
             wants = f"needs a second argument, a {signature.second}" if signature.second else "takes one argument"
             raise UsageError(f"{self.predicate} {wants}: {self.subject}, {self.second}")
         if self.second is not None and self.second == self.subject:
-            raise UsageError(f"{self.predicate}({self.subject}, {self.second}): needs two different things")
+            raise UsageError(
+                f"{self.predicate}({self.subject}, {self.second}): needs two different things; name another one second"
+            )
         if signature.unit is None and self.value is not None:
-            raise UsageError(f"{self.predicate} takes no value, not {self.value:g}")
+            raise UsageError(f"{self.predicate} takes no value; leave out {self.value:g}")
         if signature.unit is not None and self.value is None:
             object.__setattr__(self, "value", signature.default)
         if self.value is not None and not 0 <= self.value < 1e6:
@@ -105,7 +107,7 @@ class Goal:
             raise UsageError("a goal without a literal; give one or more")
         everything = self.literals + self.stays
         if len(set(everything)) != len(everything):
-            raise UsageError(f"a goal that says a thing twice: {self}")
+            raise UsageError(f"a goal that says a thing twice: {self}; say each once")
 
     def __str__(self) -> str:
         stays = f", with {' and '.join(map(str, self.stays))}" if self.stays else ""
@@ -137,8 +139,8 @@ def _literal(said: Mapping[str, Any]) -> Literal:
         raise UsageError(f"a literal with unknown fields: {', '.join(unknown)}; valid: {', '.join(fields)}")
     for name in ("predicate", "subject", "second"):
         if not isinstance(fields[name], str) and not (name == "second" and fields[name] is None):
-            raise UsageError(f"a literal whose {name} is {fields[name]!r}, not a text")
+            raise UsageError(f"a literal whose {name} is {fields[name]!r}; give a text")
     value = fields["value"]
     if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
-        raise UsageError(f"a literal whose value is {value!r}, not a number")
+        raise UsageError(f"a literal whose value is {value!r}; give a number")
     return Literal(fields["predicate"], fields["subject"], fields["second"], None if value is None else float(value))

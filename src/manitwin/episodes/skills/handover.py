@@ -10,8 +10,9 @@ from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings
 from manitwin.geometry.poses import transform
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
 
-LEAST_LENGTH_M = 0.10  # of what has room for two hands
-LEAST_LIKELY, SAME = 0.05, 0.02  # of a way to lie, and of the upward direction's coordinates between two
+LEAST_LENGTH_M = 0.10  # shorter things have no room for two hands
+LEAST_LIKELY = 0.05  # a placement's probability
+SAME = 0.02  # largest difference in a coordinate of the upward direction of two placements that are the same
 
 
 class Handover(Skill):
@@ -27,7 +28,7 @@ class Handover(Skill):
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> Iterator[np.ndarray]:
-        """Yield where the target is, then the other ways in which it stays, at the same place: how it may be put down."""
+        """Yield the target's pose, then its other stable placements at the same place: the ways in which it may be put down."""
         here = around.objects[target].object_to_world
         yield here
         for placement in around.twin(target).poses:
@@ -38,6 +39,6 @@ class Handover(Skill):
     def set_goal(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> SkillGoal | None:
-        """Return the goal."""
+        """Return the goal: handed over, and put down in any of ``poses``."""
         poses = tuple(self.poses(around, target, partner, rng))
         return SkillGoal(self.goal(around.objects[target], None), poses, None, {}, hands_over=True)

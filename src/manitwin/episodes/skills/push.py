@@ -18,21 +18,21 @@ from manitwin.scenes.layouts.pool import Pool, PoolTwin
 MARK = "mark"
 WAY_M = (0.08, 0.20)
 PLACES_TRIED = 60
-MOST_INWARD = -0.5  # cosine to the way from the robot: no hand comes from behind to push things up to its own foot
+MOST_INWARD = -0.5  # cosine to the direction away from the robot: the hand does not reach behind a thing to pull it in
 LEAST_HEIGHT_M, LEAST_WIDTH_M = 0.02, 0.03
-BASE_M, LEAST_BASE_M = 0.002, 0.025  # what is no higher over the table bears the object; narrower, and it rolls
-TIPPING = 0.8  # of its width: how high what is pushed may be, that it slides and does not fall
+BASE_M, LEAST_BASE_M = 0.002, 0.025  # corners so near to the table are its base; with a narrower base it rolls
+TIPPING = 0.8  # height over width up to which a thing that is pushed slides and does not fall over
 
 
 def base_width_m(points: np.ndarray) -> float:
-    """Return the least width of what an object stands on, of its corners ``(N, 3)``: of what is round only a strip."""
+    """Return the least width (m) of the base of an object with corners ``(N, 3)``; of a lying round thing it is a strip."""
     base = points[points[:, 2] < points[:, 2].min() + BASE_M, :2]
     angles = np.linspace(0, np.pi, 36, endpoint=False)
     return float(np.ptp(base @ np.array([np.cos(angles), np.sin(angles)]), axis=0).min())
 
 
 def can_be_pushed(points: np.ndarray) -> bool:
-    """Tell whether a fingertip finds an object of corners ``(N, 3)``, and whether that neither falls over nor rolls."""
+    """Tell whether an object with corners ``(N, 3)`` m is high enough for a fingertip, and neither falls over nor rolls."""
     *across_m, height_m = np.ptp(points, axis=0).tolist()
     broad = min(across_m) >= max(LEAST_WIDTH_M, HEIGHT_SHARE * TIPPING * height_m)
     return height_m >= LEAST_HEIGHT_M and broad and base_width_m(points) >= LEAST_BASE_M
@@ -55,7 +55,7 @@ class Push(Skill):
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> Iterator[np.ndarray]:
-        """Yield free poses in reach that the target may be slid to, the way there free too, and no fingertip passing over it."""
+        """Yield poses in reach that the target may be slid to: free ones, with a free way there for target and fingertip."""
         moved = around.objects[target]
         corners = footprint_at(moved.body, moved.object_to_world)
         taken = [footprint_at(o.body, o.object_to_world) for i, o in enumerate(around.objects) if i != target]

@@ -112,11 +112,14 @@ def checked_lens(lens: Lens, told: str) -> Lens:
     """Return a lens that a picture can be taken with; raises InputError with ``told`` before the cause."""
     numbers = [*lens.focal, *(lens.centre_px or ()), *(lens.size_px or ())]
     if not all(math.isfinite(each) and abs(each) <= LARGEST_NUMBER for each in numbers):
-        raise InputError("unreadable", f"{told}: a number of its lens is not finite or above {LARGEST_NUMBER:g}")
+        raise InputError(
+            "unreadable", f"{told}: a number of its lens is not finite or above {LARGEST_NUMBER:g}; mend the file"
+        )
     if min(*lens.focal, *(lens.size_px or (1.0,))) <= 0:
         raise InputError("unreadable", f"{told}: a focal length or a size of the picture is not above 0; give pixels")
     if not all(math.isfinite(each) and abs(each) <= MOST_COEFFICIENT for each in lens.distortion):
         raise InputError(
-            "unreadable", f"{told}: a coefficient of distortion is not finite or above {MOST_COEFFICIENT:g}"
+            "unreadable",
+            f"{told}: a coefficient of distortion is not finite or above {MOST_COEFFICIENT:g}; mend the file",
         )
     return lens

@@ -38,10 +38,10 @@ def read_camera_poses(path: Path) -> CameraPoses:
             return read_camera_poses(path / "transforms.json")
         if files is None:
             raise InputError("unreadable", f"{called}: no {CAMERAS} and {IMAGES} of one COLMAP model there; {GIVE}")
-        if not path.is_dir():  # the one that was named
+        if not path.is_dir():  # in the format, text or binary, of the file that was named
             files = folder / f"{CAMERAS}{path.suffix}", folder / f"{IMAGES}{path.suffix}"
         return CameraPoses("colmap", folder, tuple(read_model(*files)), None)
     if path.suffix.lower() != ".json":
-        raise InputError("wrong_type", f"{called}: no file of poses that is read; {GIVE}")
+        raise InputError("wrong_type", f"{called}: not a file of camera poses; {GIVE}")
     cameras, unit_m = read_transforms(path)
     return CameraPoses("transforms.json", path, tuple(cameras), unit_m)

@@ -1,4 +1,4 @@
-"""Rows of PLY elements, ASCII and binary: what a header says is held against what the file has before anything is allocated."""
+"""Rows of PLY elements, ASCII and binary. Counts in the header are checked against the file's size before memory is allocated."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ _VALUES_PER_VERTEX = 16
 
 @dataclass(frozen=True)
 class Property:
+    """A property of an element; ``count_dtype`` is the type of a list's length, None for a single value."""
+
     name: str
     dtype: str
     count_dtype: str | None = None
@@ -25,6 +27,8 @@ class Property:
 
 @dataclass(frozen=True)
 class Element:
+    """An element of the header, with the number of its rows and their properties in order."""
+
     name: str
     count: int
     properties: tuple[Property, ...]
@@ -44,7 +48,7 @@ Columns = dict[str, np.ndarray | Lists]
 def check_rows(element: Element, body_bytes: int, source: MeshSource) -> None:
     """Refuse an element of more rows or values than the file holds or the limits allow; raises InputError.
 
-    Every row takes at least a byte, and one without properties none: it is never walked.
+    Each row takes at least a byte. Rows without properties take none, so they are never iterated.
     """
     if not element.properties:
         return
@@ -60,16 +64,16 @@ def check_rows(element: Element, body_bytes: int, source: MeshSource) -> None:
 
 
 class Words:
-    """The numbers of an ASCII body, one after another; in memory are those of a block and what is asked for."""
+    """Reads the numbers of an ASCII body in order; of its text no more is parsed at once than a block and what is asked for."""
 
     def __init__(self, data: bytes, offset: int):
         self._data, self._at = data, offset
         self._ahead = np.empty(0)
 
     def peek(self, count: int) -> np.ndarray:
-        """Return the next numbers ``(count,) float64`` and stay before them; raises ValueError where there are fewer."""
+        """Return the next numbers ``(count,) float64`` without consuming them; raises ValueError where there are fewer."""
         if count > len(self._ahead):
-            # a number takes a byte and one that parts it from the next
+            # a number takes at least one byte, and a byte divides it from the next
             if 2 * (count - len(self._ahead)) - 1 > len(self._data) - self._at:
                 raise ValueError(count)
             blocks, have = [self._ahead], len(self._ahead)
@@ -80,7 +84,7 @@ class Words:
         return self._ahead[:count]
 
     def take(self, count: int) -> np.ndarray:
-        """Return the next ``count`` numbers and go on behind them."""
+        """Return the next ``count`` numbers and consume them."""
         values = self.peek(count)
         self._ahead = self._ahead[count:]
         return values
@@ -91,12 +95,12 @@ class Words:
         end = self._at + _BLOCK_BYTES
         if end < len(self._data):
             tail = self._data[end : end + _LONGEST_WORD].split(None, 1)
-            # the word that the block's end cuts, where it does
+            # the rest of a word that the end of the block cut in two
             cut = not (self._data[end - 1 : end].isspace() or self._data[end : end + 1].isspace())
             if cut and tail:
                 end += len(tail[0])
                 if len(tail[0]) == _LONGEST_WORD:
-                    raise ValueError("a word of no number's length")
+                    raise ValueError("a word that is too long for a number")
         values = np.array(self._data[self._at : end].split(), dtype=np.float64)
         self._at = end
         return values
@@ -140,7 +144,7 @@ def _ascii_lists(element: Element, words: Words, source: MeshSource) -> Columns:
 
 
 def _equal_lists(element: Element, words: Words, rows: int) -> dict[str, Lists] | None:
-    """Read rows whose lists are all as long as the first row's, which most are; None where they are not."""
+    """Read rows whose lists are all as long as the first row's, as in most files; return None where they are not."""
     at, places, sizes = 0, [], []
     for p in element.properties:
         size = 1 if p.count_dtype is None else _size(words.peek(at + 1)[at])
@@ -181,7 +185,11 @@ def _size(number: float) -> int:
 
 
 def binary_rows(element: Element, data: bytes, offset: int, order: str, source: MeshSource) -> tuple[Columns, int]:
-    """Read the rows as if all lists were as long as the first row's, else one by one."""
+    """Read an element's rows from a binary body; returns them and the offset behind them.
+
+    Rows whose lists are all as long as the first row's are read at once, others one by one. ``order`` is numpy's sign for the
+    byte order, ``<`` or ``>``. Raises InputError ``unreadable`` where the file ends early.
+    """
     fields: list[tuple[str, str] | tuple[str, str, tuple[int, ...]]] = []
     at = offset
     short = source.unreadable(f"truncated: its {element.name} rows end early", REMEDY)
@@ -239,7 +247,7 @@ def _binary_lists(element: Element, data: bytes, offset: int, order: str, short:
                 raise short from error
             sizes[p.name].append(size)
             at += size * np.dtype(p.dtype).itemsize
-        if row % _BLOCK_ROWS == _BLOCK_ROWS - 1:  # a small array a row takes many times the row's bytes
+        if row % _BLOCK_ROWS == _BLOCK_ROWS - 1:  # many small arrays take many times their rows' bytes
             _join(joined, fresh)
     _join(joined, fresh)
     columns: Columns = {}

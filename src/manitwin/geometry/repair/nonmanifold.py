@@ -15,7 +15,7 @@ from manitwin.geometry.repair.halfedges import (
 from manitwin.geometry.repair.surface import Surface
 
 _FOLD_COSINE = -0.5  # an ear folded by more than 60 degrees out of its neighbour's plane is a fin
-_MOST_WEIGHED = 12
+_MOST_WEIGHED = 12  # faces around an edge whose pairings are all weighed; more are paired with their neighbours
 _SAME_WAY_PENALTY = 0.3  # prefers partners that run in opposite directions over slightly flatter ones that do not
 
 
@@ -157,7 +157,7 @@ def _flattest_pairs(angle: np.ndarray, toward_apex: np.ndarray, forward: np.ndar
     known: dict[tuple[int, int], tuple[float, list[tuple[int, int]]]] = {}
 
     def best(first: int, end: int) -> tuple[float, list[tuple[int, int]]]:
-        """Return the least fold of the faces at places ``first`` to ``end`` of the order, and its pairs."""
+        """Return the pairs of the faces at places ``first`` to ``end`` of the order that fold least, after their summed fold."""
         if end - first < 2:
             return 0.0, []
         if (first, end) not in known:
@@ -166,7 +166,7 @@ def _flattest_pairs(angle: np.ndarray, toward_apex: np.ndarray, forward: np.ndar
             for place in range(first + 1, end):
                 within, behind = best(first + 1, place), best(place + 1, end)
                 if (place - first - 1) % 2 and (end - place - 1) % 2:
-                    continue  # each of them would leave a face over
+                    continue  # leaves an odd number of faces on each side
                 i, j = sorted((order[first], order[place]))
                 choices.append((float(fold[i, j]) + within[0] + behind[0], [(i, j), *within[1], *behind[1]]))
             known[first, end] = min(choices)

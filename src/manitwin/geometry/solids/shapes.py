@@ -1,6 +1,6 @@
 """Closed solids: bodies of revolution, rounded boxes, prisms, ellipsoids.
 
-Metres, Z up. Curves are cut into chords of at most ``CHORD_ERROR`` of their radius, with a least and a largest number.
+Metres, Z up. A full circle is cut into ``SIDES`` chords, whatever its radius, or fewer within ``coarser``.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from manitwin.errors import ManiTwinError
 SIDES = 48
 """Chords of a full circle: their area is 0.3 % less than the circle's."""
 CORNER_SIDES = 16
+"""Chords of a full circle in rounded edges and in the sections of tubes."""
 _coarseness: ContextVar[float] = ContextVar("coarseness", default=1.0)
 
 Point = tuple[float, float]
@@ -29,7 +30,7 @@ class SolidError(ManiTwinError):
 
 @contextmanager
 def coarser(share: float) -> Iterator[None]:
-    """Cut full circles into this share of their usual chords, and no small holes: solids that are drawn small and thrown away."""
+    """Cut circles into this share of their usual chords, and no small holes: for solids that are drawn small and thrown away."""
     token = _coarseness.set(share)
     try:
         yield
@@ -43,7 +44,7 @@ def is_coarse() -> bool:
 
 
 def chords(usual: int) -> int:
-    """Return how many chords a full circle of that many has now; a multiple of four, so that its extents stay."""
+    """Return how many chords a circle of ``usual`` ones has within ``coarser``: a multiple of four, which keeps its extents."""
     return usual if _coarseness.get() == 1.0 else max(8, 4 * round(usual * _coarseness.get() / 4))
 
 
@@ -132,7 +133,7 @@ def union(solids: Sequence[Manifold]) -> Manifold:
 
 
 def rounded(profile: Sequence[Point], radius_m: float, *, steps: int = 4) -> list[Point]:
-    """Return an open profile with its inner corners cut to arcs of at most ``radius_m``, quadratic in their tangents."""
+    """Return an open profile ``(K, 2)`` m, all but its ends rounded by quadratic arcs that begin at most ``radius_m`` away."""
     points = [np.array(p, dtype=float) for p in profile]
     out = [points[0]]
     for before, corner, after in zip(points[:-2], points[1:-1], points[2:], strict=True):

@@ -22,9 +22,9 @@ from manitwin.models.generators.templates.looks import MATERIALS, SAID_OF, Look
 from manitwin.models.generators.templates.matter import is_composite, is_food, looks_in, surfaces_of
 
 USUAL_WALL_M = 0.003
-"""Of what no walls of open ware are listed for: silicone, cardboard, leather."""
+"""The wall of open ware in materials that list none: silicone, cardboard, leather."""
 OF_ONE_MATTER = 0.5
-"""Of the density of its material: what is full and weighs less per volume is mostly hollow."""
+"""Mass per volume over the density of the material, below which a thing counts as hollow."""
 IMITATION = (0.08, 0.4, 1.0)
 """Mass per volume over the density of its matter: imitations of food are hollow or solid (YCB 010 to 018: 0.05 to 0.45)."""
 _LIGHTEST_KG_M3 = 10.0
@@ -43,7 +43,7 @@ def prior_as_named(name: str | None) -> Prior | None:
 def prior_of(prior: Prior, look: Look) -> Prior:
     """Return a prior as it is of another material than such things usually are; itself where they are of it anyway.
 
-    Of what has parts of unlike matter the first is of it, and how much of it that is nobody knows.
+    Where such things have parts of unlike materials, the first part is of the new one, an unknown share of the mass.
     """
     said = SAID_OF.get(look.material, look.material)
     if is_composite(prior):
@@ -68,7 +68,7 @@ def prior_of(prior: Prior, look: Look) -> Prior:
 
 
 def look_of_words(material: str | None) -> Look | None:
-    """Return the look of the words that a twin has for its material; None for several materials or none that is known."""
+    """Return the look of a twin's words for its material; None for several materials, and for none that is known."""
     if material is None:
         return None
     of_words = {said: name for name, said in SAID_OF.items()}
@@ -76,7 +76,7 @@ def look_of_words(material: str | None) -> Look | None:
 
 
 def _look_in(name: str, called: str, prior: Prior) -> Look | None:
-    """Return the material that the words around what a thing is called say, or that its name says among several usual ones."""
+    """Return the material that a name says before, in or behind the words for the thing; None for none, and for several."""
     words = re.sub(
         r"[^a-z0-9,]+", " ", without_diacritics(name).replace("\u2019", "").replace("'", "").replace(",", " , ")
     ).split()
@@ -93,7 +93,7 @@ def _look_in(name: str, called: str, prior: Prior) -> Look | None:
 
 
 def _weighed(prior: Prior, look: Look) -> tuple[tuple[float, float, float], Interval | None]:
-    """Return what the mass of such things of one size is multiplied with (low, typical, high), and their bulk density."""
+    """Return the factors (low, typical, high) of the mass of such things of one size, and their bulk density."""
     usual, bulk = looks_in(prior.material), prior.bulk_density_kg_m3
     if is_food(prior) and bulk is not None:
         low, typical, high = (share * look.density_kg_m3 for share in IMITATION)
@@ -116,14 +116,14 @@ def _weighed(prior: Prior, look: Look) -> tuple[tuple[float, float, float], Inte
 
 
 def _holds(prior: Prior, density_kg_m3: float) -> bool:
-    """Tell whether such things weigh what is in them rather than what they are of."""
+    """Tell whether the mass of such things is that of their contents rather than of their material."""
     bulk = prior.bulk_density_kg_m3
     light = bulk is not None and bulk.typical < OF_ONE_MATTER * density_kg_m3
     return prior.vessel or (prior.mass_distribution == "full" and light)
 
 
 def _as_swollen(bulk: Interval, density_kg_m3: float, look: Look, wall_m: float) -> Interval:
-    """Return the bulk density of scans in another material: as far as its walls are thicker, a scan swells them less."""
+    """Return the bulk density of scans in another material, whose walls a scan swells the less the thicker they are."""
     ends = []
     for value in (bulk.low, bulk.typical, bulk.high):
         full = min(value / density_kg_m3, 1.0)

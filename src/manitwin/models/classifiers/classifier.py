@@ -1,4 +1,4 @@
-"""Say what a picture shows in a word of the priors, with a probability that was calibrated, or say that it is not known."""
+"""Name what a picture shows by a word of the priors, with a calibrated probability, or say that it is not known."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from manitwin.models.classifiers.size_evidence import size_likelihoods
 from manitwin.twin.record_values import Estimate
 
 TEMPERATURE = 0.9
-"""The least log loss on either half of the templates' categories, rendered (benchmarks/naming.py)."""
+"""The temperature with the least log loss on renders of either half of the templates' categories (benchmarks/naming.py)."""
 LIKELIEST = 3
 AND_SIZE = "+size"
-"""Behind the source of what a known size has a say in."""
+"""Appended to the source of a probability that a known size has changed."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def classify(pictures: list[np.ndarray], min_probability: float, longest_m: floa
     def guess(name: str, value: float, members: np.ndarray) -> Guess:
         of_pictures = each @ members
         low, high = float(of_pictures.min()), float(of_pictures.max())
-        value = min(max(value, low), high)  # a mean of equal numbers may be rounded out of them
+        value = min(max(value, low), high)  # rounding may put the mean of equal numbers outside of their interval
         return Guess(name, Estimate(value=value, low=low, high=high, source=source))
 
     order = np.argsort(-names, kind="stable")

@@ -1,4 +1,4 @@
-"""A local HTTP server in a thread, around something that answers requests; each answer says that it is a rehearsal's."""
+"""A local HTTP server in a thread, around something that answers requests; a header of each answer says it is a rehearsal."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Response:
-    """An answer: a dictionary or list goes as JSON. ``cut_after`` ends the connection after so many bytes of the body."""
+    """An answer; a dictionary or list is sent as JSON. ``cut_after``: the connection ends after so many bytes of the body."""
 
     status: int = 200
     body: bytes | dict[str, Any] | list[Any] = b""
@@ -92,7 +92,7 @@ class _Server(ThreadingHTTPServer):
     fake: FakeServer
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Say nothing of clients that went away before their answer."""
+        """Print nothing about clients that went away before their answer."""
         if not isinstance(sys.exception(), ConnectionError):
             super().handle_error(request, client_address)
 
@@ -133,4 +133,4 @@ class _Handler(BaseHTTPRequestHandler):
     do_GET = do_POST = do_PUT = do_DELETE = do_HEAD = _do
 
     def log_message(self, format: str, *args: object) -> None:
-        """Say nothing: requests are kept, not printed."""
+        """Print nothing: requests are kept in ``requests``."""

@@ -160,7 +160,7 @@ def number(value: Any) -> float | None:
 def checked_address(value: Any, who: str, what: str) -> str:
     """Return an address that a reply names; raises BadReply for what cannot be one."""
     if not isinstance(value, str) or not value:
-        raise BadReply(f"{who}: its answer names no {what}")
+        raise BadReply(f"{who}: its answer names no {what}; run it again")
     if not is_name(value) or origin(value) is None:
-        raise BadReply(f"{who}: what its answer names as {what} is no address")
+        raise BadReply(f"{who}: what its answer names as {what} is no address; run it again")
     return value

@@ -88,5 +88,7 @@ class GraspGenXGrasper:
         if not isinstance(actions, list) or not any(isinstance(name, str) and name == ACTION for name in actions):
             raise Unavailable(f"{self.name}: the server at {self._server.url} has no action {ACTION}; update it")
         if not isinstance(served.get("model"), dict):
-            raise BadReply(f"{self.name}: the server at {self._server.url} does not say what it serves")
+            raise BadReply(
+                f"{self.name}: the server at {self._server.url} does not say which model it serves; update it"
+            )
         return f"serves any parallel gripper ({said(served['model'].get('generator_backbone'))})"

@@ -17,8 +17,8 @@ from manitwin.robots.grippers.suction import SuctionGripper
 POOL = 20_000  # surface samples to choose starting points from; as many as the paper takes for its candidates
 FOCUS_SPREAD_M, FOCUS_WEIGHT = 0.02, 8.0  # starting points lie denser around the selected points ...
 CENTER_SPREAD, CENTER_WEIGHT = 0.2, 2.0  # ... and around the centre of mass (as a share of the diagonal)
-FEW = 16  # others that a tree is no faster for
-ROLLS = 8  # approach directions a pair
+FEW = 16  # up to so many points a search over all of them is faster than a tree
+ROLLS = 8  # approach directions for each pair
 CONE_SAFETY = 1.5  # the friction cone is narrowed by this: contacts are patches, and hulls are not the surface
 MIN_WIDTH_M = 0.0005
 CLEARANCE_M = 0.0005  # between open finger and object, on each side
@@ -26,11 +26,9 @@ MAX_DEPTH_OFFSET_M = 0.007  # the middle of the pair stays on pads of 18.5 mm
 # The score falls to one half at this lever: measured on 1,799 trials of 18 objects, where grasps beyond 80 mm held in
 # 47 %.
 HALF_LEVER_M, LEVER_SLOPE_M = 0.08, 0.02
-CUP_ROLLS = 2  # angles of the tool about the approach a point
-CUP_HALF_LEVER_M, CUP_LEVER_SLOPE_M = (
-    0.04,
-    0.02,
-)  # the tilt that a lip of 15 mm carries: at 40 mm half of the vacuum's force
+CUP_ROLLS = 2  # angles of the tool about the approach, for each point
+CUP_HALF_LEVER_M, CUP_LEVER_SLOPE_M = 0.04, 0.02
+"""The lever at which the score of a cup is one half: a lip of 15 mm then carries half of the vacuum's force."""
 
 
 def starting_points(request: GraspRequest, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -45,7 +43,7 @@ def starting_points(request: GraspRequest, count: int, rng: np.random.Generator)
 
 
 def _density(request: GraspRequest, points: np.ndarray) -> np.ndarray:
-    """Return how much more likely each surface point is drawn than others ``(N,)``; zero where it is out of reach."""
+    """Return the relative probability ``(N,)`` of drawing each surface point; zero where it is out of reach."""
     weight, reached = np.ones(len(points)), np.ones(len(points), bool)
     if len(request.focus_points_m):
         distance = _to_nearest_m(points, request.focus_points_m)
@@ -78,7 +76,7 @@ class AntipodalGrasper:
     rounds: int | None = None
 
     def propose(self, request: GraspRequest) -> GraspProposals:
-        """Return up to ``max_proposals`` grasps, best-spread first come; none where no pair fits between the fingers.
+        """Return up to ``max_proposals`` grasps, the best first yet spread out; none where no pair fits between the fingers.
 
         Scores are the product of how well the contacts face each other and how near the closing axis passes the centre
         of mass.

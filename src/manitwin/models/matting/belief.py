@@ -21,29 +21,34 @@ from manitwin.models.matting.outline import eroded
 
 WEIGHTS_FILE = "belief.json"
 LEAST = 0.02
-"""A score below that is as bad as none."""
+"""Scores below this count as this: their logarithm is taken."""
 SCORES = (
     *("on_edges", "crisp", "separable", "complete", "uncut", "stable", "whole", "plain", "outermost"),
     *("sharply_bounded", "unshaded", "solid", "thick"),
 )
+"""Features that are the logarithms of a mask's scores (``MatteScores``)."""
 OPINIONS = ("network_alike", "network_sharp", "network_within", "network_beyond", "colours", "rival")
+"""Features that compare the mask with what a network, the colours and the next best mask say."""
 BULKY = 18.75
-"""Pixels of the photo, of area for each of the outline: a fraction of a pixel off costs a bulkier thing next to nothing."""
+"""Pixels of area for each pixel of outline, in the photo: from here on an outline that is off by a fraction of a pixel costs next
+to no intersection over union."""
 MOST_SOFT_PX = 8.0
+"""Unsure pixels of a network across the outline, in pixels of the photo: wider is no larger doubt."""
 MOST_MISJUDGED = 0.05
 """Of a mask's area: a cut-out that may be wrong of so much of the thing is not believed, whatever else speaks for it."""
 LEAST_DIFFERENCE = 0.005
-"""Of a mask's area: opinions that differ by less are alike. Beyond, each doubling of the difference is as much of a doubt."""
+"""A share of the mask's area: opinions that differ by less count as alike; beyond, each doubling adds as much doubt."""
 FEATURES = (*SCORES, *OPINIONS, "kept", "bulk", "made_by_rules")
 BEST = np.zeros(len(FEATURES))
-"""What nothing can be better than, by feature; who made the mask is no doubt of it."""
+"""The best value of each feature; that of ``made_by_rules`` is never a doubt."""
 WHOLE = np.array([name == "whole" for name in FEATURES])
+"""Selects the feature that doubts a mask beside which other pieces lie."""
 
 
 def features(candidate: Candidate, others: list[Candidate], share: np.ndarray) -> np.ndarray:
     """Return the features (F,) of a candidate beside the ``others``, given a network's ``share`` of object (any size).
 
-    Of several others the one that is most like it counts.
+    Of the others only the one that is most like the candidate counts.
     """
     mask = candidate.found.mask
     share = at_size(share, mask.shape)
@@ -71,7 +76,7 @@ def features(candidate: Candidate, others: list[Candidate], share: np.ndarray) -
 
 
 def _difference(share: float) -> float:
-    """Return how much of a doubt a difference is, given as a share of a mask's area: 0 of none, by its logarithm."""
+    """Return the doubt that a difference is, which is a share of the mask's area: 0 for none, growing with its logarithm."""
     return float(np.log1p(min(share, 1.0) / LEAST_DIFFERENCE))
 
 
@@ -85,16 +90,16 @@ def probability(values: np.ndarray) -> float:
 
 
 def unfitted(values: np.ndarray) -> float:
-    """Return by what factor in [0, 1] two doubts lower the probability that composites hardly show.
+    """Return the factor in [0, 1] by which two further doubts lower the probability.
 
-    A part in focus that may be lost, or a hole that may be filled (``kept``), and ground that may be seen through the mask
-    (``solid``).
+    Composites show them too seldom for a fit: a part in focus that may be lost or a hole that may be filled (``kept``), and
+    ground that may be seen through the mask (``solid``).
     """
     return float((1 + values[FEATURES.index("kept")]) * np.exp(values[FEATURES.index("solid")]))
 
 
 def doubts_of(values: np.ndarray) -> dict[str, float]:
-    """Return what each of the ``features`` but the maker costs a mask, in log-odds against the best that there is."""
+    """Return what each of the ``features`` but ``made_by_rules`` costs a mask, in log-odds, against its best value."""
     _, weights = _weights()
     doubts = dict(zip(FEATURES[:-1], (weights * (BEST - values))[:-1].tolist(), strict=True))
     doubts["kept"] -= float(np.log(max(1 + values[FEATURES.index("kept")], LEAST)))

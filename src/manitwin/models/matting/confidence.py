@@ -27,17 +27,15 @@ LOW_SCORE = 0.5
 class MatteScores:
     """Each in [0, 1]; 1 is best.
 
-    ``on_edges`` share of the outline that lies on an edge of the photo; ``crisp`` how
-    sharp it is against the object's own strong edges; ``separable`` how well the colours just inside and
-    just outside the outline differ from the background's (Youden's J); ``complete`` nothing else stands out of the
-    background; ``uncut`` how little of it the image border cuts; ``stable``
-    agreement of two independent opinions, or how well the mask explains every edge in focus; ``whole`` little lies outside the
-    largest connected part; ``plain`` how uniform the background is; ``outermost`` share of the outline with no edge beyond it,
-    in what passes for shade, that is nearly as sharp; ``sharply_bounded`` how little of it is as soft as a shadow's edge with
-    shade inside;
-    ``unshaded`` how little along it has the ground's own tint, dimmed, where the rest has other colours;
-    ``solid`` how little of it, enclosed by the rest, has the ground's own tint: a hole may be filled;
-    ``thick`` how small its outline is against its area: a third of a pixel off all around is 5 % of a thin thing.
+    ``on_edges`` share of the outline that lies on an edge of the photo; ``crisp`` how sharp it is against the object's own
+    strong edges; ``separable`` how well the colours just inside and just outside the outline differ from the background's
+    (Youden's J); ``complete`` nothing else stands out of the background; ``uncut`` how little of it the image border cuts;
+    ``stable`` agreement of two independent opinions, or how well the mask explains every edge in focus; ``whole`` little lies
+    outside the largest connected part; ``plain`` how uniform the background is; ``outermost`` share of the outline with no edge
+    beyond it, in what passes for shade, that is nearly as sharp; ``sharply_bounded`` how little of it is as soft as a shadow's
+    edge with shade inside; ``unshaded`` how little along it has the ground's own tint, dimmed, where the rest has other
+    colours; ``solid`` how little of it, enclosed by the rest, has the ground's own tint: a hole may be filled; ``thick`` how
+    small its outline is against its area: a third of a pixel off all around is 5 % of a thin thing.
     """
 
     on_edges: float

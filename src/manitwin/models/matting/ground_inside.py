@@ -8,23 +8,25 @@ import numpy as np
 from manitwin.models.matting.background import Background, length
 from manitwin.models.matting.outline import dilated, disk, eroded, holds
 
-LEAST_LIGHT, MOST_LIGHT = 0.3, 1.03  # of the ground's
-SAME_TINT = 0.025  # spread of the channels' ratios; ground seen through made loops and slots has 0.007 to 0.022
+LEAST_LIGHT, MOST_LIGHT = 0.3, 1.03  # the ground in shade or light, over the ground around the thing
+SAME_TINT = (
+    0.025  # spread of the channels' ratios; ground seen through loops and slots of composites has 0.007 to 0.022
+)
 SAME_CHROMA = 1.6  # L*a*b*, besides the ground's noise
-RIM = 3.5  # L*a*b*: nowhere does it run on into what surrounds it
+RIM = 3.5  # L*a*b*: the least step to what surrounds it, along four fifths of its rim
 RIM_PX = 3
-MOST_HELD = 0.04  # what encloses a print is a label
+MOST_HELD = 0.04  # of its area: a place that encloses more that is not its own is a label with print
 LEAST_SHARE = 1e-3
-CERTAIN, UNEVEN = 0.9, 0.05  # of ten such places in composites all were the thing
+CERTAIN, UNEVEN = 0.9, 0.05  # share of object, spread of light: ten such places in composites were all of the thing
 
 
 def ground_inside(
     background: Background, mask: np.ndarray, gradient: np.ndarray, threshold: float, share: np.ndarray | None = None
 ) -> float:
-    """Return the share of ``mask`` (H, W) that it encloses on all sides and that has the ground's tint, in light or shade.
+    """Return the share of ``mask`` (H, W) bool that the rest of it encloses and that has the ground's tint, in light or shade.
 
-    It may be a hole, or a grey part of a thing on grey: what cannot be told apart is doubted. What is lit as unevenly as no
-    ground within a hole, and of what all networks are sure (``share`` (H, W), the least of theirs), is the thing.
+    Such a place may be a hole, or a grey part of a thing on a grey ground; as nobody can tell, it is doubted. One of which all
+    networks are sure (``share`` (H, W) of object, the least of theirs) and that is lit too unevenly for ground is the thing.
     """
     ratio = background.light_ratio
     light = ratio.mean(2)

@@ -14,13 +14,13 @@ PATH = "estimate"
 
 
 class ServedEstimator:
-    """Ask a server of the user's; a key is in the environment, or there is none.
+    """Ask a server of the user's for poses, with the key in the environment variable ``MANITWIN_POSE_KEY`` where there is one.
 
-    ``content`` of the body has the files of the question by name, in base64. Raises what ``HttpService`` does.
+    The body's ``content`` has the files of the question in base64, by name. Raises what ``HttpService`` does.
     """
 
     def __init__(self, url: str, services: ServicesConfig):
-        """Take its address; raises ConfigError for what is none, or where a key may not go there."""
+        """Take the server's address; raises ConfigError for what is none, and where a key may not be sent there."""
         self.spec = url
         key = key_from_environment((KEY,), url, "--estimator", own_server=True)
         self._service = HttpService("estimator", url, authorization=bearer(key), services=services, key=key)

@@ -1,4 +1,4 @@
-"""One object in front of one still hand in MuJoCo, and how soft their contacts are."""
+"""One object in front of one hand that stays in place in MuJoCo, and how soft their contacts are."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from manitwin.physics.trial import TrialSettings
 from manitwin.physics.trial_phases import HandContacts
 from manitwin.robots.grippers.parallel import ParallelGripper
 
-IMPEDANCE_RATIO = 1000.0  # friction yields so many times less than the normal force: as good as nothing
+IMPEDANCE_RATIO = 1000.0  # of friction to normal force (MuJoCo's impratio): contacts hardly creep sideways
 FINGER_MASS_KG = 0.1
-MET_M = -0.001  # contacts and finger stops are soft: of 50 N they give half a millimetre on each side
-MAX_DRIVE_FORCE = 4.0  # as a multiple of the closing force: it never cuts the closing force itself
+MET_M = -0.001  # pads' distance from the middle once they met: contacts and stops give half a millimetre each at 50 N
+MAX_DRIVE_FORCE = 4.0  # the drives' limit, over the closing force: high enough never to cut that
 FINGERS = ("finger_plus", "finger_minus")
-SINK_M = 0.0005  # the closing force on a single contact: what MuJoCo's default impedance gives of a heavy object
-LEAST_IMPEDANCE, MOST_IMPEDANCE = 0.95, 0.9999  # MuJoCo's default, and what it takes at most (mjMAXIMP)
+SINK_M = 0.0005  # of one contact under the closing force: as of a heavy object at MuJoCo's default impedance
+LEAST_IMPEDANCE, MOST_IMPEDANCE = 0.95, 0.9999  # MuJoCo's default, and the most that it accepts (mjMAXIMP)
 IMPEDANCE_WIDTH_M, IMPEDANCE_MIDPOINT, IMPEDANCE_POWER = 0.001, 0.5, 2.0  # MuJoCo's own defaults
 
 
@@ -49,7 +49,7 @@ class HandScene:
         self.data.qpos[free + 3 : free + 7] = quaternion_wxyz(object_to_hand[:3, :3])
 
     def advance(self, loads_m_s2: np.ndarray) -> None:
-        """Take one step for each row of accelerations ``(N, 3)``."""
+        """Take one step for each row of the accelerations ``(N, 3)`` m/s^2 in the hand's frame that load the object."""
         model, data, gravity = self.model, self.data, self.model.opt.gravity
         start, count = self.reached_m, len(loads_m_s2)
         for number, load in enumerate(loads_m_s2, start=1):
@@ -59,18 +59,18 @@ class HandScene:
         self.reached_m = self.target.value_m
 
     def squeeze(self) -> None:
-        """Move the fingers' shared target on: over the steps of the next frame, so that they close at an even speed.
+        """Move the fingers' shared target on; the next frame's steps lead there evenly.
 
-        Fingers that leap to each frame's target are twice as fast in between, and kick away what is light.
+        Fingers that leapt to each frame's target would be twice as fast in between, and kick away what is light.
         """
         self.target.move_on(float(self.data.qpos[self.joints].mean()))
 
     def presses(self) -> bool:
-        """Tell whether the fingers' target is as far ahead of them as the closing force wants."""
+        """Tell whether the fingers' target is so far ahead of them that they press with the closing force."""
         return self.target.presses
 
     def contacts(self) -> HandContacts:
-        """Return how hard the +X and the -X finger press inwards, and the deepest overlap with the hand."""
+        """Return the forces (N) with which the +X and the -X finger press inwards, and the deepest overlap (m) with the hand."""
         forces, deepest, wrench = [0.0, 0.0], 0.0, np.zeros(6)
         for index, contact in enumerate(self.data.contact):
             bodies = self.model.geom_bodyid[list(contact.geom)]
@@ -94,11 +94,11 @@ class HandScene:
         return np.array(self.data.qpos[self.joints])
 
     def object_rotation(self) -> np.ndarray:
-        """Return the object's rotation in the hand's frame."""
+        """Return the object's rotation ``(3, 3)`` in the hand's frame."""
         return self.data.xmat[self.object].reshape(3, 3).copy()
 
     def center_of_mass_m(self) -> np.ndarray:
-        """Return the object's centre of mass in the hand's frame."""
+        """Return the object's centre of mass ``(3,)`` m in the hand's frame."""
         return self.data.xipos[self.object].copy()
 
 

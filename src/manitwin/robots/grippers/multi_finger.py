@@ -218,17 +218,23 @@ def _check(file: _File, links: tuple[Link, ...]) -> None:
     joints = {link.joint for link in links if link.joint_type != "fixed"}
     if set(file.joints) != joints:
         raise UsageError(
-            f"gripper {file.name}: joints {sorted(set(file.joints) ^ joints)} are not in both file and URDF"
+            f"gripper {file.name}: joints {sorted(set(file.joints) ^ joints)} are not in both file and URDF; name all joints"
+            " of the hand that move"
         )
     unknown = {name for finger in file.fingers for name in finger} - {link.name for link in links}
     if unknown:
-        raise UsageError(f"gripper {file.name}: the URDF has no links {', '.join(sorted(unknown))}")
+        raise UsageError(
+            f"gripper {file.name}: the URDF has no links {', '.join(sorted(unknown))}; name links that it has"
+        )
     for posture in file.postures:
         rows = {len(row) for row in posture.joints_rad}
         if rows != {len(file.joints)} or len(posture.joints_rad) != len(posture.openings_m):
             raise UsageError(
-                f"gripper {file.name}: posture {posture.name} wants {len(file.joints)} joints at each of "
-                f"{len(posture.openings_m)} openings"
+                f"gripper {file.name}: posture {posture.name} has rows of other lengths; give {len(file.joints)} joint positions"
+                f" for each of its {len(posture.openings_m)} openings"
             )
         if not (np.diff(posture.openings_m) > 0).all():
-            raise UsageError(f"gripper {file.name}: posture {posture.name}: openings_m do not ascend")
+            raise UsageError(
+                f"gripper {file.name}: posture {posture.name}: openings_m do not ascend; give them from the narrowest to the"
+                " widest"
+            )

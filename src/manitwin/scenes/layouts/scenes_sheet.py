@@ -34,7 +34,7 @@ def write_contact_sheet(dataset: str | Path, out: str | Path, *, most: int = SCE
     root, source = DatasetRoot(out), TwinSource(dataset)
     shown = accepted_scenes(out)[:most]
     if not shown:
-        raise UsageError(f"{out}: no scene was accepted, so that there is none to show")
+        raise UsageError(f"{out}: no scene was accepted, so there is none to show; `manitwin status {out}` says why")
     sheet = contact_sheet([(scene_id, _picture(root, source, scene_id)) for scene_id in shown])
     stream = io.BytesIO()
     sheet.save(stream, "WEBP", quality=SHEET_QUALITY, method=4)

@@ -1,4 +1,4 @@
-"""A question to an estimator of the user's about a thing in a view."""
+"""Have an estimator of the user's guess the poses of a thing in a view."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ from manitwin.scenes.locate.pose_model import PoseModel
 from manitwin.twin.loaded_twin import Twin
 
 MOST_NUMBER = 65535
+"""The largest value of a picture of 16 bits."""
 UNITS_M = (0.0001, 0.001, 0.01)
-"""Metres a unit of a depth picture: the finest with which all depths are numbers of 16 bits."""
+"""Units of depth pictures, the finest first: the first one in which all depths fit into 16 bits is taken."""
 MESH, VISUAL, DEPTH, MASK, RGB = "model.ply", "visual.glb", "depth.png", "mask.png", "rgb.png"
 
 
@@ -38,7 +39,10 @@ class AskedEstimator:
 
 
 def pose_request(view: DepthView, mask: np.ndarray, model: PoseModel, twin: Twin, seed: int) -> PoseRequest:
-    """Return the question where a twin is that ``mask (H, W) bool`` shows; raises UsageError for depths that no picture holds."""
+    """Return the question for the pose of the twin that ``mask (H, W) bool`` shows.
+
+    Raises UsageError for depths that no picture of 16 bits holds.
+    """
     depth = np.where(known_depth(view), view.depth_m, 0.0)
     unit_m = next((each for each in UNITS_M if depth.max() / each < MOST_NUMBER), None)
     if unit_m is None:

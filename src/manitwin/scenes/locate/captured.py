@@ -16,14 +16,15 @@ from manitwin.formats.output_folder import new_folder
 
 DEPTH, RGB, CAMERA, BASE = "depth.png", "rgb.png", "camera.json", "base.json"
 MOST_NUMBER = 65535
+"""The largest value of a picture of 16 bits."""
 
 
 @dataclass(frozen=True)
 class Capture:
     """``depth_m (H, W)``, 0 unknown; ``rgb (H, W, 3) uint8`` aligned with it; ``intrinsics (3, 3)`` as OpenCV counts pixels.
 
-    ``camera_to_base (4, 4)`` where it is known; ``masks (H, W) bool`` of things by name, where these are; ``device`` says what
-    saw it.
+    ``camera_to_base (4, 4)`` where it is known; ``masks (H, W) bool`` of things by name, where there are any; ``device``
+    names the camera.
     """
 
     depth_m: np.ndarray

@@ -33,9 +33,9 @@ _AWAY = 2.0
 class PoseModel:
     """A twin's surface in the object frame, m.
 
-    ``sides (V, 3)`` are directions towards the object's
-    viewers and ``shown[v] (S, 3)`` the points that are seen from there; ``center (3,)`` is the middle of the box.
-    ``near_motions (T, 4, 4)`` turn the object so that much of its surface falls on itself: a mug about the axis of its body.
+    ``sides (V, 3)`` are directions towards the object's viewers and ``shown[v] (S, 3)`` the points that are seen from there;
+    ``center (3,)`` is the middle of the box. ``near_motions (T, 4, 4)`` turn the object so that much of its surface falls on
+    itself: a mug about the axis of its body.
     """
 
     twin_id: str

@@ -1,4 +1,4 @@
-"""What one picture shows of one object: how much of it, where, and of which of its parts, by rays at the object alone."""
+"""What one picture shows of one object, from rays that are cast at it alone: how much of it, where, and which of its parts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.part_records import NO_PART, Part
 
 NEAR_M = 0.01
-"""What is nearer to a camera than this it does not draw."""
+"""The near plane of the cameras: nothing nearer is drawn."""
 
 Box = tuple[int, int, int, int]
 """Pixels ``x, y, width, height``; x and y may lie outside of the picture."""
@@ -26,7 +26,7 @@ Box = tuple[int, int, int, int]
 class SeenShape:
     """A twin as pictures see it: rays at its visual surface, its vertices ``(V, 3)`` and the part ``(F,)`` of each face.
 
-    Object frame, metres. ``face_parts`` are places in ``parts``, 255 is none.
+    Object frame, metres. ``face_parts`` are indices into ``parts``, 255 (``NO_PART``) for none.
     """
 
     caster: RayCaster
@@ -36,7 +36,7 @@ class SeenShape:
 
     @classmethod
     def of_twin(cls, folder: Path) -> SeenShape:
-        """Read that of a twin's folder; raises TwinError."""
+        """Read the shape of the twin in a folder; raises TwinError."""
         twin = Twin(folder)
         mesh = merged(twin.visual)
         return cls(RayCaster(mesh), np.asarray(mesh.vertices), twin.face_parts(), tuple(twin.record.parts))
@@ -126,7 +126,7 @@ def silhouette_of(shape: SeenShape, object_to_world: np.ndarray, camera: Camera)
 def view_of(silhouette: Silhouette, visible: np.ndarray) -> ObjectView:
     """Return what a picture shows of an object: its ``silhouette``, and where it is seen, ``visible (H, W) bool``.
 
-    What is seen belongs to the silhouette, though a ray and a rasterizer may take one pixel of a rim each its own way.
+    Visible pixels count as silhouette too: at a rim the rays of one and the rasterizer of the other may differ by a pixel.
     """
     beyond = int((visible & ~silhouette.amodal).sum())
     return ObjectView(
@@ -139,7 +139,7 @@ def view_of(silhouette: Silhouette, visible: np.ndarray) -> ObjectView:
 
 
 def parts_seen(shape: SeenShape, silhouette: Silhouette, visible: np.ndarray) -> np.ndarray:
-    """Return the part ``(H, W) int`` at each visible pixel, as its place in ``shape.parts``; -1 where none is."""
+    """Return the part ``(H, W) int`` at each visible pixel, as its index in ``shape.parts``; -1 where none is."""
     parts = np.full(visible.shape, -1, np.int64)
     at = visible & silhouette.amodal
     found = shape.face_parts[silhouette.face[at]].astype(np.int64)

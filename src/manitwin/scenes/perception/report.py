@@ -18,9 +18,9 @@ from manitwin.scenes.perception.splits import split_of
 
 SAMPLE_PX, MOST_SAMPLES = 256, 12
 LABEL_SHARE = 0.5
-"""How much of a pixel's colour in a sample is that of its label."""
+"""The share of the label's colour in a sample's pixel; the rest is the picture's."""
 BINS, BAR = 10, 40
-"""The histogram of visible shares, and how long its longest bar is."""
+"""Bins of the histogram of visible shares, and the characters of its longest bar."""
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""Task planning: what happens when objects are slid, and which are heavy."""
+"""Questions of task planning: what an object meets when it is slid, and which of two objects is heavier."""
 
 from __future__ import annotations
 
@@ -15,12 +15,15 @@ from manitwin.scenes.vqa.sweeps import LONGEST_M, Slide, Way
 from manitwin.scenes.vqa.things import Seen
 
 LENGTHS_CM = (5, 10, 15)
+"""Of the straight slides that are asked about."""
 LEGS_CM = (5, 10)
+"""Of each leg of a slide of two legs."""
 MOST_OPTIONS = 4
+"""Answers that a question offers at most, the right one among them."""
 
 
 def task_planning(asked: Context) -> Iterator[Draft]:
-    """Ask what slides lead to, and what is heavier."""
+    """Yield questions about slides (what is hit, which direction is blocked, two legs in a row) and about masses."""
     legs: list[_Legs] = []
     for seen in asked.slidable:
         frames = sorted({each.frame for each in asked.directions})
@@ -36,7 +39,7 @@ def task_planning(asked: Context) -> Iterator[Draft]:
 
 
 def _stays(asked: Context, seen: Seen, direction: Direction, way: Way, cm: int) -> bool:
-    """Whether the whole way is on the furniture and in the picture."""
+    """Tell whether the object stays on its support and in the picture all the way."""
     length_m = cm / 100
     return length_m <= min(way.leaves_m, LONGEST_M) and asked.in_view(seen, np.array(direction.vector) * length_m)
 
@@ -109,7 +112,7 @@ def _blocked(asked: Context, seen: Seen, directions: list[Direction], ways: list
 
 @dataclass(frozen=True)
 class _Legs:
-    """Two legs of a way, each a direction and its length; ``hit`` is what is met on the first, and where (m), or None."""
+    """A slide of two legs, each a direction and a length; ``hit`` is what the first leg meets and after how many m, or None."""
 
     seen: Seen
     first: Direction
@@ -120,13 +123,16 @@ class _Legs:
 
     @property
     def corner_m(self) -> tuple[float, float]:
-        """Where the second begins, from the object's place."""
+        """Where the second leg begins, in x and y from the place of the object."""
         x, y = self.first.vector
         return x * self.first_cm / 100, y * self.first_cm / 100
 
 
 def _first_legs(asked: Context, seen: Seen, directions: list[Direction], ways: list[Way]) -> Iterator[_Legs]:
-    """Draw two legs twice; those whose first is a matter of millimetres, or leaves the furniture or the picture, are none."""
+    """Yield up to two slides of two legs with directions drawn at random, one across the other.
+
+    None whose first leg leaves the support or the picture, or passes something so closely that nobody could tell from a hit.
+    """
     pairs = [(a, b) for a, b in permutations(range(len(directions)), 2)
              if abs(np.dot(directions[a].vector, directions[b].vector)) < 0.5]  # fmt: skip
     for first, second in asked.rng.sample(pairs, min(2, len(pairs))):
@@ -175,7 +181,7 @@ def _two_legs_draft(asked: Context, legs: _Legs, hit: tuple[str, float] | None, 
 
 
 def _weights(asked: Context) -> Iterator[Draft]:
-    """Masses are compared where their intervals do not overlap; what lies in or on another is not weighed alone."""
+    """Yield comparisons of two objects that a point can mean, where the intervals of their masses do not overlap."""
     for (a, p), (b, q) in permutations(asked.pointed, 2):
         of_a, of_b = (each.thing.shape.twin.physical.mass_kg for each in (a, b))
         if of_a.low <= of_b.high and of_b.low <= of_a.high:

@@ -39,7 +39,7 @@ def read(path: Path, root: Path | None = None) -> Linkage:
     model, data = result.model, mujoco.MjData(result.model)
     starts = [found for qpos in _starts(source, model) if (found := _overlaps(source, model, data, qpos)) is not None]
     if not starts:
-        raise AssetError(f"{file.name}: MuJoCo has no contacts of it that are numbers")
+        raise AssetError(f"{file.name}: MuJoCo finds no contacts of it that are finite numbers")
     mujoco.mj_resetData(model, data)
     mujoco.mj_kinematics(model, data)
     heads = list(dict.fromkeys(int(head) for head in model.body_weldid))

@@ -30,14 +30,16 @@ def read_linkage(path: Path, format: Format, root: Path | None = None) -> Linkag
         return None
     linkage: Linkage | None = import_module(f"{__package__}.{_READERS[format]}").read(path, root)
     if linkage is not None and len(linkage.parts) > MOST_PARTS:
-        raise AssetError(f"{path.name}: {len(linkage.parts)} parts that move, more than {MOST_PARTS}")
+        raise AssetError(
+            f"{path.name}: {len(linkage.parts)} parts that move, more than the {MOST_PARTS} that are compared"
+        )
     return linkage
 
 
 def require_whole(files: AssetFiles, name: str) -> None:
     """Raise AssetError where a mesh is missing: what is left of the parts says nothing of how they stand."""
     if files.lacks_a_mesh:
-        raise AssetError(f"{name}: meshes of its parts are not there: {', '.join(files.missing[:3])}")
+        raise AssetError(f"{name}: meshes of its parts are missing: {', '.join(files.missing[:3])}")
 
 
 def part_of(name: str, shapes: Sequence[CollisionShape], *, convex_only: bool = False) -> Part:

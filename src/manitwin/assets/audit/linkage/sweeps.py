@@ -21,11 +21,13 @@ from manitwin.geometry.poses import transform_points
 from manitwin.geometry.sampling import sample_surface
 
 SAMPLES = 120
+"""Points on the surface of the part that moves."""
 _STEPS = 24
 _MOST_STEP_RAD = math.radians(5)
 GRAZES_M = 1e-3
-"""Surfaces that slide on each other are so near."""
+"""Surfaces that slide on each other may overlap by so much: what holds a part is shrunk by it."""
 _HOUSED, _STAYS = 0.02, 0.15
+"""Shares of a part's surface: inside at the least, and the most that this changes, of a part in its bearing."""
 LEAST_TRAVEL = 0.25
 """Of the part's longest side: a button that is pressed travels less."""
 
@@ -34,8 +36,8 @@ LEAST_TRAVEL = 0.25
 class Swept:
     """What a joint does to the part that it moves, as shares of that part's surface.
 
-    ``crossing``: passes through what holds it, of what lay outside at the start. ``inside``: lies inside it at the start, and
-    ``least_inside`` and ``most_inside`` of all positions.
+    ``crossing`` lies outside of what holds it at the start, and passes through that. ``inside`` lies inside it at the start,
+    ``least_inside`` and ``most_inside`` over all positions.
     """
 
     joint: MovingJoint
@@ -46,7 +48,7 @@ class Swept:
 
     @property
     def is_housed(self) -> bool:
-        """Tell whether as much of it lies inside wherever the joint goes: a wheel in its fork, a shaft in its bearing."""
+        """Tell whether about as much of it lies inside wherever the joint goes: a wheel in its fork, a shaft in its bearing."""
         return self.least_inside > _HOUSED and self.most_inside - self.least_inside < _STAYS
 
 
@@ -84,7 +86,7 @@ def _swept(joint: MovingJoint, holder: Part, moved: Part) -> Swept | None:
 
 
 def _ends(joint: MovingJoint) -> list[float]:
-    """Return how far the joint goes either way from where it stands."""
+    """Return how far the joint goes from where it stands, rad or m, to its upper and its lower limit; none that it stands at."""
     if joint.lower is None or joint.upper is None:
         return [math.pi, -math.pi] if joint.kind not in SLIDES else []
     ways = [joint.upper - joint.start, joint.lower - joint.start]
@@ -99,7 +101,7 @@ def _positions(joint: MovingJoint, end: float) -> np.ndarray:
 
 
 def _surface_points(shapes: Sequence[np.ndarray]) -> np.ndarray:
-    """Return points on the hulls of shapes, even by area, the same at every call."""
+    """Return points ``(N, 3)`` on the hulls of shapes, spread by area, the same ones at every call."""
     hulls = [ConvexHull(shape) for shape in shapes]
     vertices, faces = trimesh.util.append_faces([hull.points for hull in hulls], [hull.simplices for hull in hulls])
     mesh = trimesh.Trimesh(vertices, faces, process=False)

@@ -15,13 +15,14 @@ from manitwin.assets.joints import ABOUT_AN_AXIS, LIMITED, TURNS, DeclaredJoint
 _NO_LENGTH = 1e-9
 _NOT_OF_LENGTH_ONE = 1e-3
 TWO_TURNS, MOST_DEGREES = 4 * math.pi, 720.0
-"""Limits of robots' wrists go to two turns; what is beyond, and within two turns in degrees, was meant in degrees."""
+"""Wrists of robots turn by up to two turns each way. A limit above 4 pi, and up to 720, was meant in degrees."""
 _MULTIPLE_OF_PI = 1e-3
-"""So near to a whole multiple of pi a wide range is meant."""
+"""In multiples of pi: a limit so near to a whole one is a wide range in radians, not degrees."""
 DEGREES_FOR_RADIANS = math.radians(math.pi)
-"""As far as half a turn is when MuJoCo takes its radians for degrees."""
+"""Half a turn in radians, where MuJoCo takes the number for degrees."""
 _RADIAN_FRACTIONS = tuple(math.radians(math.pi * part) for part in (1.0, 0.75, 2 / 3, 0.5, 1 / 3, 0.25))
 _NEAR_FRACTION = 5e-3
+"""The relative difference up to which a limit counts as one of these parts of pi."""
 MOST_NAMED = 3
 
 
@@ -108,7 +109,7 @@ def limits_missing(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def cannot_move(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of joints whose limits are one number."""
+    """Complain of joints whose two limits are the same number."""
 
     def applies(joint: DeclaredJoint) -> bool:
         return (
@@ -124,22 +125,24 @@ def cannot_move(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def follows_none(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of joints that copy one which is nowhere."""
+    """Complain of joints that mimic one which the file does not have."""
     names = {joint.name for joint in measured.asset.joints}
 
     def applies(joint: DeclaredJoint) -> bool:
         return joint.follows is not None and joint.follows not in names
 
-    yield from _of_joints(measured, applies, lambda j: f"joint {j.name!r} mimics {j.follows!r}, which is nowhere")
+    yield from _of_joints(
+        measured, applies, lambda j: f"joint {j.name!r} mimics {j.follows!r}, which the file does not have"
+    )
 
 
 def _of_joints(
     measured: MeasuredAsset, applies: Callable[[DeclaredJoint], bool], said: Callable[[DeclaredJoint], str]
 ) -> Iterator[Complaint]:
-    """Complain once of all joints that a cause applies to."""
+    """Complain once of all joints that ``applies`` tells, the first few by what is ``said`` of each."""
     found: Sequence[DeclaredJoint] = [joint for joint in measured.asset.joints if applies(joint)]
     if found:
-        more = f"; so {len(found) - MOST_NAMED} more" if len(found) > MOST_NAMED else ""
+        more = f"; and {len(found) - MOST_NAMED} more" if len(found) > MOST_NAMED else ""
         named = "; ".join(said(joint) for joint in found[:MOST_NAMED])
         yield Complaint(f"{named}{more}", values={"joints": [joint.name for joint in found[:50]]})
 

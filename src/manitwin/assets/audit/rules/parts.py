@@ -75,7 +75,7 @@ def starts_overlapping(measured: MeasuredAsset) -> Iterator[Complaint]:
             )
     if found:
         found.sort(key=lambda each: -each[0])
-        more = f"; so {len(found) - _MOST_NAMED} more" if len(found) > _MOST_NAMED else ""
+        more = f"; and {len(found) - _MOST_NAMED} more" if len(found) > _MOST_NAMED else ""
         yield Complaint(
             f"as it is loaded {'; '.join(said for _, said in found[:_MOST_NAMED])}{more}",
             values={"overlaps": [said for _, said in found[:50]]},
@@ -100,7 +100,7 @@ def passes_through(measured: MeasuredAsset) -> Iterator[Complaint]:
             f" {linkage.parts[entry.joint.parent].name!r}"
             for entry in found[:_MOST_NAMED]
         )
-        more = f"; so {len(found) - _MOST_NAMED} more" if len(found) > _MOST_NAMED else ""
+        more = f"; and {len(found) - _MOST_NAMED} more" if len(found) > _MOST_NAMED else ""
         yield Complaint(
             f"within its range {named}{more}",
             values={

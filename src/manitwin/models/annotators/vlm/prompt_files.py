@@ -87,12 +87,16 @@ def load_prompts(folder: Path | None) -> dict[str, Prompt]:
 def _parse(name: str, text: str) -> Prompt:
     found = _FORM.fullmatch(text.replace("\r\n", "\n"))
     if found is None:
-        raise ConfigError(f"prompt {name}.md: it is a line 'version: 1', then '# Instructions', then '# Question'")
+        raise ConfigError(
+            f"prompt {name}.md: not a prompt; write a line 'version: 1', then '# Instructions', then '# Question'"
+        )
     version, instructions = found.group(1), found.group(2).strip()
     question, *otherwise = (wording.strip() for wording in found.group(3).split(OTHERWISE))
     for word in _PLACEHOLDER.findall("\n".join([instructions, question, *otherwise])):
         if word not in PLACEHOLDERS[name]:
             raise ConfigError(f"prompt {name}.md: {choose_from('placeholder', word, PLACEHOLDERS[name])}")
     if any(wording.count(PICTURES) != 1 for wording in (question, *otherwise)) or PICTURES in instructions:
-        raise ConfigError(f"prompt {name}.md: its question has {PICTURES} exactly once, and its instructions have none")
+        raise ConfigError(
+            f"prompt {name}.md: put {PICTURES} into its question exactly once, and not into its instructions"
+        )
     return Prompt(name, version, instructions, question, tuple(otherwise))

@@ -43,13 +43,13 @@ MODEL_VIEWS = 3
 """How many pictures of a model are compared with what it was made from."""
 _USUAL = "mug"  # a template of usual size, for the estimate
 _PICTURES = {"template": 1, "template_measures": 1, "template_likeness": 1 + MODEL_VIEWS}
-# about what form and placeholders of a mug have
+# about as many as the form and the filled placeholders have for a mug
 _FORM_CHARACTERS = {"template": 5600, "template_measures": 2500, "template_likeness": 3200}
 ANSWER_TOKENS = {
     "template": 80,
     "template_measures": 200,
     "template_likeness": 250,
-}  # those of fakes.vlm_answers, or so
+}  # of answers like those in fakes.vlm_answers
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class TemplateReader:
 
     @property
     def source(self) -> str:
-        """Who says what is said, as an Estimate names it."""
+        """The ``source`` of an Estimate that this model gives."""
         return f"vlm:{self.chat.model}"
 
     @cached_property

@@ -15,7 +15,7 @@ from manitwin.render.raycast import merged, seen_tolerance_m, visible_points
 from manitwin.render.renderer import BACKDROP, shared_renderer
 
 _ORDER_STREAM = 2
-_HEIGHTS_MOVED = 3  # of the eight: a side that was seen from above is seen from elsewhere in the next query
+_HEIGHTS_MOVED = 3  # of eight: a side that is seen from above in one query is seen from another height in the next
 
 
 @dataclass(frozen=True)

@@ -33,21 +33,21 @@ UPRIGHT_TILT_DEG = 20.0  # an axis that leans less stands in the photo
 LEANING_DEG = 3.0  # what leans more is set upright about its own axis, as if seen from the side
 LEAST_BODY_SHARE = 0.55  # of the outline: the body that a round container's handles and spouts stick out of
 LEAST_TURNED_IOU, LEAST_MIRROR_IOU = 0.92, 0.9
-_LONGER = 1.1
+_LONGER = 1.1  # width over height from which on the axis across may be the one that a thing is turned about
 _RIM_RADIUS, _SHARP_RIM = 0.93, 0.24
-"""As much of a body's height has nearly the largest radius: 0.37 of an ellipsoid's, 0.2 of a lemon's turned the wrong way."""
-_LIKE_ENDS = 0.15  # how far the mean radii of both ends are apart, of the larger one
-_CLEARLY_NEARER = 0.1  # of the logarithm of a volume
+"""A rim is sharp where less than 0.24 of a body's height has 0.93 of the largest radius or more: of an ellipsoid 0.37 has, of a
+lemon that is turned about the wrong axis 0.2."""
+_LIKE_ENDS = 0.15  # difference of the mean radii of both ends, over the larger one, up to which they are alike
+_CLEARLY_NEARER = 0.1  # difference of logarithms of volumes
 LEAST_TIP_ANGLE_DEG = 5.0
-LEAST_STATED_ANGLE_DEG = 2.0  # of what is known to stand
+LEAST_STATED_ANGLE_DEG = 2.0  # the same, where it is known that the thing stands
 SLIGHT_CUTS = (0.015, 0.03)  # a rounded underside; what is cut higher are feet
 STANDING_CUTS = (0.05, 0.08, 0.12)  # shares of the height tried for a flat base
 _ONE_BULGE = 0.85  # solidity from which on an outline is that of one body: a handle is no thicker for its wide head
-_TOLD_RELIEF_RISE = 2.0  # a relief is as high as the body is deep whose depth is told
+_TOLD_RELIEF_RISE = 2.0  # of a body whose depth is known: a relief is as high as all of it is deep
 _RELIEF_RISE = 1.5  # a bar of radius r lies as a relief this many r high: between a half bar and a whole one
-_COMPACT = (
-    1.5  # round things no longer than this are set on their base, whatever else is usual: it is flat, they do not roll
-)
+_COMPACT = 1.5
+"""Round things no longer than so many widths are set on their base, however such things usually lie: they do not roll."""
 
 
 @dataclass(frozen=True)
@@ -75,9 +75,9 @@ class Made:
 
 
 def turned_about(silhouette: Silhouette, hint: ShapeHint) -> Silhouette:
-    """Return the silhouette with the mirror axis that the thing is turned about, where it is symmetric along and across.
+    """Return the silhouette about the axis that the thing is turned about, where it is symmetric along and across.
 
-    A lemon on its side, turned about the axis across it, would be a lens: with a sharp rim, which hardly anything has, and
+    A lemon on its side that is turned about the axis across it would be a lens: with a sharp rim, which hardly anything has, and
     more than its category's volume.
     """
     if hint.stands or hint.container or hint.flat or hint.boxy:
@@ -94,7 +94,7 @@ def turned_about(silhouette: Silhouette, hint: ShapeHint) -> Silhouette:
 
 
 def _too_much(flatness: float, hint: ShapeHint) -> bool:
-    """Whether a category's volume is that of an ellipsoid turned about its long axis, and not about its short one."""
+    """Tell whether an ellipsoid turned about its long axis is clearly nearer to the category's volume than about its short."""
     if not hint.round or hint.volume_share is None:
         return False
     flat, long = (abs(float(np.log(np.pi / 6 * flatness**power / hint.volume_share))) for power in (1, 2))

@@ -1,4 +1,4 @@
-"""What a made thing holds, and the scale that gives it a stated volume or mass."""
+"""The volume that a made thing holds, and the scale at which it has a stated volume or mass."""
 
 from __future__ import annotations
 
@@ -13,18 +13,23 @@ from manitwin.models.generators.templates.made import Made
 from manitwin.models.generators.templates.stated_amounts import Amount
 
 CLOSED_WALLS_M = {"glass": 0.003, "plastic": 0.0005, "aluminium": 0.0001, "steel": 0.0003, "cardboard": 0.0005}
-"""Of containers by what they look like: bottles and jars of glass 2 to 4 mm, PET 0.3 to 0.7, cans 0.1 to 0.3, drink cartons and
-composite cans 0.4 to 0.9."""
+"""How thick the walls of closed containers are, by their surface: bottles and jars of glass 2 to 4 mm, PET 0.3 to 0.7, cans 0.1
+to 0.3, drink cartons and composite cans 0.4 to 0.9."""
 TWO_WALLS_M = 0.005
-"""Of a thermos: two sheets of steel and what is between them."""
+"""How thick the wall of a thermos is: two sheets of steel and the gap between them."""
 LEVELS = 200
+"""Level sections that the volume of a hollow is summed over."""
 MOST_ROUNDS, CLOSE = 8, 0.005
+"""Steps of the search for a scale, and the relative error at which it ends."""
 LEAST, MOST = 1e-9, 1e3
-"""Of a volume or a mass that anything held by a hand has, m^3 or kg."""
+"""No thing that a hand holds has a volume (m^3) or a mass (kg) outside of these: no scale is sought for one."""
 
 
 def capacity_m3(made: Made) -> float | None:
-    """Return what a thing holds up to its rim's lowest place, or within its walls where it is closed; None for no vessel."""
+    """Return the volume that a thing holds: up to the lowest place of its rim, or within its walls where it is closed.
+
+    None for what is no container, and for one without a hollow.
+    """
     prior = load_priors()[made.category]
     if prior.vessel:
         solid, _ = made.solids[list(made.masses_kg).index("body")]
@@ -39,42 +44,46 @@ def capacity_m3(made: Made) -> float | None:
 
 
 def held_m3(made: Made, amount: Amount) -> float:
-    """Return what a thing holds, of which an ``amount`` is said; raises UsageError for what is no vessel."""
+    """Return ``capacity_m3`` of a thing whose volume is stated as an ``amount``; raises UsageError for what holds nothing."""
     held = capacity_m3(made)
     if held is None:
-        raise UsageError(f"a {made.category} is no vessel that has a volume ({amount.said}); say a length or a mass")
+        raise UsageError(
+            f"a {made.category} is no vessel, so {amount.said} cannot be what it holds; say a length or a mass"
+        )
     return held
 
 
 def _closed_wall_m(made: Made) -> float:
-    """Return how thick the wall of a closed vessel is; raises UsageError where nobody knows that of its material."""
+    """Return how thick (m) the wall of a closed container is; raises UsageError where that is not known of its material."""
     if made.category == "thermos":
         return TWO_WALLS_M
     surface = made.looks["body"].surface
     open_ware = load_materials()[surface].wall_m
     if surface not in CLOSED_WALLS_M and open_ware is None:
         raise UsageError(
-            f"how much a {made.category} of {made.looks['body'].material} holds is not known, as its wall is not; say a length"
+            f"what a {made.category} of {made.looks['body'].material} holds is not known, as the thickness of its wall is not;"
+            " say a length"
         )
     return CLOSED_WALLS_M[surface] if open_ware is None else CLOSED_WALLS_M.get(surface, open_ware.typical)
 
 
 def _hollow_m2(section: CrossSection) -> float:
-    """Return the area of the largest hole in a level section: where the rim is interrupted, at a spout, there is none."""
+    """Return the area (m^2) of the largest hole in a level section, 0 where the wall around is interrupted, as at a spout."""
     holes = [-area for loop in section.to_polygons() if (area := _area_m2(loop)) < 0]
     return max(holes, default=0.0)
 
 
 def _area_m2(loop: np.ndarray) -> float:
-    """Return the area of a closed loop (N, 2), negative where it runs clockwise, as around a hole."""
+    """Return the area (m^2) of a closed loop ``(N, 2)`` m, negative where it runs clockwise, as around a hole."""
     x, y = loop.T
     return 0.5 * float(x @ np.roll(y, -1) - np.roll(x, -1) @ y)
 
 
 def scale_with(amount: Amount, made_at: Callable[[float], Made]) -> float:
-    """Return the scale at which what is made has a stated volume or mass; walls and sheets keep theirs, so it is sought in steps.
+    """Return the scale at which the thing of ``made_at(scale)`` has a stated volume or mass.
 
-    Raises UsageError for a volume of what holds nothing, and an amount that no scale gives.
+    It is sought in steps, as walls and sheets keep their thickness. Raises UsageError for a volume of what holds nothing, and
+    for an amount that no scale gives.
     """
     scale, wanted = 1.0, amount.mass_kg if amount.volume_m3 is None else amount.volume_m3
     for _ in range(MOST_ROUNDS):

@@ -216,9 +216,9 @@ SAME_MATERIAL = {
     "solid silver": "sterling silver",
 }  # fmt: skip
 OF_PRECIOUS_METAL = {"silver": "sterling silver", "gold": "solid gold"}
-"""What is a colour, but behind 'of': a goblet of silver."""
+"""Words that name a colour, but after 'of' a metal: a goblet of silver."""
 SAID_OF = {"solid gold": "gold", "electronics": "plastic and electronics", "enamel": "enamelled steel"}
-"""What nobody calls by the word of its look: the mean of what is inside, and what an enamel is on."""
+"""How a material is written where the word for its look does not say it: electronics are mixed, enamel is on steel."""
 USUAL_COLORS: dict[str, tuple[str, ...]] = {
     "ceramic": ("white", "red", "blue", "navy", "green", "yellow", "black"),
     "porcelain": ("white", "ivory", "light blue", "navy"),
@@ -251,17 +251,19 @@ USUAL_COLORS: dict[str, tuple[str, ...]] = {
 
 
 _COLORED_IMITATIONS = frozenset(("plastic", "rubber", "foam", "ceramic", "wax", "textile", "paper", "cardboard"))
-"""Of what imitations of food have its colours: a plastic banana is yellow, a wooden one of wood that is seen."""
+"""Surfaces on which imitations of food have its colours: a plastic banana is yellow, a wooden one shows its wood."""
 
 
 def usual_looks(look: Look, usual: Iterable[Look]) -> list[Look]:
-    """Return looks of a material in colours that a thing has: those of its ``usual`` ones of it, else those of any of it."""
+    """Return looks of a material in the colours that a thing has: those among its ``usual`` looks, else the material's own."""
     food = [each for each in usual if each.material in FOODS]
     if food and look.surface in _COLORED_IMITATIONS:
         return [look.colored(each.rgb) for each in food]
     own = [each for each in usual if each.material == look.material]
     seen = look.surface == "wood" or (look.surface == "steel" and look.metallic > 0)
-    if len(own) > 1 and not seen:  # a red wooden handle is painted: who says wood or steel wants to see it
+    if (
+        len(own) > 1 and not seen
+    ):  # a thing of wood or steel by its text shows the material: a red wooden handle would be painted
         return own
     return [look_of(f"{color} {look.material}".strip()) for color in USUAL_COLORS.get(look.material, ("",))]
 

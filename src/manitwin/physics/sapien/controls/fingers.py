@@ -72,7 +72,7 @@ class FingersControl:
         return iter(())
 
     def opening(self) -> Iterator[np.ndarray]:
-        """Stop pressing where they are, all at once: none pushes the thing over; then go back to the joints before closing."""
+        """Stop pressing all at once, so that no finger pushes the thing over, then go back to the joints before closing."""
         self._closing = None
         here_rad = self._world.robot.hand_positions().copy()
         return chain([here_rad], self._from(here_rad, self._before))
