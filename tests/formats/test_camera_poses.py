@@ -208,5 +208,5 @@ def test_photos_are_matched_by_name_and_by_folders_where_names_are_the_same() ->
     assert [None if camera is None else cameras.index(camera) for camera in found] == [1, 0, 2, 3, None]
     with pytest.raises(InputError, match=r"may be any of left/0\.png, right/0\.png"):
         cameras_of([Path("/other/0.png")], cameras, "transforms.json")
-    with pytest.raises(InputError, match="both of one pose"):
+    with pytest.raises(InputError, match="both match one pose"):
         cameras_of([Path("/one/x.png"), Path("/two/x.png")], cameras, "transforms.json")

@@ -48,7 +48,7 @@ class Batch(Payload):
 
     @property
     def batch_id(self) -> str:
-        """An id by what is asked."""
+        """An id that follows from the fields."""
         return sha256_of_json(self.to_json())[:16]
 
     @property
@@ -79,7 +79,7 @@ def batches(
     task_ids: Sequence[str] = (),
     there: Iterable[Batch] = (),
 ) -> list[Batch]:
-    """Return the batches that are missing to ``episodes``: each number goes to what has the fewest episodes until then.
+    """Return the batches that are missing for ``episodes``: each number goes to what has the fewest episodes until then.
 
     So a number has the same twin, scene or task, and the same seed, whether episodes are made in one go or in steps. ``there``
     are the batches that there are; none of their numbers comes again. Raises UsageError where two have a number in common.

@@ -16,10 +16,8 @@ from manitwin.geometry.rigid_body import StaticBox
 PEG_RISES_RAD = np.radians(10)  # towards its tip, as coat hooks do: what hangs slides to the post
 PEG_RADIUS_M, PEG_LENGTH_M, PEG_HEIGHT_M = 0.004, 0.09, 0.28
 POST_HALF_M, FOOT_HALF_M, FOOT_HALF_HEIGHT_M = 0.012, 0.05, 0.006
-BLOCK_HALF_M, BLOCK_HALF_HEIGHT_M = (
-    0.025,
-    0.06,
-)  # slim and tall: the hand beside a short head has room, the arm above the table
+BLOCK_HALF_M, BLOCK_HALF_HEIGHT_M = 0.025, 0.06
+"""Slim and tall: the hand beside a short head has room, the arm above the table."""
 PANEL_HALF_M, PANEL_HALF_HEIGHT_M = (0.07, 0.05), 0.02
 BUTTON_HALF_M, BUTTON_HALF_HEIGHT_M = 0.010, 0.003
 HOLDER_FLOOR_M, HOLDER_WALL_M = 0.010, 0.006

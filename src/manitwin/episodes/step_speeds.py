@@ -11,7 +11,7 @@ from manitwin.physics.sapien.world import RobotWorld
 
 
 class Speeds(NamedTuple):
-    """Say how fast joints ``(n,)`` turn, and objects' centres of mass ``(O, 3)`` move and they ``(O, 3)`` turn, world frame."""
+    """The speeds of joints ``(n,)``, of objects' centres of mass ``(O, 3)`` and of their rotation ``(O, 3)``, world frame."""
 
     joints_rad_s: np.ndarray
     centers_m_s: np.ndarray

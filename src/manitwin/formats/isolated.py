@@ -29,9 +29,8 @@ MAX_MEMORY_BYTES = 8 << 30
 """Address space of the process, of which libraries take 2 GiB: a broken file of a kilobyte can ask for tens of them."""
 MAX_SECONDS = 1800.0
 _START_SECONDS = 120.0
-_GRACE_SECONDS = (
-    5  # between the limit that this process keeps, and the one that the kernel keeps where this process is gone
-)
+_GRACE_SECONDS = 5
+"""Between the limit that this process keeps, and the one that the kernel keeps where this process is gone."""
 _LENGTH = struct.Struct("<Q")
 _READY = "ready"
 _NOT_STARTED = "the process in which files of others are read does not start"

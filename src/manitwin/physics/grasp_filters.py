@@ -23,9 +23,8 @@ ACROSS, ALONG = 3, 5  # cells of a pad
 PAD_CELLS = ACROSS * ALONG
 INSET = 0.87  # the outermost rays lie inside the pad's edge
 SAME_CONTACT_M = 0.0015  # cells this close behind the first one touch too, as soft pads do
-PAD_GIVE_M = (
-    0.0005  # what pads give under the closing force: cells this close touch before the object has turned flat to them
-)
+PAD_GIVE_M = 0.0005
+"""What pads give under the closing force: cells this close touch before the object has turned flat to them."""
 # The pad filter: two cells of fifteen, contact centres at most 6 mm apart, normals inside the narrowed friction cone.
 MIN_CELLS, MAX_OFFSET_M, CONE_SAFETY = 2, 0.006, 1.5
 CLEARANCE_M = 0.0005

@@ -33,10 +33,8 @@ LOADED_ONCE, LOADED_TWICE, SURE_SHARE = (0, 2, 4), 6, 0.2
 PEAK_SHARE, EVEN_SHARE, REST_M, REST_RAD = 0.25, 0.5, 0.0002, 0.02  # the last two between two looks
 BRIEF_STROKE_S = 0.0875  # of 21 steps of 1/240 s one is at the peak; of 24 none is nearer than 0.6 %
 STEADY_SHARE, TURNED_RAD = 0.02, 0.15
-CLOSED_SPEED_M_S, CLOSED_SPEED_RAD_S = (
-    0.001,
-    0.01,
-)  # what moves less in a hand that presses with all its force is at rest
+CLOSED_SPEED_M_S, CLOSED_SPEED_RAD_S = 0.001, 0.01
+"""What moves less in a hand that presses with all its force is at rest."""
 Phase = Literal["open", "close", "lift", "hold", "slide"]
 TrialWatch = Callable[[Phase, float, np.ndarray], None]
 """Called after each advance with the phase, the time (s) and how far the hand was moved ``(3,)``, along the object's axes."""

@@ -45,10 +45,8 @@ _ALL_OVER_PAD_M = np.array(
     ]
 )
 """As close to each other as 1.5 mm and out to the pad's border ``(78, 2)``: what is thin lies between fewer of them."""
-_NARROW, _BESIDE = (
-    0.5,
-    0.25,
-)  # of the surface there: a part that has less is narrower than a fingertip; one beside it has more
+_NARROW, _BESIDE = 0.5, 0.25
+"""Of the surface there: a part that has less is narrower than a fingertip; one beside it has more."""
 _SAMPLES = 20_000
 _TIE = 1e-6  # less than the ninth of a fingertip that shares are told to, over all of 255 parts
 NOBODY = ""

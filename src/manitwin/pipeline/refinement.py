@@ -20,10 +20,8 @@ from manitwin.twin.point_records import FunctionalFrame, FunctionalPoint, Refine
 CLOSER = 12
 """How many places around a candidate are looked at."""
 _LEAST_MOVE_M = 0.002  # less is not worth another place than the one that the views show
-_LEAST_LEVEL_M, _LEVEL_SHARE = (
-    0.0005,
-    0.003,
-)  # m, of the longest side: a point farther off a face's plane is on another part
+_LEAST_LEVEL_M, _LEVEL_SHARE = 0.0005, 0.003
+"""M, of the longest side: a point farther off a face's plane is on another part."""
 _BESIDE = -0.1  # cosine: a face's border is beside it, what looks away is another side
 _ON_FRAME_M = 0.005  # the feature's own place is where the surface is this near to the frame's origin
 

@@ -73,8 +73,8 @@ def make_card(
     """Draw a twin's card and return it as PNG.
 
     ``parts`` are the textured meshes, ``solid`` the repaired one, ``hulls`` the vertices ``(V, 3)`` of each collision hull, all
-    in the object frame in metres; ``mass`` is drawn over the hulls. What stands is seen from its front, but of a mesh, whose
-    front nobody told. The first column shows ``photo (H, W, 3 or 4) uint8``, whose side the next two show, or ``prompt``; where
+    in the object frame in metres; ``mass`` is drawn over the hulls. What stands is seen from its front, which a mesh does not
+    tell. The first column shows ``photo (H, W, 3 or 4) uint8``, whose side the next two show, or ``prompt``; where
     the input was a mesh it shows the bare shape. Raises RendererMissing where nothing renders.
     """
     mesh = merged(list(parts))

@@ -13,9 +13,8 @@ from manitwin.render.renderer import BACKDROP, Frame
 DARK_GROUND = (84, 88, 94)
 """Behind light things: as far from white as the light ground is from black-brown, and no colour either."""
 
-_ALIKE_LIGHTNESS = (
-    22.0  # of CIELAB's 100: edges nearer than that to their ground are lost (looked at: white mugs on BACKDROP)
-)
+_ALIKE_LIGHTNESS = 22.0
+"""Of CIELAB's 100: edges nearer than that to their ground are lost (looked at: white mugs on BACKDROP)."""
 _ALIKE_COLOR = 38.0  # CIELAB distance under which a dot is taken for a spot of the object
 _ALIKE_HUE_DEG, _COLORFUL = 25.0, 25.0  # a darker or paler shade of a colour has its name too, where it is no grey
 _GROUND_TOLERANCE = 6  # what lossy pictures move a plain colour by

@@ -38,9 +38,8 @@ from manitwin.robots.urdf import UrdfTree, parent_of
 __all__ = ["load_robot", "shipped_robots", "shipped_two_arms"]
 
 AXIS_TOLERANCE = 1e-3
-TIP_TOLERANCE_M = (
-    0.015  # of the fingers' furthest point, against the gripper's file: a twisted or shifted hand is off by more
-)
+TIP_TOLERANCE_M = 0.015
+"""Of the fingers' furthest point, against the gripper's file: a twisted or shifted hand is off by more."""
 
 
 def load_robot(name_or_path: str) -> Robot:

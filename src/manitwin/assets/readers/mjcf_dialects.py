@@ -1,4 +1,4 @@
-"""What older MuJoCo, and others, take in an MJCF file and MuJoCo of today refuses: rewritten to what they make of it."""
+"""What older MuJoCo and other loaders accept in an MJCF file and MuJoCo of today refuses, rewritten as they read it."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from manitwin.assets.asset_files import AssetFiles
 _ORIENTATIONS = ("quat", "axisangle", "xyaxes", "zaxis", "euler")
 _PLACED = ("body", "geom", "inertial", "joint", "frame")
 MOST_LEFT_OUT = 16
-"""Kinds of elements and attributes that a document may have more than MuJoCo knows."""
+"""Kinds of unknown elements and attributes from which on a document is refused; fewer are left out."""
 _UNKNOWN_ATTRIBUTE = re.compile(r"unrecognized attribute: '([^']+)'\s+Element '([^']+)'")
 _UNKNOWN_ELEMENT = re.compile(r"unrecognized element\s+Element '([^']+)'")
 _HOLD_SHAPES = frozenset(
     {"worldbody", "body", "frame", "geom", "inertial", "joint", "freejoint", "asset", "mesh", "default"}
 )
-"""Whose place is wrong where MuJoCo does not know them: without them the file is another one."""
+"""Elements that are never left out: one that MuJoCo does not know stands in a wrong place, and is a part of the asset."""
 _ORIGIN = (0.0, 0.0, 0.0)
 _ENDLESS = "0 0 1"
-"""Half lengths of 0 have no end; the third is between the lines that are drawn."""
+"""The size of a plane without an end, of half lengths 0; the third number is the spacing of the grid that is drawn."""
 _MAIN = "main"
 _CLASSES = ("class", "childclass")
 _NOT_OF_DEFAULTS = ("class",)
@@ -30,7 +30,7 @@ _NOT_OF_DEFAULTS = ("class",)
 
 
 def rewrite_dialects(root: etree._Element, files: AssetFiles) -> None:
-    """Rewrite a parsed MJCF, each thing with a remark: one that goes by the letter would refuse the file.
+    """Rewrite a parsed MJCF, each thing with a remark: a loader that goes by the letter would refuse the file.
 
     Top-level classes under other names (older MuJoCo took the first one for all that have no class), attributes of <default>
     beside its class, coordinates of the world (before 2.3.4) where no body is turned, fixed joints (of PyBullet and SAPIEN),

@@ -21,9 +21,8 @@ from manitwin.formats.meshes.textures import bake_transform
 from manitwin.geometry.poses import GLTF_TO_OBJECT, OBJECT_TO_GLTF, transform
 
 _NUMBERED = re.compile(r"^\d+_(.+)$")
-_EXTENTS_TOLERANCE = (
-    0.1  # RoboTwin's own are those of an oriented box: a tenth apart is another axis, not another rounding
-)
+_EXTENTS_TOLERANCE = 0.1
+"""RoboTwin's own are those of an oriented box: a tenth apart is another axis, not another rounding."""
 
 
 def read(path: Path) -> Asset:

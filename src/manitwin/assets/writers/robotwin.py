@@ -29,9 +29,8 @@ from manitwin.twin.point_records import FunctionalPoint
 from manitwin.twin.record import Language, Placement
 from manitwin.twin.store import canonical_json
 
-MAX_GRASPS = (
-    16  # RoboTwin plans a path to every contact frame each time it chooses one: two frames a grasp are 32 plans
-)
+MAX_GRASPS = 16
+"""RoboTwin plans a path to every contact frame each time it chooses one: two frames a grasp are 32 plans."""
 SEEN, UNSEEN = 12, 3  # phrases of a description, as in RoboTwin's own
 STABLE_TILT_RAD = math.radians(3)  # RoboTwin's check_stable throws a scene away in which an object turned by more
 _FIRST_NUMBER, _NUMBERS = 200, 800  # below are RoboTwin's own objects

@@ -29,7 +29,7 @@ from manitwin.twin.loaded_links import joints_of
 
 MESHES = "meshes"
 NO_EFFORT_LIMIT, NO_VELOCITY_LIMIT = 1e3, 1e2
-"""Which the specification asks for, and stand for none: far beyond what a thing of such a size meets."""
+"""Limits that stand for none, as the specification asks for numbers: far beyond what a thing of such a size meets."""
 
 
 def export(twin: TwinContent) -> Exported:

@@ -17,9 +17,8 @@ DAMPING = 1e-3  # of the error's square (Sugihara 2011): none is left near the s
 LEAST_DAMPING = 1e-8
 LARGEST_STEP_RAD = 0.5
 ITERATIONS = 30
-STALLED_AFTER = (
-    6  # iterations without the error's square halving: measured, from a known pose near by, 98 per cent converge
-)
+STALLED_AFTER = 6
+"""Iterations without the error's square halving: measured, from a known pose near by, 98 per cent converge."""
 
 
 class ArmKinematics:

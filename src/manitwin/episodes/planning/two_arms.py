@@ -30,10 +30,8 @@ from manitwin.episodes.planning.two_hands import TwoHands
 from manitwin.episodes.planning.withdrawal import plan_withdrawal
 from manitwin.robots.robot import Robot
 
-MOST_TAKEN, MOST_RETAKEN = (
-    6,
-    24,
-)  # grasps of the taker that are tried beyond a look at its hand: beforehand, and at the meeting
+MOST_TAKEN, MOST_RETAKEN = 6, 24
+"""Grasps of the taker that are tried beyond a look at its hand: beforehand, and at the meeting."""
 SETTLED_M = 0.004  # by how much fingers may stand farther apart than planned
 
 

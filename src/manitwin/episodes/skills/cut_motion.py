@@ -29,9 +29,8 @@ ABOVE_M, FREE_KNOTS, KNOTS = 0.05, 4, 7
 NEAR_M = 0.002  # of the edge above the board
 SHARES = (0.0, 0.2, -0.2)  # of the edge's length from its middle: which part of it goes along the line
 FINGER_M = 0.015  # fingers are so far from the edge's ends
-LEAN_STEP = (
-    0.25  # grasps whose hands are about as high above the knife count as equal: the table and the board are below
-)
+LEAN_STEP = 0.25
+"""In the cosine of a hand's lean: grasps that differ by less are about as high above the knife, and count as equal."""
 
 
 class CutMotion(HeldSkill):

@@ -22,9 +22,8 @@ from manitwin.scenes.layouts.pool import Pool, PoolTwin
 
 LEAST_RADIUS_M = 1.8 * PEG_RADIUS_M  # the peg is square: its corners, and a millimetre or two of room
 PEG_REACH_M = np.sqrt(2) * PEG_RADIUS_M + 0.0005
-HALF_DEPTH_M = (
-    0.012  # of the hole, that is looked at: what is farther along is beside it, as a mug is beside its handle
-)
+HALF_DEPTH_M = 0.012
+"""How far along its axis a hole is looked at, to each side: what is farther is beside it, as a mug is beside its handle."""
 PEG = "peg"
 FINGERS_CLEAR_M = 0.03
 RADII_M, TURN_RAD, FACING_RAD = (0.45, 0.60), (0.6, 0.9), 0.6

@@ -20,9 +20,8 @@ LEANING_FALL_M = 0.004  # above where a drop ended
 AS_IT_IS_TRIED, LYING_TRIED, ON_END_TRIED, LEANING_TRIED = 3, 4, 12, 12
 ROUNDS = 5  # of tries; the next is only made where no pose of those before can be planned for
 RESTS_FIRST = 8  # of where drops ended, before the poses that they began in
-FAR_FALL_M = (
-    0.03  # what moves farther as it falls meets the opening hand on its way: twice as many drops, twice as far beside
-)
+FAR_FALL_M = 0.03
+"""What moves farther as it falls meets the opening hand on its way: twice as many drops of it are tried, twice as far beside."""
 
 
 class PlaceIn(Skill):

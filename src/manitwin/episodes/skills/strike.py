@@ -24,9 +24,8 @@ from manitwin.scenes.layouts.twin_frames import TwinFrame
 BLOCK = "block"
 ABOVE_M, BELOW_M, FREE_KNOTS = 0.12, 0.03, 6  # the blow begins so far above, and would end so far below the top
 ROLLS = 8
-FINGERS_BEHIND_M = (
-    0.005  # corners of fingers farther out would touch before the face does, or as the tool turns in the hand
-)
+FINGERS_BEHIND_M = 0.005
+"""How far fingers stay behind the tool's face: farther out they would touch before it, or as the tool turns in the hand."""
 LEVER_STEP_M = 0.03  # grasps whose levers differ by less count as equal: heavy heads turn in a hand far from them
 BLOW = Guard(first=0, stop_n=1e-3, duration_s=0.5, beyond=1.7, touches=FREE_KNOTS)
 SLOWEST_S = 1.2  # of the whole way at the joints' limits, which leaves 0.23 m/s at the touch: 1.875 x 0.15 m / 1.2 s

@@ -30,7 +30,7 @@ ABOVE_M, BELOW_M, FREE_KNOTS, DESCENT_KNOTS = 0.05, 0.003, 4, 4
 DESCENT_M_S, STROKE_M_S = 0.004, 0.06
 OVERLAP = 0.8  # of the face's width: from row to row
 STEP_M = 0.01
-FINGERS_BEHIND_M = 0.003  # the face
+FINGERS_BEHIND_M = 0.003  # how far fingers stay behind the face that wipes
 
 
 class Wipe(HeldSkill):

@@ -30,7 +30,7 @@ def cameras_of(photos: Sequence[Path], cameras: Sequence[PosedCamera], called: s
             both = f"{_told(photos[found.index(taken)])} and {_told(photos[number])}"
             raise InputError(
                 "unreadable",
-                f"{both}: both of one pose of {called}, {_told(Path(cameras[taken].file))}; give one of them",
+                f"{both}: both match one pose of {called}, {_told(Path(cameras[taken].file))}; give one of them",
             )
     return [None if number is None else cameras[number] for number in found]
 
@@ -48,7 +48,8 @@ def _camera_of(photo: Path, parts: Sequence[tuple[str, ...]], by_stem: dict[str,
             names = ", ".join("/".join(parts[number][-3:]) for number in best[:_SHOWN])
             shown = printable_line(names, max_characters=200)
             raise InputError(
-                "unreadable", f"{_told(photo)}: may be any of {shown} of {called}; keep the photos in folders so"
+                "unreadable",
+                f"{_told(photo)}: may be any of {shown} of {called}; keep the photos in the folders that the file names",
             )
         return best[0]
     return None

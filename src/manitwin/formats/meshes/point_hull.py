@@ -10,7 +10,7 @@ from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import make_part, pbr_material
 
 _FLAT = 1e-9
-"""Of the least and the largest extent of points that lie in a plane, as far as numbers can tell."""
+"""Least over largest extent up to which points count as lying in one plane."""
 
 
 def hull_part(points: np.ndarray, source: MeshSource, color: tuple[float, float, float]) -> trimesh.Trimesh:

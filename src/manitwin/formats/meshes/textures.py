@@ -27,10 +27,8 @@ _MAX_UV = 1e6  # textures may repeat, but not so often
 _MAX_NORMAL = 1e6
 _MAX_ATLAS = 4096
 _HEAD_BYTES = 4096
-_CELL_SIZES = (
-    8,
-    4,
-)  # 8 pixels are JPEG's own block, so colours do not leak between cells; 4 are the fewest for two triangles
+_CELL_SIZES = (8, 4)
+"""8 pixels are JPEG's own block, so colours do not leak between cells; 4 are the fewest for two triangles."""
 
 
 def decode_texture(data: Buffer, name: str, source: MeshSource) -> Image.Image | None:

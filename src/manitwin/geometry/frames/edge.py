@@ -16,12 +16,8 @@ _FLAT = 0.28  # thickness by second spread (standard deviations) of a plate
 _THIN_FACTOR = 1.6  # times the thickness at the point's own plate: more is another part
 _STRAIGHT_SHARE = 0.12  # of the length: how far an edge may be off its chord
 _CLEAR = 1.08  # the score of the best side by that of the next
-_REACH_SHARES = (
-    0.6,
-    0.3,
-    0.18,
-    0.1,
-)  # of the longest side: how far from the point a plate is followed; a wedge is flat nearby
+_REACH_SHARES = (0.6, 0.3, 0.18, 0.1)
+"""Of the longest side: how far from the point a plate is followed; a wedge is flat nearby."""
 
 
 def edge_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> Found:

@@ -22,12 +22,10 @@ _END_ON = 1.1  # matter behind an end by the end's width
 _BUTTON_SEARCH = 0.05  # of the longest side
 _FACING_COSINE = 0.85  # of a button's top and the point: a bevel beside it is not pressed
 _ON_BUTTON = 0.012  # of the longest side: how far the point may be from the patch
-_BUTTON_SHARE = (
-    0.1  # of the longest side: a larger radius is a face (0.057 at most among the templates of the tuning half)
-)
-_BUTTON_ROUGH = (
-    0.05  # RMS distance from the plane by the radius: what is rounder is a bump whose middle is not known (0.005)
-)
+_BUTTON_SHARE = 0.1
+"""Of the longest side: a larger radius is a face (0.057 at most among the templates of the tuning half)."""
+_BUTTON_ROUGH = 0.05
+"""RMS distance from the plane by the radius: what is rounder is a bump whose middle is not known (0.005)."""
 
 
 def face_frame(

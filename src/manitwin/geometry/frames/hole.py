@@ -15,9 +15,8 @@ _SLOT = 0.9  # of the largest circle's radius: as much room as the middle of a s
 _LEAST_RADIUS_M = 0.0008
 _SEARCH_SHARE, _SEEDS = 0.2, 60  # of the longest side around the point, and how many samples there are asked
 _LEVEL = 0.01  # by which a place must be narrower for each metre along the axis: a bore is equally narrow everywhere
-_BESIDE_RADII = (
-    1.5  # of the radius: a point farther from the wall is not of this hole; a handle's is not the mouth beside it
-)
+_BESIDE_RADII = 1.5
+"""Of the radius: a point farther from the wall is not of this hole; a handle's is not the mouth beside it."""
 _FEW = 2  # starts found around the point: where there are more, the middle of the thing is no better
 _ON_WALL = 0.3  # of the radius: a point that near to a hole's wall means that hole
 _FAN_RAD = np.radians(12)

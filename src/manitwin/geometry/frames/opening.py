@@ -14,10 +14,8 @@ _HANDLE_SECTOR_RAD = np.radians(50)  # around a handle the rim is not asked: a p
 _OBLONG = 1.15  # longer by shorter width of a rim from which the roll is not free
 _MOST_TILT_RAD = np.radians(20)  # of the rim's plane from the direction in which the hollow was found
 _NEAR_RADII = 1.6  # a point this many rim radii from the middle belongs to another feature
-_BESIDE, _JUMP = (
-    4,
-    1.3,
-)  # of 72 azimuths to each side: a wall this many times farther than these is a handle behind a low rim
+_BESIDE, _JUMP = 4, 1.3
+"""Of 72 azimuths to each side: a wall this many times farther than these is a handle behind a low rim."""
 
 
 def opening_frame(surface: FramedMesh, point_m: np.ndarray) -> Found:

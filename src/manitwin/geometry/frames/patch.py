@@ -10,14 +10,8 @@ from scipy.sparse.csgraph import connected_components
 
 from manitwin.geometry.frames.feature import FramedMesh
 
-_WIDTHS = (
-    2.0,
-    1.5,
-    1.5,
-    1.0,
-    1.0,
-    1.0,
-)  # of slab and angle, by rounds of fitting the plane and growing the patch again
+_WIDTHS = (2.0, 1.5, 1.5, 1.0, 1.0, 1.0)
+"""Of slab and angle, by rounds of fitting the plane and growing the patch again."""
 
 
 @dataclass(frozen=True)

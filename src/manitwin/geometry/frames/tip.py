@@ -11,10 +11,8 @@ _REACH_SHARES = (0.12, 0.2, 0.35)  # of the longest side: how much of the thing 
 _LONG = 1.5  # longest by second spread (variances) of what has a direction
 _END_SHARE = 0.012  # of the longest side: what is that near to the outermost place is the end
 _FAR_SHARE = 0.25  # of the longest side: an end farther away is not what the point means
-_RIVAL = (
-    1.5,
-    0.02,
-)  # times the best score, plus of the longest side: an end that looks elsewhere and is as near as that is a rival
+_RIVAL = (1.5, 0.02)
+"""Times the best score, plus of the longest side: an end that looks elsewhere and is as near as that is a rival."""
 _SAME_WAY = np.cos(np.radians(25.0))  # of the directions of two ends that are one
 _BLUNT = 0.75  # radius of the end by that of what is behind it within a tenth of the longest side, for short stubs
 

@@ -9,10 +9,8 @@ from manitwin.geometry.parts.shape import Shape, SurfacePoints
 
 _OUTLETS_FROM = 0.85  # of the height: above it are the outlets of pumps and triggers, and no trigger
 _SLICES = 16
-_MIRRORED, _UNLIKE = (
-    0.5,
-    0.1,
-)  # the share of the surface that is elsewhere in the mirror: relative to the other axis, and least
+_MIRRORED, _UNLIKE = 0.5, 0.1
+"""The share of the surface that is elsewhere in the mirror: relative to the other axis, and least."""
 _LOPSIDED = 1.25  # how much farther a head reaches out to the side of its outlet than to the other: round caps do not
 
 

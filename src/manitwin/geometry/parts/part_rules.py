@@ -73,14 +73,11 @@ _LEAST_STEP = 0.045  # of the largest radius, beyond what the slopes on both sid
 _CAP_ABOVE, _CAP_BELOW = 0.35, 0.95  # of the height: where a cap may begin
 _STEP_BAND = 0.03  # of the longest side: a step is known more exactly than other borders
 _CAP_RADIUS = 0.3  # of the largest radius: what is thinner is a wick or a pole, no cap
-_PUT_ON = (
-    0.8  # of the largest radius: what widens over a neck to no more than that is a cap, and the neck below it is not
-)
+_PUT_ON = 0.8
+"""Of the largest radius: what widens over a neck to no more than that is a cap, and the neck below it is not."""
 _NECK = 0.35  # of the largest radius: a neck is wider, the stem of a pump is not
-_NEXT_STEP, _SURE_STEP = (
-    0.5,
-    0.12,
-)  # of the sharpest step, or of the radius: the lowest such step is where the cap begins
+_NEXT_STEP, _SURE_STEP = 0.5, 0.12
+"""Of the sharpest step, or of the radius: the lowest such step is where the cap begins."""
 
 
 def _outline(shape: Shape) -> tuple[np.ndarray, np.ndarray]:

@@ -22,10 +22,8 @@ from manitwin.geometry.parts.outline import (
 
 Borders = tuple[tuple[int, ...], float]
 """The slices at which sections begin, one or two of 48, and how sure they are."""
-_SECTION_ENDS = (
-    0.04,
-    0.96,
-)  # of the length: where a section may begin; one that wants to begin there is too short to be told
+_SECTION_ENDS = (0.04, 0.96)
+"""Of the length: where a section may begin; one that wants to begin there is too short to be told."""
 _SHARP_CONTRAST = 1.06  # of width and thickness (together) on both sides of a sharp border
 _SHARP, _SHARP_SLICES = 0.5, 2  # of the difference between two sections, so near to their border: less is a taper
 _LEAST_SECTION = 0.05  # of the area: a pole or a plug that is smaller yields to a groove

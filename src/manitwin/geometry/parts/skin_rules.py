@@ -147,11 +147,8 @@ _FLAT, _ROUNDED = 0.8, 0.35  # of a normal, along the axis: what looks up or dow
 _MOST_ROUNDED = 0.2  # of the area, in between: with more it has no faces that end somewhere
 _LEAST_FACE = 0.03  # of the area
 _UPPER, _LOWER = 0.6, 0.4  # shares of the height
-_LID_SHARE, _LID_LEVELS, _LID_WINDOW = (
-    0.12,
-    48,
-    8,
-)  # of the height at either end; its levels; those on either side of a hollow
+_LID_SHARE, _LID_LEVELS, _LID_WINDOW = 0.12, 48, 8
+"""Of the height at either end; its levels; those on either side of a hollow."""
 _LID_DIRECTIONS = 24
 _LID_HOLLOW = 0.012  # of the radius, below the chord over the hollow
 _INWARD = -0.5  # outward part of a normal: the wall of a sunk lid looks at the axis

@@ -18,9 +18,8 @@ _SHARE_OF_ROOM = 0.4  # of the free way inward: opposite walls must not meet
 
 _SAMPLES = 32  # points on a closing surface
 _DIRECTIONS = 128  # rays from each
-_FOLD_COSINE = (
-    0.7  # a lid is folded off the wall around it by 45 degrees or more on average; a patch carries its surface on
-)
+_FOLD_COSINE = 0.7
+"""A lid is folded off the wall around it by 45 degrees or more on average; a patch carries its surface on."""
 _BAND = 0.25  # of a patch's size: how wide a band of the surface around it is looked at
 _OPENNESS = 0.5  # of the half space before a lid; a patch deep in a crevice sees less of the outside
 

@@ -28,9 +28,8 @@ from manitwin.models.generators.templates.looks import MATERIALS
 from manitwin.twin.record import Language
 from manitwin.twin.record_values import Estimate
 
-_SIZE_EXPONENT = (
-    2.0  # mass grows about with the square of the size in a category: larger things have relatively thinner walls
-)
+_SIZE_EXPONENT = 2.0
+"""Mass grows about with the square of the size in a category: larger things have relatively thinner walls."""
 _FILLED = 0.5  # of the volume of its hull: necks and waists of bottles leave 0.7 and more of it
 _SAME_SIZE_SPREAD = 0.6  # of the category's spread of mass that is left among things of one size
 

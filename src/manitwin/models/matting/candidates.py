@@ -31,7 +31,7 @@ SURELY_GROUND, MOST_CERTAIN_OF_SHADE = 0.1, 0.3
 """Mean share of object of a piece, and how much of it has a colour that is not the ground's in shade: of 39 pieces in focus that
 rules find and the network does not, in calibration pictures, 35 are ground, 26 of these below both, and none of the others."""
 UNLIKE_GROUND = 4.0
-"""Of ``Background.distance``: what nine in ten pixels of a border are below."""
+"""``Background.distance`` below which nine in ten pixels of the photo's border are."""
 
 
 @dataclass(frozen=True)

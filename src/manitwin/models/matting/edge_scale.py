@@ -9,9 +9,9 @@ from manitwin.models.matting.outline import disk, gradient_magnitude
 
 FINE_PX, COARSE_PX = 1.0, 2.5
 SHARPEST_PX = 0.9  # at working size: a resampled photo's own edges are at least about as wide
-WIDER = (
-    1.25  # than the photo's own: its edges differ by 1.1 times, penumbras of made photos are 1.2 to 1.6 times as wide
-)
+WIDER = 1.25
+"""Times the width of the photo's own edges, from which on an edge is a penumbra: a photo's own differ by 1.1 times, penumbras of
+made photos are 1.2 to 1.6 times as wide."""
 LEAST_STEP = 1.5  # L*a*b* per pixel: less is a JPEG's blocks and ringing
 LEAST_LENGTH = 0.06  # pixels of an edge against the longer side: shorter ones are ringing beside a strong edge
 

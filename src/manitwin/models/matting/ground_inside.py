@@ -9,9 +9,8 @@ from manitwin.models.matting.background import Background, length
 from manitwin.models.matting.outline import dilated, disk, eroded, holds
 
 LEAST_LIGHT, MOST_LIGHT = 0.3, 1.03  # the ground in shade or light, over the ground around the thing
-SAME_TINT = (
-    0.025  # spread of the channels' ratios; ground seen through loops and slots of composites has 0.007 to 0.022
-)
+SAME_TINT = 0.025
+"""Spread of the channels' ratios; ground seen through loops and slots of composites has 0.007 to 0.022."""
 SAME_CHROMA = 1.6  # L*a*b*, besides the ground's noise
 RIM = 3.5  # L*a*b*: the least step to what surrounds it, along four fifths of its rim
 RIM_PX = 3

@@ -19,9 +19,8 @@ BOUNCE = 0.35  # of the object's tint: as much of its own colour it throws into 
 LEAST_ATTACHED, MOST_ATTACHED = 0.35, 0.65  # share of the rim that lies on the object: half, for a strip beside it
 STRONGER = 1.1  # the object's edge against the shadow's edge towards the light
 PENUMBRA_PX = 1.5  # a perfect edge is 1.05 wide under the gradient's blur, and a light of some extent widens a shadow's
-ALL_NARROW = (
-    0.9  # of the edge towards the light: near its foot a shadow is as sharp as a thing, a thing is so all along
-)
+ALL_NARROW = 0.9
+"""Of the edge towards the light: near its foot a shadow is as sharp as a thing, a thing is so all along."""
 LEAST_PIXELS = 5e-5  # of the picture: smaller strips than this are left to the graph cut
 STEEPNESS = 5.0  # an edge as strong as ``edge`` costs exp(-5) of what flat ground costs
 FLAT_COST = 10_000  # capacities are whole numbers

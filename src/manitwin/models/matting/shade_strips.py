@@ -15,10 +15,8 @@ from manitwin.models.matting.shadow import falls_inward
 
 MOST_LIGHT = 0.95  # of the ground's: paler is the mixed rim of anything
 MOST_TINT = 0.12  # spread of the channels' ratios: what other lights add to a shadow
-OWN_TINT, OWN_TIMES = (
-    0.15,
-    2.2,
-)  # of the thing: at least, and against the strip's; measured 3 to 9 times on made shadows
+OWN_TINT, OWN_TIMES = 0.15, 2.2
+"""The thing's own tint at the least, by itself and over that of the strip (3 to 9 times on made shadows)."""
 LEAST_CORE = 0.4  # of the mask: a thing mostly of the ground's tint tells nothing
 MOST_DEPTH = 0.3  # of the core's: a strip, not a half of the thing
 LEAST_SHARE = 0.003  # of the mask

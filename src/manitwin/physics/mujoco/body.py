@@ -10,10 +10,8 @@ from manitwin.geometry.rigid_body import RigidBody
 
 TIMESTEP_S = 0.002
 OBJECT = "object"
-SOFT_SOLREF, STIFF_SOLREF = (
-    (0.02, 1.0),
-    (0.005, 1.0),
-)  # time constant (s) and damping ratio: MuJoCo's default, and stiffer
+SOFT_SOLREF, STIFF_SOLREF = (0.02, 1.0), (0.005, 1.0)
+"""Time constant (s) and damping ratio: MuJoCo's default, and stiffer."""
 TORSIONAL_FRICTION_M, ROLLING_FRICTION_M = 0.005, 1e-4  # MuJoCo's own defaults
 
 

@@ -18,8 +18,8 @@ from manitwin.scenes.layouts.stacking import mouth_of
 from manitwin.scenes.scene import SceneMeasures
 from manitwin.scenes.settings import LayoutSettings
 
-LOADED_S = 1.0  # for so long a scene stays as it is recorded when it is loaded
-GIVE_UP = 3.0  # times the limit: no need to see where it ends
+LOADED_S = 1.0  # how long a scene has to stay as it is recorded after it is loaded
+GIVE_UP = 3.0  # times the limit of motion, beyond which the simulation is stopped
 
 
 @dataclass(frozen=True)

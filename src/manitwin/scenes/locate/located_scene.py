@@ -23,7 +23,7 @@ from manitwin.twin.loaded_twin import Twin
 
 LOCATED = "located"
 """What ``clutter`` says of a scene that was seen and not sampled."""
-GIVE_UP = 3.0  # times the limit: no need to see where it ends
+GIVE_UP = 3.0  # times the limit of motion, beyond which the simulation is stopped
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,10 @@ from manitwin.assets.audit.rules.frames import is_sound
 from manitwin.geometry.poses import transform_points
 
 SLACK_M, SLACK_SHARE = 0.002, 0.01
-"""How far the lowest point may be from the plane, and which share of the longest side."""
+"""How far the lowest point may be from the plane: the larger of so many metres and a share of the longest side."""
 
 PATCH_M, PATCH_SHARE = 0.003, 0.02
-"""Points so near to the plane bear: real surfaces and settled poses are not exact."""
+"""Points so near to the plane, by the larger of the two, carry the object: real surfaces and settled poses are not exact."""
 
 TIPS_M = 0.003
 """How far outside the bearing points the centre of mass may be."""

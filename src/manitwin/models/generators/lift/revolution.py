@@ -39,10 +39,8 @@ WALL_SHARE = 0.06  # of the radius: the wall of a container where nothing is kno
 RIM_SEEN = 0.5  # the share of the rim's front edge that must lie on edges of the photo to believe an elevation by it
 ROUND_ENDS_DEG = 57.0  # an outline whose upper end fits a steeper view may as well be round
 MOUTH_SHARE = 0.6  # of the largest radius: the least of an opening whose rim tells the elevation
-COLLAR_SHARE, COLLAR_RISE = (
-    0.3,
-    0.08,
-)  # of the height, of the largest radius: a shorter and higher bulge is a pair of handles
+COLLAR_SHARE, COLLAR_RISE = 0.3, 0.08
+"""Of the height, of the largest radius: a shorter and higher bulge is a pair of handles."""
 _SMOOTH_SHARE = 0.012  # of the height, a Gaussian's sigma: the profile's unevenness within a pixel
 _LEAST = 0.02  # of the largest radius: no ring is a point
 _EDGE_ON = 0.01  # the outline itself is seen, however its normals are rounded

@@ -16,9 +16,9 @@ from scipy import ndimage
 from manitwin.models.generators.lift.surface import LiftedSurface, cut_below, tip_angle_deg
 
 REACHES = (0.0, 0.03, 0.06, 0.09, 0.12)
-"""Shares of the height: what ends so little above the lowest point is a foot, too. Tried in turn."""
+"""Shares of the height, tried in turn: what ends so little above the lowest point is a foot too."""
 SOLE_SHARE = 0.02
-"""Of the height: so much of a foot's end is its sole."""
+"""The share of the height, at the end of a foot, that is its sole."""
 DEEPER = (1.0, 1.5, 2.0, 2.5, 3.0)
 """How much deeper soles may be than their outline tells, tried in turn: a foot is longer than it looks from before it."""
 LEAST_SOLE_PX = 2.0

@@ -25,9 +25,8 @@ _SAMPLES, _ROUNDS = 4096, 10
 _AROUND_SHARE = 0.06  # of the longer side, a Gaussian's sigma: a letter with the ground around it
 _RING_SHARE = 0.03  # of the length along an axis: a line of text with its ground; a cap is higher
 _SOFT_SHARE = 0.008  # of the longer side: borders between two colours are no sharper
-_SOFT_RIM_SHARE = (
-    0.015  # of the longer side, a Gaussian's sigma: strokes of letters are lost, the shade of the side is not
-)
+_SOFT_RIM_SHARE = 0.015
+"""Of the longer side, a Gaussian's sigma: strokes of letters are lost, the shade of the side is not."""
 _GRAZED_SHARE = 0.025  # of the longer side: so far inward a large round body is seen too much askew to show the photo
 _RIM_SHARE = 0.04  # of the longer side: how far the outline's colours reach inward
 
@@ -117,7 +116,7 @@ def paint_unseen(crop: Crop, axis: Silhouette | None) -> np.ndarray:
 
 
 def _voted(photo: np.ndarray, mask: np.ndarray, spread: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """Return for each place the mean colour, near it, of the kind of colour that most pixels near it are of.
+    """Return for each place the mean of the kind of colour that most pixels near it have.
 
     ``spread`` adds up what is near each place of an image ``(H, W, C)`` and may change its shape.
     """
@@ -134,7 +133,7 @@ def _voted(photo: np.ndarray, mask: np.ndarray, spread: Callable[[np.ndarray], n
 def _kinds(photo: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """Return which of a few colours each pixel of the mask is nearest to, -1 outside: k-means in Lab.
 
-    It begins with the median and the colours farthest from those before (Gonzalez 1985), so that it draws nothing.
+    It begins with the median and the colours farthest from those before (Gonzalez 1985), so that nothing is drawn at random.
     """
     colours = cv2.cvtColor(photo / 255, cv2.COLOR_RGB2Lab)[mask]
     some = colours[:: max(1, len(colours) // _SAMPLES)]
@@ -179,7 +178,7 @@ def _of_rings(photo: np.ndarray, mask: np.ndarray, axis: Silhouette) -> np.ndarr
 
 
 def _rim_difference(photo: np.ndarray, base: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Return what the photo differs from ``base`` near the outline, softly, fading inward; as at the outline outward."""
+    """Return the photo less ``base`` near the outline, smoothed and fading inward; beyond the outline it stays as it is there."""
     side = max(mask.shape)
     sigma = _SOFT_RIM_SHARE * side
     inside = mask.astype(np.float32)
