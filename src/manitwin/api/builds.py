@@ -48,20 +48,33 @@ def build(
     under another one, the inputs that are given are (where none is given, all that are there), from the first stage that
     it changes.
 
-    ``name``, ``units`` m|cm|mm|none|auto, ``up`` y|z|auto, ``longest_side_m`` (of length, width and height as it stands),
-    ``license`` and ``attribution`` hold for all inputs whose manifest row does not say otherwise. Of one photo ``mask`` is a
-    picture of the thing's outline, white where it is, and ``box_px`` where it is: left, top, right, bottom. Of each text
-    ``count`` variations are made, which differ in what it leaves open. With ``views`` the inputs are photos of one thing, which
-    becomes one twin; ``turns_deg`` is the camera's turn about the vertical in each, counter-clockwise seen from above, or
-    ``poses`` a transforms.json or the folder of a COLMAP model that states their cameras, whose unit and up axis are then
-    ``units`` and ``up``. With ``strict`` a manifest's column that nobody knows is an error. ``config`` None: what the data set
-    was built with, else the defaults. ``flags`` are said on top of it: ``seed``; ``grippers``, names or .toml files, the first
-    one's grasps are the twin's own; ``vlm``, ``generator`` and ``grasper`` choose backends (docs/backends.md); once services
-    have charged ``max_cost_usd``, items that would cost more are left unfinished; ``record`` is a file that a VLM's answers are
-    added to; ``require_agreement`` verifies only what a second engine holds too; ``second_opinion`` "sample" tries 20 of the
-    held grasps there instead of all; ``quick`` leaves out second engine and robustness; ``link`` asks of things with joints,
-    which are locked, for grasps that touch this link with both fingertips. ``executor`` is local (``jobs`` processes), ray (a
-    cluster at ``address``), or inline, in this process.
+    What a manifest's row may say for one input, these say for all others:
+
+    - ``name``, ``license``, ``attribution``; ``units`` m|cm|mm|none|auto and ``up`` y|z|auto of meshes
+    - ``longest_side_m``: the longest of length, width and height as the thing stands
+    - ``mask``: a picture of the thing's outline in one photo, white where it is; ``box_px``: left, top, right, bottom of it
+
+    What the inputs are:
+
+    - ``count``: so many variations of each text, which differ in what it leaves open
+    - ``views``: they are photos of one thing, which becomes one twin. ``turns_deg`` are the camera's turns about the vertical in
+      these, counter-clockwise seen from above; or ``poses`` is a transforms.json or the folder of a COLMAP model that states
+      the cameras, whose unit and up axis are then ``units`` and ``up``
+    - ``strict``: a column of a manifest that nobody knows is an error
+
+    ``config`` None is what the data set was built with, else the defaults. ``flags`` change it:
+
+    - ``seed``; ``grippers``, names or .toml files, the first one's grasps are the twin's own
+    - ``vlm``, ``generator``, ``grasper`` and ``matting`` choose backends (docs/backends.md); ``record`` is a file that a VLM's
+      answers are added to
+    - ``max_cost_usd``: once services have charged so much, items that would cost more are left unfinished
+    - ``require_agreement`` verifies only grasps that a second engine holds too; ``second_opinion`` "sample" tries 20 of the held
+      ones there instead of all; ``quick`` leaves out second engine and robustness
+    - ``link``: of things with joints, which are locked, both fingertips of each grasp touch this link
+
+    ``executor`` is local (``jobs`` processes), ray (a cluster at ``address``), or inline, in this process. ``on_estimate`` is
+    called with about what services charge for a twin (USD) by the kind of its input, ``on_start`` with the number of items and of
+    those that are to be done, ``on_stage`` and ``on_result`` with each event of a stage and each item that has ended.
 
     Raises UsageError for wrong arguments, and where another build is at work there; what happens to one item is in the report
     and never raised.
@@ -80,7 +93,7 @@ def build(
     }
     request = request_build(
         inputs, out, texts=texts, count=count, views=views, turns_deg=turns_deg, poses=poses, strict=strict, jobs=jobs,
-        config=config,         defaults=defaults, flags=flags,
+        config=config, defaults=defaults, flags=flags,
     )  # fmt: skip
     from manitwin.dataset.build import build_requested
 

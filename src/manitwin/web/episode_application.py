@@ -23,7 +23,7 @@ from manitwin.web.twin_document import document_bytes
 
 
 def episode_application(pages: ASGIApp, episodes: EpisodeFolders, title: str) -> Starlette:
-    """Return the pages of episodes before those of ``application``, which shows the twins, without the guard before them."""
+    """Return the pages of episodes, and ``pages`` of the twins behind them, without the guard that belongs before all."""
 
     async def show_list(request: Request) -> Response:
         asked = request.query_params

@@ -31,7 +31,7 @@ _SHAPES = (DOCUMENT, trial_document.DOCUMENT, "visual.glb")
 
 
 def review_application(pages: ASGIApp, twins: TwinFolders, session: ReviewSession) -> Starlette:
-    """Return the pages of a review before those of ``application``, of which a blind one has pictures and shapes alone."""
+    """Return the pages of a review, and ``pages`` of the twins behind them, pictures and shapes alone where it is blind."""
 
     async def onward(request: Request) -> Response:
         return await _answered(lambda: _onward(session, twins, _person(request), request.query_params.get("after")))

@@ -18,7 +18,7 @@ from manitwin.web.twin_document import document_bytes
 
 
 def scene_application(pages: ASGIApp, scenes: SceneFolders, title: str) -> Starlette:
-    """Return the pages of scenes before those of ``application``, which shows the twins, without the guard before them."""
+    """Return the pages of scenes, and ``pages`` of the twins behind them, without the guard that belongs before all."""
 
     async def show_list(request: Request) -> Response:
         if len(scenes.ids) == 1:
