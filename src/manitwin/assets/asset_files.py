@@ -54,7 +54,7 @@ class AssetFiles:
     _faces: int = 0
 
     def remark(self, sentence: str) -> None:
-        """Note something once."""
+        """Note a sentence for who reads about the asset; the same one counts once."""
         if sentence not in self.remarks:
             self.remarks.append(sentence)
 

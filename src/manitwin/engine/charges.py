@@ -67,7 +67,7 @@ class Budget:
         return self.spent_usd + sum(self._expected.values()) + expected_usd <= self.max_usd
 
     def begin(self, ticket: int, expected_usd: float) -> None:
-        """Note a job that begins."""
+        """Note a job that begins, with what it is expected to be charged."""
         if expected_usd > 0:
             self._expected[ticket] = expected_usd
 

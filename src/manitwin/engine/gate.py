@@ -34,7 +34,7 @@ class Gate:
         return wait
 
     def begin(self) -> None:
-        """Count a job that begins."""
+        """Count a job that begins against the rate of the service."""
         if self._per_second is not None:
             self._tokens -= 1
 

@@ -59,14 +59,14 @@ class RootJobMemory:
 
 
 class NoMemory:
-    """For generators whose jobs end with the process."""
+    """Remembers nothing: for generators whose jobs end with the process."""
 
     def recall(self, request: str) -> str | None:
-        """Return None."""
+        """Return None: no job is remembered."""
         return None
 
     def note(self, request: str, job_id: str) -> None:
-        """Keep nothing."""
+        """Do nothing: no job is remembered."""
 
     def forget(self, request: str) -> None:
-        """Drop nothing."""
+        """Do nothing: there is no job to forget."""

@@ -120,7 +120,10 @@ class Stage(Protocol):
         ...
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
-        """Do the step."""
+        """Do the stage's work for an item: write its files into ``folder`` and return its fields, those that ``writes`` names.
+
+        Raises Rejected where nothing can be made of the item, and a BackendError where a backend cannot work now.
+        """
         ...
 
 
@@ -130,7 +133,7 @@ class PaidStage(Protocol):
 
     @property
     def expected_usd(self) -> float:
-        """About what it costs."""
+        """About what services charge for the stage of one item, USD."""
         ...
 
 

@@ -241,11 +241,11 @@ class InlineExecutor:
         self._ended: list[tuple[int, Reply]] = []
 
     def slots(self, needs: Resource) -> int:
-        """Return the same for all."""
+        """Return how many jobs may be given at a time, the same for all resources."""
         return self._slots
 
     def submit(self, ticket: int, job: Job) -> None:
-        """Do it."""
+        """Do a job at once; ``ended`` returns its reply."""
         self._ended.append((ticket, self._worker.do(job)))
 
     def ended(self, timeout_s: float) -> list[tuple[int, Reply]]:

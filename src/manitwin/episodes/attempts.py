@@ -197,7 +197,7 @@ class Tally:
     kept: int = 0
 
     def add(self, attempt: Attempt) -> None:
-        """Count one."""
+        """Count an attempt by how far it came."""
         self.attempted += 1
         self.executed += attempt.planned
         self.succeeded += attempt.succeeded
@@ -225,7 +225,7 @@ def _frequent_first(counted: Counter[str]) -> dict[str, int]:
 
 
 def success_of(attempts: Iterable[Attempt]) -> Success:
-    """Count attempts."""
+    """Return the counts of attempts, in all and by category and outcome."""
     total, by_category, outcomes = Tally(), dict[str, Tally](), Counter[str]()
     categories, successful = dict[str, str](), set[str]()
     failures, without_grasp = Counter[str](), set[tuple[str, str]]()

@@ -30,7 +30,7 @@ class EventWatch(Protocol):
 
     @property
     def force_n(self) -> float:
-        """The force at the last look."""
+        """The force (N) of what is watched, at the last look."""
         ...
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:

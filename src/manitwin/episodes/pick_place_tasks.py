@@ -52,7 +52,7 @@ class Placeable:
 
     @classmethod
     def in_pose(cls, pool: Pool, twin: PoolTwin, pose: StandingPose) -> Placeable:
-        """Take a settled placement."""
+        """Return a twin in one of its settled placements."""
         return cls(twin.twin_id, pool.body(twin.twin_id).body, pose.object_to_plane)
 
 

@@ -104,7 +104,7 @@ class StirWatch:
         return (Event("stirred", self.tool, self.vessel, values),)
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
-        """Look where the end is."""
+        """Note the sector of the vessel that the tool's end is in."""
         if self._start is None:
             self._start = self.granules()
         pose, opening = self.vessel_to_world(), self.opening

@@ -35,7 +35,7 @@ class Tried:
     outcome: list[str]
 
     def add(self, grasps: GraspProposals, outcome: list[str]) -> None:
-        """Append rows."""
+        """Append grasps, and the outcome of each."""
         self.grasps, self.outcome = GraspProposals.joined([self.grasps, grasps]), self.outcome + outcome
 
 

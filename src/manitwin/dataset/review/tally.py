@@ -30,13 +30,13 @@ class Accuracy:
 
     @property
     def share(self) -> float | None:
-        """The accuracy."""
+        """The share of the judged twins that are right; None where none is judged."""
         judged = self.right + self.wrong
         return self.right / judged if judged else None
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Its 95 % interval."""
+        """The interval of ``share``, Wilson's of 95 %."""
         return wilson_interval(self.right, self.right + self.wrong)
 
     @property

@@ -57,7 +57,7 @@ class Planner(Protocol):
     """The protocol of an episode's planner (``planning.pick_place.PickPlacePlanner``)."""
 
     def plan(self, problem: PickPlaceProblem) -> PlanReport:
-        """Plan all of it."""
+        """Plan the whole of a problem, from the start to the placement and back."""
         ...
 
     def plan_place(

@@ -10,7 +10,7 @@ from manitwin.episodes.planning.problem import PlanFailure, later
 
 @dataclass
 class GraspTally:
-    """Counts grasps by their numbers; what one fails of is the latest stage that any of its tries came to."""
+    """Counts grasps by their numbers; a grasp fails by the cause of that try which came the farthest."""
 
     tried: set[int] = field(default_factory=set)
     beyond_a_look: set[int] = field(default_factory=set)
@@ -23,7 +23,7 @@ class GraspTally:
 
     @property
     def reasons(self) -> Counter[PlanFailure]:
-        """How many of them failed of what."""
+        """How many grasps failed by each cause."""
         return Counter(self.failures.values())
 
     def is_new(self, index: int) -> bool:
@@ -31,7 +31,7 @@ class GraspTally:
         return index not in self.beyond_a_look
 
     def count(self, index: int, failure: PlanFailure) -> None:
-        """Count a try that failed."""
+        """Count a try of a grasp, by its number, that failed."""
         self.tried.add(index)
         self.failures[index] = later(failure, self.failures.get(index, failure))
 

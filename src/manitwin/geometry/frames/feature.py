@@ -85,7 +85,7 @@ class FramedMesh:
 
     @cached_property
     def size_m(self) -> float:
-        """The longest side."""
+        """The longest side of the box along the axes, m."""
         return float(self.mesh.extents.max())
 
     @cached_property
@@ -106,7 +106,7 @@ class FramedMesh:
 
     @cached_property
     def tree(self) -> cKDTree:
-        """The samples by place."""
+        """A tree over the positions of ``samples``."""
         return cKDTree(self.samples[0])
 
     @cached_property

@@ -49,7 +49,7 @@ class RulesAnnotator:
         return None
 
     def expected_usd(self, question: AnnotatorQuestion) -> float:
-        """Return 0."""
+        """Return 0: rules cost nothing."""
         return 0.0
 
     def judge_quality(self, subject: Subject) -> QualityVerdict:

@@ -29,7 +29,7 @@ class Deadline:
         self._until = clock() + seconds
 
     def extend(self, seconds: float) -> None:
-        """Give the request more time."""
+        """Give the request so many seconds more."""
         self.seconds += seconds
         self._until += seconds
 

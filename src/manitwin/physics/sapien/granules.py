@@ -43,7 +43,7 @@ class GranuleFill:
 
     @property
     def volume_m3(self) -> float:
-        """What they take in a heap."""
+        """The volume that they take in a heap, gaps included, m^3."""
         return float(len(self.centers_m) * 4 / 3 * np.pi * self.radius_m**3 / PACKING)
 
 

@@ -34,7 +34,7 @@ class SapienHand(Protocol):
     is_ahead: bool
 
     def joints(self) -> np.ndarray:
-        """Return its state ``(J,)``."""
+        """Return the positions ``(J,)`` of its joints, m or rad."""
         ...
 
     def squeeze(self) -> None:

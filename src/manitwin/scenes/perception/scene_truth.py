@@ -80,7 +80,7 @@ class PictureTruth:
 
     @cached_property
     def rgb(self) -> np.ndarray:
-        """The colours."""
+        """The colours ``(H, W, 3) uint8`` sRGB; raises UsageError where they cannot be read."""
         path = self.folder / f"{self.name}_rgb.webp"
         try:
             pixels = read_image(path).pixels[..., :3]

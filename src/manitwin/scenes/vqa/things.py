@@ -103,7 +103,7 @@ class Thing:
 
     @cached_property
     def placed(self) -> PlacedParts:
-        """The hulls where they stand."""
+        """Its hulls at its pose in the world."""
         return self.shape.hulls.at(self.pose)
 
     @cached_property
@@ -114,7 +114,7 @@ class Thing:
 
     @property
     def longest_m(self) -> float:
-        """The distance of the two points of it that are farthest apart."""
+        """The distance (m) of its two points that are farthest apart."""
         return self.shape.longest_m
 
 
@@ -128,7 +128,7 @@ class Seen:
 
     @cached_property
     def mask(self) -> np.ndarray:
-        """The visible pixels."""
+        """Its visible pixels ``(H, W) bool``."""
         return self.picture.ids == self.thing.number
 
     @cached_property

@@ -82,7 +82,7 @@ class Model:
         return self
 
     def point(self, label: str, kind: PointKind, part: str, position_m: Vector, direction: Vector) -> Model:
-        """Note a place with a use."""
+        """Add a place that is known to have a use, with its direction out of the thing; return this model."""
         self.points.append(KnownPoint(label, kind, part, position_m, direction))
         return self
 
@@ -136,11 +136,11 @@ class Template:
     told_in_full: bool = False
 
     def drawn(self, rng: np.random.Generator) -> dict[str, float]:
-        """Draw all measures."""
+        """Return a value of each measure, by name, drawn within its interval."""
         return {name: measure.drawn(rng) for name, measure in self.measures.items()}
 
     def typical(self) -> dict[str, float]:
-        """Return the usual measures."""
+        """Return the usual value of each measure, by name."""
         return {name: measure.typical for name, measure in self.measures.items()}
 
 

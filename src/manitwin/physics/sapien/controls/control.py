@@ -16,19 +16,19 @@ from manitwin.robots.grippers.suction import SuctionGripper
 
 
 class HandControl(Protocol):
-    """A robot's hand. ``told (h,)`` is what it is told, ``state (h,)`` what it is, by the names of ``Robot``.
+    """A robot's hand. ``told (h,)`` are its targets and ``state (h,)`` its positions, in the units of ``Robot``.
 
     What it is to be told next is chosen here, one frame of ``TrialSettings`` at a time; nothing moves before ``tell``.
     """
 
     @property
     def told(self) -> np.ndarray:
-        """What it is told now ``(h,)``."""
+        """The present targets ``(h,)``."""
         ...
 
     @property
     def state(self) -> np.ndarray:
-        """What it is now ``(h,)``."""
+        """The present positions ``(h,)``."""
         ...
 
     @property
@@ -53,11 +53,11 @@ class HandControl(Protocol):
         ...
 
     def closing_empty(self) -> Iterator[np.ndarray]:
-        """Close on nothing."""
+        """Yield the targets ``(h,)``, one a frame, that close it on nothing."""
         ...
 
     def opening(self) -> Iterator[np.ndarray]:
-        """Let go."""
+        """Yield the targets ``(h,)``, one a frame, that let go."""
         ...
 
     def look(self, contacts: Sequence[physx.PhysxContact]) -> None:

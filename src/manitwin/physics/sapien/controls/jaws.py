@@ -33,22 +33,22 @@ class JawsControl:
 
     @property
     def told(self) -> np.ndarray:
-        """The target opening."""
+        """The target of the opening ``(1,)``, m."""
         return np.array([self._target_m])
 
     @property
     def state(self) -> np.ndarray:
-        """The opening."""
+        """The opening ``(1,)``, m."""
         return np.array([self._robot.opening_m()])
 
     @property
     def presses(self) -> bool:
-        """Whether the target is so far within what is between the jaws."""
+        """Whether the target is so far within what the jaws hold that they press on it with about the closing force."""
         pressing_n = (self._robot.opening_m() - self._target_m) / 2 * self._settings.finger_stiffness_n_m
         return pressing_n > PRESSING_SHARE * self._settings.force_n
 
     def tell(self, told: np.ndarray) -> None:
-        """Tell the opening."""
+        """Set the target of the opening, ``told (1,)`` m."""
         self._target_m = float(told[0])
         self._robot.set_opening_target(self._target_m)
 
