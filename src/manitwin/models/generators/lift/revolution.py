@@ -74,10 +74,11 @@ def half_widths(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     filled = mask[rows]
     columns = np.nonzero(mask.any(axis=0))[0]
     best = (-1.0, 0.0, np.zeros(len(rows)))
+    to_left, to_right = _runs(filled)
     for column in np.arange(columns[0] + 1, columns[-1], 0.5):
         middle = int(np.ceil(column))
-        left = np.cumprod(filled[:, :middle][:, ::-1], axis=1).sum(axis=1) + (column - middle + 0.5)
-        right = np.cumprod(filled[:, middle:], axis=1).sum(axis=1) - (column - middle + 0.5)
+        left = to_left[middle] + (column - middle + 0.5)
+        right = to_right[middle] - (column - middle + 0.5)
         both = np.where((left > 0) & (right > 0), np.minimum(left, right), 0.0)
         if both.sum() > best[0]:
             apart = np.abs(left - right) > 0.08 * (left + right) + 1.5
@@ -85,6 +86,16 @@ def half_widths(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     kept = np.isin(rows, rows_on_axis(mask, best[1]))
     widths = gaussian_filter1d(median_filter(best[2][kept], 5, mode="nearest"), 0.8, mode="nearest")
     return rows[kept].astype(float), widths, best[1]
+
+
+def _runs(filled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return how many pixels of rows ``(K, W) bool`` are filled in one go left and right of each border, ``(W + 1, K)`` both."""
+    across = np.arange(filled.shape[1])
+    empty_before = np.maximum.accumulate(np.where(filled, -1, across), axis=1)
+    empty_from = np.minimum.accumulate(np.where(filled, len(across), across)[:, ::-1], axis=1)[:, ::-1]
+    ends = np.zeros((len(filled), 1), dtype=np.int64)
+    left, right = np.hstack([ends, across - empty_before]), np.hstack([empty_from - across, ends])
+    return np.ascontiguousarray(left.T), np.ascontiguousarray(right.T)
 
 
 def without_collars(widths: np.ndarray) -> np.ndarray:

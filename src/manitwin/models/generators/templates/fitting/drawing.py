@@ -19,10 +19,11 @@ def to_pixels(flat: np.ndarray, side_px: int, box_share: float) -> np.ndarray:
 
 def facing(pixels: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Return which faces ``(F, 3)`` of projected vertices ``(V, 2)``, wound outward, look at the camera."""
-    a, b, c = (pixels[faces[:, corner]] for corner in range(3))
-    first, second = b - a, c - a
+    x, y = pixels.T.copy()
+    a, b, c = faces.T
+    x_a, y_a = x[a], y[a]
     # y runs downward: what is counter-clockwise in the world is clockwise here
-    return np.asarray(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0] < 0)
+    return np.asarray((x[b] - x_a) * (y[c] - y_a) - (y[b] - y_a) * (x[c] - x_a) < 0)
 
 
 def edges_between(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -42,22 +43,23 @@ def silhouette(pixels: np.ndarray, faces: np.ndarray, edges: tuple[np.ndarray, n
     """
     ends, beside = edges
     front = facing(pixels, faces)
-    one, other = front[beside[:, 0]], front[beside[:, 1]]
-    contour = one != other
-    path = np.where(one[contour, None], ends[contour], ends[contour][:, ::-1])
-    start, end = pixels[path[:, 0]], pixels[path[:, 1]]
-    low, high = np.minimum(start[:, 1], end[:, 1]), np.maximum(start[:, 1], end[:, 1])
-    first = np.clip(np.ceil(low), 0, side_px).astype(np.int64)
-    count = np.maximum(np.clip(np.ceil(high), 0, side_px).astype(np.int64) - first, 0)
+    one = front[beside[:, 0]]
+    contour = np.flatnonzero(one != front[beside[:, 1]])
+    one, ends = one[contour], ends[contour]
+    (start_x, start_y), (end_x, end_y) = (
+        pixels[np.where(forward, ends[:, 0], ends[:, 1])].T for forward in (one, ~one)
+    )
+    first = np.clip(np.ceil(np.minimum(start_y, end_y)), 0, side_px).astype(np.int64)
+    count = np.clip(np.ceil(np.maximum(start_y, end_y)), 0, side_px).astype(np.int64) - first
     which = np.repeat(np.arange(len(count)), count)
-    row = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count) + first[which]
-    step = end - start
+    row = np.arange(len(which)) - np.repeat(np.cumsum(count) - count - first, count)
     mask = np.zeros((side_px, side_px), np.uint8)
     if not len(which):
         return mask
-    x = start[which, 0] + (row - start[which, 1]) * step[which, 0] / step[which, 1]
+    step_x, step_y = end_x - start_x, end_y - start_y
+    x = start_x[which] + (row - start_y[which]) * step_x[which] / step_y[which]
     column = np.clip(np.ceil(x), 0, side_px).astype(np.int64)
-    sign = np.where(step[which, 1] > 0, 1.0, -1.0)
+    sign = np.where(step_y > 0, 1.0, -1.0)[which]
     top, bottom, left, right = row.min(), row.max() + 1, column.min(), column.max()
     height, width = bottom - top, right - left + 1
     turns = np.bincount((row - top) * width + column - left, weights=sign, minlength=height * width)

@@ -89,14 +89,18 @@ def signed_distance(mask: np.ndarray) -> np.ndarray:
     """
     step, reach = 2 * FINE, REACH * mask.shape[0]
     found = np.full([len(range(1, side, step)) for side in mask.shape], -1.0, np.float32)
-    if not mask.any():
+    inside = mask.astype(np.uint8)
+    left, top, width, height = cv2.boundingRect(inside)
+    if not width:
         return found
-    rows, columns = (_within_reach(np.asarray(mask.any(axis=other)), int(reach) + 2, step) for other in (1, 0))
-    inside = np.ascontiguousarray(mask[rows, columns]).astype(np.uint8)
-    away = cv2.distanceTransform(inside, cv2.DIST_L2, 3) - cv2.distanceTransform(1 - inside, cv2.DIST_L2, 3)
-    some = np.clip(away[1::step, 1::step] / reach, -1, 1)
-    top, left = rows.start // step, columns.start // step
-    found[top : top + some.shape[0], left : left + some.shape[1]] = some
+    away_px = int(reach) + 2
+    # the first row and column are multiples of the step
+    first_row, first_column = (max(0, (first - away_px) // step * step) for first in (top, left))
+    inside = np.ascontiguousarray(inside[first_row : top + height + away_px, first_column : left + width + away_px])
+    depth, beyond = (cv2.distanceTransform(each, cv2.DIST_L2, 3)[1::step, 1::step] for each in (inside, 1 - inside))
+    some = np.clip((depth - beyond) / reach, -1, 1)
+    row, column = first_row // step, first_column // step
+    found[row : row + some.shape[0], column : column + some.shape[1]] = some
     return found
 
 
@@ -108,13 +112,6 @@ def without_small_holes(mask: np.ndarray) -> np.ndarray:
     if count <= 2 or not small.any():
         return mask
     return np.asarray(mask | small[labels])
-
-
-def _within_reach(drawn: np.ndarray, reach_px: int, step: int) -> slice:
-    """Return the lines around those that are ``drawn (N,) bool``; the first of them is a multiple of ``step``."""
-    at = np.flatnonzero(drawn)
-    first = max(0, (int(at[0]) - reach_px) // step * step)
-    return slice(first, min(len(drawn), int(at[-1]) + 1 + reach_px))
 
 
 def _largest(mask: np.ndarray) -> np.ndarray:
