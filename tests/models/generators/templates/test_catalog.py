@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
+import runpy
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -19,13 +19,20 @@ from manitwin.models.generators.templates.template import IN_THE_OPEN
 from manitwin.models.generators.templates.text import Wanted
 
 TEMPLATES = load_templates()
-SEEDS = (11, 12)
+SEEDS = (0, 11)
+"""The first is that of the page, which names the parts of what was made here."""
+ROOT = Path(__file__).resolve().parents[4]
 MASS_MARGIN, SIZE_MARGIN = 3.0, 1.25
 """Priors' intervals hold 19 of 20 such things: a template that draws its materials may be a little beyond."""
 
 
 def made(category: str, seed: int) -> Made:
     return make(TEMPLATES[category], Wanted(category), np.random.default_rng(seed))
+
+
+@cache
+def first_made(category: str) -> Made:
+    return made(category, SEEDS[0])
 
 
 def test_there_are_templates_of_the_six_groups_of_the_paper() -> None:
@@ -41,7 +48,7 @@ def test_template_is_one_solid_of_its_parts_with_its_points_on_them(category: st
     prior = lookup(category)
     assert prior is not None and prior.category == category
     for seed in SEEDS:
-        thing = made(category, seed)
+        thing = first_made(category) if seed == SEEDS[0] else made(category, seed)
         surface = trimesh.Trimesh(thing.mesh.vertices, thing.mesh.faces, process=False)
         assert surface.is_watertight and surface.body_count == 1, seed
         assert surface.bounds[0, 2] == pytest.approx(0.0, abs=1e-6), "it rests on the ground"
@@ -73,9 +80,9 @@ def test_names_and_looks_of_a_template_mean_it(category: str) -> None:
 
 
 def test_page_of_the_templates_is_that_of_the_code() -> None:
-    root = Path(__file__).resolve().parents[4]
-    done = subprocess.run([sys.executable, root / "docs" / "make_templates_page.py", "--check"], capture_output=True)
-    assert done.returncode == 0, done.stderr
+    program = runpy.run_path(str(ROOT / "docs" / "make_templates_page.py"))
+    assert program["page"](lambda template: first_made(template.category)) == program["PAGE"].read_text()
+    assert np.array_equal(program["first_thing"](TEMPLATES["mug"]).mesh.vertices, first_made("mug").mesh.vertices)
 
 
 def test_same_seed_makes_the_same_thing_and_another_one_another() -> None:
