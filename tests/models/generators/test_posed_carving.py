@@ -14,7 +14,7 @@ import trimesh
 
 from manitwin.errors import Rejected
 from manitwin.formats.camera_poses.posed_camera import Lens, PosedCamera
-from manitwin.models.generators.lift import posed_views
+from manitwin.models.generators.lift import posed_carving, posed_views
 from manitwin.models.generators.lift.carved_solid import Carved
 from manitwin.models.generators.lift.made_of_views import MadeOfViews
 from manitwin.models.generators.lift.posed_carving import carve_posed
@@ -37,7 +37,7 @@ def the_same_photos_carved_once() -> Iterator[None]:
 
     def carved(photos: Any, cameras: Sequence[PosedCamera], turns_deg: Any) -> Any:
         pictures = tuple(rgba.tobytes() for _, rgba in photos)
-        key = pictures, tuple(each.world_to_camera.tobytes() for each in cameras), tuple(turns_deg)
+        key = posed_carving.CELLS, pictures, tuple(each.world_to_camera.tobytes() for each in cameras), tuple(turns_deg)
         if key not in kept:
             kept[key] = carve_posed(photos, cameras, turns_deg)
         return kept[key]
@@ -45,6 +45,12 @@ def the_same_photos_carved_once() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(posed_views, "carve_posed", carved)
         yield
+
+
+@pytest.fixture
+def coarser(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Carve with a quarter of the cells: what is asked here shows with these too."""
+    monkeypatch.setattr(posed_carving, "CELLS", 100)
 
 
 def _cameras(poses: Sequence[np.ndarray]) -> list[PosedCamera]:
@@ -87,6 +93,7 @@ def test_seven_photos_make_the_thing_in_metres() -> None:
     assert made.notes["confidence"] > 0.97 and made.notes["left_out"] == []
 
 
+@pytest.mark.usefixtures("coarser")
 def test_the_unit_of_the_poses_is_that_of_the_size_and_without_one_there_is_none() -> None:
     scaled = [np.diag([1000, 1000, 1000, 1.0]) @ pose @ np.diag([0.001, 0.001, 0.001, 1]) for pose in POSES]
     in_millimetres = from_views(_views(PHOTOS, _cameras(scaled)), None, 0.001)
@@ -118,6 +125,7 @@ def test_colours_are_those_of_the_photos() -> None:
     assert np.median(pixels[top], axis=0) == pytest.approx([50, 70, 200], abs=30)
 
 
+@pytest.mark.usefixtures("coarser")
 def test_cameras_from_below_see_the_underside_and_nothing_is_cut_off() -> None:
     places = [*PLACES[:5], (20, -40, 0.3), (200, -60, 0.3)]
     poses = [pose_at(*place) for place in places]
@@ -125,6 +133,7 @@ def test_cameras_from_below_see_the_underside_and_nothing_is_cut_off() -> None:
     assert np.ptp(made.part.vertices[:, 2]) > 0.113  # as high as the hull is, though the thing is not
 
 
+@pytest.mark.usefixtures("coarser")
 def test_a_photo_at_a_wrong_pose_is_left_out_of_many_and_named_of_few() -> None:
     cameras = _cameras([*POSES[:6], pose_at(20, 30, 0.25)])
     assert from_views(_views(PHOTOS, cameras), None).notes["left_out"] == ["6.png"]
@@ -159,6 +168,7 @@ def test_photos_from_one_direction_and_its_opposite_are_refused() -> None:
         from_views(_views(photos, _cameras(poses)), None)
 
 
+@pytest.mark.usefixtures("coarser")
 @pytest.mark.parametrize("fisheye", [False, True])
 def test_the_distortion_of_a_lens_is_undone(fisheye: bool) -> None:
     """The photos are bent as the lens does it; without its coefficients the outlines do not fill each other as far."""
@@ -180,6 +190,7 @@ def test_the_distortion_of_a_lens_is_undone(fisheye: bool) -> None:
     assert to_manifold(carved.surface).volume() == pytest.approx(to_manifold(straight.surface).volume(), rel=0.05)
 
 
+@pytest.mark.usefixtures("coarser")
 def test_a_photo_that_was_scaled_since_makes_the_same() -> None:
     half = [cv2.resize(photo, (WIDTH // 2, HEIGHT // 2), interpolation=cv2.INTER_AREA) for photo in PHOTOS]
     made = from_views(_views(half, _cameras(POSES)), None, 1.0)
