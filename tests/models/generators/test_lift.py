@@ -298,10 +298,10 @@ def painted(shape: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray
 
 def test_a_ball_with_its_mirror_image_is_no_ball() -> None:
     one = painted(lambda x, y: np.hypot(x, y) < 0.3)
-    assert from_photo(one, "golf ball").notes["primitive"] != ""
+    assert from_photo(one, "tennis ball").notes["primitive"] != ""
     beside = painted(lambda x, y: (np.hypot(x, y + 0.2) < 0.2) | (np.hypot(x, y - 0.18) < 0.2))
-    with pytest.raises(Rejected, match="times as long as wide, as no golf ball is"):
-        from_photo(beside, "golf ball")
+    with pytest.raises(Rejected, match="times as long as wide, as no tennis ball is"):
+        from_photo(beside, "tennis ball")
 
 
 @pytest.mark.parametrize("degrees", [0, 20])

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from collections.abc import Iterator
 
 import cv2
 import numpy as np
 import pytest
 
+from kept_solids import kept_solids
 from manitwin.models.generators.lift import made_photo, nameless
 from manitwin.models.generators.lift.made_photo import from_photo
 from manitwin.models.generators.lift.nameless import OF_LIKELY_NAMES, OF_TURNED_SOLIDS
@@ -21,6 +23,13 @@ SIDE_PX = 640
 SIDE, TOP = (130, 90, 60, 255), (220, 200, 170, 255)
 BOTTLE = ((0.035, 0.0), (0.035, 0.10), (0.014, 0.14), (0.014, 0.18))
 CAN = ((0.027, 0.0), (0.033, 0.008), (0.033, 0.112), (0.027, 0.12))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def solids_fitted_once() -> Iterator[None]:
+    """Fit plain and turned solids once to each picture."""
+    with kept_solids():
+        yield
 
 
 def _seen(profile: tuple[tuple[float, float], ...], elevation_deg: float) -> np.ndarray:
@@ -41,7 +50,7 @@ def _seen(profile: tuple[tuple[float, float], ...], elevation_deg: float) -> np.
 
 @pytest.mark.parametrize("elevation_deg", [40.0, 55.0])
 def test_what_is_seen_from_above_is_as_high_as_it_is(elevation_deg: float) -> None:
-    found = turned_solid(_seen(BOTTLE, elevation_deg))
+    found = nameless.turned_solid(_seen(BOTTLE, elevation_deg))
     assert found is not None and found.upright
     assert np.degrees(found.view.elevation_rad) == pytest.approx(elevation_deg, abs=7.0)
     width, depth, height = np.ptp(found.made.mesh.vertices, axis=0)
@@ -50,10 +59,11 @@ def test_what_is_seen_from_above_is_as_high_as_it_is(elevation_deg: float) -> No
     assert height / width == pytest.approx(np.ptp(heights) / (2 * radii.max()), rel=0.06)
 
 
-def test_a_nameless_bottle_seen_from_above_is_that_body_and_stands() -> None:
+def test_a_nameless_bottle_seen_from_above_is_that_body_and_stands(monkeypatch: pytest.MonkeyPatch) -> None:
     job = from_photo(_seen(BOTTLE, 55.0), None)
     assert job.notes["primitive"] == "revolution" and job.notes["source"] == OF_TURNED_SOLIDS
     assert job.notes["rests"] == "standing" and job.known is None and not job.metric
+    monkeypatch.setattr(nameless, "turned_solid", turned_solid)  # fitted again, and not kept
     assert from_photo(_seen(BOTTLE, 55.0), None).glb == job.glb
 
 
@@ -66,7 +76,7 @@ def test_a_can_is_no_open_one_because_that_is_what_it_may_be_called() -> None:
 def can() -> tuple[np.ndarray, Fitted, Fitted]:
     """A picture, the body of revolution fitted to it, and a can that was."""
     rgba = _seen(CAN, 30.0)
-    turned, other = turned_solid(rgba), fit("can", rgba)
+    turned, other = nameless.turned_solid(rgba), fit("can", rgba)
     assert turned is not None and other is not None
     return rgba, turned, other
 

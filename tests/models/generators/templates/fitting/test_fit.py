@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -13,10 +12,11 @@ import pytest
 import trimesh
 from scipy import ndimage
 
+from kept_solids import kept_solids
 from manitwin.errors import Rejected
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.ray_caster import RayCaster
-from manitwin.models.generators.lift import LiftGenerator, made_photo, nameless
+from manitwin.models.generators.lift import LiftGenerator
 from manitwin.models.generators.lift.lifting import hint_from_name, lift
 from manitwin.models.generators.lift.made_photo import fitted_or_lifted, from_photo
 from manitwin.models.generators.lift.nameless import OF_LIKELY_NAMES
@@ -294,25 +294,9 @@ def _generated(rgba: np.ndarray, name: str, folder: Path) -> Generated:
 
 @pytest.fixture(scope="module")
 def nameless_mug() -> Iterator[np.ndarray]:
-    """A photo of a mug that nobody names: what needs no names, plain and turned solids, is fitted to it once."""
-    photo = photo_of("mug", View(np.radians(60.0), np.radians(30.0), 0.0, 0.1), {})
-    with pytest.MonkeyPatch.context() as patch:
-        for module, name in ((made_photo, "plain_solids"), (nameless, "turned_solid")):
-            patch.setattr(module, name, _kept(getattr(module, name), photo))
-        yield photo
-
-
-def _kept(function: Callable[..., Any], photo: np.ndarray) -> Callable[..., Any]:
-    """Call a function of this photo and what does not change beside it once for each kind of arguments."""
-    found: dict[str, Any] = {}
-
-    def of_photo(rgba: np.ndarray, *others: Any) -> Any:
-        assert np.array_equal(rgba, photo)
-        if repr(others) not in found:
-            found[repr(others)] = function(rgba, *others)
-        return found[repr(others)]
-
-    return of_photo
+    """A photo of a mug that nobody names."""
+    with kept_solids():
+        yield photo_of("mug", View(np.radians(60.0), np.radians(30.0), 0.0, 0.1), {})
 
 
 def test_a_nameless_thing_has_the_shape_of_a_likely_name_that_explains_the_photo(nameless_mug: np.ndarray) -> None:
