@@ -6,14 +6,6 @@ import io
 from functools import lru_cache
 from typing import Any
 
-import pyarrow.parquet as pq
-import trimesh
-from trimesh.visual import TextureVisuals
-from trimesh.visual.material import PBRMaterial
-
-from manitwin.formats.glb import write_glb
-from manitwin.twin.grasp_table import SCHEMA
-
 
 def _estimate(value: float) -> dict[str, Any]:
     return {"value": value, "low": value, "high": value, "source": "user"}
@@ -66,7 +58,18 @@ CUBE: dict[str, Any] = {
 
 @lru_cache(maxsize=1)
 def cube_files() -> dict[str, bytes]:
-    """Return the files that go with the record: the cube that is seen, and an empty table of grasps."""
+    """Return the files that go with the record: the cube that is seen, its shape, and an empty table of grasps."""
+    # here, for every worker of a rehearsal imports this module, and only where the run begins the files are made
+    import pyarrow.parquet as pq
+    import trimesh
+    from trimesh.visual import TextureVisuals
+    from trimesh.visual.material import PBRMaterial
+
+    from manitwin.formats.glb import write_glb
+    from manitwin.geometry.shape_descriptor import shape_descriptor
+    from manitwin.twin.grasp_table import SCHEMA
+    from manitwin.twin.shape_file import shape_to_json
+
     cube = trimesh.creation.box([0.05] * 3).apply_translation([0, 0, 0.025])  # it stands on z = 0
     cube.metadata["name"] = "cube"
     cube.visual = TextureVisuals(
@@ -74,4 +77,5 @@ def cube_files() -> dict[str, bytes]:
     )
     table = io.BytesIO()
     pq.write_table(SCHEMA.empty_table(), table)
-    return {"visual.glb": write_glb([cube]), "grasps.parquet": table.getvalue()}
+    shape = shape_to_json(shape_descriptor(cube, seed=0))
+    return {"visual.glb": write_glb([cube]), "shape.json": shape, "grasps.parquet": table.getvalue()}

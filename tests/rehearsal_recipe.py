@@ -27,7 +27,7 @@ import os
 import re
 import signal
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -142,6 +142,9 @@ class RehearsalRecipe(FolderRecipe[TwinRecord]):
     seed: int = 0
     usd: float = 0.0
     tables: Tables | None = None
+    files: dict[str, bytes] = field(
+        default_factory=cube_files
+    )  # made where a run begins: its workers start without meshes
 
     @property
     def sha256(self) -> str:
@@ -204,7 +207,7 @@ class RehearsalRecipe(FolderRecipe[TwinRecord]):
         write_bytes_atomically(fresh / RUN, canonical_json(costs_json).encode())
         (fresh / "prompt.txt").write_text(draft.payload.text or "")
         if rejected is None:
-            for name, file in cube_files().items():
+            for name, file in self.files.items():
                 (fresh / name).write_bytes(file)
         sealed = seal(fresh, rehearsed_record(draft, self.sha256, rejected))
         note_sizes(fresh)

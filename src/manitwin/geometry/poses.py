@@ -1,9 +1,11 @@
-"""Rigid transforms as 4x4 matrices and quaternions in wxyz order."""
+"""Rigid transforms as 4x4 matrices and quaternions in wxyz order.
+
+SciPy's rotations are imported when they are asked for: a third of the start of a program that turns nothing.
+"""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 OBJECT_TO_GLTF = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 """Z-up object frame to the Y-up frame of glTF 2.0 (section 3.4): (x, y, z) -> (x, z, -y)."""
@@ -16,11 +18,15 @@ LEAST_LEADING = 1e-3  # of a quaternion's number that says its sign: 0.1 degrees
 
 def quaternion_wxyz(rotation: np.ndarray) -> np.ndarray:
     """Convert rotation matrices ``(..., 3, 3)`` to unit quaternions ``(..., 4)`` wxyz with w >= 0."""
+    from scipy.spatial.transform import Rotation
+
     return Rotation.from_matrix(rotation).as_quat(canonical=True, scalar_first=True)
 
 
 def rotation_from_quaternion_wxyz(quaternion: np.ndarray) -> np.ndarray:
     """Convert quaternions ``(..., 4)`` wxyz to rotation matrices ``(..., 3, 3)``."""
+    from scipy.spatial.transform import Rotation
+
     return Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
 
 
@@ -61,6 +67,8 @@ def yaw_onto_axis(direction: np.ndarray) -> np.ndarray:
 
 def rotation_between(source: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Return the smallest rotation ``(3, 3)`` that turns direction ``source`` into ``target`` (Rodrigues)."""
+    from scipy.spatial.transform import Rotation
+
     a, b = source / np.linalg.norm(source), target / np.linalg.norm(target)
     axis, cosine = np.cross(a, b), float(a @ b)
     sine = float(np.linalg.norm(axis))

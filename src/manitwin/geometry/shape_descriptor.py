@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 
 from manitwin.geometry.sampling import sample_surface
+
+if TYPE_CHECKING:
+    import trimesh
 
 QUANTILES = 32
 _PAIRS = 1 << 15  # two draws are 0.005 apart, at most 0.011, over 25 real objects; different ones 0.047 or more

@@ -1,18 +1,23 @@
-"""The shape descriptor that lies in a twin's folder, so that who compares many twins reads none of their meshes."""
+"""The shape descriptor that lies in a twin's folder, so that who compares many twins reads none of their meshes.
+
+What reads meshes is imported for twins alone that have no such file.
+"""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import trimesh
 
 from manitwin.errors import AssetError, TwinError
 from manitwin.formats.json_file import json_number, json_vector, read_json_object
 from manitwin.geometry.shape_descriptor import QUANTILES, ShapeDescriptor, shape_descriptor
-from manitwin.twin.mesh_files import read_visual
 from manitwin.twin.store import REMEDY, canonical_json
+
+if TYPE_CHECKING:
+    import trimesh
 
 SHAPE = "shape.json"
 MAX_SHAPE_BYTES = 16_384
@@ -22,6 +27,10 @@ _SEED = 0  # every data set describes shapes alike
 
 def surface(path: Path) -> trimesh.Trimesh:
     """Return all parts of a twin's ``visual.glb`` as one mesh without texture, in the object frame; raises TwinError."""
+    import trimesh
+
+    from manitwin.twin.mesh_files import read_visual
+
     parts = read_visual(path)
     if not parts:
         raise TwinError(f"{path}: has no mesh in it; {REMEDY}")
