@@ -102,7 +102,8 @@ def rehearse() -> None:
     from rehearsal_recipe import RehearsalRecipe
 
     root = DatasetRoot(FOLDER / "data")
-    recipe = RehearsalRecipe(log=FOLDER / "started")  # which a worker writes as it begins a stage
+    # a worker writes the log as it begins a stage, and no item ends
+    recipe = RehearsalRecipe(log=FOLDER / "started", files={})
     items = [Item(file=None, text=f"{n} sleep:a:600") for n in range(4)]
     with WatchedRun("items", root.url) as watched:
         drive(recipe, items, root, RunConfig(cpu=2), configuration={}, on_start=watched.start)

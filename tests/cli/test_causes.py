@@ -14,8 +14,8 @@ from manitwin.engine.ledger.progress import Unaccepted
 from manitwin.errors import InputError
 from manitwin.formats.meshes.read import read_mesh
 from manitwin.models.fakes.meshes import draco_glb
-from manitwin.pipeline.gate import TRULY_LARGE
 from manitwin.pipeline.guesses import OF_ANYTHING, SIZE_UNSAID
+from manitwin.pipeline.size_remarks import TRULY_LARGE
 from manitwin.twin.record import REJECTION_REASONS
 
 

@@ -92,3 +92,13 @@ def test_h_asks_for_help_too(words: list[str]) -> None:
     asked = [CliRunner().invoke(app, [*words[:-1], option]) for option in ("-h", "--help")]
     assert [done.exit_code for done in asked] == [0, 0] and asked[0].output == asked[1].output
     assert "Usage:" in asked[0].output
+
+
+def test_what_knows_names_alone_loads_no_library_of_meshes() -> None:
+    """A catalogue's status, and why items of a run were rejected."""
+    program = (
+        "import sys, manitwin.dataset.collect.status, manitwin.pipeline.guesses, manitwin.pipeline.size_remarks\n"
+        "print({'trimesh', 'networkx'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"

@@ -14,7 +14,7 @@ from manitwin.pipeline.assembly import NAME_HINT, _rejection, name_would_help
 from manitwin.pipeline.guesses import OF_ANYTHING, SIZE_UNSAID, unsaid_size_words
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.recipe import ending_of
-from manitwin.pipeline.suspicious_size import CHECK_SCALE
+from manitwin.pipeline.size_remarks import CHECK_SCALE
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.record import REJECTION_REASONS, TwinRecord
 from manitwin.twin.store import RECORD, parse_record

@@ -158,9 +158,8 @@ def _cause(first: Unaccepted, count: int) -> Cause:
 
 def _of_size(message: str) -> str | None:
     """Return the remedy of a rejection that a size decided which is usual, unlikely, or no hand's; None where it is sound."""
-    from manitwin.pipeline.gate import TRULY_LARGE
     from manitwin.pipeline.guesses import OF_ANYTHING, SIZE_UNSAID
-    from manitwin.pipeline.suspicious_size import CHECK_SCALE
+    from manitwin.pipeline.size_remarks import CHECK_SCALE, TRULY_LARGE
 
     if TRULY_LARGE in message:
         return AS_SCENERY

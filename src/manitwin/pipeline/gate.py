@@ -19,10 +19,9 @@ from manitwin.models.annotators.protocol import Annotator, QualityVerdict
 from manitwin.models.annotators.words import article
 from manitwin.pipeline.links import read_articulation
 from manitwin.pipeline.object_state import cut_out_photos, load_solid, object_name, read_subject
+from manitwin.pipeline.size_remarks import TRULY_LARGE
 from manitwin.twin.record_values import Check
 
-TRULY_LARGE = "is that large, and no gripper here holds it"
-"""Of what is too large for a twin and has the size of such things; remedies go by it."""
 _LITTLE_LARGER = 1.25
 """Times the largest such things: what is that little larger is a large one, and no unit explains it."""
 

@@ -8,9 +8,7 @@ from manitwin.engine.stage import Draft
 from manitwin.models.annotators.prior_names import found_by, word_for
 from manitwin.models.annotators.priors import unknown_prior
 from manitwin.pipeline.object_state import object_name
-
-CHECK_SCALE = "check its unit and scale first"
-"""What such a rejection's detail says; remedies go by it."""
+from manitwin.pipeline.size_remarks import CHECK_SCALE
 
 FACTORS = {
     1000.0: "metres taken for millimetres", 100.0: "metres taken for centimetres", 10.0: "centimetres taken for millimetres",

@@ -7,24 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Literal
 
 import numpy as np
 
+from manitwin.geometry.parts.feature_names import Feature
 from manitwin.geometry.parts.outermost import beam, bow, crest, outlet
 from manitwin.geometry.parts.scores import near as _near
 from manitwin.geometry.parts.scores import share_of_height as _share_of_height
 from manitwin.geometry.parts.shape import LEAST_HANDLE_REACH, Shape, SurfacePoints
 from manitwin.geometry.parts.striking_face import handle_direction, handle_line, striking_face
 from manitwin.geometry.parts.uneven import case, lens, spine, strap, teeth
-
-Feature = Literal[
-    "opening", "rim", "inside", "handle", "handle_end", "head", "face", "tip", "edge", "middle", "neck", "spout",
-    "top", "base", "side", "center", "front", "back", "end", "ring", "mouth", "bristles", "muzzle", "grip", "housing",
-    "apex", "arch_end", "end_wall", "toe", "stem", "nozzle", "crest", "teeth", "spine", "case", "strap", "lens",
-    "bow", "beam",
-]  # fmt: skip
-"""A place on an object that geometry can point out."""
 
 
 def feature_scores(feature: Feature, shape: Shape, points: SurfacePoints) -> np.ndarray | None:

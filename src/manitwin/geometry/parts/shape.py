@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 import trimesh
@@ -12,6 +11,7 @@ import trimesh
 from manitwin.geometry.boxes import mirror_axis, oriented_bounding_box
 from manitwin.geometry.cavity import Opening, find_opening
 from manitwin.geometry.parts.arch import Arch, find_arch
+from manitwin.geometry.parts.feature_names import HeadEnd
 from manitwin.geometry.parts.hooked_end import straight_is_last
 from manitwin.geometry.parts.outline import SLICES
 from manitwin.geometry.parts.pistol import Pistol, find_pistol
@@ -21,11 +21,6 @@ from manitwin.geometry.parts.stem import Stem, find_stem
 from manitwin.geometry.poses import transform
 from manitwin.geometry.ray_caster import local_thickness
 from manitwin.geometry.sampling import sample_surface
-
-HeadEnd = Literal["wide", "narrow", "thin", "thick", "short", "straight", "heavy", "up"]
-"""What tells the working end: its width, its thickness, being the shorter section (a cap; the wider end where no border shows),
-being away from an end that is bent to a hook (an umbrella; the wider end where none is), the side of the centre of mass, or
-being the upper one."""
 
 _SLICES = 32
 _DIRECTIONS = 12

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from manitwin.geometry.parts.features import Feature
+from manitwin.geometry.parts.feature_names import Feature
 from manitwin.models.annotators.prior_records import Prior
 
 _FEATURES: dict[str, tuple[Feature, ...]] = {

@@ -11,7 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from manitwin.geometry.parts.features import Feature, feature_scores
+from manitwin.geometry.parts.feature_names import Feature
+from manitwin.geometry.parts.features import feature_scores
 from manitwin.geometry.parts.membership import Membership
 from manitwin.geometry.parts.part_rules import membership
 from manitwin.geometry.parts.shape import Shape, SurfacePoints, measure_shape, surface_points

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from manitwin.geometry.parts.features import Feature
+from manitwin.geometry.parts.feature_names import Feature, HeadEnd
 from manitwin.geometry.parts.membership import PartRole, PartRule
-from manitwin.geometry.parts.shape import HeadEnd, Shape
 from manitwin.twin.point_records import GraspType
 from manitwin.twin.record_values import Estimate, Finite, Record
+
+if TYPE_CHECKING:
+    from manitwin.geometry.parts.shape import Shape
 
 HEAVIEST_CONTENTS_KG_M3 = 2000.0
 """Closed packages hold no more: sugar, sand and shampoo in a jar are below."""

@@ -5,18 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
-import trimesh
 
 from manitwin.config import Resource
-from manitwin.models.annotators.photo_light import PhotoLight
 from manitwin.render.cameras import Camera
 from manitwin.twin.import_record import ImportRecord
 from manitwin.twin.point_records import FunctionalPoint, GraspPoint
 from manitwin.twin.record import Language
 from manitwin.twin.record_values import Estimate
+
+if TYPE_CHECKING:
+    import trimesh
+
+    from manitwin.models.annotators.photo_light import PhotoLight
 
 
 @dataclass(frozen=True)
