@@ -5,7 +5,8 @@
 Photos are rendered (``template_photos``) at three elevations of the camera over plain and patterned ground, and go through the
 stages of a build from matting to true size, one process. OUT gets photos, meshes (GLB) and ``results.csv``. Seeds from 0 are
 for tuning; ``--held-out`` takes those from 1200. ``--nameless`` gives no name. ``--truth-matte`` gives the true outline, to see
-the shape by itself. ``shape_agreement`` says how meshes are compared. ``--docs`` writes docs/photo_benchmark.md from OUT.
+the shape by itself. ``shape_agreement`` says how meshes are compared. ``--docs``, beside the options that OUT was built with,
+builds nothing and writes docs/photo_benchmark.md from it.
 """
 
 from __future__ import annotations
@@ -268,10 +269,20 @@ def main() -> None:
         print(table(families(results), by), end="\n\n")
     print(*(f"{count:4d} {reason}" for reason, count in summary_reasons(results)), sep="\n")
     if options.docs:
-        words = " --nameless" if any(not r.named for r in results) else ""
-        things = len({(r.category, r.seed) for r in results})
-        command = f"python benchmarks/photo_generation.py OUT --held-out{words} --docs"
-        PAGE.write_text(page(results, f"`{command}` from {len(results)} photos of {things} things"))
+        kinds, things = len({r.category for r in results}), len({(r.category, r.seed) for r in results})
+        of = f"{len(results)} photos of {things} things of {kinds} kinds"
+        PAGE.write_text(page(results, f"`{command_of(options)}` and the same with `--docs` from {of}"))
+
+
+def command_of(options: argparse.Namespace) -> str:
+    """Return the command that builds what ``options`` say, into a folder OUT."""
+    words = ["python benchmarks/photo_generation.py OUT"]
+    if options.categories:
+        words.append(f"--categories {options.categories}")
+    elif options.every != DEFAULT_EVERY:
+        words.append(f"--every {options.every}")
+    words += [f"--seeds {options.seeds}"] * (options.seeds != 1) + ["--held-out"] * options.held_out
+    return " ".join(words + ["--nameless"] * options.nameless + ["--truth-matte"] * options.truth_matte)
 
 
 def run(options: argparse.Namespace) -> list[Result]:

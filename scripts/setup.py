@@ -1,6 +1,6 @@
 """Set up everything in ``.venv``: the locked packages, this package, the system's libraries that they want, a Vulkan driver.
 
-Runs on the system's Python alone (3.11+), on Debian 12 or Ubuntu 24.04. The second run takes a second: a stamp in the
+Runs on the system's Python alone (3.11+), on Debian 12 and 13 and Ubuntu 24.04. The second run takes a second: a stamp in the
 environment holds the digest of the lock and of ``pyproject.toml``. What needs root is installed when it may be, else the one
 command to run is said.
 """
