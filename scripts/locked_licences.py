@@ -67,6 +67,7 @@ READ = {
     "alabaster": ("BSD-3-Clause", "LICENSE.rst"),
     "antlr4-python3-runtime": ("BSD-3-Clause", "antlr4/Parser.py"),
     "assimp-py": ("BSD-3-Clause", "licenses/src/assimp/LICENSE"),  # the bindings are under MIT (licenses/LICENSE)
+    "assimp-py==1.2.0": ("BSD-3-Clause", "licenses/licenses/assimp-LICENSE"),
     "cascadio": ("MIT", "METADATA"),  # its own; OpenCASCADE in it is under LGPL 2.1 with an exception
     "cmeel-qhull": ("Qhull", "licenses/qhull/COPYING.txt"),
     "comm": ("BSD-3-Clause", "licenses/LICENSE"),
@@ -109,7 +110,7 @@ READ = {
     "transforms3d": ("BSD-3-Clause", "LICENSE"),
     "webencodings": ("BSD-3-Clause", "licenses/LICENSE"),
 }
-"""Licences read by a person, each with the file of the wheel that states it.
+"""Licences read by a person, each with the file of the wheel that states it; of a version, where its file is another.
 
 ``LicenseRef-BSD``: the classifier says BSD, and the wheel has no text that says of how many clauses.
 That of pycocotools is called FreeBSD, which is the one of two. ``LicenseRef-matplotlib``:
@@ -121,12 +122,13 @@ ELSEWHERE = {
     "appnope": "BSD-2-Clause",
     "colorama": "BSD-3-Clause",
     "httpx2-jsfetch": "BSD-3-Clause",
+    "pybullet": "Zlib",
     "pywin32": "PSF-2.0",
     "tzdata": "Apache-2.0",
 }
-"""Packages that are locked for other systems (macOS, Windows, browsers), by their wheels at PyPI.
+"""Packages that are locked for other systems (macOS, Windows, browsers) or some Pythons, by their wheels at PyPI.
 
-The set-up does not install them on Linux, and where another tool did, the answer is the same.
+The set-up does not install them everywhere, and where it did, or another tool, the answer is the same.
 """
 
 CARRIED = {
@@ -207,16 +209,16 @@ def licences(lock: str) -> Iterator[Licence]:
     """Yield the licence of each locked package."""
     for name, version in locked(lock):
         if name in ELSEWHERE:
-            yield Licence(name, version, ELSEWHERE[name], "PyPI; not of this system")
+            yield Licence(name, version, ELSEWHERE[name], "PyPI; not of every system")
             continue
         try:
             package = distribution(name)
         except PackageNotFoundError:
             yield Licence(name, version, None, "not installed")
             continue
-        if name in READ:
-            expression, source = READ[name]
-            yield Licence(name, version, expression, source)
+        read = READ.get(f"{name}=={version}") or READ.get(name)
+        if read is not None:
+            yield Licence(name, version, *read)
         else:
             yield Licence(name, version, stated(package), "METADATA")
 

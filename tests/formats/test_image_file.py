@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import struct
 import zlib
 from pathlib import Path
@@ -79,12 +80,14 @@ def test_chosen_frame_of_an_animation_is_read_and_said(shared_data: Path) -> Non
 
 def tiff_of(path: Path, *pictures: tuple[Image.Image, int]) -> Path:
     """A TIFF of several pictures, each with its NewSubfileType."""
-    with TiffImagePlugin.AppendingTiffWriter(str(path), True) as stream:
+    written = io.BytesIO()  # a file of its own the writer closes twice
+    with TiffImagePlugin.AppendingTiffWriter(written, True) as stream:
         for picture, kind in pictures:
             tags = TiffImagePlugin.ImageFileDirectory_v2()
             tags[254] = kind
             picture.save(stream, format="TIFF", tiffinfo=tags)
             stream.newFrame()
+        path.write_bytes(written.getvalue())
     return path
 
 

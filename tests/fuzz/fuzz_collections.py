@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -95,7 +96,7 @@ def reviewed(folder: Path) -> None:
         store.add([review], ["one"])
         store.put_draft("bo", second, {"answers": {"mesh": "yes"}})
         store._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-    with sqlite3.connect(reviews_path(root)) as closed:
+    with closing(sqlite3.connect(reviews_path(root))) as closed:
         closed.execute("PRAGMA journal_mode = DELETE")
 
 

@@ -51,7 +51,8 @@ def words(name: str, file: str) -> str:
     """The text of a file of an installed wheel, or of its metadata folder, in lower case with single spaces."""
     package = distribution(name)
     for path in package.files or []:
-        if str(path) == file or str(path).endswith(f".dist-info/{file}"):
+        # newer builds of a wheel have its licences in a folder of theirs
+        if str(path) == file or str(path).endswith((f".dist-info/{file}", f".dist-info/licenses/{file}")):
             return " ".join(Path(str(package.locate_file(path))).read_text(errors="replace").lower().split())
     pytest.fail(f"{name} has no file {file}")
 
@@ -71,7 +72,11 @@ SIGNS = {
 
 
 def test_licences_that_a_person_read_stand_in_the_files_named(script: ModuleType) -> None:
-    for name, (expression, file) in script.READ.items():
+    for package, (expression, file) in script.READ.items():
+        name, _, version = package.partition("==")
+        installed = distribution(name).version
+        if installed != version and (version or f"{name}=={installed}" in script.READ):
+            continue
         text = words(name, file)
         for licence in re.split(r" AND | OR ", expression):
             assert re.search(SIGNS[licence], text), (name, licence)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +51,7 @@ def inputs(tmp_path: Path) -> Path:
 
 
 def states(catalogue: Path) -> dict[str, tuple[str, int | None]]:
-    with sqlite3.connect(catalogue) as connection:
+    with closing(sqlite3.connect(catalogue)) as connection:
         found = connection.execute("SELECT place, status, duplicate_of FROM inputs").fetchall()
     return {Path(place).name[0]: (status, of) for place, status, of in found}
 
@@ -99,9 +100,9 @@ def test_shapes_are_alike_in_any_turn_and_size_and_others_are_not() -> None:
 
 def test_a_catalogue_of_before_looks_is_brought_on(inputs: Path, tmp_path: Path) -> None:
     catalogue = tmp_path / "old.db"
-    with sqlite3.connect(catalogue) as connection:
+    with closing(sqlite3.connect(catalogue)) as connection:
         connection.executescript(f"{MIGRATIONS[0]} PRAGMA application_id = {APPLICATION}; PRAGMA user_version = 1;")
     add(catalogue, inputs, MINE)
-    with sqlite3.connect(catalogue) as connection:
+    with closing(sqlite3.connect(catalogue)) as connection:
         assert connection.execute("PRAGMA user_version").fetchone() == (len(MIGRATIONS),)
         assert connection.execute("SELECT count(*) FROM looks").fetchone() == (0,)

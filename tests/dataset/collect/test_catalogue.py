@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -31,7 +32,7 @@ def photos(tmp_path: Path) -> Path:
 
 
 def rows(catalogue: Path, columns: str = "*") -> list[tuple[object, ...]]:
-    with sqlite3.connect(catalogue) as connection:
+    with closing(sqlite3.connect(catalogue)) as connection:
         return connection.execute(f"SELECT {columns} FROM inputs ORDER BY number").fetchall()
 
 
@@ -167,7 +168,7 @@ def test_a_catalogue_with_a_schema_of_its_own_is_refused_before_it_is_asked(
 ) -> None:
     path = tmp_path / "c.db"
     add(path, photos, MINE)
-    with sqlite3.connect(path) as changed:
+    with closing(sqlite3.connect(path)) as changed:
         changed.executescript(own.replace("$NAME", "refused"))
     with pytest.raises(UsageError, match="not those of a catalogue"):
         catalogue_status(path)
@@ -181,7 +182,7 @@ def test_what_is_no_catalogue_is_refused_and_left_as_it_is(kind: str, photos: Pa
     elif kind == "pipe":
         os.mkfifo(path)
     else:
-        with sqlite3.connect(path) as connection:
+        with closing(sqlite3.connect(path)) as connection:
             connection.execute("CREATE TABLE inputs (place)")
     before = path.read_bytes() if path.is_file() else None
     for use in (lambda: add(path, photos, MINE), lambda: catalogue_status(path)):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +45,7 @@ def packed(folder: Path, told: Any, name: str = "000-023.json.gz") -> Path:
 
 
 def rows(catalogue: Path, columns: str) -> list[tuple[object, ...]]:
-    with sqlite3.connect(catalogue) as connection:
+    with closing(sqlite3.connect(catalogue)) as connection:
         return connection.execute(f"SELECT {columns} FROM inputs ORDER BY number").fetchall()
 
 

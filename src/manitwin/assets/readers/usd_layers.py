@@ -298,6 +298,7 @@ def _told_of_no_layer(file: Path) -> str | None:
 def _resolved(path: Path) -> Path | None:
     """Return a path without links; None for a loop of links, or a name that no file system can hold."""
     try:
-        return path.resolve()
+        file = path.resolve()
+        return None if file.is_symlink() else file  # from Python 3.13 on a loop is left as it is
     except (OSError, ValueError, RuntimeError):
         return None
