@@ -1,6 +1,6 @@
 """Make photo_sheet.png beside this file: made photos of known things, and what was built of each, from the front and the side.
 
-    python benchmarks/photo_generation.py OUT --held-out
+    python benchmarks/photo_generation.py OUT --every 7 --seeds 5 --held-out
     python docs/make_photo_sheet.py OUT
 
 One photo a thing, the first that was accepted. A frame says how much of the true volume the shape shares (IoU): red below 0.6.
