@@ -10,6 +10,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from imported_modules import imported_of
 from manitwin.cli.main import app
 from manitwin.cli.quick_start import only_asked_for
 
@@ -96,9 +97,5 @@ def test_h_asks_for_help_too(words: list[str]) -> None:
 
 def test_what_knows_names_alone_loads_no_library_of_meshes() -> None:
     """A catalogue's status, and why items of a run were rejected."""
-    program = (
-        "import sys, manitwin.dataset.collect.status, manitwin.pipeline.guesses, manitwin.pipeline.size_remarks\n"
-        "print({'trimesh', 'networkx'} & set(sys.modules))"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "set()"
+    modules = "manitwin.dataset.collect.status", "manitwin.pipeline.guesses", "manitwin.pipeline.size_remarks"
+    assert imported_of({"trimesh", "networkx"}, *modules) == set()

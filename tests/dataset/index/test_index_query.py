@@ -1,11 +1,10 @@
-import subprocess
-import sys
 from pathlib import Path
 
 import fsspec
 import pyarrow as pa
 import pytest
 
+from imported_modules import imported_of
 from manitwin.dataset.index.parts import compact, rows_of_twins, write_part
 from manitwin.dataset.index.query import Index
 from manitwin.dataset.index.tables import TABLES
@@ -219,9 +218,4 @@ def test_index_behind_a_url_is_read_and_locked_too(root: DatasetRoot, index: Ind
 
 
 def test_query_imports_neither_meshes_nor_simulation() -> None:
-    code = (
-        "import sys, manitwin.dataset.index.query;"
-        "print([m for m in ('trimesh', 'scipy', 'sapien', 'cv2') if m in sys.modules])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    assert imported_of({"trimesh", "scipy", "sapien", "cv2"}, "manitwin.dataset.index.query") == set()

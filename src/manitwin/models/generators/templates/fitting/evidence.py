@@ -48,9 +48,9 @@ class Evidence:
     center_px: tuple[float, float]
     box_px: float
 
-    def of_perforated(self) -> Evidence:
-        """Return what the photo says of a thing whose small holes are not compared."""
-        return replace(self, mask=self.filled_mask, outline=self.filled_outline)
+    def compared_with(self, *, perforated: bool) -> Evidence:
+        """Return what a drawn solid is compared with: without small holes where it is perforated, as its own are left out."""
+        return replace(self, mask=self.filled_mask, outline=self.filled_outline) if perforated else self
 
 
 def evidence_of(rgba: np.ndarray, focal_mm: float | None = None) -> Evidence:

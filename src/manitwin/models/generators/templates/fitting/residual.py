@@ -57,8 +57,8 @@ def outline_difference(solid: CoarseSolid, view: View, evidence: Evidence) -> np
     """Return the differences of signed distances ``(N,)`` to both outlines, of whose squares the fit makes the least."""
     flat, _ = view.project(solid.vertices)
     drawn = silhouette(to_pixels(flat, FINE * SIDE_PX, BOX_SHARE), solid.faces, solid.edges, FINE * SIDE_PX)
-    seen = evidence.filled_outline if solid.perforated else evidence.outline
-    return np.asarray((signed_distance(drawn) - seen).ravel())
+    seen = evidence.compared_with(perforated=solid.perforated)
+    return np.asarray((signed_distance(drawn) - seen.outline).ravel())
 
 
 def iou(mask: np.ndarray, evidence: Evidence) -> float:
@@ -69,8 +69,7 @@ def iou(mask: np.ndarray, evidence: Evidence) -> float:
 
 def residual(solid: CoarseSolid, view: View, evidence: Evidence) -> Residual:
     """Compare a solid seen from a view with a photo."""
-    if solid.perforated:
-        evidence = evidence.of_perforated()
+    evidence = evidence.compared_with(perforated=solid.perforated)
     flat, distance = view.project(solid.vertices)
     pixels = to_pixels(flat, FINE * SIDE_PX, BOX_SHARE)
     face = seen_faces(pixels, distance, solid.faces, FINE * SIDE_PX)[::FINE, ::FINE]

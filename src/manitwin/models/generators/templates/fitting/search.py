@@ -139,6 +139,7 @@ def is_round(solid: CoarseSolid) -> bool:
 
 def grid(solid: CoarseSolid, evidence: Evidence, turns: bool) -> list[tuple[View, bool]]:
     """Return views of a solid by how well its outline agrees with the photo's, the best first, whether upright beside each."""
+    evidence = evidence.compared_with(perforated=solid.perforated)
     lean = principal_angle(evidence.mask)
     scored: list[tuple[float, View, bool]] = []
     perspective = float(np.clip(evidence.perspective / 1.6, LEAST_PERSPECTIVE, MOST_PERSPECTIVE))

@@ -157,7 +157,8 @@ def _boxed(solid: CoarseSolid, view: View) -> View:
 
 def _iou(solid: CoarseSolid, view: View, evidence: Evidence) -> float:
     flat, _ = view.project(solid.vertices)
-    return iou(silhouette(to_pixels(flat, SIDE_PX, BOX_SHARE), solid.faces, solid.edges, SIDE_PX), evidence)
+    drawn = silhouette(to_pixels(flat, SIDE_PX, BOX_SHARE), solid.faces, solid.edges, SIDE_PX)
+    return iou(drawn, evidence.compared_with(perforated=solid.perforated))
 
 
 def _is_told(family: Family, fit: Fitted, evidence: Evidence) -> bool:
