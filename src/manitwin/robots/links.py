@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
 import trimesh
 from lxml import etree  # type: ignore[import-untyped]
-from scipy.spatial.transform import Rotation
 
 from manitwin.formats.xml_file import read_xml
 from manitwin.geometry.poses import inverse, rotation_between, transform, transform_points
@@ -62,6 +62,11 @@ class Link:
     moments_kg_m2: np.ndarray
     principal_axes: np.ndarray
     shapes: tuple[LinkShape, ...]
+
+    @cached_property
+    def link_to_joint(self) -> np.ndarray:
+        """The link's own frame in the joint's, ``(4, 4)``."""
+        return np.linalg.inv(self.joint_to_link)
 
 
 def links_of(tree: UrdfTree, find_mesh: Callable[[str], Path]) -> tuple[Link, ...]:
@@ -161,10 +166,11 @@ def link_poses(links: tuple[Link, ...], joints: dict[str, float]) -> np.ndarray:
         value = joints.get(link.joint, 0.0)
         if link.joint_type == "prismatic":
             moved[0, 3] = value
-        elif link.joint_type != "fixed":
-            moved[:3, :3] = Rotation.from_rotvec([value, 0, 0]).as_matrix()
-        # rotation axis X of the joint's frame, which the link carries along
-        link_to_parent = link.joint_to_parent @ moved @ np.linalg.inv(link.joint_to_link)
+        elif link.joint_type != "fixed":  # about X of the joint's frame, which the link carries along
+            moved[1, 1] = moved[2, 2] = math.cos(value)
+            moved[2, 1] = math.sin(value)
+            moved[1, 2] = -moved[2, 1]
+        link_to_parent = link.joint_to_parent @ moved @ link.link_to_joint
         poses[index] = link_to_parent if link.parent < 0 else poses[link.parent] @ link_to_parent
     return poses
 
