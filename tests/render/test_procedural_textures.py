@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from manitwin.errors import UsageError
-from manitwin.render.procedural_textures import periodic_noise, procedural_texture
+from manitwin.render.procedural_textures import (
+    TexturedBox,
+    periodic_noise,
+    procedural_texture,
+    textured_box,
+    textured_boxes,
+)
 
 MATERIALS = ("cloth", "marble", "metal", "wood")
 
@@ -61,3 +67,20 @@ def test_noise_has_mean_zero_and_deviation_one() -> None:
 def test_unknown_material_names_the_nearest() -> None:
     with pytest.raises(UsageError, match="did you mean 'wood'"):
         procedural_texture("wodd", 0)
+
+
+def test_boxes_of_one_texture_are_as_each_alone_where_it_stands() -> None:
+    wood = procedural_texture("wood", 0, size_px=64)
+    boxes = [
+        TexturedBox(np.array([0.3, 0.2, 0.02]), offset_m=(0.1, 0.2)),
+        TexturedBox(np.array([0.02, 0.02, 0.3]), center_m=(0.2, -0.1, -0.32), offset_m=(-0.3, 0.4)),
+    ]
+    whole = textured_boxes(boxes, wood)
+    assert len(whole.vertices) == 48 and len(whole.faces) == 24
+    for number, box in enumerate(boxes):
+        alone = textured_box(box.half_extents_m, wood, offset_m=box.offset_m)
+        vertices = slice(24 * number, 24 * number + 24)
+        assert np.allclose(whole.vertices[vertices], alone.vertices + box.center_m)
+        assert np.allclose(whole.visual.uv[vertices], alone.visual.uv)
+        assert np.allclose(whole.vertex_normals[vertices], alone.vertex_normals)
+        assert np.array_equal(whole.faces[(whole.faces // 24 == number).all(1)] - 24 * number, alone.faces)

@@ -5,7 +5,7 @@ All noise is made in the frequency domain, so a texture continues across its edg
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -196,6 +196,15 @@ _FACES = (
 )
 
 
+@dataclass(frozen=True)
+class TexturedBox:
+    """A box of half extents ``(3,)`` about ``center_m (3,)``, with the texture shifted by ``offset_m``."""
+
+    half_extents_m: np.ndarray
+    center_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    offset_m: tuple[float, float] = (0.0, 0.0)
+
+
 def textured_box(
     half_extents_m: np.ndarray, texture: ProceduralTexture, *, offset_m: tuple[float, float] = (0.0, 0.0)
 ) -> trimesh.Trimesh:
@@ -203,16 +212,21 @@ def textured_box(
 
     ``offset_m`` shifts the texture, so that boards of one wood differ.
     """
-    half = np.asarray(half_extents_m, float)
-    grain = int(half.argmax())
+    return textured_boxes([TexturedBox(np.asarray(half_extents_m, float), offset_m=offset_m)], texture)
+
+
+def textured_boxes(boxes: Sequence[TexturedBox], texture: ProceduralTexture) -> trimesh.Trimesh:
+    """Return boxes of one texture as one visual part: each part has a texture of its own that is uploaded."""
     vertices, uv, normals = [], [], []
-    for corners, right, up in _FACES:
-        points = np.array(corners) * half
-        axes = (right, up) if right == grain or up != grain else (up, right)
-        vertices.append(points)
-        uv.append((points[:, axes] + offset_m) / texture.size_m)
-        normals.append(np.cross(points[1] - points[0], points[3] - points[0]))
-    quads = np.arange(24).reshape(6, 4)
+    for box in boxes:
+        grain = int(box.half_extents_m.argmax())
+        for corners, right, up in _FACES:
+            points = np.array(corners) * box.half_extents_m
+            axes = (right, up) if right == grain or up != grain else (up, right)
+            vertices.append(points + box.center_m)
+            uv.append((points[:, axes] + box.offset_m) / texture.size_m)
+            normals.append(np.cross(points[1] - points[0], points[3] - points[0]))
+    quads = np.arange(4 * len(vertices)).reshape(-1, 4)
     faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     normal = np.repeat(np.array(normals) / np.linalg.norm(normals, axis=1)[:, None], 4, axis=0)
     # glTF 2.0, section 3.9.2: roughness is green, metallic is blue

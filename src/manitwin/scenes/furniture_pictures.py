@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterable
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
-import trimesh
 
-from manitwin.formats.meshes.textures import bake_transform
 from manitwin.geometry.poses import transform
-from manitwin.render.procedural_textures import ProceduralTexture, procedural_texture, textured_box
+from manitwin.render.drawable import Drawable, drawable
+from manitwin.render.procedural_textures import TexturedBox, procedural_texture, textured_boxes
 from manitwin.render.scene_lighting import DirectionalLight, Lighting
 from manitwin.render.scene_renderer import SceneRenderer, Surroundings
 from manitwin.scenes.scene import Furniture, Light, SurfaceBox
@@ -21,6 +21,8 @@ TEXTURE_VARIANTS = 8
 
 
 LEGGED, LEG_HALF_M = "table", 0.03
+BOXES_KEPT = 8
+"""Ready to be drawn, some 10 MB each: most episodes stand on one of so many tables."""
 
 
 def add_furniture(renderer: SceneRenderer, furniture: Furniture, *, seed: int) -> None:
@@ -30,27 +32,34 @@ def add_furniture(renderer: SceneRenderer, furniture: Furniture, *, seed: int) -
     an unknown material.
     """
     for box in furniture.boxes:
-        texture = procedural_texture(box.material, seed % TEXTURE_VARIANTS)
-        code = zlib.crc32(box.name.encode())
-        offset_m = (code % 997 / 997, code // 997 % 991 / 991)
-        parts = [textured_box(np.array(box.half_extents_m), texture, offset_m=offset_m)]
-        if box.name == LEGGED:
-            parts += _legs(box, texture)
-        renderer.add(box.name, parts, transform(translation=np.array(box.center_m)))
+        pose = transform(translation=np.array(box.center_m))
+        renderer.add(box.name, _box_drawable(box, seed % TEXTURE_VARIANTS), pose)
 
 
-def _legs(table: SurfaceBox, texture: ProceduralTexture) -> list[trimesh.Trimesh]:
+@lru_cache(maxsize=BOXES_KEPT)
+def _box_drawable(box: SurfaceBox, variant: int) -> Drawable:
+    code = zlib.crc32(box.name.encode())
+    offset_m = (code % 997 / 997, code // 997 % 991 / 991)
+    boxes = [TexturedBox(np.array(box.half_extents_m), offset_m=offset_m)]
+    if box.name == LEGGED:
+        boxes += _legs(box)
+    return drawable([textured_boxes(boxes, procedural_texture(box.material, variant))])
+
+
+def _legs(table: SurfaceBox) -> list[TexturedBox]:
     """Return four legs down to the room's floor, in the table's frame: they are of its looks only."""
     x, y, z = table.half_extents_m
     half_m = np.array([LEG_HALF_M, LEG_HALF_M, (table.center_m[2] - z - Surroundings().floor_z_m) / 2])
     if half_m[2] <= 0:
         return []
-    legs = []
-    for side_x, side_y in product((-1, 1), repeat=2):
-        leg = textured_box(half_m, texture, offset_m=(side_x * 0.3, side_y * 0.4))
-        corner = np.array([side_x * (x - 2 * LEG_HALF_M), side_y * (y - 2 * LEG_HALF_M), -z - half_m[2]])
-        legs.append(bake_transform(leg, transform(translation=corner)))
-    return legs
+    return [
+        TexturedBox(
+            half_m,
+            center_m=(side_x * (x - 2 * LEG_HALF_M), side_y * (y - 2 * LEG_HALF_M), -z - half_m[2]),
+            offset_m=(side_x * 0.3, side_y * 0.4),
+        )
+        for side_x, side_y in product((-1, 1), repeat=2)
+    ]
 
 
 def lighting_of(ambient: tuple[float, float, float], lights: Iterable[Light]) -> Lighting:
