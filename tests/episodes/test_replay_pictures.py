@@ -16,10 +16,11 @@ from manitwin.episodes.cameras import named_cameras
 from manitwin.episodes.recording import Recording
 from manitwin.episodes.replay_pictures import (
     FINE_PX,
-    MOST_OF_OBJECTS_M,
+    MOST_OF_FINGERS_M,
     EpisodeReplay,
     link_poses,
-    tolerance_of,
+    link_tolerance_m,
+    object_tolerance_m,
 )
 from manitwin.episodes.robot_looks import link_drawables, link_visuals
 from manitwin.errors import UsageError
@@ -199,7 +200,7 @@ def test_links_for_small_pictures_have_fewer_triangles_and_look_alike() -> None:
     faces = [
         sum(
             len(each.faces)
-            for link in link_drawables(panda.urdf, tolerance_of(px), MOST_OF_OBJECTS_M).values()
+            for link in link_drawables(panda.urdf, link_tolerance_m(px), MOST_OF_FINGERS_M).values()
             for each in link.surfaces
         )
         for px in (FINE_PX, SIZE)
@@ -208,5 +209,8 @@ def test_links_for_small_pictures_have_fewer_triangles_and_look_alike() -> None:
 
 
 def test_tolerance_grows_with_the_pixels_up_to_a_limit() -> None:
-    assert [tolerance_of(px) for px in (1280, FINE_PX, 256)] == pytest.approx([0.0008, 0.0008, 0.002])
-    assert tolerance_of(64) == tolerance_of(16) == 0.004
+    assert [link_tolerance_m(px) for px in (2048, FINE_PX, 256)] == pytest.approx([0.0008, 0.0024, 0.006])
+    assert link_tolerance_m(64) == link_tolerance_m(16) == 0.012
+    assert [object_tolerance_m(px) for px in (1280, FINE_PX, 256)] == pytest.approx([0.0008, 0.0008, 0.002])
+    assert object_tolerance_m(64) == object_tolerance_m(16) == 0.0024
+    assert object_tolerance_m(64, MOST_OF_FINGERS_M) == MOST_OF_FINGERS_M

@@ -83,7 +83,7 @@ class EpisodeFilmsStage:
     """Draw the kept episodes of a batch: one film a camera, all episodes in it, frame t of an episode showing state t."""
 
     name = "films"
-    version = "7"
+    version = "8"
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = (FILMS, "first_frames", "cameras")
     needs: Resource = "cpu"

@@ -100,7 +100,8 @@ class SceneRenderer:
         self._casters: dict[str, Any] = {}
         self._cameras: dict[tuple[str, int, int, int], tuple[Any, Any]] = {}
         backdrop = np.zeros(3) if surroundings is None else np.array(surroundings.backdrop, np.float32)
-        self._backdrop_seen = np.rint((1 - np.arange(256, dtype=np.float32) / 255)[:, None] * backdrop).astype(np.uint8)
+        seen = (1 - np.arange(256, dtype=np.float32) / 255)[:, None] * backdrop
+        self._backdrop_seen = np.rint(seen).astype(np.uint8)[:, None]  # (256, 1, 3), by opacity
         self._add_lights(lighting, shadows)
         self._floor_to_add = surroundings
         _open_renderers.add(self)
@@ -179,11 +180,10 @@ class SceneRenderer:
 
     def _rgb(self, component: Any, camera: Camera) -> np.ndarray:
         picture = component.get_picture("Color")[: camera.height_px, : camera.width_px]  # the rest of it is not drawn
-        opacity = picture[..., 3]
-        rgb = cv2.cvtColor(picture, cv2.COLOR_RGBA2RGB)
+        opacity, rgb = cv2.extractChannel(picture, 3), cv2.cvtColor(picture, cv2.COLOR_RGBA2RGB)
         if opacity.min() == 255:
             return np.asarray(rgb)
-        return np.asarray(cv2.add(rgb, cv2.LUT(cv2.merge([opacity] * 3), self._backdrop_seen[None])))
+        return np.asarray(cv2.add(rgb, cv2.applyColorMap(opacity, self._backdrop_seen)))
 
     def _geometry(self, component: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         normals, entity = component.get_picture("WorldNormal"), component.get_picture("Segmentation")[..., 0]
