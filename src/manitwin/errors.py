@@ -7,6 +7,7 @@
     ├── Rejected              an answer, not an accident: kept with its reason               exit 3
     ├── InputChanged          an input that was changed or deleted while it was worked on       exit 4
     ├── TwinError             a finished twin folder that cannot be read or written
+    │   └── NewerVersion      one that a newer version of this package has written
     ├── AssetError            an asset of another tool that cannot be read
     ├── ExportError           a twin that cannot be written in a format
     ├── EpisodesError         recorded episodes that cannot be read or written
@@ -25,7 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, TypeGuard
 
 _SHOWN_CHARACTERS = 100
 _MOST_CHARACTERS = 3000
@@ -53,6 +54,10 @@ class ConfigError(UsageError):
 
 class TwinError(ManiTwinError):
     """A finished twin folder that is incomplete, altered or of an unknown schema."""
+
+
+class NewerVersion(TwinError):
+    """A finished folder that a newer version of this package has written: nothing is wrong with it, and it is left as it is."""
 
 
 class AssetError(ManiTwinError):
@@ -128,6 +133,16 @@ class BadReply(BackendError):
 
 class RendererMissing(Unavailable):
     """No Vulkan device that SAPIEN can render with."""
+
+
+def of_newer_schema(place: object, version: int, newest: int) -> str:
+    """Return the one line about a file of a schema that only a newer version of this package knows."""
+    return f"{place}: of schema {version}, this version reads up to {newest}; use the version that wrote it, or a newer one"
+
+
+def is_newer(version: object, newest: int) -> TypeGuard[int]:
+    """Tell whether what a file says of its schema is a later version than the newest that is known here."""
+    return type(version) is int and version > newest
 
 
 def encodable(text: str) -> str:

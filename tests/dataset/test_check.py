@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import sqlite3
@@ -23,7 +24,8 @@ from manitwin.engine.ledger.soundness import LedgerDamaged
 from manitwin.errors import UsageError
 from manitwin.pipeline.item import Item
 from manitwin.twin.dataset_root import DatasetRoot
-from manitwin.twin.store import canonical_json, read_record
+from manitwin.twin.migration import SCHEMA_VERSION
+from manitwin.twin.store import RECORD, canonical_json, read_record, revision_of
 from manitwin.twin.wholeness import note_sizes
 from rehearsal_recipe import RehearsalRecipe
 from twin_folders import write_accepted
@@ -279,3 +281,29 @@ def test_folder_that_leads_out_is_not_written(place: Path, tmp_path: Path, name:
     (place / name).symlink_to(tmp_path / "elsewhere")
     with pytest.raises(UsageError, match="a link out of"):
         built(place)
+
+
+def made_newer(folder: Path) -> bytes:
+    """Make of a twin's record one of the next schema, as a newer version would have left it; returns its bytes."""
+    said = json.loads((folder / RECORD).read_text()) | {"schema_version": SCHEMA_VERSION + 1, "weather": "fine"}
+    said["revision"] = revision_of(said)
+    (folder / RECORD).write_text(canonical_json(said))
+    note_sizes(folder)
+    return (folder / RECORD).read_bytes()
+
+
+def test_a_twin_of_a_newer_version_is_named_and_left_as_it_is(place: Path) -> None:
+    record = made_newer(twins(place)[0])
+    (said,) = [line for line in found(place, repair=True) if "twin.json" in line]
+    assert f"of schema {SCHEMA_VERSION + 1}" in said and "use the version that wrote it" in said
+    assert (twins(place)[0] / RECORD).read_bytes() == record
+
+
+def test_a_build_under_another_recipe_stops_at_a_twin_of_a_newer_version(place: Path) -> None:
+    record = made_newer(twins(place)[0])
+    recipe = replace(RehearsalRecipe(size=10, versions=(("a", "2"),)), tables=IndexTables())
+    items = [Item(file=None, text=text) for text in TEXTS]
+    report = drive(recipe, items, DatasetRoot(place), RunConfig(patience_s=0), configuration={}, executor="inline")
+    assert report.exit_code == 4 and report.stopped is not None
+    assert report.stopped.startswith("twins/") and f"twin.json: of schema {SCHEMA_VERSION + 1}" in report.stopped
+    assert (twins(place)[0] / RECORD).read_bytes() == record

@@ -12,7 +12,7 @@ from manitwin.engine.folder_recipe import FolderRecipe, FolderRecord
 from manitwin.engine.recipe import Ending
 from manitwin.engine.stage import Draft
 from manitwin.engine.task import Payload
-from manitwin.errors import ManiTwinError, Rejected
+from manitwin.errors import ManiTwinError, NewerVersion, Rejected
 
 
 @dataclass(frozen=True)
@@ -84,3 +84,9 @@ def test_a_rejection_is_an_error_where_a_recipe_knows_none(tmp_path: Path) -> No
     with pytest.raises(ManiTwinError, match=r"word id: .*cannot be rejected"):
         Words().finish(Draft("id", Word("mug"), 0), "word", {}, Rejected("poor_quality", "so"), "spell", tmp_path / "a")
     assert not (tmp_path / "a").exists()
+
+
+def test_a_record_of_a_newer_version_is_not_taken_for_one_to_be_made_again() -> None:
+    with pytest.raises(NewerVersion, match=r"word.json: of schema 2, this version reads up to 1"):
+        Words().ending_of(b'{"schema_version": 2, "letters": 3, "sounds": 2}')
+    assert Words().ending_of(b'{"schema_version": 1, "sounds": 2}') is None

@@ -17,7 +17,7 @@ from manitwin.episodes.cameras import named_cameras
 from manitwin.episodes.collect import batch_folders, collect, stored_episodes
 from manitwin.episodes.episode_pictures import draw_episodes, write_with_pictures
 from manitwin.episodes.episodes_run import make_episodes
-from manitwin.episodes.episodes_stage import EPISODES
+from manitwin.episodes.episodes_stage import EPISODES, EpisodesStage
 from manitwin.episodes.lerobot.read import read_lerobot
 from manitwin.episodes.planning.problem import Phase
 from manitwin.episodes.settings import PicturesConfig, TrajectoriesConfig
@@ -221,3 +221,44 @@ def test_batches_that_repeat_an_episode_are_refused(episodes: Path, tmp_path: Pa
     shutil.copytree(folder, folder.parent / f"{folder.name[:2]}{'0' * 14}")
     with pytest.raises(EpisodesError, match=r"repeats episode 00000000 of .*make the episodes again in a new folder"):
         collect(tmp_path / "copy", ["lerobot"])
+
+
+@pytest.mark.parametrize("count", [3, 4])
+def test_episodes_that_another_version_made_stay_and_the_run_says_so(
+    count: int, bricks: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as earlier:
+        earlier.setattr(EpisodesStage, "version", "of an earlier version")
+        make_episodes(bricks, tmp_path, 3, CONFIG, executor="inline")
+    before = {folder.name: (folder / "batch.json").read_bytes() for folder in batch_folders(tmp_path)}
+    opened: list[int] = []
+    report = make_episodes(
+        bricks, tmp_path, count, CONFIG, executor="inline", on_start=lambda items, todo: opened.append(todo)
+    )
+    assert opened == [count - 3] and report.exit_code == 0
+    after = {folder.name: (folder / "batch.json").read_bytes() for folder in batch_folders(tmp_path)}
+    assert {name: after[name] for name in before} == before
+    assert any("were made by another version" in said and "new folder" in said for said in report.remarks)
+    assert f"3 of {count} episodes were there already" in report.remarks
+
+
+def test_a_batch_of_a_newer_version_is_refused(episodes: Path, tmp_path: Path) -> None:
+    shutil.copytree(episodes, tmp_path / "newer")
+    record = batch_folders(tmp_path / "newer")[0] / "batch.json"
+    record.write_text(json.dumps({**json.loads(record.read_text()), "schema_version": 2, "weather": "fine"}))
+    with pytest.raises(
+        EpisodesError, match=r"batch\.json: of schema 2, this version reads up to 1; use the version that"
+    ):
+        collect(tmp_path / "newer", [])
+
+
+def test_episodes_of_a_version_that_recorded_less_are_refused_before_more_are_made(
+    bricks: Path, episodes: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "earlier"
+    shutil.copytree(episodes, out)
+    for table in out.glob(f"batches/*/*/{ATTEMPTS}"):
+        pq.write_table(pq.read_table(table).drop_columns(["goal"]), table)
+    with pytest.raises(EpisodesError, match="has no column goal; make the episodes again in a new folder"):
+        make_episodes(bricks, out, 8, CONFIG, executor="inline")
+    assert len(list(out.glob("batches/*/*/batch.json"))) == len(batch_folders(episodes))

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 from rejected_records import rejected_record
 
-from manitwin.errors import TwinError
+from manitwin.errors import NewerVersion, TwinError
 from manitwin.twin.migration import SCHEMA_VERSION, migrated
 from manitwin.twin.point_records import FunctionalPoint, Points
 from manitwin.twin.store import RECORD, amend, canonical_json, parse_record, read_record, revision_of, seal
@@ -66,3 +66,13 @@ def test_frame_that_is_no_rotation_is_refused() -> None:
     for wrong in ({"quaternion_wxyz": [1, 1, 0, 0]}, {"size_m": 0}, {"kind": "lid"}, {"source": ""}):
         with pytest.raises(ValueError):
             FunctionalPoint(**POINT, frame=frame | {"source": "geometry"} | wrong)
+
+
+def test_a_record_of_a_newer_version_is_told_as_that_and_not_as_damage(of_version_1: Path) -> None:
+    said = json.loads((of_version_1 / RECORD).read_text()) | {"schema_version": SCHEMA_VERSION + 1, "weather": "fine"}
+    said["revision"] = revision_of(said)
+    (of_version_1 / RECORD).write_text(canonical_json(said))
+    with pytest.raises(
+        NewerVersion, match=f"twin.json: of schema {SCHEMA_VERSION + 1}, .* up to {SCHEMA_VERSION}; use the version"
+    ):
+        read_record(of_version_1, verify=True)

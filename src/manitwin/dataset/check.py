@@ -10,7 +10,7 @@ from functools import partial
 from manitwin.engine.ledger.ledger import Ledger
 from manitwin.engine.machine_share import available_cores
 from manitwin.engine.stage_runner import RESULT, is_whole
-from manitwin.errors import TwinError, UsageError
+from manitwin.errors import NewerVersion, TwinError, UsageError
 from manitwin.formats.printable import printable_line
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.record import TwinRecord
@@ -68,6 +68,9 @@ def _ended_without_folder(ledger: Ledger, root: DatasetRoot, digests: bool) -> I
             record = _read(root, twin_id)
         except FileNotFoundError:
             wrong: str | None = f"{state} in the ledger, and there is no folder"
+        except NewerVersion as error:
+            yield Disagreement(f"{called}: {error}", None)
+            continue
         except TwinError as error:
             wrong = str(error)
         else:

@@ -89,7 +89,8 @@ def drive(
 ) -> RunReport:
     """Add tasks to the ledger below a root and make of each what the recipe says, until all that are open have ended.
 
-    Items that ended under another recipe are made again: those that are given, or all where none is.
+    Items that ended under another recipe are made again where the recipe replaces them: those that are given, or all where none
+    is. What is made again for that, and what stays, is remarked.
     ``configuration`` is left beside the ledger. What was remarked while they were read is in ``remarks``,
     and how many were there already is added to it. Raises UsageError for wrong arguments, or where another run is at work there.
     """
@@ -110,7 +111,8 @@ def drive(
         remarks += heal(ledger, root, recipe, given)
         root.write_bytes(CONFIG, canonical_json(configuration).encode())
         setup = WorkerSetup(root.url, recipe, cache_folder(root), settings.keep_work, settings.memory_gb)
-        items, opened = ledger.totals(recipe.sha256, given)
+        remarks += _of_others(ledger, recipe, given)
+        items, opened = ledger.totals(recipe.sha256, given, replaces=recipe.replaces)
         with _executor(executor, address, setup, settings, opened, remarks) as engine:
             driver = Driver(
                 ledger, engine, recipe, settings, on_ended=ended, on_stage=on_stage, sweep=partial(sweep, root),
@@ -142,6 +144,22 @@ def _opened_with(payloads: Iterable[Payload], recipe: Recipe, path: Path) -> tup
             with suppress(OSError):  # not empty: another run has begun there
                 path.parent.rmdir()
         raise
+
+
+def _of_others(ledger: Ledger, recipe: Recipe, given: list[int]) -> list[str]:
+    """Return remarks about items that ended under another recipe: how many are made again, how many stay as they were made."""
+    others = len(ledger.ended_under_others(recipe.sha256))
+    if not recipe.replaces:
+        said = "were made by another version of manitwin, and stay as they are; in a new folder all are made alike"
+        return [f"{others} that are there {said}"] if others else []
+    again = len(ledger.ended_under_others(recipe.sha256, given))
+    made = "made by another version of manitwin or with other settings"
+    remarks = [f"{again} were {made}: {recipe.made_again}"] if again else []
+    if others > again:
+        remarks.append(
+            f"{others - again} that are not given were {made}, and stay as they are; a build without inputs looks at all of them"
+        )
+    return remarks
 
 
 def _executor(

@@ -82,7 +82,7 @@ class Driver:
 
     def run(self) -> RunResult:
         """Work until every open item has ended, waits for a service that was given up, or something stops the run."""
-        run = self.ledger.begin_run(self.recipe.sha256, self._given)
+        run = self.ledger.begin_run(self.recipe.sha256, self._given, replaces=self.recipe.replaces)
         RUN.info("run %d begins: recipe %s, seed %d", run, self.recipe.sha256[:16], self.recipe.seed)
         how = "interrupted"
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from abc import ABC, abstractmethod
 from pathlib import Path
@@ -13,7 +14,7 @@ from manitwin.engine.recipe import Ending, Tables
 from manitwin.engine.stage import Draft
 from manitwin.engine.stage_runner import StageCost
 from manitwin.engine.task import Payload
-from manitwin.errors import ManiTwinError, Rejected
+from manitwin.errors import ManiTwinError, NewerVersion, Rejected, is_newer, of_newer_schema
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import canonical_json, sha256_of_json, write_bytes_atomically
 
@@ -39,7 +40,10 @@ class FolderRecipe(ABC, Generic[RecordT]):
     payload: ClassVar[type[Payload]]
     record: ClassVar[str]
     record_type: ClassVar[type[BaseModel]]
+    record_schema: ClassVar[int] = 1
     can_reject: ClassVar[bool] = True
+    replaces: ClassVar[bool] = True
+    made_again: ClassVar[str] = "what would be another result now is made again"
     tables: Tables | None = None
 
     @property
@@ -58,7 +62,10 @@ class FolderRecipe(ABC, Generic[RecordT]):
         """Write the files and the record into the empty folder ``fresh``; ``stage`` is the last one that ran."""
 
     def parse(self, record: bytes) -> RecordT:
-        """Read a record; raises ValueError or ManiTwinError where it cannot be read."""
+        """Read a record; raises ValueError or ManiTwinError where it cannot be read, of a newer version NewerVersion."""
+        said = json.loads(record)
+        if isinstance(said, dict) and is_newer(said.get("schema_version"), self.record_schema):
+            raise NewerVersion(of_newer_schema(self.record, said["schema_version"], self.record_schema))
         return self.record_type.model_validate_json(record)  # type: ignore[return-value]
 
     def is_current(self, record: RecordT) -> bool:
@@ -88,9 +95,14 @@ class FolderRecipe(ABC, Generic[RecordT]):
         return None
 
     def ending_of(self, record: bytes, amended_sha256: str | None = None) -> Ending | None:
-        """Return how a finished folder ended; None where it cannot be read, or this recipe or amendment makes another one."""
+        """Return how a finished folder ended; None where it cannot be read, or this recipe or amendment makes another one.
+
+        Raises NewerVersion for one that a newer version of this package has written: it is not to be replaced by an older one.
+        """
         try:
             read = self.parse(record)
+        except NewerVersion:
+            raise
         except (ValueError, ManiTwinError):
             return None
         current = self.is_current(read) and self.amended_sha256(read) == amended_sha256

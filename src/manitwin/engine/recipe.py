@@ -94,6 +94,16 @@ class Recipe(Protocol):
         """Whether an item may end as rejected; else what cannot be made of it is a failure."""
         ...
 
+    @property
+    def replaces(self) -> bool:
+        """Whether what ended under another recipe is made again; else it stays as it is, and only what is missing is made."""
+        ...
+
+    @property
+    def made_again(self) -> str:
+        """What becomes of items that are made again as they ended under another recipe, in words for a person."""
+        ...
+
     def folder_of(self, item_id: str) -> str:
         """Return the name of an item's finished folder below the data set's root."""
         ...

@@ -35,6 +35,7 @@ from manitwin.errors import (
     BackendError,
     InputChanged,
     ManiTwinError,
+    NewerVersion,
     RateLimited,
     Rejected,
     TwinError,
@@ -78,6 +79,8 @@ class Worker:
             return Failure("unsupported", _line(error))
         except InputChanged as error:
             return Failure("changed", " ".join(str(error).split()))
+        except NewerVersion as error:  # of no other folder either should an older one take the place: the run stops
+            return Failure("denied", " ".join(str(error).split()))
         except BackendError as error:
             return Failure("error", _line(error))
         except OSError as error:
@@ -130,6 +133,8 @@ class Worker:
         try:
             amended = amendments_sha256(self._draft_amendments(item_id))
             return recipe.ending_of(self.root.read_bytes(name), amended) if self.root.exists(name) else None
+        except NewerVersion as error:
+            raise NewerVersion(f"{recipe.folder_of(item_id)}/{error}") from error
         except TwinError:  # no file that is read: what is made takes its place
             return None
 

@@ -30,6 +30,7 @@ NEVER_EXECUTED = ("unsettled", "reached_already", "no_grasp", "no_plan", "no_roo
 EXECUTION_FAILURES = ("misplaced", "toppled", "goal_missed", "dropped", "not_lifted", "replan_failed")
 
 ATTEMPTS = "attempts.parquet"
+REMEDY = "make the episodes again in a new folder; those of an earlier version are read by the version that made them"
 _TEXT, _REAL, _COUNT, _FLAG = pa.string(), pa.float64(), pa.int32(), pa.bool_()
 
 SCHEMA = pa.schema(
@@ -118,9 +119,7 @@ def attempt_from(said: dict[str, Any]) -> Attempt:
     try:
         return Attempt(**{**said, "instructions": tuple(said["instructions"])})
     except (TypeError, KeyError) as error:
-        raise EpisodesError(
-            f"an attempt with other fields than this version's ({error}); run the episodes again"
-        ) from error
+        raise EpisodesError(f"an attempt with other fields than this version's ({error}); {REMEDY}") from error
 
 
 def attempts_table(attempts: Iterable[Attempt]) -> pa.Table:
@@ -148,7 +147,7 @@ def read_attempts(path: Path) -> Iterator[Attempt]:
 
 def read_tables(path: Path) -> Iterator[pa.Table]:
     """Yield the rows of a file, a row group at a time, with the columns of ``SCHEMA`` first."""
-    with open_parquet(path, EpisodesError, schema=SCHEMA, remedy="run the episodes again", inside=path.parent) as file:
+    with open_parquet(path, EpisodesError, schema=SCHEMA, remedy=REMEDY, inside=path.parent) as file:
         for group in range(file.row_groups):
             yield file.read(SCHEMA.names, row_group=group)
 

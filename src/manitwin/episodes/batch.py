@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from manitwin.engine.folder_recipe import FolderRecord
 from manitwin.engine.task import Payload
-from manitwin.errors import EpisodesError, UsageError
+from manitwin.errors import EpisodesError, UsageError, is_newer, of_newer_schema
 from manitwin.formats.json_file import read_json_object
 from manitwin.twin.store import sha256_of_json
 
@@ -152,8 +152,11 @@ _REMEDY = "run manitwin trajectories again"
 def read_batch(folder: Path) -> BatchRecord:
     """Read the record of a finished batch; raises EpisodesError where it cannot be read."""
     path = folder / BATCH_RECORD
+    said = read_json_object(path, EpisodesError, inside=folder, name=str(path), remedy=_REMEDY)
+    if is_newer(said.get("schema_version"), BATCH_SCHEMA_VERSION):
+        raise EpisodesError(of_newer_schema(path, said["schema_version"], BATCH_SCHEMA_VERSION))
     try:
-        return BatchRecord(**read_json_object(path, EpisodesError, inside=folder, name=str(path), remedy=_REMEDY))
+        return BatchRecord(**said)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"])) or "the whole"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from manitwin.episodes.attempts import ATTEMPTS, Success, merge_attempts, read_attempts, success_of
-from manitwin.episodes.batch import BATCH_RECORD, BATCHES, REMEDY_OF_REPEATS
+from manitwin.episodes.batch import BATCH_RECORD, BATCHES, REMEDY_OF_REPEATS, read_batch
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import EpisodeFile, has_granules
 from manitwin.episodes.hdf5_merge import merge_episodes
@@ -52,13 +52,15 @@ def chosen_formats(given: Iterable[str]) -> list[str]:
 def batch_folders(out: Path) -> list[Path]:
     """Return the finished batches of a run, by the numbers of their episodes.
 
-    Raises UsageError where there are none, EpisodesError where two have an episode of the same number: both drew with one seed.
+    Raises UsageError where there are none, EpisodesError for one that cannot be read or is of a newer version, and where two have
+    an episode of the same number: both drew with one seed.
     """
     folders = [path.parent for path in sorted((out / BATCHES).glob(f"*/*/{BATCH_RECORD}"))]
     if not folders:
         raise UsageError(f"{out}: no episodes there; `manitwin trajectories` makes some")
     of, first = dict[str, Path](), dict[Path, str]()
     for folder in folders:
+        read_batch(folder)
         for attempt in read_attempts(folder / ATTEMPTS):
             number = attempt.episode_id.rpartition("-")[2]
             other = of.setdefault(number, folder)

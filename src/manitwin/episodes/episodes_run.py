@@ -53,6 +53,7 @@ class EpisodesRecipe(FolderRecipe[BatchRecord]):
     record = BATCH_RECORD
     record_type = BatchRecord
     can_reject = False
+    replaces = False
 
     config: TrajectoriesConfig
     dataset: str
@@ -207,7 +208,8 @@ def make_episodes(
     ``count`` is how many there are at the end; where there are as many already, none is made.
     Raises UsageError for a place without twins or scenes, twins of which none has a grasp for the robot's hand, settings that
     tasks or scenes answer themselves, an unknown robot or skill, an ``out`` that has episodes of scenes where twins are given or
-    the other way, or made with other settings, or where another run is at work there.
+    the other way, or made with other settings, or where another run is at work there; EpisodesError for an ``out`` whose
+    episodes an earlier version made that recorded less of them.
     """
     if not 1 <= count <= LARGEST_COUNT:
         raise UsageError(f"{count:.6g} episodes; ask for 1 or more, at most {LARGEST_COUNT}")
@@ -226,6 +228,7 @@ def make_episodes(
         configuration["tasks"] = source.tasks
     check_settings(root, configuration, free=DECIDE_NO_EPISODE, made="batches of episodes")
     there = _batches_there(root)
+    _check_collectable(Path(out), there)
     try:
         if source.tasks is not None:
             ids = [task.task_id for task in tasks]
@@ -284,6 +287,17 @@ def _batches_there(root: DatasetRoot) -> list[Batch]:
     with read_ledger(path) as ledger:
         rows = ledger.execute("SELECT item FROM items WHERE state <> 'duplicate' ORDER BY number")
         return [_batch(text, path) for (text,) in rows]
+
+
+def _check_collectable(out: Path, there: Sequence[Batch]) -> None:
+    """Raise EpisodesError where the first batch that was made is of a version whose attempts this one cannot collect.
+
+    Batches that were made before would else be found to be so after those that are missing were made.
+    """
+    tables = (out / batch_name(batch.batch_id) / ATTEMPTS for batch in there)
+    first = next((path for path in tables if path.is_file()), None)
+    if first is not None:
+        next(read_attempts(first), None)
 
 
 def _batch(text: str, ledger: Path) -> Batch:

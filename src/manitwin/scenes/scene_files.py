@@ -7,11 +7,12 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from manitwin.errors import UsageError
+from manitwin.errors import UsageError, is_newer, of_newer_schema
 from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.json_file import MAX_JSON_BYTES, parse_json_object, read_json_object
 from manitwin.formats.printable import printable_line
 from manitwin.scenes.scene import SCENE, SCENE_SCHEMA_VERSION, SceneRecord
+from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import canonical_json, write_bytes_atomically
 
 SCENES = "scenes"
@@ -43,6 +44,8 @@ def parse_scene(content: bytes, path: str | Path = SCENE) -> SceneRecord:
     """Read the content of a scene file; raises UsageError naming ``path``, the cause and the remedy."""
     data = parse_json_object(content, str(path), UsageError, remedy="sample the layout again")
     version = data.get("schema_version")
+    if is_newer(version, SCENE_SCHEMA_VERSION):
+        raise UsageError(of_newer_schema(path, version, SCENE_SCHEMA_VERSION))
     if version != SCENE_SCHEMA_VERSION:
         version = printable_line(str(version), max_characters=40)
         raise UsageError(
@@ -60,6 +63,26 @@ def scene_name(scene_id: str) -> str:
     """Return a scene's folder below the root: a thousand scenes share one."""
     number = scene_id.rpartition("_")[2]
     return f"{SCENES}/{int(number) // 1000:04d}/{scene_id}"
+
+
+def scene_there(root: DatasetRoot, scene_id: str) -> bytes | None:
+    """Return the scene file of a run's scene; None where there is none that can be read.
+
+    Raises UsageError for one that a newer version of this package has written: it is not to be replaced.
+    """
+    name = f"{scene_name(scene_id)}/{SCENE}"
+    try:
+        content = root.read_bytes(name, UsageError, limit_bytes=MAX_JSON_BYTES)
+        said = parse_json_object(content, name, UsageError)
+    except (FileNotFoundError, UsageError):
+        return None
+    if is_newer(version := said.get("schema_version"), SCENE_SCHEMA_VERSION):
+        raise UsageError(of_newer_schema(root.full(name), version, SCENE_SCHEMA_VERSION))
+    try:
+        parse_scene(content, name)
+    except UsageError:
+        return None
+    return content
 
 
 def dataset_of(scene: Path) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from manitwin.errors import TwinError, UsageError
+from manitwin.errors import NewerVersion, TwinError, UsageError, is_newer, of_newer_schema
 from manitwin.formats.bounded_file import open_regular, read_bytes
 from manitwin.formats.json_file import MAX_JSON_BYTES, parse_json_object, read_json_object
 from manitwin.formats.printable import printable, printable_line
@@ -229,8 +229,13 @@ def parse_record(content: bytes, path: str | Path = RECORD, *, sealed: bool = Fa
 
 
 def in_present_version(said: dict[str, Any], path: str | Path) -> dict[str, Any]:
-    """Return the content of a twin.json in the present schema version; raises TwinError naming ``path`` for one not known."""
+    """Return the content of a twin.json in the present schema version; raises TwinError naming ``path`` for one not known.
+
+    One of a newer version of this package raises NewerVersion.
+    """
     data = migrated(said)
+    if is_newer(data.get("schema_version"), SCHEMA_VERSION):
+        raise NewerVersion(of_newer_schema(path, data["schema_version"], SCHEMA_VERSION))
     if data.get("schema_version") != SCHEMA_VERSION:
         version = printable_line(str(data.get("schema_version")), max_characters=_SHOWN_CHARACTERS)
         raise TwinError(f"{path}: schema version {version}, this package reads 1 to {SCHEMA_VERSION}; {REMEDY}")

@@ -62,6 +62,8 @@ def test_a_ledger_of_a_newer_version_is_refused(tmp_path: Path) -> None:
     connection.close()
     with pytest.raises(UsageError, match="use the version that wrote it"):
         Ledger(path)
+    with pytest.raises(UsageError, match="use the version that wrote it"), read_ledger(path):
+        pass  # not as a damaged one, which `manitwin check` would put aside
 
 
 def test_items_are_added_once(ledger: Ledger) -> None:

@@ -106,7 +106,7 @@ def test_the_same_seed_gives_the_same_bytes_and_an_ended_run_is_left(
 @pytest.mark.parametrize(
     ("change", "cause"),
     [
-        ({"schema_version": 9}, "task version 9"),
+        ({"schema_version": 9}, "of schema 9"),
         ({"kind": "in"}, "that of its goal"),
         ({"surprise": 1}, "surprise"),
         ({"steps": []}, "steps"),

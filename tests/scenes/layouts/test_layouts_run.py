@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import mujoco
@@ -10,13 +11,16 @@ from typer.testing import CliRunner
 
 import manitwin
 from manitwin.cli.main import app
+from manitwin.config import RunConfig
+from manitwin.engine.ledger.reading import read_ledger
 from manitwin.errors import UsageError
 from manitwin.pipeline.settings import stored_config
+from manitwin.scenes.layouts.layouts_recipe import LayoutStage
 from manitwin.scenes.layouts.layouts_run import layout_totals, make_layouts
 from manitwin.scenes.scene_files import scene_ids, scene_name
 from manitwin.scenes.settings import LayoutsConfig, LayoutSettings
 from manitwin.twin.dataset_root import DatasetRoot
-from scene_twins import write_things
+from scene_twins import THINGS, write_things
 
 CONFIG = LayoutsConfig(seed=4, layout=LayoutSettings(objects=(2, 4)))
 
@@ -67,3 +71,43 @@ def test_scenes_are_exported_like_twins(tmp_path: Path) -> None:
     assert any((tmp_path / "out" / "layout_4_000000" / "usd").iterdir())
     refused = CliRunner().invoke(app, ["export", str(tmp_path / "made"), "-o", str(tmp_path / "out"), "--to", "urdf"])
     assert isinstance(refused.exception, UsageError) and "Valid: mjcf, sdf, usd" in str(refused.exception)
+
+
+def scenes_of(out: Path) -> dict[str, bytes]:
+    return {path.parent.name: path.read_bytes() for path in out.glob("scenes/*/*/scene.json")}
+
+
+def test_scenes_that_another_version_made_stay_as_they_are_and_the_run_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_things(tmp_path / "twins")
+    write_things(tmp_path / "built_anew", THINGS[:3])
+    out, config = tmp_path / "made", CONFIG.model_copy(update={"run": RunConfig(keep_work=False)})
+    with monkeypatch.context() as earlier:
+        earlier.setattr(LayoutStage, "version", "of an earlier version")
+        make_layouts(tmp_path / "twins", out, 2, config, executor="inline")
+    before = scenes_of(out)
+    opened: list[int] = []
+    report = make_layouts(
+        tmp_path / "built_anew", out, 3, config, executor="inline", on_start=lambda items, todo: opened.append(todo)
+    )
+    assert opened == [3] and report.exit_code == 0
+    after = scenes_of(out)
+    assert len(after) == 3 and {name: after[name] for name in before} == before
+    (said,) = [line for line in report.remarks if "another version" in line]
+    assert said.startswith("2 were made by another version") and "scenes stay as they are" in said
+
+
+def test_a_scene_of_a_newer_version_is_refused_and_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_things(tmp_path / "twins_here")
+    out, config = tmp_path / "made", CONFIG.model_copy(update={"run": RunConfig(keep_work=False, attempts=1)})
+    make_layouts(tmp_path / "twins_here", out, 1, config, executor="inline")
+    (scene,) = out.glob("scenes/*/*/scene.json")
+    scene.write_text(json.dumps({**json.loads(scene.read_text()), "schema_version": 2, "weather": "fine"}))
+    before = scenes_of(out)
+    monkeypatch.setattr(LayoutStage, "version", "another")
+    assert make_layouts(tmp_path / "twins_here", out, 1, config, executor="inline").exit_code == 4
+    with read_ledger(out / "ledger.sqlite") as ledger:
+        (detail,) = ledger.execute("SELECT detail FROM items").fetchone()
+    assert "scene.json: of schema 2, this version reads up to 1; use the version that wrote it" in detail
+    assert scenes_of(out) == before

@@ -9,7 +9,7 @@ import typer
 
 from manitwin.cli import choices, options
 from manitwin.cli.causes import causes_of, print_causes
-from manitwin.cli.console import out_console, print_error
+from manitwin.cli.console import err_console, out_console, print_error
 from manitwin.cli.documents import Json, print_document
 
 if TYPE_CHECKING:
@@ -70,6 +70,8 @@ def layout(
         require_renderer()
     with WatchedRun("layouts", out) as watched:
         report = make_layouts(dataset, out, count, config=settings, **options.placed(run), **watched.callbacks)
+    for remark in report.remarks:
+        err_console.print(remark)
     totals = layout_totals(out)
     if settings.layout.upright and (lying := without_upright(dataset)):
         out_console.print(f"twins that have no upright placement and lie as they rest: {len(lying)}")

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from manitwin.dataset.collect.facts import BANDS, GROUPS, UNKNOWN
 from manitwin.dataset.collect.schema import APPLICATION, MIGRATIONS, migrate
-from manitwin.errors import UsageError
+from manitwin.errors import UsageError, of_newer_schema
 from manitwin.formats.bounded_file import open_regular
 from manitwin.formats.sqlite_store import BUSY_S, damaged, errors_named, flaw_in, transaction
 
@@ -98,9 +98,7 @@ class Catalogue:
         if application != APPLICATION:
             raise UsageError(f"{self.path}: is no catalogue; give one that `manitwin collect add` made, or a new name")
         if version > len(MIGRATIONS):
-            raise UsageError(
-                f"{self.path}: of schema {version}, this version reads up to {len(MIGRATIONS)}; use the version that wrote it"
-            )
+            raise UsageError(of_newer_schema(self.path, version, len(MIGRATIONS)))
         migrate(self._connection, version)
         if (flaw := flaw_in(self._connection, migrate, tables_of="a catalogue")) is not None:
             raise damaged(self.path, flaw, _DAMAGED)

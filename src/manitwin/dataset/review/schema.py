@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 
-from manitwin.errors import UsageError
+from manitwin.errors import UsageError, of_newer_schema
 
 MIGRATIONS = (
     """
@@ -53,8 +53,6 @@ def migrate(connection: sqlite3.Connection, path: str) -> None:
     """Bring a store to the newest schema; raises UsageError for one of a newer version of this package."""
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if version > len(MIGRATIONS):
-        raise UsageError(
-            f"{path}: of schema {version}, this version reads up to {len(MIGRATIONS)}; use the version that wrote it"
-        )
+        raise UsageError(of_newer_schema(path, version, len(MIGRATIONS)))
     for number, script in enumerate(MIGRATIONS[version:], version + 1):
         connection.executescript(f"BEGIN IMMEDIATE; {script}; PRAGMA user_version = {number}; COMMIT;")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 
-from manitwin.errors import UsageError
+from manitwin.errors import UsageError, is_newer, of_newer_schema
 
 MIGRATIONS = (
     """
@@ -51,12 +51,16 @@ MIGRATIONS = (
 )
 
 
+def schema_of(connection: sqlite3.Connection, path: str) -> int:
+    """Return how many steps a ledger has taken; raises UsageError for one of a newer version of this package."""
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    if is_newer(version, len(MIGRATIONS)):
+        raise UsageError(of_newer_schema(path, version, len(MIGRATIONS)))
+    return int(version)
+
+
 def migrate(connection: sqlite3.Connection, path: str) -> None:
     """Bring a ledger to the newest schema; raises UsageError for one of a newer version of this package."""
-    (version,) = connection.execute("PRAGMA user_version").fetchone()
-    if version > len(MIGRATIONS):
-        raise UsageError(
-            f"{path}: of schema {version}, this version reads up to {len(MIGRATIONS)}; use the version that wrote it"
-        )
+    version = schema_of(connection, path)
     for number, script in enumerate(MIGRATIONS[version:], version + 1):
         connection.executescript(f"BEGIN; {script}; PRAGMA user_version = {number}; COMMIT;")

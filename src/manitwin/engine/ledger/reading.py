@@ -9,13 +9,15 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from manitwin.engine.ledger.lock import is_written
+from manitwin.engine.ledger.migrations import schema_of
 from manitwin.engine.ledger.soundness import check_whole, require_regular, sound
 from manitwin.errors import UsageError
 
 
 @contextmanager
 def read_ledger(path: Path) -> Iterator[sqlite3.Connection]:
-    """Open a ledger for reading, also while a run writes it; raises UsageError where there is none, or a damaged one.
+    """Open a ledger for reading, also while a run writes it; raises UsageError where there is none, a damaged one, or one of
+    a newer version of this package.
 
     Nothing is left beside one that no run writes: SQLite's reader of a write-ahead log makes files there and does not remove
     them, so where that log holds nothing it is told to leave it alone (https://sqlite.org/uri.html, ``immutable``). What
@@ -31,6 +33,9 @@ def read_ledger(path: Path) -> Iterator[sqlite3.Connection]:
     try:
         with sound(path):
             connection.execute("PRAGMA trusted_schema = OFF")
+            schema_of(
+                connection, str(path)
+            )  # first: tables of a newer one are no damage, and nothing is to be put aside
             check_whole(connection, path)
             yield connection
     finally:

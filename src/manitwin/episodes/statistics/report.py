@@ -20,7 +20,7 @@ from manitwin.dataset.statistics.page import (
 )
 from manitwin.dataset.statistics.query import Column, ReportTables, Result, Row
 from manitwin.dataset.statistics.style import Figure, drawing
-from manitwin.episodes.attempts import ATTEMPTS, SCHEMA
+from manitwin.episodes.attempts import ATTEMPTS, REMEDY, SCHEMA
 from manitwin.episodes.statistics import figures as drawn
 from manitwin.episodes.statistics import queries as q
 from manitwin.episodes.statistics.joint_ranges import joint_ranges
@@ -165,7 +165,7 @@ class EpisodeReport:
         ]
 
 
-_REMEDY = "run manitwin trajectories again"
+_REMEDY = f"run manitwin trajectories again, or {REMEDY}"
 
 
 def episode_statistics(folder: Path) -> EpisodeReport:

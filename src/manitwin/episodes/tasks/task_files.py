@@ -9,7 +9,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from manitwin.episodes.tasks.task_record import TASK_SCHEMA_VERSION, TaskRecord
-from manitwin.errors import UsageError
+from manitwin.errors import UsageError, is_newer, of_newer_schema
 from manitwin.formats.bounded_file import decode_text, read_bytes
 from manitwin.formats.json_file import parse_json_object
 from manitwin.formats.printable import printable_line
@@ -52,6 +52,8 @@ def read_tasks(place: str | Path) -> list[TaskRecord]:
 def _task(line: str, where: str) -> TaskRecord:
     said = parse_json_object(line, where, UsageError, remedy=_REMEDY)
     version = said.get("schema_version")
+    if is_newer(version, TASK_SCHEMA_VERSION):
+        raise UsageError(of_newer_schema(where, version, TASK_SCHEMA_VERSION))
     if version != TASK_SCHEMA_VERSION:
         shown = printable_line(str(version), max_characters=40)
         raise UsageError(f"{where}: task version {shown}, this package reads {TASK_SCHEMA_VERSION}; {_REMEDY}")

@@ -154,6 +154,7 @@ class TasksRecipe(FolderRecipe[SceneTasksRecord]):
     record = "scene_tasks.json"
     record_type = SceneTasksRecord
     can_reject = False
+    replaces = False
 
     config: TasksConfig
     dataset: str

@@ -21,8 +21,9 @@ from manitwin.errors import Rejected
 from manitwin.scenes.layouts.pool import pool_of
 from manitwin.scenes.layouts.sample import sample_layout
 from manitwin.scenes.scene import SCENE
-from manitwin.scenes.scene_files import parse_scene, read_scene, scene_name, write_scene
+from manitwin.scenes.scene_files import parse_scene, read_scene, scene_name, scene_there, write_scene
 from manitwin.scenes.settings import LayoutsConfig, LayoutSettings
+from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.store import sha256_of_json
 
@@ -50,7 +51,10 @@ class LayoutNumber(Payload):
 
 
 class LayoutStage:
-    """Sample the layout of a number."""
+    """Sample the layout of a number, or take the scene that is there: it is never replaced, whoever made it.
+
+    The twins may be others by now, or this stage; tasks and episodes name the scene by its id.
+    """
 
     name = "layout"
     version = "2"
@@ -60,12 +64,17 @@ class LayoutStage:
     backend = "sapien"
     model: str | None = None
 
-    def __init__(self, settings: LayoutSettings, dataset: str):
+    def __init__(self, settings: LayoutSettings, dataset: str, out: str | None = None):
         self.settings: BaseModel = settings
         self._layout, self._dataset = settings, dataset
+        self._out = None if out is None else DatasetRoot(out)
 
     def run(self, draft: Draft[LayoutNumber], folder: Path) -> dict[str, Any]:
-        """Write the scene; raises Rejected where none could be made."""
+        """Write the scene; raises Rejected where none could be made, UsageError where a newer version made one."""
+        there = None if self._out is None else scene_there(self._out, draft.item_id)
+        if there is not None:
+            (folder / SCENE).write_bytes(there)
+            return {}
         number = draft.payload.number
         write_scene(sample_layout(pool_of(self._dataset), self._layout, draft.seed, number), folder)
         return {}
@@ -106,14 +115,16 @@ class LayoutRecord(FolderRecord):
 
 @dataclass(frozen=True)
 class LayoutsRecipe(FolderRecipe[LayoutRecord]):
-    """Layouts of the twins of ``dataset``, one for each number."""
+    """Layouts of the twins of ``dataset``, one for each number; scenes that are below ``out`` already are taken as they are."""
 
     payload = LayoutNumber
     record = LAYOUT_RECORD
     record_type = LayoutRecord
+    made_again = "scenes stay as they are, pictures are drawn again"
 
     config: LayoutsConfig
     dataset: str
+    out: str | None = None
 
     @cached_property
     def sha256(self) -> str:
@@ -136,7 +147,7 @@ class LayoutsRecipe(FolderRecipe[LayoutRecord]):
 
     def stages(self, kind: str) -> list[Stage]:
         """Return the sampling, and the drawing where pictures are wanted."""
-        stages: list[Stage] = [LayoutStage(self.config.layout, self.dataset)]
+        stages: list[Stage] = [LayoutStage(self.config.layout, self.dataset, self.out)]
         if self.config.pictures:
             stages.append(ScenePicturesStage(self.config, self.dataset))
         return stages

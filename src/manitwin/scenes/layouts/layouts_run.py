@@ -66,7 +66,7 @@ def make_layouts(
     least_objects(pool.upright if config.layout.upright else pool, config.layout)
     root = DatasetRoot(out)
     config = _with_pictures_there(config, earlier_settings(root), root.url)
-    recipe = LayoutsRecipe(config, place)
+    recipe = LayoutsRecipe(config, place, root.absolute())
     configuration = {"kind": "layouts", "dataset": place, **config.model_dump(mode="json")}
     check_settings(root, configuration, free=DECIDE_NO_SCENE, made="scenes")
 
