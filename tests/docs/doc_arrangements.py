@@ -169,6 +169,7 @@ PAGES: dict[str, Arrangement] = {
         slow=(r".",),
     ),
     "docs/twin.md": Arrangement(blocks={"^<twin_id>/": "tree twins/twins/*/*"}),
+    "docs/upgrading.md": Arrangement(rewritten={r"\bDATASET\b": "twins"}),  # which has a ledger
     "docs/view.md": Arrangement(
         rewritten={r"view TWIN": "view $(ls -d DATASET/twins/*/* | head -1)"}, slow=(r"manitwin view",)
     ),

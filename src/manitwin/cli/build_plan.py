@@ -15,12 +15,13 @@ from manitwin.config import BuildConfig
 from manitwin.engine.amendments import amendments_sha256, read_amendments
 from manitwin.engine.ledger.ledger import LEDGER, Ledger
 from manitwin.engine.ledger.location import copy_ledger
-from manitwin.engine.recipe import Recipe
+from manitwin.engine.recipe import Ending, Recipe
+from manitwin.errors import NewerVersion, TwinError
 from manitwin.pipeline.inspection import NotInspected, identified
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.recipe import TwinRecipe, estimate_usd
+from manitwin.pipeline.recipe import TwinRecipe, estimate_usd, made_otherwise
 from manitwin.twin.dataset_root import DatasetRoot
-from manitwin.twin.store import RECORD
+from manitwin.twin.store import RECORD, parse_record
 
 ENOUGH_ITEMS = 3
 """How many accepted items a data set must have before its own rate is used."""
@@ -152,13 +153,29 @@ class _Planner:
             return PlannedItem(item, twin_id, kind, "duplicate", "the same input as another one")
         self.seen.add(twin_id)
         record = self._record_of(twin_id)
-        ending = None if record is None else self._recipe.ending_of(record, self._amended(twin_id))
+        ending = None if record is None else self._ending_of(record, twin_id)
         if ending is not None:
             detail = f"{ending.reason}: {ending.detail}" if ending.reason else ending.detail
             return PlannedItem(item, twin_id, kind, ending.status, detail)
         refused = identity.rejected or by_header
         state: PlannedState = "to_build" if refused is None else "would_be_rejected"
-        return PlannedItem(item, twin_id, kind, state, "" if refused is None else str(refused))
+        if refused is not None:
+            return PlannedItem(item, twin_id, kind, state, str(refused))
+        return PlannedItem(item, twin_id, kind, state, "" if record is None else self._why_again(record))
+
+    def _ending_of(self, record: bytes, twin_id: str) -> Ending | None:
+        try:
+            return self._recipe.ending_of(record, self._amended(twin_id))
+        except NewerVersion as error:
+            raise NewerVersion(f"{self._root.url}/{self._recipe.folder_of(twin_id)}/{error}") from error
+
+    def _why_again(self, record: bytes) -> str:
+        """Return why a twin that is there would be built again."""
+        try:
+            otherwise = made_otherwise(parse_record(record), self._config)
+        except TwinError:
+            return "what is there cannot be read"
+        return f"what is there was made {otherwise or 'before people put something right'}"
 
     def _amended(self, twin_id: str) -> str | None:
         return amendments_sha256(read_amendments(self._root, twin_id))

@@ -50,5 +50,5 @@ def heal(ledger: Ledger, root: DatasetRoot, recipe: Recipe, given: Collection[in
         remarks.append(f"{len(damaged)} finished folders were gone or damaged: they are made again")
     if recipe.tables is not None and ledger.any_indexed() and recipe.tables.heal(root):
         ledger.forget_indexed()
-        remarks.append("the index was gone or damaged: it is written again")
+        remarks.append("the index was gone, damaged or of another version: it is written again")
     return remarks

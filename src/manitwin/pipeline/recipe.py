@@ -42,6 +42,7 @@ from manitwin.pipeline.points import PointsStage
 from manitwin.pipeline.record_grasps import RecordGraspsStage
 from manitwin.pipeline.robustness import RobustnessStage
 from manitwin.pipeline.second_opinion import SecondOpinionStage
+from manitwin.pipeline.stage_order import place_in_pipeline
 from manitwin.pipeline.verify import VerifyStage
 from manitwin.pipeline.views import ViewsStage
 from manitwin.robots.grippers.gripper import Gripper, load_gripper
@@ -51,6 +52,7 @@ from manitwin.twin.store import RECORD, parse_record, sha256_of_json
 from manitwin.twin.wholeness import size_damage
 
 RUN = logging.getLogger("manitwin.run")
+_STAGES_NAMED = 4
 
 
 def check_names(config: BuildConfig) -> None:
@@ -186,15 +188,31 @@ def config_sha256(config: BuildConfig) -> str:
 
 def is_current(record: TwinRecord, config: BuildConfig) -> bool:
     """Tell whether a record is what this configuration and seed, and the stages as they are now, would make."""
-    if (record.provenance.config_sha256, record.provenance.seed) != (config_sha256(config), config.seed):
-        return False
+    return not _otherwise_set(record, config) and not _other_stages(record, config)
+
+
+def made_otherwise(record: TwinRecord, config: BuildConfig) -> str:
+    """Return in words what of a configuration, seed and stages is not as it was when a twin was made; empty where all is."""
+    said = _otherwise_set(record, config)
+    if stages := _other_stages(record, config):
+        more = f" and {len(stages) - _STAGES_NAMED} more stages" if len(stages) > _STAGES_NAMED else ""
+        said.append(f"by other versions of {', '.join(stages[:_STAGES_NAMED])}{more}")
+    return " and ".join(said)
+
+
+def _otherwise_set(record: TwinRecord, config: BuildConfig) -> list[str]:
+    seed = [] if record.provenance.seed == config.seed else ["with another seed"]
+    return seed + ([] if record.provenance.config_sha256 == config_sha256(config) else ["with other settings"])
+
+
+def _other_stages(record: TwinRecord, config: BuildConfig) -> list[str]:
+    """Return the stages that ran otherwise than they would now, or that would run now, in their order."""
     now = {stage.name: _decided_by(stage) for stage in stages_for(record.source.kind, config)}
     ran = {name: _decided_by(stage) for name, stage in record.provenance.stages.items()}
     if "generate" in ran and "generate" in now and now["generate"][2] is None:
         ran["generate"] = (*ran["generate"][:2], None)  # which model it was, this generator knows only afterwards
-    if record.status == "accepted":
-        return ran == now
-    return all(now.get(name) == identity for name, identity in ran.items())
+    names = {*ran, *now} if record.status == "accepted" else ran.keys()
+    return sorted((name for name in names if now.get(name) != ran.get(name)), key=place_in_pipeline)
 
 
 def _decided_by(stage: Stage | StageProvenance) -> tuple[str, str, str | None]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import json
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -114,6 +115,33 @@ def stored_config(root: DatasetRoot) -> BuildConfig:
         raise UsageError(f"{place}: not a configuration of this version ({error}); give --config") from error
 
 
+_DECIDE_NO_TWIN = ("run", "services")
+_MOST_NAMED, _MOST_SHOWN = 6, 80
+
+
+def _not_by_default(settings: BuildConfig) -> str:
+    """Return the settings that decide twins and are not as an empty configuration of this version has them, in one line.
+
+    They were chosen once, or were the defaults of the version that made the data set.
+    """
+    default = dict(_flat(BuildConfig().model_dump(mode="json")))
+    differ = [
+        f"{name} {json.dumps(value)}"
+        for name, value in _flat(settings.model_dump(mode="json"))
+        if name.partition(".")[0] not in _DECIDE_NO_TWIN and (name not in default or default[name] != value)
+    ]
+    more = f" and {len(differ) - _MOST_NAMED} more" if len(differ) > _MOST_NAMED else ""
+    return ", ".join(printable_line(each, max_characters=_MOST_SHOWN) for each in differ[:_MOST_NAMED]) + more
+
+
+def _flat(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in settings.items():
+        if isinstance(value, Mapping) and value:
+            yield from _flat(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
+
+
 MOST_VARIATIONS = 100_000
 """Of one text: more than any data set of the paper has of one category."""
 
@@ -166,8 +194,10 @@ def request_build(
     check_names(settings)
     notes = Notes()
     if config is None and base != BuildConfig():
+        kept = _not_by_default(base)
+        which = f" (not this version's defaults: {kept})" if kept else ""
         notes.remarks.append(
-            "the settings are those that the data set was built with; --config and options change them"
+            f"the settings are those that the data set was built with{which}; --config and options change them"
         )
     items = iterate_items(
         given,

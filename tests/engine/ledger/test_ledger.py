@@ -107,8 +107,13 @@ def test_progress_counts_rate_time_left_and_reasons(path: Path, ledger: Ledger) 
     assert progress.left_s == pytest.approx(100)
     assert (progress.rejected_by_reason, progress.failed_by_reason) == ({"too_wide": 1}, {"crashed": 1})
     assert progress.cpu_seconds == pytest.approx(7.5) and progress.last_run == "at work"
+    assert progress.of_another_recipe == 0
     ledger.end_run(run, "finished")
     assert ledger.not_indexed(10) == [f"{n:016x}" for n in (1, 2, 3, 4)], "a failed item has no folder"
+    ledger.begin_run("of a newer version", given=[1])
+    ledger.commit()
+    with read_ledger(path) as connection:
+        assert read_progress(connection, at_work=False).of_another_recipe == 4
 
 
 def test_another_recipe_opens_what_ended_but_not_duplicates(ledger: Ledger) -> None:

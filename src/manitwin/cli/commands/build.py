@@ -74,8 +74,8 @@ def build(
         _print_dry_run(inputs or [], out, arguments, said, as_json=json)
         return
     request = _request(inputs or [], out, arguments, said)
-    report = _watched_build(request, lines=lines, executor=cast("ExecutorName", executor), address=address)
-    _print_report(report, lines)
+    report, told = _watched_build(request, lines=lines, executor=cast("ExecutorName", executor), address=address)
+    _print_report(report, lines, told)
     if json:
         from manitwin.cli.causes import causes_of
         from manitwin.cli.documents import build_document
@@ -131,8 +131,10 @@ def _request(inputs: list[Path], out: str, arguments: dict[str, Any], said: dict
         gc.enable()
 
 
-def _watched_build(request: BuildRequest, *, lines: bool, executor: ExecutorName, address: str | None) -> BuildReport:
-    """Build while a person watches."""
+def _watched_build(
+    request: BuildRequest, *, lines: bool, executor: ExecutorName, address: str | None
+) -> tuple[BuildReport, int]:
+    """Build while a person watches; returns the report, and how many of its remarks were told as the work began."""
     from manitwin.cli.progress import WatchedRun
     from manitwin.dataset.build import build_requested
     from manitwin.engine.fork_server import forked_workers
@@ -144,6 +146,14 @@ def _watched_build(request: BuildRequest, *, lines: bool, executor: ExecutorName
     elif executor == "local":
         require_driver()  # what renders is looked for by the first stage that draws
     asked: list[bool] = []
+    told = 0
+
+    def started(items: int, opened: int) -> None:
+        nonlocal told
+        watched.start(items, opened)
+        told = len(request.notes.remarks)
+        for remark in request.notes.remarks:  # before days of work: why what is there is made again
+            err_console.print(remark)
 
     def require_device_once() -> None:
         """End a build that has begun its work and could not draw; one that finds all of it done needs no device."""
@@ -167,16 +177,17 @@ def _watched_build(request: BuildRequest, *, lines: bool, executor: ExecutorName
     watch = WatchedRun("inputs", request.out, lambda: request.notes.under_way)
     # pandas is 30 MB in each worker that Arrow takes where it finds it; forked before threads show how far it is
     with left_out("pandas"), looked_for_once(), forked, watch as watched:
-        return build_requested(
-            request, executor=executor, address=address, on_estimate=print_estimate, on_start=watched.start, on_stage=staged,
+        report = build_requested(
+            request, executor=executor, address=address, on_estimate=print_estimate, on_start=started, on_stage=staged,
             on_result=ended,
         )  # fmt: skip
+    return report, told
 
 
-def _print_report(report: BuildReport, lines: bool) -> None:
+def _print_report(report: BuildReport, lines: bool, told: int) -> None:
     from manitwin.cli.run_summary import grasp_lines, summarize_grasps
 
-    for remark in report.remarks:
+    for remark in report.remarks[told:]:
         err_console.print(remark)
     if lines:
         _print_others(report)

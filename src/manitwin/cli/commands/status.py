@@ -124,6 +124,11 @@ def _view(progress: Progress) -> RenderableType:
         + (", ".join(f"{n} {state}" for state, n in progress.items.items() if n and state != "open") or "none"),
         f"last run: {progress.last_run}",
     ]
+    if progress.of_another_recipe:
+        lines.append(
+            f"{progress.of_another_recipe} of these ended under another version of manitwin, or with other settings, than the"
+            " last run had"
+        )
     if progress.items_per_hour:
         left = f", {timedelta(seconds=round(progress.left_s or 0))} left" if progress.items["open"] else ""
         lines.append(f"{progress.items_per_hour:.0f} items an hour{left}")

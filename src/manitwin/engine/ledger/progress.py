@@ -48,7 +48,10 @@ class StageProgress:
 
 @dataclass(frozen=True)
 class Progress:
-    """The progress of a data set. ``items_per_hour`` is of the last ten minutes of work, None before anything ended."""
+    """The progress of a data set. ``items_per_hour`` is of the last ten minutes of work, None before anything ended.
+
+    ``of_another_recipe`` ended under another version of this package, or with other settings, than the last run had.
+    """
 
     items: dict[str, int]
     stages: list[StageProgress]
@@ -59,6 +62,7 @@ class Progress:
     cost_usd: float
     cpu_seconds: float
     last_run: str
+    of_another_recipe: int
 
 
 @dataclass(frozen=True)
@@ -98,6 +102,7 @@ def read_progress(
         cost_usd=sum((stage.cost_usd for stage in stages), 0.0),
         cpu_seconds=sum((stage.mean_cpu_seconds * (stage.done + stage.rejected) for stage in stages), 0.0),
         last_run="none" if run is None else run["ended_how"] or ("at work" if at_work else "cut off"),
+        of_another_recipe=0 if run is None else _of_another(connection, run["recipe_sha256"]),
     )
 
 
@@ -115,6 +120,13 @@ def _stages(connection: sqlite3.Connection, place_of: StageOrder) -> list[StageP
 
     # stages of another recipe stay in the order of the query: no item comes to a stage before it was at those before
     return sorted((StageProgress(**dict(row)) for row in rows), key=place)
+
+
+def _of_another(connection: sqlite3.Connection, recipe_sha256: str) -> int:
+    (count,) = connection.execute(
+        "SELECT count(*) FROM items WHERE state NOT IN ('open', 'duplicate') AND recipe_sha256 <> ?", (recipe_sha256,)
+    ).fetchone()
+    return int(count)
 
 
 def _by_reason(connection: sqlite3.Connection, state: str) -> dict[str, int]:
