@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import inspect
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from typer.testing import CliRunner
 
 import manitwin
@@ -21,6 +23,7 @@ from manitwin.engine.stage import Draft
 from manitwin.engine.stage_runner import stage_key
 from manitwin.errors import BadReply, UsageError
 from manitwin.geometry.boxes import upright_extents
+from manitwin.models.annotators.protocol import PointsRequest, SelectedPoints, Subject
 from manitwin.pipeline.guesses import naming_checks
 from manitwin.pipeline.human_corrections import (
     CATEGORY,
@@ -30,12 +33,14 @@ from manitwin.pipeline.human_corrections import (
     corrected_category,
     corrected_points,
     name_by_person,
+    place_in_box,
 )
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import object_name
 from manitwin.pipeline.recipe import TwinRecipe, stages_for
 from manitwin.pipeline.stage_order import STAGE_ORDER
 from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.point_records import GraspPoint
 from manitwin.twin.store import read_record
 
 SAMPLES = Path(__file__).resolve().parents[2] / "samples"
@@ -142,6 +147,8 @@ def test_corrections_come_back_with_their_source_and_what_follows_is_made_again(
     assert after.language.category == after.name == "cup"
     moved = after.points.functional[0]
     assert (moved.candidate, moved.source) == (free, "human:ada")
+    (said,) = read_amendments(DatasetRoot(place), before.twin_id)["points"]["moves"].values()
+    assert said["place"] == place_in_box(np.array(before.points.candidates.positions_m), free)
     ratio = after.physical.scale_applied / before.physical.scale_applied
     assert moved.position_m == pytest.approx(
         [ratio * each for each in before.points.candidates.positions_m[free]], abs=1e-4
@@ -164,11 +171,44 @@ def test_corrections_come_back_with_their_source_and_what_follows_is_made_again(
 
 
 def test_a_moved_point_that_is_gone_is_never_guessed() -> None:
-    from manitwin.models.annotators.protocol import SelectedPoints
-
     move = {"moves": {"f0": {"candidate": 1, "label": "spout", "source": "human:ada"}}}
     with pytest.raises(BadReply, match=r"f0 \(spout\) was moved by human:ada, and is no point now"):
         corrected_points(SelectedPoints((), ()), None, move)  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def request_of_points() -> PointsRequest:
+    """Candidates all over a box of 8 x 12 x 4 cm."""
+    box = trimesh.creation.box((0.08, 0.12, 0.04))
+    positions_m, _ = trimesh.sample.sample_surface(box, 42, seed=3)
+    subject = Subject("box", box, (box,), True, (), (), 0)
+    return PointsRequest(subject, np.asarray(positions_m), np.eye(3)[[2] * 42], (), (), np.zeros(3), 0.08)
+
+
+def moved_to_5(request: PointsRequest, place: list[float] | None) -> GraspPoint:
+    """Move a grasp point to candidate 5, which a person saw at a place."""
+    point = GraspPoint.model_validate(
+        {**request.place(9), "id": "g0", "type": "pinch", "scenario": "lift", "confidence": 1.0, "rationale": "thin"}
+    )
+    said = {"candidate": 5, "label": None, "source": "human:ada"} | ({} if place is None else {"place": place})
+    return corrected_points(SelectedPoints((), (point,)), request, {"moves": {"g0": said}}).grasp[0]
+
+
+def test_a_candidate_is_the_one_that_was_seen_whatever_the_size_and_though_the_surface_changed_a_little(
+    request_of_points: PointsRequest,
+) -> None:
+    place = place_in_box(request_of_points.positions_m, 5)
+    assert place != place_in_box(request_of_points.positions_m, 6)
+    now = replace(request_of_points, positions_m=3 * request_of_points.positions_m + 0.0005)
+    assert moved_to_5(now, place).position_m == pytest.approx(now.positions_m[5])
+
+
+def test_a_candidate_that_is_another_place_by_now_is_never_guessed(request_of_points: PointsRequest) -> None:
+    place = place_in_box(request_of_points.positions_m, 5)
+    numbered_anew = replace(request_of_points, positions_m=request_of_points.positions_m[::-1])
+    with pytest.raises(BadReply, match="candidate 5, which is another place of the object now; review the twin again"):
+        moved_to_5(numbered_anew, place)
+    assert moved_to_5(numbered_anew, None).candidate == 5, "a correction of an earlier version does not say its place"
 
 
 def test_name_that_a_person_said_since_counts_before_the_given_one_and_a_corrected_category_before_both() -> None:

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from manitwin.engine.stage import Draft
 from manitwin.errors import BadReply
 from manitwin.models.annotators.protocol import PhysicalEstimates, PointsRequest, SelectedPoints
@@ -16,7 +18,7 @@ from manitwin.twin.record_values import Estimate, Record
 
 HUMAN = "human:"
 CATEGORY, MASS, SIZE, MOVES = "category", "mass_kg", "longest_side_m", "moves"
-"""Keys of a stage's amendment: a name, two Estimates, and ``{point id: {candidate, label, source}}``."""
+"""Keys of a stage's amendment: a name, two Estimates, and ``{point id: {candidate, place, label, source}}``."""
 STAGES = {
     CATEGORY: ("physical", "caption", "points", "parts", "finish"),
     MASS: ("physical",),
@@ -89,7 +91,8 @@ def corrected_points(selected: SelectedPoints, request: PointsRequest, amendment
     """Return the points, those that a person has moved at their candidates.
 
     A correction is of the point with its id and label; where the annotator has since chosen others, of the only one with the
-    label. Raises BadReply where there is none: the twin has to be looked at again.
+    label. Raises BadReply where there is none, and where the candidate is another place of the object by now: the twin has to be
+    looked at again.
     """
     functional, grasp = list(selected.functional), list(selected.grasp)
     for point_id, move in sorted(amendment.get(MOVES, {}).items()):
@@ -100,6 +103,26 @@ def corrected_points(selected: SelectedPoints, request: PointsRequest, amendment
             place = _place_of(grasp, point_id, move)
             grasp[place] = _moved(grasp[place], request, move)
     return replace(selected, functional=tuple(functional), grasp=tuple(grasp))
+
+
+def place_in_box(positions_m: np.ndarray, candidate: int) -> list[float]:
+    """Return where a candidate lies among all, ``(N, 3)``: from the lower corner of their box, in its longest sides.
+
+    So it is the same whatever the object's size is said to be.
+    """
+    lower, side_m = _box(positions_m)
+    return [round(float(each), 6) for each in (positions_m[candidate] - lower) / side_m]
+
+
+def is_at(positions_m: np.ndarray, candidate: int, place: np.ndarray) -> bool:
+    """Tell whether of all candidates none is nearer than this one to a place as ``place_in_box`` gives it."""
+    lower, side_m = _box(positions_m)
+    distances = np.linalg.norm((positions_m - lower) / side_m - place, axis=1)
+    return bool(distances[candidate] <= distances.min())
+
+
+def _box(positions_m: np.ndarray) -> tuple[np.ndarray, float]:
+    return positions_m.min(0), max(float(np.ptp(positions_m, axis=0).max()), 1e-9)
 
 
 def _place_of(points: list[FunctionalPoint] | list[GraspPoint], point_id: str, move: Mapping[str, Any]) -> int:
@@ -118,5 +141,11 @@ def _moved(point: Any, request: PointsRequest, move: Mapping[str, Any]) -> Any:
     candidate = int(move["candidate"])
     if candidate >= len(request.positions_m):
         raise BadReply(f"{point.id} was moved to candidate {candidate}, of {len(request.positions_m)}; review it again")
+    place = move.get("place")  # corrections of earlier versions do not say it
+    if place is not None and not is_at(request.positions_m, candidate, np.asarray(place, float)):
+        raise BadReply(
+            f"{point.id} was moved by {move['source']} to candidate {candidate}, which is another place of the object now; review"
+            " the twin again, or remove its amendment"
+        )
     said = f"moved from candidate {point.candidate}"
     return point.model_copy(update={**request.place(candidate), "source": move["source"], "rationale": said})

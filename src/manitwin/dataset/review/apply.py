@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, Unpack
 
+import numpy as np
+
 from manitwin.dataset.index.query import Index
 from manitwin.dataset.review.corrections import Conflict, Correction, settled
 from manitwin.dataset.review.making_again import made_again
@@ -17,7 +19,7 @@ from manitwin.engine.ledger.location import local_ledger
 from manitwin.engine.ledger.reading import read_ledger
 from manitwin.errors import UsageError
 from manitwin.formats.json_file import parse_json_object
-from manitwin.pipeline.human_corrections import CATEGORY, MASS, MOVES, SIZE, STAGES
+from manitwin.pipeline.human_corrections import CATEGORY, MASS, MOVES, SIZE, STAGES, place_in_box
 from manitwin.pipeline.item import Item
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.record import TwinRecord
@@ -73,11 +75,25 @@ def amended(before: Amendments, corrections: Iterable[Correction], record: TwinR
             if key == CATEGORY:
                 said[key] = each.value
             elif key == MOVES:
-                move = {"candidate": each.value, "label": _label(record, each.name), "source": each.source}
+                move = {
+                    "candidate": each.value,
+                    "place": place_in_box(_marked_m(record), each.value),
+                    "label": _label(record, each.name),
+                    "source": each.source,
+                }
                 said[key] = {**said.get(key, {}), each.name: move}
             else:
                 said[key] = {**each.value, "source": each.source}
     return after
+
+
+def _marked_m(record: TwinRecord) -> np.ndarray:
+    """Return the positions ``(N, 3)`` of a twin's candidates as they were chosen, before a closer look moved some."""
+    assert record.points is not None, "an accepted twin has points"
+    positions_m = np.array(record.points.candidates.positions_m, float)
+    for each in record.points.candidates.refined:
+        positions_m[each.candidate] = each.marked_position_m
+    return positions_m
 
 
 def _label(record: TwinRecord, point_id: str) -> str | None:
