@@ -19,7 +19,7 @@ from manitwin.config import BuildConfig, MattingConfig
 from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
 from manitwin.models.matting.matte import DoubtedCutOut, Matte
-from manitwin.pipeline.cutout import CUTOUT, SHOWN_PX, confirmed_or_rejected, shown_cutout
+from manitwin.pipeline.cutout import CUTOUT, SHOWN_PX, confirmation, confirmed_or_rejected, shown_cutout
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.photo import PhotoStage
 from manitwin.twin.dataset_root import DatasetRoot
@@ -58,6 +58,31 @@ def test_only_the_picture_that_was_looked_at_is_confirmed() -> None:
     with pytest.raises(Rejected, match=r"^low_confidence_matte: a\.jpg: why$") as caught:
         confirmed_or_rejected(doubted, "a.jpg", {})
     assert pickle.loads(pickle.dumps(caught.value)).files == {CUTOUT: shown_cutout(half())}
+
+
+def test_what_would_be_cut_out_otherwise_now_is_cut_out_as_it_was_confirmed() -> None:
+    said = {"cutout": confirmation(shown_cutout(half()), "human:ada")}
+    assert said["cutout"]["sha256"] == hashlib.sha256(shown_cutout(half())).hexdigest()
+    otherwise = half()
+    otherwise[..., 3] = np.roll(otherwise[..., 3], 300, axis=1)
+    doubted = DoubtedCutOut("low_confidence_matte", "a.jpg: why", Matte(otherwise, "network", 0.4, ("cut",), {}))
+    matte = confirmed_or_rejected(doubted, "a.jpg", said)
+    assert matte.findings == ("cut out as human:ada confirmed it",) and matte.confidence == 0.4
+    assert (matte.rgba[..., :3] == otherwise[..., :3]).all() and matte.rgba.flags.c_contiguous
+    differs = matte.rgba[..., 3] != half()[..., 3]
+    assert not differs[:, :1496].any() and not differs[:, 1504:].any(), "but for the pixels of the border"
+
+
+@pytest.mark.parametrize("damage", ["nonsense", "", "bm8gcGljdHVyZQ=="])
+def test_what_was_confirmed_of_another_part_of_the_photo_or_cannot_be_read_is_looked_at_again(damage: str) -> None:
+    said = confirmation(shown_cutout(half()), "human:ada")
+    part = DoubtedCutOut("low_confidence_matte", "a.jpg: why", Matte(half()[:900], "network", 0.4, (), {}))
+    whole = half()
+    whole[:700, :, 3] = 255
+    otherwise = DoubtedCutOut("low_confidence_matte", "a.jpg: why", Matte(whole, "network", 0.4, (), {}))
+    for doubted, kept in ((part, said), (otherwise, {**said, "alpha_png": damage})):
+        with pytest.raises(Rejected, match="otherwise than as human:ada confirmed it; look at it again"):
+            confirmed_or_rejected(doubted, "a.jpg", {"cutout": kept})
 
 
 def test_what_shows_nothing_has_no_cut_out(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
 import io
 from collections.abc import Mapping
@@ -12,13 +13,14 @@ import cv2
 import numpy as np
 from PIL import Image
 
-from manitwin.errors import Rejected
+from manitwin.errors import Rejected, UsageError
 from manitwin.models.matting.matte import DoubtedCutOut, Matte
 
 CUTOUT = "cutout.webp"
 """In the folder of a rejected photo: what would have been cut out, transparent around it."""
 CONFIRMED = "cutout"
-"""Key of the photo stage's amendment: ``{sha256, source}``, the digest of the picture that was looked at and who did so."""
+"""Key of the photo stage's amendment: ``{sha256, alpha_png, source}``: the digest of the picture that was looked at, its alpha
+channel as a PNG file in base64 (what earlier versions wrote has none), and who did so."""
 SHOWN_PX = 1024
 QUALITY = 85
 
@@ -37,16 +39,53 @@ def reduced(rgba: np.ndarray, side_px: int) -> np.ndarray:
     return cv2.resize(rgba, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) if scale < 1 else rgba
 
 
+def confirmation(picture: bytes, source: str) -> dict[str, str]:
+    """Return what is kept of a cut-out that a person, the ``source``, has looked at as ``picture`` and found right.
+
+    Raises UsageError for a picture that cannot be read.
+    """
+    try:
+        with Image.open(io.BytesIO(picture), formats=("WEBP",)) as shown:
+            alpha = shown.convert("RGBA").getchannel("A")
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        raise UsageError(f"{CUTOUT}: no picture that can be read; run manitwin check --digests") from error
+    encoded = io.BytesIO()
+    alpha.save(encoded, "PNG", optimize=True)
+    return {
+        "sha256": hashlib.sha256(picture).hexdigest(),
+        "alpha_png": base64.b64encode(encoded.getvalue()).decode("ascii"),
+        "source": source,
+    }
+
+
+def _as_confirmed(rgba: np.ndarray, said: Mapping[str, Any]) -> np.ndarray | None:
+    """Return a photo ``(H, W, 4) uint8`` with the alpha that was confirmed; None where there is none, or of another size."""
+    try:
+        data = base64.b64decode(said["alpha_png"], validate=True)
+        with Image.open(io.BytesIO(data), formats=("PNG",)) as picture:
+            if picture.size != reduced(rgba, SHOWN_PX).shape[1::-1]:  # before any of it is unpacked
+                return None
+            alpha = picture.convert("L").resize(rgba.shape[1::-1], Image.Resampling.BILINEAR)
+    except (KeyError, TypeError, ValueError, OSError, SyntaxError, Image.DecompressionBombError):
+        return None
+    return np.dstack([rgba[..., :3], np.asarray(alpha)])
+
+
 def confirmed_or_rejected(doubted: DoubtedCutOut, name: str, amendment: Mapping[str, Any]) -> Matte:
     """Return a doubted cut-out that a person has looked at and confirmed; raises Rejected of any other, with its picture.
 
-    ``amendment`` is the photo stage's. Who confirmed another picture than would be shown now is told to look again.
+    ``amendment`` is the photo stage's. Where the photo would be cut out otherwise now, by another version or other settings, it
+    is cut out as it was when it was confirmed. Where that was not kept, or was of another part of the photo, who confirmed it is
+    told to look again.
     """
     picture, said = shown_cutout(doubted.matte.rgba), amendment.get(CONFIRMED)
     if said is None:
         raise Rejected(doubted.reason, doubted.detail, doubted.stage, {CUTOUT: picture})
     if hashlib.sha256(picture).hexdigest() != said["sha256"]:
-        detail = f"{name}: is cut out otherwise than as {said['source']} confirmed it; look at it again"
-        raise Rejected(doubted.reason, detail, doubted.stage, {CUTOUT: picture})
+        rgba = _as_confirmed(doubted.matte.rgba, said)
+        if rgba is None:
+            detail = f"{name}: is cut out otherwise than as {said['source']} confirmed it; look at it again"
+            raise Rejected(doubted.reason, detail, doubted.stage, {CUTOUT: picture})
+        return replace(doubted.matte, rgba=rgba, findings=(f"cut out as {said['source']} confirmed it",))
     findings = (f"doubtful by itself ({doubted.matte.confidence:.2f}); {said['source']} confirmed the cut-out",)
     return replace(doubted.matte, findings=findings + doubted.matte.findings)

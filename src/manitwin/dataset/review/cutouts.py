@@ -19,7 +19,7 @@ from manitwin.engine.ledger.location import local_ledger
 from manitwin.engine.ledger.reading import read_ledger
 from manitwin.errors import TwinError, UsageError
 from manitwin.formats.json_file import parse_json_object
-from manitwin.pipeline.cutout import CONFIRMED, CUTOUT, reduced
+from manitwin.pipeline.cutout import CONFIRMED, CUTOUT, confirmation, reduced
 from manitwin.pipeline.drawn_outline import DRAWN
 from manitwin.pipeline.human_corrections import HUMAN
 from manitwin.pipeline.item import Item
@@ -148,7 +148,8 @@ def confirm(
         amendments = read_amendments(root, photo.twin_id)
         said = amendments.setdefault(PhotoStage.name, {})
         said.pop(DRAWN, None)  # an outline that was drawn before goes before any cut-out
-        said[CONFIRMED] = {"sha256": photo.sha256, "source": f"{HUMAN}{annotator}"}
+        picture = root.read_bytes(f"{root.twin_name(photo.twin_id)}/{CUTOUT}", UsageError)
+        said[CONFIRMED] = confirmation(picture, f"{HUMAN}{annotator}")
         write_amendments(root, photo.twin_id, amendments)
     return chosen, made_again(root, ((each.number, each.item) for each in chosen), jobs, **options)
 
