@@ -42,6 +42,13 @@ def place(tmp_path: Path) -> Path:
     return tmp_path / "data"
 
 
+def test_what_failed_is_tried_again_by_a_recipe_that_replaces_nothing(tmp_path: Path) -> None:
+    built(tmp_path / "data", "mug", "raise:b", recipe=EARLIER)
+    report = built(tmp_path / "data", recipe=Keeps(plan=(("a", "cpu"), ("c", "cpu")), size=10))
+    assert report.counts["accepted"] == 2 and report.counts.get("failed", 0) == 0, "there was nothing to be replaced"
+    assert [said[:22] for said in report.remarks] == ["1 that are there were "]
+
+
 def test_without_inputs_all_are_made_again_and_the_run_says_why(place: Path) -> None:
     assert built(place).remarks == [
         "2 were made by another version of manitwin or with other settings: what would be another result now is made again"
@@ -66,9 +73,7 @@ def test_of_those_that_are_not_given_it_is_said_that_they_stay(place: Path) -> N
 def test_a_recipe_that_replaces_nothing_leaves_them_whatever_is_given(place: Path, texts: tuple[str, ...]) -> None:
     recipe = Keeps(size=10, versions=NOW.versions)
     remarks = built(place, *texts, recipe=recipe).remarks
-    assert (
-        "2 that are there were made by another version of manitwin, and stay as they are; in a new folder all are made alike"
-        in (remarks)
-    )
+    (said,) = [each for each in remarks if "another version" in each]
+    assert said.startswith("2 that are there were made by another version of manitwin,") and "in a new folder" in said
     assert made_by(place)[:2] == [EARLIER.sha256] * 2
     assert len(made_by(place)) == (3 if "vase" in texts else 2)

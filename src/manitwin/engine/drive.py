@@ -150,8 +150,13 @@ def _of_others(ledger: Ledger, recipe: Recipe, given: list[int]) -> list[str]:
     """Return remarks about items that ended under another recipe: how many are made again, how many stay as they were made."""
     others = len(ledger.ended_under_others(recipe.sha256))
     if not recipe.replaces:
-        said = "were made by another version of manitwin, and stay as they are; in a new folder all are made alike"
-        return [f"{others} that are there {said}"] if others else []
+        stay = others - len(ledger.ended_under_others(recipe.sha256, replaces=False))
+        made = "made by another version of manitwin, or of a file that the settings name"
+        return (
+            [f"{stay} that are there were {made}, and stay as they are; in a new folder all are made alike"]
+            if stay
+            else []
+        )
     again = len(ledger.ended_under_others(recipe.sha256, given))
     made = "made by another version of manitwin or with other settings"
     remarks = [f"{again} were {made}: {recipe.made_again}"] if again else []

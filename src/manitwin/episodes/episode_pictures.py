@@ -155,6 +155,7 @@ class PicturesRecipe(FolderRecipe[PicturesRecord]):
     record = PICTURES_RECORD
     record_type = PicturesRecord
     can_reject = False
+    made_again = "they are drawn again"
 
     config: PicturesConfig
     episodes: str

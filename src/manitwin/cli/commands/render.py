@@ -77,6 +77,8 @@ def render(
             episodes, config=settings, twins=twins, on_written=written.append,
             **options.placed(run), **watched.callbacks,
         )  # fmt: skip
+    for remark in report.remarks:
+        err_console.print(remark)
     for each in written:
         out_console.print(
             f"{each.episodes} episodes, {each.frames} frames, {len(settings.cameras)} cameras: {episodes}/lerobot",

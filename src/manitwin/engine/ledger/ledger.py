@@ -126,7 +126,7 @@ class Ledger:
         """Note the begin of a run: what an earlier one left running was cut off, which is nobody's failed attempt.
 
         Items that ended under another recipe are opened again, their attempts forgotten: those with the ``given`` numbers, or
-        where none is given all; none where the recipe ``replaces`` nothing.
+        where none is given all. Where the recipe ``replaces`` nothing, only those that failed: there is nothing of them.
         """
         run = self.connection.execute(
             "INSERT INTO runs (started_at, recipe_sha256) VALUES (?, ?)", (time.time(), recipe_sha256)
@@ -134,7 +134,7 @@ class Ledger:
         self.connection.execute(
             "UPDATE stages SET state = 'waiting', attempts = max(attempts - 1, 0) WHERE state = 'running'"
         )
-        self.reopen(self.ended_under_others(recipe_sha256, given) if replaces else ())
+        self.reopen(self.ended_under_others(recipe_sha256, given, replaces=replaces))
         return int(run or 0)
 
     def end_run(self, run: int, how: str) -> None:
@@ -276,12 +276,16 @@ class Ledger:
     def totals(self, recipe_sha256: str, given: Collection[int] = (), *, replaces: bool = True) -> tuple[int, int]:
         """Return how many items there are, and how many are open, or are opened again as ``begin_run`` does."""
         row = self.connection.execute("SELECT count(*), coalesce(sum(state = 'open'), 0) FROM items").fetchone()
-        return int(row[0]), int(row[1]) + (len(self.ended_under_others(recipe_sha256, given)) if replaces else 0)
+        return int(row[0]), int(row[1]) + len(self.ended_under_others(recipe_sha256, given, replaces=replaces))
 
-    def ended_under_others(self, recipe_sha256: str, given: Collection[int] = ()) -> list[int]:
-        """Return the numbers of items that ended under another recipe: of the given ones, or of all."""
+    def ended_under_others(
+        self, recipe_sha256: str, given: Collection[int] = (), *, replaces: bool = True
+    ) -> list[int]:
+        """Return the numbers of items that ended under another recipe: of the given ones or of all, as ``begin_run`` does."""
         rows = self.connection.execute(
-            "SELECT number FROM items WHERE state NOT IN ('open', 'duplicate') AND recipe_sha256 <> ?", (recipe_sha256,)
+            "SELECT number FROM items WHERE state NOT IN ('open', 'duplicate') AND recipe_sha256 <> ?"
+            " AND (? OR state = 'failed')",
+            (recipe_sha256, replaces),
         )
         wanted = set(given)
         return [number for (number,) in rows if not wanted or number in wanted]
