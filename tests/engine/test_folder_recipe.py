@@ -89,4 +89,5 @@ def test_a_rejection_is_an_error_where_a_recipe_knows_none(tmp_path: Path) -> No
 def test_a_record_of_a_newer_version_is_not_taken_for_one_to_be_made_again() -> None:
     with pytest.raises(NewerVersion, match=r"word.json: of schema 2, this version reads up to 1"):
         Words().ending_of(b'{"schema_version": 2, "letters": 3, "sounds": 2}')
-    assert Words().ending_of(b'{"schema_version": 1, "sounds": 2}') is None
+    for damaged in (b'{"schema_version": 1, "sounds": 2}', b"[1]", b"{", b"[" * 100_000):
+        assert Words().ending_of(damaged) is None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from abc import ABC, abstractmethod
 from pathlib import Path
@@ -14,7 +13,8 @@ from manitwin.engine.recipe import Ending, Tables
 from manitwin.engine.stage import Draft
 from manitwin.engine.stage_runner import StageCost
 from manitwin.engine.task import Payload
-from manitwin.errors import ManiTwinError, NewerVersion, Rejected, is_newer, of_newer_schema
+from manitwin.errors import ManiTwinError, NewerVersion, Rejected, TwinError, is_newer, of_newer_schema
+from manitwin.formats.json_file import parse_json_object
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import canonical_json, sha256_of_json, write_bytes_atomically
 
@@ -63,9 +63,9 @@ class FolderRecipe(ABC, Generic[RecordT]):
 
     def parse(self, record: bytes) -> RecordT:
         """Read a record; raises ValueError or ManiTwinError where it cannot be read, of a newer version NewerVersion."""
-        said = json.loads(record)
-        if isinstance(said, dict) and is_newer(said.get("schema_version"), self.record_schema):
-            raise NewerVersion(of_newer_schema(self.record, said["schema_version"], self.record_schema))
+        version = parse_json_object(record, self.record, TwinError).get("schema_version")
+        if is_newer(version, self.record_schema):
+            raise NewerVersion(of_newer_schema(self.record, version, self.record_schema))
         return self.record_type.model_validate_json(record)  # type: ignore[return-value]
 
     def is_current(self, record: RecordT) -> bool:

@@ -95,7 +95,7 @@ def test_scenes_that_another_version_made_stay_as_they_are_and_the_run_says_so(
     after = scenes_of(out)
     assert len(after) == 3 and {name: after[name] for name in before} == before
     (said,) = [line for line in report.remarks if "another version" in line]
-    assert said.startswith("2 were made by another version") and "scenes stay as they are" in said
+    assert said.startswith("2 were made by another version") and "their scenes stay as they are" in said
 
 
 def test_a_scene_of_a_newer_version_is_refused_and_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

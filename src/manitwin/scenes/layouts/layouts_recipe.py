@@ -120,7 +120,7 @@ class LayoutsRecipe(FolderRecipe[LayoutRecord]):
     payload = LayoutNumber
     record = LAYOUT_RECORD
     record_type = LayoutRecord
-    made_again = "scenes stay as they are, pictures are drawn again"
+    made_again = "their scenes stay as they are, pictures that they have are drawn again"
 
     config: LayoutsConfig
     dataset: str
