@@ -27,7 +27,7 @@ FAMILIES = (
     "food", "groceries", "balls", "toys",
     "cutting_tools", "workshop", "kitchen_tools", "cookware",
     "computing", "instruments", "appliances", "packages", "accessories", "clothing", "stationery", "homeware",
-    "drinkware", "cosmetics", "batteries", "blocks", "chess_pieces", "clamps", "presses", "vegetables",
+    "drinkware", "cosmetics", "batteries", "blocks", "chess_pieces", "clamps", "presses", "vegetables", "plastic_bottles",
 )  # fmt: skip
 
 

@@ -24,7 +24,7 @@ from manitwin.models.generators.templates.making import dressed
 from manitwin.models.generators.templates.other_shapes import KIN_OF_ANOTHER_SHAPE
 from manitwin.models.generators.templates.template import Template
 
-_MOST_KINDS, _SIZE_MARGIN = 6, 1.5
+_MOST_KINDS, _SIZE_MARGIN = 8, 1.5
 LEAST_CONFIDENCE = 0.5
 LEAST_AGAINST_INFLATION = 0.12
 """A doubtful template is nearer to the truth than an inflated outline: of rendered photos of things bent by 16 % of their size, 6
@@ -77,9 +77,10 @@ def template_for(name: str | None) -> Template | None:
 def kinds_of(category: str) -> list[str]:
     """Return the categories that people may mean by a category's name: a can may be a drink can, a water bottle a bottle.
 
-    They share its last word and are about as large: nobody calls a watering can a can. A plain name stands also for what has a
-    name with that last word, a mug that is called a coffee cup, and for that with something, a cup and saucer; but for what keeps
-    things in it or not as its own things do: no glass is a magnifying glass.
+    They share its last word, or the priors have them beside it, a mallet beside the hammer, and are about as large: nobody calls a
+    watering can a can. A plain name stands also for what has a name with that last word, a mug that is called a coffee cup, and
+    for that with something, a cup and saucer; but for what keeps things in it or not as its own things do: no glass is a
+    magnifying glass.
     """
     templates, last = load_templates(), category.split()[-1]
     said = lookup(category)
@@ -89,6 +90,8 @@ def kinds_of(category: str) -> list[str]:
         kinds = [other for other in templates if other != category and last in _heads(templates[other])]
         kinds = [other for other in kinds if not templates[other].told_in_full]
         kinds = [other for other in kinds if said is not None and load_priors()[other].container == said.container]
+    beside = [other for other in templates if load_priors()[other].kin_of == category]
+    kinds += [other for other in beside if other not in kinds and not templates[other].told_in_full]
     return [other for other in kinds if said is not None and _about_as_large(lookup(other), said)][:_MOST_KINDS]
 
 
