@@ -19,12 +19,13 @@ import time
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
+from typing import Protocol
 
 import cv2
 import numpy as np
 import trimesh
 from shape_agreement import agreement
-from template_photos import ELEVATIONS_DEG, TemplatePhoto, photograph
+from template_photos import ELEVATIONS_DEG, photograph
 
 from manitwin.config import BuildConfig
 from manitwin.engine.stage import Draft
@@ -69,7 +70,22 @@ class Result:
     cpu_s: float
 
 
-def build(photo: TemplatePhoto, category: str, seed: int, path: Path, options: argparse.Namespace) -> Result:
+class KnownPhoto(Protocol):
+    """What is asked of a photo and of what it shows, as of ``TemplatePhoto``."""
+
+    @property
+    def rgb(self) -> np.ndarray: ...
+    @property
+    def mask(self) -> np.ndarray: ...
+    @property
+    def truth(self) -> trimesh.Trimesh: ...
+    @property
+    def elevation_deg(self) -> float: ...
+    @property
+    def ground(self) -> str: ...
+
+
+def build(photo: KnownPhoto, category: str, seed: int, path: Path, options: argparse.Namespace) -> Result:
     """Write the photo, run the stages and compare."""
     rgb = photo.rgb
     if options.truth_matte:

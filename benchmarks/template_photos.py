@@ -80,7 +80,29 @@ def photograph(
     """
     rng = np.random.default_rng([seed, *category.encode()])
     made = make(load_templates()[category], Wanted(category, {} if wish is None else {"": wish}), rng)
-    parts = visual_parts(made)
+    shots = photographed(visual_parts(made), rng, elevations_deg, turns_deg=turns_deg)
+    return [TemplatePhoto(shot.rgb, shot.mask, made, shot.camera, *shot.seen_from, shot.ground) for shot in shots]
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A photo of any thing: ``rgb (H, W, 3) uint8``, ``mask (H, W) bool``; ``seen_from`` elevation and azimuth, degrees."""
+
+    rgb: np.ndarray
+    mask: np.ndarray
+    camera: Camera
+    seen_from: tuple[float, float]
+    ground: str
+
+
+def photographed(
+    parts: Sequence[trimesh.Trimesh],
+    rng: np.random.Generator,
+    elevations_deg: Sequence[float] = ELEVATIONS_DEG,
+    *,
+    turns_deg: Sequence[float] = (0.0,),
+) -> list[Shot]:
+    """Photograph the visual parts of a thing that stands on z = 0 of its frame, whose front is towards -Y."""
     points = np.concatenate([part.vertices for part in parts])
     drawn = max(1.0, LEAST_DRAWN_M / float(np.linalg.norm(np.ptp(points, axis=0))))
     size_m = drawn * float(np.linalg.norm(np.ptp(points, axis=0)))
@@ -89,7 +111,7 @@ def photograph(
     number = int(rng.integers(TABLE_EVERY * len(GROUNDS)))
     floor, backdrop = GROUNDS[number % len(GROUNDS)]
     table = number // len(GROUNDS) == 0
-    photos = []
+    shots = []
     with SceneRenderer(
         _lighting(rng, start_deg),
         surroundings=Surroundings(-0.0005 * size_m - (drawn * TABLE_TOP_M if table else 0.0), floor, backdrop),
@@ -102,7 +124,7 @@ def photograph(
             top = textured_box(np.array([1.5, 1.5, TABLE_TOP_M / 2]), texture)
             below_m = drawn * TABLE_TOP_M / 2 + 0.0004 * size_m
             scene.add("table", [top.apply_scale(drawn)], transform(np.eye(3), [0, 0, -below_m]))
-        number = scene.add("thing", [part.apply_scale(drawn) for part in parts])
+        number = scene.add("thing", [part.copy().apply_scale(drawn) for part in parts])
         for elevation in elevations_deg:
             for turn in turns_deg:
                 azimuth = start_deg + turn
@@ -110,8 +132,8 @@ def photograph(
                 frame = scene.render([_scaled(camera, drawn)], geometry=True)[0]
                 assert frame.ids is not None
                 rgb = _exposed(frame.rgb, rng)
-                photos.append(TemplatePhoto(rgb, frame.ids == number, made, camera, elevation, azimuth, ground))
-    return photos
+                shots.append(Shot(rgb, frame.ids == number, camera, (elevation, azimuth), ground))
+    return shots
 
 
 def _pulled_back(points: np.ndarray, azimuth_deg: float, elevation_deg: float, fov_deg: float, by: float) -> Camera:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from manitwin.geometry.solids.shapes import cylinder, lathe, polygon, prism, rectangle, rounded
+from manitwin.geometry.solids.shapes import lathe, polygon, prism, rectangle, rounded
 from manitwin.models.generators.templates.catalog.vessel import bulge
 from manitwin.models.generators.templates.template import Model, template
 

@@ -77,8 +77,8 @@ def template_for(name: str | None) -> Template | None:
 def kinds_of(category: str) -> list[str]:
     """Return the categories that people may mean by a category's name: a can may be a drink can, a water bottle a bottle.
 
-    They share its last word, or the priors have them beside it, a mallet beside the hammer, and are about as large: nobody calls a
-    watering can a can. A plain name stands also for what has a name with that last word, a mug that is called a coffee cup, and
+    They share its last word, or the priors have them beside it, a mallet beside the hammer, and are about as large: nobody calls
+    a watering can a can. A plain name stands also for what has a name with that last word, a mug that is called a coffee cup, and
     for that with something, a cup and saucer; but for what keeps things in it or not as its own things do: no glass is a
     magnifying glass.
     """
