@@ -33,9 +33,8 @@ def read_ledger(path: Path) -> Iterator[sqlite3.Connection]:
     try:
         with sound(path):
             connection.execute("PRAGMA trusted_schema = OFF")
-            schema_of(
-                connection, str(path)
-            )  # first: tables of a newer one are no damage, and nothing is to be put aside
+            # first: tables of a newer one are no damage, and nothing is to be put aside
+            schema_of(connection, str(path))
             check_whole(connection, path)
             yield connection
     finally:
