@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import socket
 import socketserver
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 Converse = Callable[[socketserver.StreamRequestHandler], None]
 
@@ -31,5 +32,7 @@ def tcp_server(converse: Converse) -> Iterator[str]:
         try:
             yield f"127.0.0.1:{server.server_address[1]}"
         finally:
+            with suppress(OSError):
+                server.socket.shutdown(socket.SHUT_RDWR)  # or it looks at what is asked of it every 20 ms
             server.shutdown()
             thread.join()

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import socket
 import sys
 import threading
+from contextlib import suppress
 from dataclasses import dataclass, field
 from email.parser import BytesParser
 from email.policy import HTTP
@@ -15,6 +17,8 @@ from urllib.parse import parse_qsl, urlsplit
 from manitwin.engine.charges import REHEARSAL_MARK
 
 MAX_BODY_BYTES = 256 << 20
+LONGEST_WAIT_S = 0.05
+"""For a request, before it is looked whether the server is to end."""
 
 
 @dataclass(frozen=True)
@@ -79,10 +83,12 @@ class FakeServer:
         self.url = f"http://127.0.0.1:{self._server.server_address[1]}"
 
     def __enter__(self) -> FakeServer:
-        threading.Thread(target=self._server.serve_forever, args=(0.05,), daemon=True).start()
+        threading.Thread(target=self._server.serve_forever, args=(LONGEST_WAIT_S,), daemon=True).start()
         return self
 
     def __exit__(self, *exc: object) -> None:
+        with suppress(OSError):  # a socket that is shut ends the wait for the next request: it is not waited out
+            self._server.socket.shutdown(socket.SHUT_RDWR)
         self._server.shutdown()
         self._server.server_close()
 
