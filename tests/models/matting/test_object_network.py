@@ -149,3 +149,17 @@ def test_its_weights_are_small_enough_to_come_along() -> None:
     for name in WEIGHTS_FILES:
         assert len((files("manitwin.models.matting") / name).read_bytes()) < 1_000_000
     assert object_network.built_in_model().startswith("object-network sha256:")
+
+
+def test_the_content_of_the_network_is_made_once_for_all_photos(monkeypatch: pytest.MonkeyPatch) -> None:
+    object_network._content.cache_clear()
+    read: list[str] = []
+
+    def weights() -> dict[str, np.ndarray]:
+        read.append("weights")
+        return load_weights()
+
+    monkeypatch.setattr(object_network, "load_weights", weights)
+    photo, _ = _scene((200, 150), (90, 60))
+    assert np.array_equal(object_share(photo), object_share(photo))
+    assert read == ["weights"]

@@ -45,12 +45,24 @@ class Background:
         return np.asarray((cv2.pow(smooth, 2.2) + 2e-3) / (cv2.pow(expected, 2.2) + 2e-3))
 
     @cached_property
+    def light(self) -> np.ndarray:
+        """Each pixel's light (H, W) over that of the expected background, the mean of its ``light_ratio``."""
+        return total(self.light_ratio) / 3
+
+    @cached_property
+    def tint(self) -> np.ndarray:
+        """How far each pixel's ``light_ratio`` (H, W) is from an even one, over its ``light``."""
+        return np.asarray(length(self.light_ratio / self.light[..., None] - 1) / np.sqrt(3))
+
+    @cached_property
     def shade(self) -> np.ndarray:
         """Where a photo (H, W) has the background's colour, darkened without tint."""
-        ratio = self.light_ratio
-        mean = ratio.mean(2)
-        neutral = length(ratio / mean[..., None] - 1) / np.sqrt(3) < NEUTRAL
-        return (mean > MIN_SHADE) & (mean < MAX_SHADE) & neutral
+        return (self.light > MIN_SHADE) & (self.light < MAX_SHADE) & (self.tint < NEUTRAL)
+
+
+def total(vectors: np.ndarray) -> np.ndarray:
+    """Return the sum (...) of the components of vectors (..., 3), the same as numpy's, five times as fast."""
+    return np.asarray(vectors[..., 0] + vectors[..., 1] + vectors[..., 2])
 
 
 def length(vectors: np.ndarray) -> np.ndarray:
@@ -97,10 +109,12 @@ def model_background(rgb: np.ndarray) -> Background:
 def _surface(height: int, width: int, coefficients: np.ndarray, degree: int) -> np.ndarray:
     """Return the colours (H, W, 3) float32 of a surface, term by term: all terms of a picture of 1024 pixels are 60 MB."""
     x, y = _axis(width), _axis(height)[:, None]
-    colours = np.zeros((height, width, 3))
+    channels = np.zeros((3, height, width))
     for (i, j), coefficient in zip(_powers(degree), coefficients, strict=True):
-        colours += (x**i * y**j)[..., None] * coefficient
-    return colours.astype(np.float32)
+        term = x**i * y**j
+        for channel, factor in zip(channels, coefficient, strict=True):  # one by one: three times as fast
+            channel += term * factor
+    return np.ascontiguousarray(np.moveaxis(channels, 0, 2), np.float32)
 
 
 def _basis(height: int, width: int, degree: int) -> np.ndarray:
@@ -145,9 +159,9 @@ def _grow_surface(
     ring_colours = colours[left]
     modes = ring_colours[:: max(1, len(ring_colours) // 200)]
     weights = np.array([0.5, 1.0, 1.0])  # lightness varies along a background more than colour does
-    near = ((ring_colours[:, None] - modes[None]) ** 2 * weights).sum(2) < 49
+    near = total((ring_colours[:, None] - modes[None]) ** 2 * weights) < 49
     start = modes[near.sum(0).argmax()]
-    used = left & (((colours - start) ** 2 * weights).sum(1) < 100)
+    used = left & (total((colours - start) ** 2 * weights) < 100)
     for step in range(20):
         degree = 1 if step < 5 else 2 if step < 12 else 3
         basis = bases[degree]
@@ -155,7 +169,7 @@ def _grow_surface(
         coefficients = np.linalg.solve(a.T @ a + 1e-4 * len(a) * np.eye(a.shape[1]), a.T @ colours[used])
         residual = colours - basis @ coefficients
         spread = 1.4826 * np.median(np.abs(residual[used] - np.median(residual[used], 0)), axis=0) + 0.3
-        distance = np.sqrt((residual**2 / spread**2).sum(1))
+        distance = np.sqrt(total(residual**2 / spread**2))
         inlier = distance < max(4.5, 9 - 0.5 * step)
         grown = connected_to(inlier.reshape(shape), left.reshape(shape)).ravel()
         if grown.sum() < 0.02 * len(colours):
@@ -211,7 +225,7 @@ def _explain_seams(
     for i in range(len(surfaces)):
         for j in range(i):
             step = surfaces[i] - surfaces[j]
-            share = ((smooth - surfaces[j]) * step).sum(2) / np.maximum((step**2).sum(2), 1e-6)
+            share = total((smooth - surfaces[j]) * step) / np.maximum(total(step**2), 1e-6)
             mixed = length(smooth - surfaces[j] - np.clip(share, 0, 1)[..., None] * step)
             both = [cv2.dilate((plain & (side < 0.5)).astype(np.uint8), near) > 0 for side in (share, 1 - share)]
             seam |= both[0] & both[1] & (mixed < 4 * max(noise, NOISE_FLOOR_LAB))

@@ -177,7 +177,7 @@ def lost_parts(mask: np.ndarray, found: Segmentation, share: np.ndarray) -> np.n
 def _shade(found: Segmentation, share: np.ndarray) -> Callable[[tuple[slice, slice], np.ndarray], bool]:
     """Return what tells whether a piece in its box is darker than the ground, of no other colour, and no object to a network."""
     seen, certain = at_size(share, found.mask.shape), found.colours.certain
-    darker = found.background.light_ratio.mean(2) < 1
+    darker = found.background.light < 1
 
     def is_shade(box: tuple[slice, slice], piece: np.ndarray) -> bool:
         sure = seen[box][piece].mean() < SURELY_GROUND and certain[box][piece].mean() < MOST_CERTAIN_OF_SHADE

@@ -27,9 +27,7 @@ def ground_inside(
     Such a place may be a hole, or a grey part of a thing on a grey ground; as nobody can tell, it is doubted. One of which all
     networks are sure (``share`` (H, W) of object, the least of theirs) and that is lit too unevenly for ground is the thing.
     """
-    ratio = background.light_ratio
-    light = ratio.mean(2)
-    tint = length(ratio / np.maximum(light, 1e-3)[..., None] - 1) / np.sqrt(3)
+    light, tint = background.light, background.tint
     same = (light > LEAST_LIGHT) & (light < MOST_LIGHT) & (tint < 4 * SAME_TINT)
     steepest = 0.25 * float(np.percentile(cv2.dilate(gradient, disk(3))[mask], 75))
     quiet = eroded(mask, RIM_PX) & (same | (background.distance < 4)) & (gradient < max(4 * threshold, steepest))

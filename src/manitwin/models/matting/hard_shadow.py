@@ -52,10 +52,9 @@ def hard_shadow(background: Background, solid: np.ndarray, gradient: np.ndarray,
     a sharp outline, or lie apart, or hold lights and pieces of it.
     """
     found = np.zeros(solid.shape, bool)
-    ratio = background.light_ratio
-    light = ratio.mean(2)
+    ratio, light = background.light_ratio, background.light
     dim = (light > MIN_LIGHT) & (light < MAX_SHADE)
-    tint = _tint(ratio, solid)
+    tint = _tint(ratio, light, solid)
     falling = falls_inward(light, ~solid)
     certain = opened(solid & ~(dim & falling & (tint < CERTAIN_TINT)) & (background.distance > 4), 1)
     if not certain.any():
@@ -92,13 +91,13 @@ def _is_shadow(evidence: _Evidence) -> bool:
     )
 
 
-def _tint(ratio: np.ndarray, solid: np.ndarray) -> np.ndarray:
+def _tint(ratio: np.ndarray, light: np.ndarray, solid: np.ndarray) -> np.ndarray:
     """Return how far the light (H, W) of each pixel is from that of the background, dimmed evenly.
 
     What goes towards the object's own tint may be light that it throws into its shadow: ``BOUNCE`` of it counts as ``TINT``.
     """
-    light = ratio.mean(2)[..., None]
-    left = (ratio - light) / np.maximum(light, 0.3) / np.sqrt(3)
+    even = light[..., None]
+    left = (ratio - even) / np.maximum(even, 0.3) / np.sqrt(3)
     size = length(left)
     coloured = solid & (size > CERTAIN_TINT)
     if not coloured.any():

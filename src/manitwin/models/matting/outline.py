@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from manitwin.models.matting.background import Background, connected_to
+from manitwin.models.matting.background import Background, connected_to, total
 
 BY_ROWS_FROM_PX = 6  # of a disk's radius: a larger one is applied row by row, sixteen times as fast at 60
 OBJECT_DISTANCE = 6.0  # of a border pixel's Mahalanobis distance: what the background's fit takes for explained
@@ -67,10 +67,10 @@ def holds(region: np.ndarray) -> int:
 def gradient_magnitude(lab: np.ndarray, blur_px: float = 1.0) -> np.ndarray:
     """Return the colour gradient (H, W) in L*a*b* units per pixel."""
     smooth = cv2.GaussianBlur(lab, (0, 0), blur_px)
-    total = np.zeros(lab.shape[:2], np.float32)
+    squares = np.zeros(lab.shape[:2], np.float32)
     for axis in ((1, 0), (0, 1)):
-        total += (cv2.Sobel(smooth, cv2.CV_32F, *axis, scale=0.125) ** 2).sum(2)
-    return np.sqrt(total)
+        squares += total(cv2.Sobel(smooth, cv2.CV_32F, *axis, scale=0.125) ** 2)
+    return np.sqrt(squares)
 
 
 def edge_threshold(background: Background, gradient: np.ndarray) -> float:

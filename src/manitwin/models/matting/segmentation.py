@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
-from manitwin.models.matting.background import Background, length, model_background
+from manitwin.models.matting.background import Background, length, model_background, total
 from manitwin.models.matting.edge_scale import edge_scale, narrow_edges
 from manitwin.models.matting.hard_shadow import hard_shadow
 from manitwin.models.matting.outline import (
@@ -199,7 +199,7 @@ def to_half_contrast(background: Background, mask: np.ndarray, band_px: int = 8)
     nearest = ndimage.distance_transform_edt(~inner, return_distances=False, return_indices=True)
     residual = cv2.GaussianBlur(background.residual, (0, 0), 0.6)
     own = residual[nearest[0], nearest[1]]
-    share = (residual * own).sum(2) / np.maximum((own**2).sum(2), 1e-6)
+    share = total(residual * own) / np.maximum(total(own**2), 1e-6)
     visible = length(own) > 8 * max(background.noise_lab, 0.5)
     # a mixture lies between B and F; a rim of another colour does not, and stays
     off_line = length(residual - share[..., None] * own)

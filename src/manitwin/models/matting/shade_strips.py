@@ -40,9 +40,7 @@ def shade_strips(background: Background, mask: np.ndarray, gradient: np.ndarray)
     outline as sharp as the thing's, as has the shadow of a very small lamp, or is attached by its end. (``hard_shadow`` tells
     what has no such colours by its penumbra.)
     """
-    ratio = background.light_ratio
-    light = ratio.mean(2)
-    tint = length(ratio / np.maximum(light, 1e-3)[..., None] - 1) / np.sqrt(3)
+    light, tint = background.light, background.tint
     strips = opened(mask & (light > MIN_SHADE) & (light < MOST_LIGHT) & (tint < MOST_TINT), 1)
     core = mask & ~dilated(strips, 1)
     shadow, doubtful = np.zeros(mask.shape, bool), np.zeros(mask.shape, bool)

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
-from manitwin.models.matting.background import MAX_SHADE, MIN_SHADE, NEUTRAL, Background, length
+from manitwin.models.matting.background import MAX_SHADE, MIN_SHADE, NEUTRAL, Background, length, total
 from manitwin.models.matting.outline import dilated, disk, eroded, flood, holds, opened
 
 MAX_PENUMBRA = 3.5  # L*a*b* units per pixel at working size; cast shadows of the studied photos have 1.5 to 3.3
@@ -30,11 +30,10 @@ def cast_shadow(
     eighth where several lights tint the shadow. A glow differs from the background by less than 15 % of what the object does.
     Neither is bounded by an edge that is as ``narrow`` as the photo's own: a pale cap or a grey handle is.
     """
-    ratio = background.light_ratio
-    darkening = ratio.mean(2)
+    ratio, darkening = background.light_ratio, background.light
     tint = ratio / darkening[..., None] - 1
     shady = (darkening > MIN_SHADE) & (darkening < MAX_SHADE)
-    tinted = length(tint) / np.sqrt(3)
+    tinted = background.tint
     certain = opened(candidate & ~(shady & (tinted < TINTED)) & (background.distance > 4), 2)
     edge = _object_edge(certain, candidate, gradient)
     shady &= falls_inward(darkening, ~candidate)
@@ -115,9 +114,7 @@ def gaps(background: Background, candidate: np.ndarray, gradient: np.ndarray, th
     Such a region has the expected colour, or that colour evenly shaded, no more drawing than the border has (or no more than a
     shadow of the ground's own tint), and a rim that differs from both clearly.
     """
-    ratio = background.light_ratio
-    shade = ratio.mean(2)
-    tint = length(ratio / shade[..., None] - 1) / np.sqrt(3)
+    shade, tint = background.light, background.tint
     even = (shade > 0.45) & (shade < MAX_SHADE) & (tint < 0.12)
     quiet = candidate & (gradient < 4 * threshold) & ((background.distance < 4) | even)
     outside = eroded(~candidate, 2)
@@ -181,7 +178,7 @@ def _walled(lab: np.ndarray, outside: np.ndarray, region: np.ndarray, noise_lab:
     )
     step = ground - own
     offset = lab[box] - own
-    share = np.clip((offset * step).sum(2) / np.maximum((step**2).sum(2), 1e-6), 0, 1)
+    share = np.clip(total(offset * step) / np.maximum(total(step**2), 1e-6), 0, 1)
     off = np.where(part | beyond, 0, length(cv2.GaussianBlur(offset - share[..., None] * step, (0, 0), 0.8)))
     near = dilated(filled, WALL_PX // 2)
     wall = cv2.dilate(np.where(near, off, 0).astype(np.float32), disk(WALL_PX // 2))
