@@ -9,9 +9,10 @@ from manitwin.errors import Rejected
 from manitwin.models.generators.lift.carved_part import MOST_COLOURING, carved_part, colouring
 from manitwin.models.generators.lift.carving import carve
 from manitwin.models.generators.lift.made_of_views import MadeOfViews
+from manitwin.models.generators.lift.pinhole import passing_px
 from manitwin.models.generators.lift.several import from_views
 from manitwin.models.generators.lift.surface import to_manifold
-from manitwin.models.generators.lift.turntable import calibrated
+from manitwin.models.generators.lift.turntable import TurntableCamera, calibrated, scaled_masks, sights_of
 from manitwin.models.generators.protocol import PhotoView
 from turned_things import FOV_DEG, SIDES, turned_photo, turned_thing
 
@@ -29,6 +30,16 @@ def test_a_camera_that_stays_is_told_by_the_outlines(elevation_deg: float) -> No
     assert camera.elevation_deg == pytest.approx(elevation_deg, abs=3)
     assert camera.focal == pytest.approx(focal, rel=0.2)
     assert camera.axis_share == pytest.approx(0.5 - focal * 0.02 / 0.25, abs=0.01)
+
+
+def test_an_outline_that_another_camera_saw_is_the_same_as_one_that_is_made_for_it() -> None:
+    turns = [0.0, 70.0, 140.0]
+    masks = scaled_masks([turned_photo(turn, 20.0) for turn in turns], 160)
+    first, second = (sights_of(masks, TurntableCamera(elevation, 1.0, 0.5, 0.0), turns) for elevation in (10.0, 20.0))
+    passing_px(first)  # finds what is kept of the outlines
+    moved = [sight.seen_from(other.matrix, other.focal_px) for sight, other in zip(first, second, strict=True)]
+    assert passing_px(moved) == passing_px(second) != passing_px(first)
+    assert all(one.rim_rays is other.rim_rays for one, other in zip(first, moved, strict=True))
 
 
 @pytest.mark.slow

@@ -42,6 +42,29 @@ class Sight:
         lines, _ = cv2.findContours(inside, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
         return np.asarray(max(lines, key=len)[:, 0, :] + self.corner + 0.5, float)
 
+    @cached_property
+    def rim_rays(self) -> np.ndarray:
+        """Some of the ``rim``, ``(RIM_RAYS, 2)``, spread along it."""
+        return np.asarray(self.rim[np.linspace(0, len(self.rim) - 1, RIM_RAYS).astype(int)])
+
+    @cached_property
+    def rim_circle(self) -> tuple[np.ndarray, float]:
+        """The middle ``(2,)`` of the box of the ``rim`` and how far the rim is from it at most, pixels."""
+        middle = (self.rim.min(axis=0) + self.rim.max(axis=0)) / 2
+        return middle, float(np.linalg.norm(self.rim - middle, axis=1).max())
+
+    def seen_from(self, matrix: np.ndarray, focal_px: float) -> Sight:
+        """Return the same outline as another camera saw it."""
+        other = Sight(self.distance, self.box, matrix, focal_px)
+        for name in (
+            "corner",
+            "rim",
+            "rim_rays",
+            "rim_circle",
+        ):  # found once: a camera is looked for in a thousand places
+            other.__dict__[name] = getattr(self, name)
+        return other
+
     @property
     def position(self) -> np.ndarray:
         """The projection centre ``(3,)``."""
@@ -56,10 +79,18 @@ class Sight:
 
     def inside(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return how far inside the outline points ``(..., 3)`` are seen, pixels, and the length of a pixel at each."""
+        found, depth = self._looked_up(points)
+        return found, np.maximum(depth, 1e-6) / self.focal_px
+
+    def inside_px(self, points: np.ndarray) -> np.ndarray:
+        """Return how far inside the outline points ``(..., 3)`` are seen, pixels."""
+        return self._looked_up(points)[0]
+
+    def _looked_up(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         column, row, depth = self.project(points)
         flat = column.reshape(1, -1) - self.corner[0] - 0.5, row.reshape(1, -1) - self.corner[1] - 0.5
         found = _looked_up(self.distance, *flat).reshape(column.shape)
-        return np.where(depth > 1e-6, found, -FAR_PX), np.maximum(depth, 1e-6) / self.focal_px
+        return np.where(depth > 1e-6, found, -FAR_PX), depth
 
     def rays(self, pixels: np.ndarray) -> np.ndarray:
         """Return the directions ``(N, 3)`` through pixels ``(N, 2)``, with a depth of 1."""
@@ -69,18 +100,19 @@ class Sight:
 def _looked_up(image: np.ndarray, column: np.ndarray, row: np.ndarray) -> np.ndarray:
     """Return an image's values, between its pixels too; in slices, for OpenCV takes no more than 32,767 columns."""
     size = 1 << 14
+    column, row = column.astype(np.float32), row.astype(np.float32)
     parts = [
         cv2.remap(
             image,
-            column[:, at : at + size].astype(np.float32),
-            row[:, at : at + size].astype(np.float32),
+            column[:, at : at + size],
+            row[:, at : at + size],
             cv2.INTER_LINEAR,
             borderMode=cv2.BORDER_CONSTANT,
             borderValue=-FAR_PX,
         )
         for at in range(0, column.shape[1], size)
     ]
-    return np.concatenate(parts, axis=1)
+    return np.concatenate(parts, axis=1) if len(parts) > 1 else parts[0]
 
 
 def signed_distance(mask: np.ndarray) -> np.ndarray:
@@ -93,22 +125,15 @@ def signed_distance(mask: np.ndarray) -> np.ndarray:
 
 def around(sights: Sequence[Sight]) -> tuple[np.ndarray, float]:
     """Return a centre ``(3,)`` and a radius that hold the object: where the rays through the outlines' middles are nearest."""
-    normal, moment, middles = np.zeros((3, 3)), np.zeros(3), []
+    normal, moment, identity = np.zeros((3, 3)), np.zeros(3), np.eye(3)
     for sight in sights:
-        middle = (sight.rim.min(axis=0) + sight.rim.max(axis=0)) / 2
-        ray = sight.rays(middle[None])[0]
+        ray = sight.rays(sight.rim_circle[0][None])[0]
         ray /= np.linalg.norm(ray)
-        across = np.eye(3) - np.outer(ray, ray)
+        across = identity - np.outer(ray, ray)
         normal += across
         moment += across @ sight.position
-        middles.append(middle)
     centre = np.linalg.lstsq(normal, moment, rcond=None)[0]
-    reach = [
-        float(np.linalg.norm(sight.rim - middle, axis=1).max())
-        * max(float(sight.project(centre)[2]), 0)
-        / sight.focal_px
-        for sight, middle in zip(sights, middles, strict=True)
-    ]
+    reach = [sight.rim_circle[1] * max(float(sight.project(centre)[2]), 0) / sight.focal_px for sight in sights]
     return centre, _AROUND * max(reach)
 
 
@@ -125,7 +150,7 @@ def inside_others(sights: Sequence[Sight], number: int, points: np.ndarray) -> n
     least = np.full(points.shape[:-1], FAR_PX, np.float32)
     for other, sight in enumerate(sights):
         if other != number:
-            least = np.minimum(least, sight.inside(points)[0])
+            least = np.minimum(least, sight.inside_px(points))
     return least
 
 
@@ -134,8 +159,7 @@ def passing_px(sights: Sequence[Sight]) -> float:
     surroundings = around(sights)
     passed = []
     for number, sight in enumerate(sights):
-        some = np.linspace(0, len(sight.rim) - 1, RIM_RAYS).astype(int)
-        best = inside_others(sights, number, points_on_rays(sight, sight.rim[some], surroundings)).max(axis=1)
+        best = inside_others(sights, number, points_on_rays(sight, sight.rim_rays, surroundings)).max(axis=1)
         # the middle of a pixel of the rim is half a pixel within the outline
         passed.append(np.clip(0.5 - best, 0.0, MOST_PASSING_PX))
     return float(np.mean(passed))

@@ -35,7 +35,7 @@ def covered_shares(sights: Sequence[Sight]) -> tuple[list[float], np.ndarray]:
         each = np.full((count, *points.shape[:2]), FAR_PX, np.float32)
         for other in range(count):
             if other != number:
-                each[other] = sights[other].inside(points)[0]
+                each[other] = sights[other].inside_px(points)
         order = np.sort(each, axis=0)[:2]
         shares.append(float(np.mean(order[0].max(axis=1) > -NEAR_PX)))
         for left_out in range(count):

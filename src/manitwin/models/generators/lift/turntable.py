@@ -140,12 +140,10 @@ def _unplaced(mask: ScaledMask) -> Sight:
 def _seen_by(
     plain: Sequence[Sight], masks: Sequence[ScaledMask], camera: TurntableCamera, turns_deg: Sequence[float]
 ) -> list[Sight]:
-    seen = []
-    for sight, mask, turn in zip(plain, masks, turns_deg, strict=True):
-        placed = Sight(sight.distance, sight.box, camera.matrix(turn, *mask.size_px), camera.focal * max(mask.size_px))
-        placed.__dict__["rim"] = sight.rim  # found once: the cost is asked for a thousand times
-        seen.append(placed)
-    return seen
+    return [
+        sight.seen_from(camera.matrix(turn, *mask.size_px), camera.focal * max(mask.size_px))
+        for sight, mask, turn in zip(plain, masks, turns_deg, strict=True)
+    ]
 
 
 def _spread(turns_deg: Sequence[float]) -> list[int]:
