@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
 import pytest
 
+from kept_opinions import kept_opinions
 from manitwin.errors import Rejected
 from manitwin.models.generators.templates.fitting.outline_check import template_outline_check
 from manitwin.models.matting import matte_photo
@@ -15,6 +17,13 @@ from manitwin.models.matting.study import EXPLAINED_ODDS, study_photo
 
 SIZE = (300, 400)
 CENTER, RADIUS_PX = (200, 150), 70
+
+
+@pytest.fixture(scope="module", autouse=True)
+def rules_and_the_built_in_network_asked_once() -> Iterator[None]:
+    """Keep what they say of a picture: one is studied by itself, and with what explains it or does not."""
+    with kept_opinions():
+        yield
 
 
 @dataclass

@@ -154,7 +154,7 @@ def test_colours_that_are_worked_out_some_rows_at_a_time_are_those_of_the_whole(
     monkeypatch.setattr(outline_network, "ROWS_AT_ONCE", len(photo))
     whole = BothSides(photo, mask, 3).values(0, len(photo))
     monkeypatch.setattr(outline_network, "ROWS_AT_ONCE", 7)
-    assert BothSides(photo, mask, 3).values(0, len(photo)) == pytest.approx(whole, abs=1e-4)
+    assert np.abs(BothSides(photo, mask, 3).values(0, len(photo)) - whole).max() < 1e-4
 
 
 def test_the_band_follows_the_photos_size() -> None:
