@@ -58,8 +58,8 @@ armature_kg_m2 = 0.0005
 name = "pinch"
 grasp_types = ["pinch"]
 depth_m = [0.06, 0.06]
-openings_m = [0.0, 0.06]
-joints_rad = [[0.1, 0.1], [-0.5, 0.1]]
+openings_m = [0.33, 0.37]
+joints_rad = [[0.1, 1.0], [0.1, 0.0]]
 """  # fmt: skip
 ARM = TOML.replace("small", "thing").replace('"lift", "roll"', '"lift"').replace("0.5, 0.0]", "0.5]")
 

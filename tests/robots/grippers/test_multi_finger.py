@@ -155,10 +155,10 @@ def test_own_urdf_with_meshes_loads_and_its_meshes_stay_inside(tmp_path: Path) -
         "</collision></link>"
         for name in links
     )
-    for child, parent in (("a1", "palm"), ("a2", "a1"), ("b1", "palm"), ("b2", "b1")):
+    for child, parent, x_m in (("a1", "palm", -0.04), ("a2", "a1", 0), ("b1", "palm", 0.04), ("b2", "b1", 0)):
         text += (
             f"<joint name='j_{child}' type='revolute'><parent link='{parent}'/><child link='{child}'/>"
-            "<origin xyz='0 0 0.03'/><axis xyz='0 1 0'/><limit lower='-1' upper='1'/></joint>"
+            f"<origin xyz='{x_m} 0 0.03'/><axis xyz='0 1 0'/><limit lower='-1' upper='1'/></joint>"
         )
     folder = tmp_path / "hand"
     folder.mkdir()
@@ -204,6 +204,6 @@ armature_kg_m2 = 0.0005
 name = "pinch"
 grasp_types = ["pinch"]
 depth_m = [0.06, 0.06]
-openings_m = [0.0, 0.06]
-joints_rad = [[0.1, 0.1, -0.1, -0.1], [-0.5, 0.1, 0.5, -0.1]]
+openings_m = [0.006, 0.056]
+joints_rad = [[1.0, 0.0, -1.0, 0.0], [0.0, 0.0, 0.0, 0.0]]
 """

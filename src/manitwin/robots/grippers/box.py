@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import ConfigDict
 
+from manitwin.robots.grippers.quantities import Length, Position, Turn
+
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
 """A key that means nothing is an error: it is a misspelt one."""
 
@@ -18,9 +20,9 @@ PlacedBox = tuple[np.ndarray, np.ndarray]
 class Box:
     """A box of a gripper part: its centre (m), half extents (m) and rotation about Y (rad), in the grasp frame."""
 
-    center_m: tuple[float, float, float]
-    half_extents_m: tuple[float, float, float]
-    rotation_y_rad: float = 0.0
+    center_m: tuple[Position, Position, Position]
+    half_extents_m: tuple[Length, Length, Length]
+    rotation_y_rad: Turn = 0.0
 
     def placed(self, offset_x_m: float = 0.0, side: int = 1) -> PlacedBox:
         """Return the box moved along X; with ``side`` -1, turned by half a turn about Z after that."""

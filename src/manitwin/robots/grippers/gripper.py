@@ -18,7 +18,8 @@ from manitwin.errors import UsageError, choose_from
 from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.toml_file import MAX_TOML_BYTES, parse_toml
 from manitwin.robots.grippers.box import PlacedBox
-from manitwin.robots.grippers.multi_finger import load_multi_finger
+from manitwin.robots.grippers.box_checks import check_cup, check_jaws
+from manitwin.robots.grippers.multi_finger_file import load_multi_finger
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.robots.grippers.suction import SuctionGripper
 
@@ -88,17 +89,26 @@ def of_kind(gripper: Gripper, kind: type[Kind]) -> Kind:
     return gripper
 
 
+ROBOT_DESCRIPTIONS = (".urdf", ".xacro", ".xml", ".sdf", ".mjcf")
+
 Loader = Callable[[dict[str, Any], Path], Gripper]
 
 
-def _described_by(kind: type[ParallelGripper] | type[SuctionGripper]) -> Loader:
-    """Return the loader of a kind that its file describes wholly."""
-    return lambda data, folder: TypeAdapter(kind).validate_python(data)
+def _load_jaws(data: dict[str, Any], folder: Path) -> ParallelGripper:
+    jaws = TypeAdapter(ParallelGripper).validate_python(data)
+    check_jaws(jaws)
+    return jaws
+
+
+def _load_cup(data: dict[str, Any], folder: Path) -> SuctionGripper:
+    cup = TypeAdapter(SuctionGripper).validate_python(data)
+    check_cup(cup)
+    return cup
 
 
 KINDS: dict[str, Loader] = {
-    "parallel": _described_by(ParallelGripper),
-    "suction": _described_by(SuctionGripper),
+    "parallel": _load_jaws,
+    "suction": _load_cup,
     "multi_finger": load_multi_finger,
 }
 """How each kind is made of its file's content and folder."""
@@ -121,9 +131,14 @@ def load_gripper(name_or_path: str) -> Gripper:
             raise UsageError(
                 f"gripper file {name_or_path} is not there; give a .toml file or one of {', '.join(shipped_grippers())}"
             )
+    elif name_or_path.endswith(ROBOT_DESCRIPTIONS):
+        raise UsageError(
+            f"gripper {name_or_path} is the description of a robot; write a .toml file of the gripper beside it, of the kind"
+            " multi_finger, which names a URDF, or parallel or suction, which are boxes and numbers"
+        )
     else:
         if name_or_path not in shipped_grippers():
-            raise UsageError(choose_from("gripper", name_or_path, shipped_grippers()))
+            raise UsageError(f"{choose_from('gripper', name_or_path, shipped_grippers())}, or a .toml file")
         path = _shipped_folder() / f"{name_or_path}.toml"
     content = read_bytes(path, MAX_TOML_BYTES, UsageError, name=f"gripper file {path}")
     data = parse_toml(content, f"gripper file {path}", UsageError)
@@ -132,8 +147,32 @@ def load_gripper(name_or_path: str) -> Gripper:
         raise UsageError(f"gripper file {path}: {choose_from('kind', str(kind), KINDS)}")
     data["sha256"] = hashlib.sha256(content).hexdigest()
     try:
-        return KINDS[kind](data, path.parent)
+        gripper = KINDS[kind](data, path.parent)
+        if gripper.name in shipped_grippers():
+            _check_name(gripper.name, path, content)
+        return gripper
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise UsageError(f"gripper file {path}: {where}: {first['msg']}") from error
+        raise UsageError(f"gripper file {path}: {_first_of(error)}") from error
+    except ValueError as error:  # a check's own words
+        raise UsageError(f"gripper file {path}: {error}") from error
+
+
+def _check_name(name: str, path: Path, content: bytes) -> None:
+    """Raise ValueError where another gripper has the name of a shipped one, for which exports, pages and robots would take it."""
+    if content != (_shipped_folder() / f"{name}.toml").read_bytes():
+        raise ValueError(f"name: {name!r} is the name of a gripper that comes with the package; give this one another")
+
+
+def _first_of(error: ValidationError) -> str:
+    """Return the first complaint, an unknown key before a missing one: a key that is misspelt is both."""
+    complaints = error.errors()
+    unknown = [each for each in complaints if each["type"] in ("extra_forbidden", "unexpected_keyword_argument")]
+    missing = [str(each["loc"][-1]) for each in complaints if each["type"] == "missing"]
+    first = (unknown or complaints)[0]
+    where = ".".join(str(part) for part in first["loc"])
+    if unknown:
+        lacks = f"; missing are {', '.join(missing)}" if missing else ""
+        return f"{where}: no key of this kind{lacks}; mend or remove it"
+    if missing:
+        return f"it lacks {', '.join(missing)}; give {'it' if len(missing) == 1 else 'them'}"
+    return f"{where}: {first['msg'].removeprefix('Value error, ')}"

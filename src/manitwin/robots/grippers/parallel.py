@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from manitwin.robots.grippers.box import STRICT, Box, PlacedBox
+from manitwin.robots.grippers.quantities import Length, Name, Positive, Source
 
 
 @dataclass(frozen=True)
@@ -20,16 +21,16 @@ class ParallelGripper:
     __pydantic_config__ = STRICT
     kind: ClassVar[str] = "parallel"
 
-    name: str
+    name: Name
     sha256: str
-    opening_m: float
-    tip_depth_m: float
-    force_n: float
-    finger_friction: float
-    pad_half_extents_m: tuple[float, float]
+    opening_m: Length
+    tip_depth_m: Length
+    force_n: Positive
+    finger_friction: Positive
+    pad_half_extents_m: tuple[Length, Length]
     finger_boxes: tuple[Box, ...]
     palm_boxes: tuple[Box, ...]
-    source: str
+    source: Source
 
     def boxes(self, opening_m: float) -> list[PlacedBox]:
         """Return ``(box_to_gripper 4x4, half_extents_m (3,))`` of palm and both fingers at a given opening between the pads."""

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from manitwin.robots.grippers.box import STRICT, Box, PlacedBox
+from manitwin.robots.grippers.quantities import Gap, Length, Name, Positive, Slope, Source, Vacuum
 
 SYMBOL_HALF_WIDTH_M = 0.002
 
@@ -26,19 +27,19 @@ class SuctionGripper:
     __pydantic_config__ = STRICT
     kind: ClassVar[str] = "suction"
 
-    name: str
+    name: Name
     sha256: str
-    lip_radius_m: float
-    lip_travel_m: float
-    reach_m: float
-    max_tilt_rad: float
-    ceiling_m: float
-    max_surface_angle_rad: float
-    vacuum_pa: float
-    tip_depth_m: float
-    finger_friction: float
+    lip_radius_m: Length
+    lip_travel_m: Gap
+    reach_m: Gap
+    max_tilt_rad: Slope
+    ceiling_m: Gap
+    max_surface_angle_rad: Slope
+    vacuum_pa: Vacuum
+    tip_depth_m: Length
+    finger_friction: Positive
     body_boxes: tuple[Box, ...]
-    source: str
+    source: Source
 
     @property
     def force_n(self) -> float:

@@ -1,0 +1,76 @@
+"""Joints of a hand that follow others: ``<mimic>`` of a URDF (http://wiki.ros.org/urdf/XML/joint)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from manitwin.robots.links import Link
+from manitwin.robots.urdf import UrdfTree
+
+FOLLOWS_WITHIN_RAD = 0.005
+"""Positions in a gripper's file are rounded to two or three digits."""
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A joint that is at ``ratio`` times the position of its leader, plus ``offset``."""
+
+    leader: str
+    ratio: float
+    offset: float
+
+
+def couplings_of(tree: UrdfTree) -> dict[str, Coupling]:
+    """Return the joints of a checked URDF that follow another, by name, with a leader that follows none.
+
+    Raises the tree's error where a leader is not there, or joints follow one another in a circle.
+    """
+    given = {
+        name: Coupling(mimic.get("joint", ""), float(mimic.get("multiplier", "1")), float(mimic.get("offset", "0")))
+        for name, joint in tree.joints.items()
+        if joint.get("type") != "fixed" and (mimic := joint.find("mimic")) is not None
+    }
+    for coupling in given.values():
+        tree.joint(coupling.leader)
+    return {name: _resolved(tree, given, name) for name in given}
+
+
+def _resolved(tree: UrdfTree, given: dict[str, Coupling], name: str) -> Coupling:
+    whole, seen = given[name], {name}
+    while whole.leader in given:
+        if whole.leader in seen:
+            raise tree.refuse(f"joint {name!r}", "mimics itself by way of others", "let one of them lead")
+        seen.add(whole.leader)
+        above = given[whole.leader]
+        whole = Coupling(above.leader, whole.ratio * above.ratio, whole.ratio * above.offset + whole.offset)
+    return whole
+
+
+def with_followers(
+    named: tuple[str, ...], positions_rad: np.ndarray, links: tuple[Link, ...], couplings: dict[str, Coupling]
+) -> tuple[tuple[str, ...], np.ndarray]:
+    """Return all movable joints, those that are ``named`` first, and their positions ``(K, J)`` from those ``(K, N)``.
+
+    A follower that is not named is where its leader puts it, within its limits. Raises ValueError where one is named at
+    another position, or a leader is not named.
+    """
+    left_out = [link.joint for link in links if link.joint in couplings and link.joint not in named]
+    limits = {link.joint: link.limits for link in links}
+    columns = dict(zip(named, positions_rad.T, strict=True))
+    for name in [*left_out, *(name for name in named if name in couplings)]:
+        coupling = couplings[name]
+        if coupling.leader not in named:
+            raise ValueError(f"joints: {coupling.leader!r} is not named, which {name!r} follows; name it")
+        follows = np.clip(coupling.ratio * columns[coupling.leader] + coupling.offset, *limits[name])
+        off = np.abs(columns.setdefault(name, follows) - follows)
+        if off.max(initial=0.0) > FOLLOWS_WITHIN_RAD:
+            row = int(off.argmax())
+            raise ValueError(
+                f"joints_rad: row {row} has {name!r} at {columns[name][row]:g}, its <mimic> puts it at {follows[row]:.4g}"
+                f" ({coupling.ratio:g} times {coupling.leader!r} plus {coupling.offset:g}, within its limits); leave"
+                f" {name!r} out of joints, or mend the row"
+            )
+    joints = (*named, *left_out)
+    return joints, np.stack([columns[name] for name in joints], axis=-1)

@@ -1,0 +1,129 @@
+"""Postures of a hand with many joints: made of an open and a closed hand, and checked against the links of its URDF."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+
+from manitwin.robots.grippers.fingertip_gaps import Fingertips
+from manitwin.robots.grippers.multi_finger import MultiFingerGripper, Posture
+
+STEPS = 24
+"""Of the way between open and closed; between two the gap is taken to change evenly."""
+LIMIT_TOLERANCE = 1e-3
+"""Positions and limits are rounded to three digits."""
+LEAST_TRAVEL_M = 0.001
+
+
+def measured_posture(hand: MultiFingerGripper, tips: Fingertips, posture: Posture) -> Posture:
+    """Return a posture of two rows, closed and open, with the openings that the fingertips have between these.
+
+    Past the row in which thumb and fingers meet, openings go on into the negative as fast as they came. Raises ValueError
+    where they do not come nearer.
+    """
+    closed, opened = np.array(posture.joints_rad)
+    share = np.linspace(0, 1, STEPS + 1)
+    rows = closed + share[:, None] * (opened - closed)
+    gaps_m = posture_gaps_m(tips, rows)
+    meet = int(np.flatnonzero(gaps_m <= 0).max(initial=-1))  # the last in which they overlap
+    first = max(meet, int(np.argmin(gaps_m)))
+    last = first + int(np.argmax(gaps_m[first:]))
+    if gaps_m[last] - gaps_m[first] < LEAST_TRAVEL_M:
+        raise ValueError(_not_closing(posture.name, float(gaps_m[0]), float(gaps_m[-1]), "closed_rad", "open_rad"))
+    kept = [first]
+    for index in range(first + 1, last + 1):
+        if gaps_m[index] > gaps_m[kept[-1]]:
+            kept.append(index)
+    openings_m, joints = gaps_m[kept].tolist(), rows[kept]
+    if first > 0:  # the target of a squeeze lies behind the row in which they meet
+        speed = (gaps_m[last] - gaps_m[first]) / (share[last] - share[first])
+        openings_m, joints = [float(gaps_m[first] - speed * share[first]), *openings_m], np.vstack([closed, joints])
+    return replace(posture, openings_m=tuple(openings_m), joints_rad=tuple(map(tuple, joints.tolist())))
+
+
+def posture_gaps_m(tips: Fingertips, joints_rad: np.ndarray) -> np.ndarray:
+    """Return the least distance of the thumb from the fingers that take part, in each row ``(K,)`` of joints ``(K, J)``.
+
+    A finger takes part whose tip moves most from the first to the last row, or half as far; others stand aside.
+    """
+    gaps_m = np.array([tips.gaps_m(row) for row in joints_rad])
+    moved = np.ptp(np.array([_tip_centers(tips, row) for row in (joints_rad[0], joints_rad[-1])]), axis=0)
+    travel = np.linalg.norm(moved[1:], axis=-1)
+    part = travel >= travel.max() / 2
+    return np.asarray(gaps_m[:, part].min(axis=1))
+
+
+def _tip_centers(tips: Fingertips, joints_rad: np.ndarray) -> np.ndarray:
+    return np.array([points.mean(0) for points in tips.points_m(joints_rad)])
+
+
+def check_fingers(hand: MultiFingerGripper) -> None:
+    """Raise ValueError where fingers share a link, or have no joint that turns."""
+    if len(hand.fingers) < 2:
+        raise ValueError("fingers: there are fewer than two; name the links of the thumb, then those of each finger")
+    twice = [name for name, count in Counter(name for finger in hand.fingers for name in finger).items() if count > 1]
+    if twice:
+        raise ValueError(f"fingers: {', '.join(twice)} is named twice; a link is of one finger")
+    moving = {link.name for link in hand.links if link.joint_type != "fixed"}
+    for number, finger in enumerate(hand.fingers):
+        if not moving & set(finger):
+            raise ValueError(
+                f"fingers: none of the joints that hold {', '.join(finger) or 'finger ' + str(number)} moves; name the links"
+                " that turn, or leave this finger out"
+            )
+
+
+def check_posture(hand: MultiFingerGripper, tips: Fingertips, posture: Posture) -> None:
+    """Raise ValueError where a posture is beyond its joints' limits, moves the palm, or does not close as the file says."""
+    rows = np.array(posture.joints_rad)
+    owner = dict(zip((link.joint for link in hand.links), hand.finger_of_link, strict=True))
+    limits = {link.joint: link.limits for link in hand.links}
+    where = f"posture {posture.name!r}"
+    for column, joint in zip(rows.T, hand.joints, strict=True):
+        low, high = limits[joint]
+        if column.min() < low - LIMIT_TOLERANCE or column.max() > high + LIMIT_TOLERANCE:
+            worst = column[np.argmax(np.maximum(low - column, column - high))]
+            raise ValueError(
+                f"{where}: joint {joint!r} is at {worst:g}, its limits in the URDF are {low:g} to {high:g} rad; mend the"
+                " position, whose order is that of joints"
+            )
+        if owner[joint] < 0 and np.ptp(column) > LIMIT_TOLERANCE:
+            raise ValueError(
+                f"{where}: joint {joint!r} moves, but the link that it holds is of no finger; name that under fingers, or"
+                " keep the joint at one position"
+            )
+    _check_closing(hand, tips, posture, rows)
+
+
+def _check_closing(hand: MultiFingerGripper, tips: Fingertips, posture: Posture, rows: np.ndarray) -> None:
+    where, ends = f"posture {posture.name!r}", rows[[0, -1]]
+    closed_m, open_m = posture_gaps_m(tips, ends)
+    if open_m - closed_m < LEAST_TRAVEL_M:
+        raise ValueError(_not_closing(posture.name, closed_m, open_m, "the first row", "the last"))
+    least_m = posture.openings_m[-1] - 2 * hand.clearance_m
+    if open_m < least_m:
+        raise ValueError(
+            f"{where}: its widest opening is said to be {posture.openings_m[-1]:.4g} m, thumb and fingers of the URDF are then"
+            f" {open_m:.4g} m apart; mend openings_m, or give closed_rad and open_rad, between which openings are measured"
+        )
+    centers = _tip_centers(tips, rows[-1])
+    thumb, fingers = centers[0], centers[1:].mean(0)
+    if thumb[0] >= fingers[0]:
+        raise ValueError(
+            f"{where}: the thumb's tip is at x = {thumb[0]:.3f} of the grasp frame, the fingers' at {fingers[0]:.3f}; the thumb"
+            " belongs on -X: name it first under fingers, or turn root_to_gripper about Z"
+        )
+    if max(thumb[2], fingers[2]) <= hand.palm_front_m:
+        raise ValueError(
+            f"{where}: the fingertips are at z = {fingers[2]:.3f} of the grasp frame, the palm's front at"
+            f" {hand.palm_front_m:.3f}; +Z points out of the palm: turn root_to_gripper, or mend palm_front_m"
+        )
+
+
+def _not_closing(name: str, closed_m: float, open_m: float, closed: str, opened: str) -> str:
+    return (
+        f"posture {name!r}: thumb and fingers do not come nearer as it closes, they are {closed_m:.4g} m apart in {closed} and"
+        f" {open_m:.4g} m in {opened}; look at the signs of the positions: each joint turns about its <axis>"
+    )
