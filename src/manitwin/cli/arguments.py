@@ -25,6 +25,7 @@ PLACES = frozenset(
         "scenes",
         "prompts",
         "out",
+        "draw",
         "config",
         "record",
         "log",

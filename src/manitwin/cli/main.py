@@ -30,6 +30,7 @@ from manitwin.cli.commands.doctor import doctor
 from manitwin.cli.commands.evaluate import evaluate
 from manitwin.cli.commands.export import export
 from manitwin.cli.commands.fake import fake
+from manitwin.cli.commands.gripper import gripper
 from manitwin.cli.commands.import_ import import_
 from manitwin.cli.commands.layout import layout
 from manitwin.cli.commands.locate import locate
@@ -117,7 +118,8 @@ for making in (index, stats, publish, export, segmentation, affordances, catalog
     register(app, reported(making))
 register(app, reported(import_), "import")
 for other in (
-    status, retry, check, query, search, plan, doctor, models, fake, prompts, audit, carve, evaluate, capture, locate, view,
+    status, retry, check, query, search, plan, doctor, gripper, models, fake, prompts, audit, carve, evaluate, capture, locate,
+    view,
 ):  # fmt: skip
     register(app, other)
 register(app, review)

@@ -17,6 +17,8 @@ from manitwin.errors import ConfigError, ManiTwinError, choose_from
 from manitwin.formats.xml_file import MAX_NUMBER, read_xml
 from manitwin.robots.urdf import MOMENTS, UrdfTree, child_of, values_of
 
+XACRO = ("http://www.ros.org/wiki/xacro", "http://wiki.ros.org/xacro", "http://ros.org/wiki/xacro")
+"""The namespace of xacro's elements, as files have it."""
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed")
 _COUNTS: dict[tuple[str, str], tuple[int, ...]] = {
     ("origin", "xyz"): (3,),
@@ -82,6 +84,10 @@ def read_urdf(
     if prepare is not None:
         prepare(root)
     tree = UrdfTree(name, root, rules.error)
+    if rules.simulated and (macro := _first_macro(root)) is not None:
+        raise tree.refuse(
+            f"<{macro}>", "is of xacro, which makes URDFs and is none", "run 'xacro FILE > FILE.urdf', give that"
+        )
     _check_tree(tree, rules)
     for link_name, link in tree.links.items():
         _check_link(tree, rules, f"link {link_name!r}", link)
@@ -97,6 +103,14 @@ def read_urdf(
     for material in tree.element.findall("material"):
         _check_attributes(tree, rules, f"material {material.get('name')!r}", material, ("color",))
     return tree
+
+
+def _first_macro(root: etree._Element) -> str | None:
+    """Return the first element of xacro, by the name that the file gives it."""
+    for element in root.iter(etree.Element):
+        if etree.QName(element).namespace in XACRO:
+            return f"{element.prefix}:{etree.QName(element).localname}"
+    return None
 
 
 def _check_tree(tree: UrdfTree, rules: UrdfRules) -> None:

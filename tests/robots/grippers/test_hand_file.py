@@ -88,6 +88,17 @@ def test_followers_in_a_circle_and_without_a_leader_are_refused(tmp_path: Path) 
         )
 
 
+def test_xacro_in_place_of_a_urdf_is_told_how_to_expand_it(tmp_path: Path) -> None:
+    macro = '<xacro:property name="w" value="0.1"/><link'
+    source = urdf().replace(
+        '<robot name="small_hand"><link', f'<robot name="h" xmlns:xacro="http://www.ros.org/wiki/xacro">{macro}', 1
+    )
+    with pytest.raises(ManiTwinError, match=r"hand\.urdf: <xacro:property> is of xacro.*run 'xacro FILE > FILE\.urdf'"):
+        load_gripper(write_hand(tmp_path, description=source))
+    expanded = urdf().replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ')
+    assert load(write_hand(tmp_path, description=expanded)).name == "small_hand"
+
+
 def test_changed_mesh_of_a_link_is_another_gripper(tmp_path: Path) -> None:
     with_mesh = urdf().replace('<box size="0.09 0.05 0.02"/>', '<mesh filename="palm.stl"/>')
     digests = []
@@ -112,6 +123,7 @@ def test_changed_mesh_of_a_link_is_another_gripper(tmp_path: Path) -> None:
         ("force_n = 8.0", "force_n = -8.0", "force_n: is -8, it must be above 0"),
         ("tip_depth_m = 0.085", "tip_depth_m = 85", "tip_depth_m: is 85"),
         ("depth_m = [0.06, 0.085]", "depth_m = [0.085, 0.06]", "depth_m: descends"),
+        ("depth_m = [0.06, 0.085]", "depth_m = [0.06, 0.11]", "depth_m ends at 0.11, thumb and fingers reach to 0.098 along +Z"),
         ("quaternion_wxyz = [1.0, 0.0, 0.0, 0.0]", "quaternion_wxyz = [1.0, 1.0, 0.0, 0.0]", "quaternion wxyz of length 1"),
         ("quaternion_wxyz = [1.0, 0.0, 0.0, 0.0]", "quaternion_wxyz = [0.0, 0.0, 0.0, 1.0]", "the thumb belongs on -X"),
         ("quaternion_wxyz = [1.0, 0.0, 0.0, 0.0]", "quaternion_wxyz = [0.0, 0.0, 1.0, 0.0]", "-X"),

@@ -11,7 +11,7 @@ from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.links import LinkShape
 
 SPACING_M = 0.003
-"""Of points on a fingertip: facing surfaces 1 cm apart are measured 0.1 mm too far."""
+"""Of points on a fingertip: facing surfaces 1 cm apart are measured up to 0.4 mm too far."""
 MOST_SPACED = 20.0
 """Sides of a tip are cut into no more pieces than this."""
 
@@ -33,7 +33,7 @@ class Fingertips:
             self.links.append(max(shaped, key=lambda index: len(_ancestors(hand, index))))
         parts = [[_solid(shape) for shape in hand.links[index].shapes] for index in self.links]
         self._points_m = [np.concatenate([points for points, _ in solids]) for solids in parts]
-        self._solids = parts
+        self._planes = [[(points.min(0), points.max(0), planes) for points, planes in solids] for solids in parts]
 
     def points_m(self, joints_rad: np.ndarray) -> list[np.ndarray]:
         """Return points on each fingertip ``(P, 3)`` in the grasp frame, at joints ``(J,)``."""
@@ -53,10 +53,14 @@ class Fingertips:
             ]
         )
 
+    def reach_m(self, joints_rad: np.ndarray) -> np.ndarray:
+        """Return how far along +Z of the grasp frame each fingertip reaches ``(F,)``, the thumb's first."""
+        return np.array([points[:, 2].max() for points in self.points_m(joints_rad)])
+
     def _is_inside(self, finger: int, pose: np.ndarray, points_m: np.ndarray) -> bool:
         local_m = transform_points(inverse(pose), points_m)
-        for corners_m, planes in self._solids[finger]:
-            some = local_m[((local_m > corners_m.min(0)) & (local_m < corners_m.max(0))).all(axis=1)]
+        for low_m, high_m, planes in self._planes[finger]:
+            some = local_m[((local_m > low_m) & (local_m < high_m)).all(axis=1)]
             if len(some) and (some @ planes[:, :3].T + planes[:, 3] < 0).all(axis=1).any():
                 return True
         return False
@@ -82,4 +86,5 @@ def _solid(shape: LinkShape) -> tuple[np.ndarray, np.ndarray]:
     corners_m = transform_points(shape.shape_to_link, np.asarray(mesh.vertices))
     edge_m = max(SPACING_M, float(np.ptp(corners_m, axis=0).max()) / MOST_SPACED)
     points_m, _ = trimesh.remesh.subdivide_to_size(corners_m, mesh.faces, edge_m, max_iter=20)
-    return np.asarray(points_m), ConvexHull(corners_m).equations
+    _, one_of_each_cell = np.unique(np.floor(np.asarray(points_m) / SPACING_M), axis=0, return_index=True)
+    return np.asarray(points_m)[np.sort(one_of_each_cell)], np.unique(ConvexHull(corners_m).equations.round(9), axis=0)

@@ -27,6 +27,8 @@ from manitwin.twin.point_records import GraspType
 
 UNIT_TOLERANCE = 1e-6
 MAX_MESH_BYTES = 64 << 20
+_SETTLED: dict[str, tuple[Posture, ...]] = {}
+"""The postures of hands that were checked, by their digest: a build loads a hand often, and measuring takes a second."""
 
 
 class _UrdfField(BaseModel):
@@ -118,6 +120,8 @@ def load_multi_finger(data: dict[str, Any], folder: Path) -> MultiFingerGripper:
 
 def _settled(hand: MultiFingerGripper) -> MultiFingerGripper:
     """Return the hand with its openings measured where its file leaves them, all postures checked."""
+    if hand.sha256 in _SETTLED:
+        return replace(hand, postures=_SETTLED[hand.sha256])
     check_fingers(hand)
     tips = Fingertips(hand)
     settled = []
@@ -131,6 +135,7 @@ def _settled(hand: MultiFingerGripper) -> MultiFingerGripper:
             f"clearance_m: the hand opens {hand.opening_m + 2 * hand.clearance_m:.4g} m, of which a clearance of"
             f" {hand.clearance_m:g} on each side leaves nothing; open it wider, or give less"
         )
+    _SETTLED[hand.sha256] = hand.postures
     return hand
 
 

@@ -49,14 +49,35 @@ def posture_gaps_m(tips: Fingertips, joints_rad: np.ndarray) -> np.ndarray:
     A finger takes part whose tip moves most from the first to the last row, or half as far; others stand aside.
     """
     gaps_m = np.array([tips.gaps_m(row) for row in joints_rad])
-    moved = np.ptp(np.array([_tip_centers(tips, row) for row in (joints_rad[0], joints_rad[-1])]), axis=0)
+    return np.asarray(gaps_m[:, _taking_part(tips, joints_rad)].min(axis=1))
+
+
+def posture_reach_m(tips: Fingertips, joints_rad: np.ndarray) -> np.ndarray:
+    """Return how far along +Z both the thumb and the fingers that take part reach, in each row ``(K,)``."""
+    reach_m = np.array([tips.reach_m(row) for row in joints_rad])
+    return np.minimum(reach_m[:, 0], reach_m[:, 1:][:, _taking_part(tips, joints_rad)].max(axis=1))
+
+
+def tip_centers_m(tips: Fingertips, joints_rad: np.ndarray) -> np.ndarray:
+    """Return the middle of each fingertip ``(F, 3)`` in the grasp frame, the thumb's first."""
+    return np.array([(points.min(0) + points.max(0)) / 2 for points in tips.points_m(joints_rad)])
+
+
+def opposition_tilt_rad(tips: Fingertips, joints_rad: np.ndarray) -> float:
+    """Return how far the line from the thumb to the fingers that take part is turned from X towards Z, in the middle row.
+
+    A turn of ``root_to_gripper`` by this about Y lays it along X, along which things are held.
+    """
+    centers_m = tip_centers_m(tips, joints_rad[len(joints_rad) // 2])
+    across_m = centers_m[1:][_taking_part(tips, joints_rad)].mean(0) - centers_m[0]
+    return float(np.arctan2(across_m[2], across_m[0]))
+
+
+def _taking_part(tips: Fingertips, joints_rad: np.ndarray) -> np.ndarray:
+    """Tell which fingers but the thumb take part ``(F - 1,)``."""
+    moved = np.ptp(np.array([tip_centers_m(tips, row) for row in (joints_rad[0], joints_rad[-1])]), axis=0)
     travel = np.linalg.norm(moved[1:], axis=-1)
-    part = travel >= travel.max() / 2
-    return np.asarray(gaps_m[:, part].min(axis=1))
-
-
-def _tip_centers(tips: Fingertips, joints_rad: np.ndarray) -> np.ndarray:
-    return np.array([points.mean(0) for points in tips.points_m(joints_rad)])
+    return np.asarray(travel >= travel.max() / 2)
 
 
 def check_fingers(hand: MultiFingerGripper) -> None:
@@ -108,7 +129,7 @@ def _check_closing(hand: MultiFingerGripper, tips: Fingertips, posture: Posture,
             f"{where}: its widest opening is said to be {posture.openings_m[-1]:.4g} m, thumb and fingers of the URDF are then"
             f" {open_m:.4g} m apart; mend openings_m, or give closed_rad and open_rad, between which openings are measured"
         )
-    centers = _tip_centers(tips, rows[-1])
+    centers = tip_centers_m(tips, rows[-1])
     thumb, fingers = centers[0], centers[1:].mean(0)
     if thumb[0] >= fingers[0]:
         raise ValueError(
@@ -119,6 +140,12 @@ def _check_closing(hand: MultiFingerGripper, tips: Fingertips, posture: Posture,
         raise ValueError(
             f"{where}: the fingertips are at z = {fingers[2]:.3f} of the grasp frame, the palm's front at"
             f" {hand.palm_front_m:.3f}; +Z points out of the palm: turn root_to_gripper, or mend palm_front_m"
+        )
+    reach_m = float(posture_reach_m(tips, rows).max())
+    if posture.depth_m[1] > reach_m:
+        raise ValueError(
+            f"{where}: depth_m ends at {posture.depth_m[1]:g}, thumb and fingers reach to {reach_m:.3f} along +Z in it, and"
+            " would close behind what is held; give less, or mend root_to_gripper"
         )
 
 
