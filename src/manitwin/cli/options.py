@@ -76,6 +76,12 @@ Grippers = Annotated[
     list[str] | None,
     choices.GRIPPERS.option("--gripper", help="A gripper to verify for; may be repeated, the first is the twin's own."),
 ]
+OwnGrippers = Annotated[
+    list[str] | None,
+    choices.GRIPPERS.option(
+        "--gripper", help="The file of a gripper of your own that twins were built with; may be repeated."
+    ),
+]
 Vlm = Annotated[
     str | None,
     choices.ANNOTATORS.option(

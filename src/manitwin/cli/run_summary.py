@@ -90,6 +90,24 @@ def grasp_lines(totals: GraspTotals) -> list[str]:
     return lines
 
 
+def other_gripper_lines(records: Iterable[TwinRecord]) -> list[str]:
+    """Write what the other grippers than the first hold of the accepted twins among ``records``, a line for each."""
+    grasps = [record.grasps for record in records if record.grasps is not None]
+    lines = []
+    for name in dict.fromkeys(name for each in grasps for name in each.other_grippers):
+        others = [each.other_grippers[name] for each in grasps if name in each.other_grippers]
+        summaries = [other.summary for other in others if other.summary is not None]
+        simulated, verified = sum(s.simulated for s in summaries), sum(s.verified for s in summaries)
+        tried = f"{verified} of {simulated} verified{_percent(verified, simulated)}" if simulated else "nothing to try"
+        line = f"with {name}: {tried}"
+        reasons = Counter(other.reason for other in others if other.summary is None)
+        if reasons:
+            why = ", ".join(f"{count} {reason}" for reason, count in sorted(reasons.items(), key=str))
+            line += f"; no grasps of {sum(reasons.values())} of {len(others)} twins ({why})"
+        lines.append(line)
+    return lines
+
+
 def _unfiltered_held(grasps: GraspSummary) -> int:
     return round((grasps.unfiltered_success_rate or 0.0) * grasps.unfiltered_simulated)
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import transform_points
+from manitwin.robots.grippers.gripper import Gripper
 from manitwin.scenes.locate.carried_frames import CarriedPlacement, carry_placements
 from manitwin.scenes.locate.carried_grasps import CarriedGrasps, carry_grasps
 from manitwin.scenes.locate.depth_view import DepthView, measured_noise_m
@@ -32,7 +33,8 @@ class LocatedView:
     """A view with the things that were looked for in it; what all of them share is found once.
 
     ``camera_to_base (4, 4)`` is where the camera is in the frame of a robot's base, if that is known; ``robot`` the arm that
-    stands there. Raises UsageError for a robot that these grasps are not for, Unavailable where planning is not installed.
+    stands there; ``grippers`` are those of one's own that twins were built with. Raises UsageError for a robot that these
+    grasps are not for, Unavailable where planning is not installed.
     """
 
     def __init__(
@@ -42,8 +44,10 @@ class LocatedView:
         camera_to_base: np.ndarray | None = None,
         robot: str | None = None,
         seed: int = 0,
+        grippers: Sequence[Gripper] = (),
     ):
         self.view, self.things, self.seed = view, tuple(things), seed
+        self._grippers = grippers
         self._camera_to_base = camera_to_base
         self._planner = None if robot is None else _planner_of(robot)
 
@@ -78,7 +82,7 @@ class LocatedView:
         except UsageError as error:
             raise UsageError(f"--grasps: {error} (the hand has to keep clear of the table)") from error
         noise_m = measured_noise_m(self.view, np.ones(self.view.depth_m.shape, bool))
-        carried = carry_grasps(thing, twin, self.view, plane, noise_m)
+        carried = carry_grasps(thing, twin, self.view, plane, noise_m, self._grippers)
         if carried is None or self._planner is None:
             return carried
         from manitwin.episodes.located_reach import with_reach

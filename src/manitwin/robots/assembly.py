@@ -33,7 +33,8 @@ def mount(tree: UrdfTree, hand: UrdfTree, mount_link: str, root_link: str, root_
         twice = sorted(set(mine) & set(theirs))
         if twice:
             raise ConfigError(
-                f"{hand.name}: {kind} names {', '.join(twice)} are also the arm's; rename them in one URDF"
+                f"{hand.name}: {kind} names {', '.join(twice)} are also the arm's; rename them in the arm's URDF (a renamed"
+                " hand is another gripper than the one that twins were verified for)"
             )
     for element in hand.element:
         tree.element.append(copy.deepcopy(element))

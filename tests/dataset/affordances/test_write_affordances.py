@@ -14,6 +14,8 @@ from drawn_scenes import add_parts
 from manitwin.dataset.affordances.maps import surface_maps
 from manitwin.dataset.affordances.write import split_of, write_affordances
 from manitwin.errors import UsageError
+from manitwin.robots import grippers
+from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.store import RECORD, seal
@@ -205,3 +207,19 @@ def test_maps_are_of_the_first_gripper_with_parallel_jaws(tmp_path: Path) -> Non
     done = write_affordances(tmp_path / "set", tmp_path / "out", points=200, trials=12)
     assert (done.twins, done.with_grasp_map) == (1, 1) and list(done.left_out) == [cup_alone]
     assert "suction has no parallel jaws" in done.left_out[cup_alone]
+
+
+def test_maps_of_a_gripper_of_ones_own_are_made_with_its_file(tmp_path: Path) -> None:
+    identity = write_thing(tmp_path / "set", 0, can())
+    folder = tmp_path / "set" / twin_name(identity)
+    panda = Path(grippers.__file__).parent / "definitions" / "panda.toml"
+    (tmp_path / "mine.toml").write_text(panda.read_text().replace('name = "panda"', 'name = "mine"'))
+    mine = load_gripper(str(tmp_path / "mine.toml"))
+    record = json.loads((folder / RECORD).read_bytes())
+    record["grasps"] |= {"trial": tried_as_built(), "gripper": "mine", "gripper_sha256": mine.sha256}
+    del record["revision"], record["files"]
+    seal(folder, record)
+    without = write_affordances(tmp_path / "set", tmp_path / "without", points=60, trials=3)
+    assert "give its file with --gripper" in without.left_out[identity]
+    done = write_affordances(tmp_path / "set", tmp_path / "out", points=200, trials=12, grippers=[mine])
+    assert (done.twins, done.left_out) == (1, {})

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from grasped_twins import HEIGHT_M, write_brick
+from manitwin.errors import UsageError
 from manitwin.geometry.poses import inverse, transform_points
+from manitwin.robots import grippers
+from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.scenes.locate.carried_grasps import carry_grasps
 from manitwin.scenes.locate.depth_view import DepthView
 from manitwin.scenes.locate.estimate import Location, PoseEstimate, Status
@@ -15,6 +23,7 @@ from manitwin.scenes.locate.proposals import table_plane
 from manitwin.scenes.locate.recognition import Thing
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.store import RECORD, seal
 from seen_solids import Seen, seen_from
 
 NOISE_M = 0.001
@@ -91,3 +100,24 @@ def test_what_was_not_found_has_no_grasps(brick: Twin, seen: Seen, model: PoseMo
     plane = table_plane(seen.view, np.random.default_rng(0))
     nowhere = found_at([], seen, model)
     assert carry_grasps(nowhere, brick, seen.view, plane, NOISE_M) is None
+
+
+def test_grasps_of_a_gripper_of_ones_own_are_carried_with_its_file(
+    tmp_path: Path, seen: Seen, model: PoseModel
+) -> None:
+    panda = (Path(grippers.__file__).parent / "definitions" / "panda.toml").read_text()
+    (tmp_path / "mine.toml").write_text(panda.replace('name = "panda"', 'name = "mine"'))
+    mine = load_gripper(str(tmp_path / "mine.toml"))
+    folder = tmp_path / "set" / twin_name(write_brick(tmp_path / "set", 0))
+    table, record = pq.read_table(folder / "grasps.parquet"), json.loads((folder / RECORD).read_bytes())
+    place = table.schema.get_field_index("gripper")
+    table = table.set_column(place, table.schema.field(place), pa.array(["mine"] * len(table)))
+    pq.write_table(table, folder / "grasps.parquet")
+    record["grasps"] |= {"gripper": "mine", "gripper_sha256": mine.sha256}
+    del record["revision"], record["files"]
+    seal(folder, record)
+    plane, found = table_plane(seen.view, np.random.default_rng(0)), found_at([seen.object_to_camera], seen, model)
+    with pytest.raises(UsageError, match=r"gripper mine does not come with the package.*--gripper"):
+        carry_grasps(found, Twin(folder), seen.view, plane, NOISE_M)
+    carried = carry_grasps(found, Twin(folder), seen.view, plane, NOISE_M, [mine])
+    assert carried is not None and carried.verified == 6

@@ -26,13 +26,16 @@ def affordances(
         int, typer.Option(help="Grasps to try for the map of grasping.", callback=choices.count_of("--trials", 10_000))
     ] = 200,
     seed: Annotated[int, typer.Option(help="The seed of everything random.", min=0, max=2**63 - 1)] = 0,
+    gripper: options.OwnGrippers = None,
 ) -> None:
     """Write where twins can be held, are held for a use, and are used, on points of their surfaces."""
     from manitwin.dataset.affordances.write import write_affordances
+    from manitwin.robots.grippers.gripper import load_gripper
 
-    done = write_affordances(dataset, out, points=points, trials=trials, seed=seed, on_twin=_say)
-    for reason in done.left_out.values():
-        out_console.print(f"left out: {reason}")
+    grippers = [load_gripper(name) for name in gripper or ()]
+    done = write_affordances(dataset, out, points=points, trials=trials, seed=seed, grippers=grippers, on_twin=_say)
+    for identity, reason in done.left_out.items():
+        out_console.print(f"left out: {reason if identity in reason else f'{identity}: {reason}'}")
     line = (
         f"{done.twins:,} twins in {out}: {done.with_grasp_map:,} with a map of grasping, {done.with_parts:,} with parts"
     )

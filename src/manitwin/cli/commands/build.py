@@ -185,7 +185,7 @@ def _watched_build(
 
 
 def _print_report(report: BuildReport, lines: bool, told: int) -> None:
-    from manitwin.cli.run_summary import grasp_lines, summarize_grasps
+    from manitwin.cli.run_summary import grasp_lines, other_gripper_lines, summarize_grasps
 
     for remark in report.remarks[told:]:
         err_console.print(remark)
@@ -195,7 +195,8 @@ def _print_report(report: BuildReport, lines: bool, told: int) -> None:
     said = ", ".join(f"{count} {status}" for status, count in counted.items() if count or status != "duplicate")
     out_console.print(f"{said}, in {report.dataset}")
     if counted["accepted"] <= MOST_RECORDS:
-        for line in grasp_lines(summarize_grasps(report.records())):
+        records = list(report.records())
+        for line in [*grasp_lines(summarize_grasps(records)), *other_gripper_lines(records)]:
             out_console.print(line)
     if report.run.left:
         # a build that was stopped says by itself what for: no money left, a key that is refused

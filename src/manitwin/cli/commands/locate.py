@@ -91,6 +91,7 @@ def locate(
         Path | None, options.new_folder("A new folder for location.json, overlays, and the scene as a layout.")
     ] = None,
     seed: Annotated[int, typer.Option(help="The seed of what is sampled.", min=0, max=options.LARGEST_SEED)] = 0,
+    gripper: options.OwnGrippers = None,
     json_: Json = False,
 ) -> None:
     """Find where a twin is in a depth picture: its pose, several that look the same, or that it is not what is seen."""
@@ -103,6 +104,7 @@ def locate(
     from manitwin.config import ServicesConfig
     from manitwin.episodes.located_view import LocatedView
     from manitwin.models.pose_estimators.from_spec import pose_estimator
+    from manitwin.robots.grippers.gripper import load_gripper
     from manitwin.scenes.locate.base_file import read_base
     from manitwin.scenes.locate.layout_files import dataset_of_twin, layout_document
     from manitwin.scenes.locate.located_scene import LocatedScene
@@ -119,6 +121,7 @@ def locate(
         raise UsageError(
             "--fit-size: looks for the size of one twin by the built-in search; name a twin, without --estimator"
         )
+    grippers = [load_gripper(name) for name in gripper or ()]
     view, masks = files.read(seed)
     if one is None:
         found = find_twins(DatasetRoot(source), view, masks, model, tried=tried, seed=seed, on_twin=_drawn)
@@ -127,7 +130,7 @@ def locate(
     else:
         found = find_twin(one, view, masks, model, seed)
     things = found.things
-    place = LocatedView(view, list(zip(things, found.twins, strict=True)), camera_to_base, robot, seed)
+    place = LocatedView(view, list(zip(things, found.twins, strict=True)), camera_to_base, robot, seed, grippers)
     usable = grasps and found.has_own_size
     carried = [place.grasps(number) if usable else None for number in range(len(things))]
     rests = [place.placements(number) if usable else () for number in range(len(things))]

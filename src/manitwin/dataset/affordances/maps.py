@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +27,7 @@ from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import farthest_point_sampling, sample_surface
 from manitwin.models.graspers.protocol import GraspProposals
 from manitwin.pipeline.refinement import away_from_feature_m
+from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.part_records import NO_PART
 from manitwin.twin.point_records import FunctionalPoint
@@ -56,10 +58,11 @@ class SurfaceMaps:
     agreement: dict[str, tuple[float, float]]
 
 
-def surface_maps(twin: Twin, *, points: int, trials: int, seed: int) -> SurfaceMaps:
+def surface_maps(twin: Twin, *, points: int, trials: int, seed: int, grippers: Sequence[Gripper] = ()) -> SurfaceMaps:
     """Compute the maps of a twin; without enough contacts there is no map ``grasp``. The same arguments give the same maps.
 
-    Raises TwinError for a twin that was rejected, UsageError for one without a gripper of parallel jaws.
+    ``grippers`` are those of one's own that twins were built with. Raises TwinError for a twin that was rejected, UsageError for
+    one without a gripper of parallel jaws that is known.
     """
     rng = np.random.default_rng([seed, zlib.crc32(twin.record.twin_id.encode())])
     vertices, faces = trimesh.util.append_faces(
@@ -72,7 +75,7 @@ def surface_maps(twin: Twin, *, points: int, trials: int, seed: int) -> SurfaceM
     caster, spread_m = RayCaster(mesh), contact_spread_m(mesh.extents)
     solid = mesh.copy()
     solid.merge_vertices(merge_tex=True, merge_norm=True)
-    sampled = sample_grasps(twin, solid, trials, rng)
+    sampled = sample_grasps(twin, solid, trials, rng, grippers)
     touches = {"grasp": _contacts(caster, sampled.grasps.take(np.flatnonzero(sampled.held)))}
     touches = {name: found for name, found in touches.items() if len(found[0]) >= 2 * LEAST_CONTACTS}
     touches |= _task_contacts(twin, caster, sampled.gripper)

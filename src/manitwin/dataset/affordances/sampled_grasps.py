@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +16,8 @@ from manitwin.physics.confirmed_trial import ConfirmedTrial
 from manitwin.physics.mujoco.trial import MujocoTrial
 from manitwin.physics.sapien.trial import SapienTrial
 from manitwin.pipeline.trial_replay import settings_of_trial
-from manitwin.robots.grippers.gripper import load_gripper
+from manitwin.robots.grippers.gripper import Gripper
+from manitwin.robots.grippers.of_twins import gripper_of
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.twin.grasp_summary import GraspSummary
 from manitwin.twin.loaded_twin import Twin
@@ -32,14 +34,16 @@ class SampledGrasps:
     held: np.ndarray
 
 
-def sample_grasps(twin: Twin, solid: trimesh.Trimesh, trials: int, rng: np.random.Generator) -> SampledGrasps:
+def sample_grasps(
+    twin: Twin, solid: trimesh.Trimesh, trials: int, rng: np.random.Generator, grippers: Sequence[Gripper] = ()
+) -> SampledGrasps:
     """Sample antipodal grasps all over a twin's surface and try ``trials`` of them as its own grasps were tried.
 
     They lie no denser at its grasp points, and nothing chooses among them; what a trial could only fail, as the open fingers
     overlap the object, is left out before. Raises UsageError for a twin none of whose grippers has parallel jaws, whose
-    gripper is not one that is shipped, or whose record tells no trial that can be run.
+    gripper is neither shipped nor among ``grippers``, or whose record tells no trial that can be run.
     """
-    summary, gripper = _parallel(twin)
+    summary, gripper = _parallel(twin, grippers)
     body = twin.rigid_body()
     request = GraspRequest(
         solid=solid,
@@ -64,13 +68,13 @@ def sample_grasps(twin: Twin, solid: trimesh.Trimesh, trials: int, rng: np.rando
     return SampledGrasps(summary.gripper, chosen, np.array([result.outcome == "held" for result in results], bool))
 
 
-def _parallel(twin: Twin) -> tuple[GraspSummary, ParallelGripper]:
+def _parallel(twin: Twin, grippers: Sequence[Gripper]) -> tuple[GraspSummary, ParallelGripper]:
     """Return the first of a twin's grippers that has parallel jaws, of which alone contacts are known, and what it did."""
     first = twin.record.grasps
     assert first is not None
     others = [other.summary for other in first.other_grippers.values() if other.summary is not None]
     for summary in (first, *others):
-        gripper = load_gripper(summary.gripper)
+        gripper = gripper_of(summary.gripper, summary.gripper_sha256, grippers)
         if isinstance(gripper, ParallelGripper):
             return summary, gripper
     names = ", ".join(summary.gripper for summary in (first, *others))

@@ -7,7 +7,7 @@ import io
 import json
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import astuple, dataclass
 from math import isfinite
 from pathlib import Path
@@ -21,6 +21,7 @@ from manitwin.dataset.affordances.report import affordances_page, sample_picture
 from manitwin.dataset.report_page import Picture
 from manitwin.errors import TwinError, UsageError
 from manitwin.formats.output_folder import new_folder
+from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.part_records import NO_PART
@@ -61,13 +62,14 @@ def write_affordances(
     points: int = POINTS,
     trials: int = TRIALS,
     seed: int = 0,
+    grippers: Sequence[Gripper] = (),
     on_twin: Callable[[SurfaceMaps], None] = lambda maps: None,
 ) -> Affordances:
     """Write the maps of all accepted twins of a local data set below ``out``, whole or not at all.
 
     ``maps/<twin>.npz`` has 3D AffordanceNet's fields; ``parts/`` is laid out as ShapeNetPart and ``partnext/`` as PartNeXt, of
-    the twins whose parts are known; ``affordances.json`` lists all, ``report.html`` shows some. Raises UsageError for a data
-    set without twins and an ``out`` that is not empty.
+    the twins whose parts are known; ``affordances.json`` lists all, ``report.html`` shows some. ``grippers`` are those of
+    one's own that twins were built with. Raises UsageError for a data set without twins and an ``out`` that is not empty.
     """
     root = DatasetRoot(dataset)
     if root.local is None:
@@ -88,7 +90,7 @@ def write_affordances(
     with new_folder(Path(out)) as folder, PartNextFolder(folder / "partnext") as partnext:
         for twin in twins:
             try:
-                maps = surface_maps(twin, points=points, trials=trials, seed=seed)
+                maps = surface_maps(twin, points=points, trials=trials, seed=seed, grippers=grippers)
             except (TwinError, UsageError) as error:
                 left_out[twin.record.twin_id] = str(error)
                 continue

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,8 @@ from scipy.spatial import cKDTree
 
 from manitwin.geometry.poses import inverse, rotation_angle_rad, transform_points
 from manitwin.robots.grippers.box import PlacedBox
-from manitwin.robots.grippers.gripper import load_gripper
+from manitwin.robots.grippers.gripper import Gripper
+from manitwin.robots.grippers.of_twins import gripper_of
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.scenes.locate.depth_view import DepthView, known_depth
 from manitwin.scenes.locate.proposals import Plane
@@ -59,18 +61,21 @@ class CarriedGrasps:
     robot: str | None = None
 
 
-def carry_grasps(thing: Thing, twin: Twin, view: DepthView, plane: Plane, noise_m: float) -> CarriedGrasps | None:
+def carry_grasps(
+    thing: Thing, twin: Twin, view: DepthView, plane: Plane, noise_m: float, grippers: Sequence[Gripper] = ()
+) -> CarriedGrasps | None:
     """Return a twin's verified grasps at its best pose, free of the observed table and neighbours.
 
     Where the pose is ambiguous, a grasp counts that is one of the twin's in every pose. The poses that a symmetry of the shape
     makes are tried in turn, since any of them may be the true one. The hand is tested open, where it grasps and on the last
     10 cm before, against what is seen beside the thing and against the plane where that is hidden; what is hidden
-    otherwise, it is not tested against. None where nothing was found, or the twin has no grasps of a parallel gripper.
+    otherwise, it is not tested against. ``grippers`` are those of one's own that twins were built with. None where nothing was
+    found, or the twin has no grasps of a parallel gripper.
     """
     location = thing.location
     if not location.poses or twin.record.grasps is None:
         return None
-    gripper = load_gripper(twin.record.grasps.gripper)
+    gripper = gripper_of(twin.record.grasps.gripper, twin.record.grasps.gripper_sha256, grippers)
     if not isinstance(gripper, ParallelGripper):
         return None
     grasps = twin.grasps()
