@@ -65,6 +65,15 @@ def test_jaws_and_cups_are_drawn(tmp_path: Path, name: str) -> None:
     assert len(np.unique(np.asarray(Image.open(tmp_path / "a.png")))) > 20
 
 
+def test_hand_whose_fingers_are_elsewhere_than_its_file_says_is_drawn_and_refused(tmp_path: Path) -> None:
+    turned = TOML.replace("quaternion_wxyz = [1.0, 0.0, 0.0, 0.0]", "quaternion_wxyz = [0.0, 0.0, 0.0, 1.0]")
+    with pytest.raises(UsageError, match="the thumb belongs on -X"):
+        gripper(write_hand(tmp_path, turned), draw=tmp_path / "hand.png")
+    view = np.asarray(Image.open(tmp_path / "hand.png").convert("RGB")).astype(int)[34:180, :420]
+    red = np.argwhere((view[..., 0] - view[..., 2] > 60) & (view[..., 1] > 40) & (view[..., 1] < 110))
+    assert red[:, 1].min() > 210, "the thumb is seen on the wrong side"
+
+
 def test_picture_of_another_format_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"ends in \.png"):
         gripper("panda", draw=tmp_path / "a.jpg")

@@ -90,15 +90,14 @@ def _states(gripper: Gripper) -> list[tuple[str, list[trimesh.Trimesh]]]:
 def _posture_states(hand: MultiFingerGripper) -> list[list[tuple[str, list[trimesh.Trimesh]]]]:
     rows = []
     for posture in hand.postures:
-        widest_m, least_m = posture.openings_m[-1], posture.openings_m[0]
+        joints = np.array(posture.joints_rad)
+        half = joints[len(joints) // 2] if len(joints) > 2 else joints.mean(0)
+        width = f", {1000 * posture.openings_m[-1]:.0f} mm" if posture.openings_m else ""
         rows.append(
             [
-                (
-                    f"{hand.name}, {posture.name}: open, {1000 * widest_m:.0f} mm",
-                    _hand_parts(hand, posture.joints_at(np.array(widest_m))),
-                ),
-                ("closed", _hand_parts(hand, posture.joints_at(np.array(least_m)))),
-                ("half open", _hand_parts(hand, posture.joints_at(np.array(widest_m / 2)))),
+                (f"{hand.name}, {posture.name}: open{width}", _hand_parts(hand, joints[-1])),
+                ("closed", _hand_parts(hand, joints[0])),
+                ("half open", _hand_parts(hand, half)),
             ]
         )
     return rows

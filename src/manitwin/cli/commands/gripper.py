@@ -36,17 +36,21 @@ def gripper(
 
     if draw is not None and draw.suffix.lower() != ".png":
         raise UsageError(f"--draw {draw}: a picture is written as PNG; give a name that ends in .png")
-    loaded = load_gripper(name)
-    for line in _facts(loaded):
+    try:
+        loaded = load_gripper(name)
+    except UsageError:
+        if draw is not None:  # what is wrong is best seen; a file that cannot be drawn either raises the same
+            _draw(load_gripper(name, checked=False), draw)
+        raise
+    for line in [*_facts(loaded), *(_postures(loaded) if isinstance(loaded, MultiFingerGripper) else ())]:
         out_console.print(line)
-    if isinstance(loaded, MultiFingerGripper):
-        for line in _postures(loaded):
-            out_console.print(line)
     if draw is not None:
-        write_output(draw, _picture(loaded))
-        out_console.print(
-            f"drawn to {draw}: arrows X red, Y green, Z blue; the ball is tip_depth_m in front of the base"
-        )
+        _draw(loaded, draw)
+
+
+def _draw(loaded: Gripper, file: Path) -> None:
+    write_output(file, _picture(loaded))
+    out_console.print(f"drawn to {file}: arrows X red, Y green, Z blue; the ball is tip_depth_m in front of the base")
 
 
 def _facts(loaded: Gripper) -> list[str]:

@@ -91,18 +91,20 @@ def of_kind(gripper: Gripper, kind: type[Kind]) -> Kind:
 
 ROBOT_DESCRIPTIONS = (".urdf", ".xacro", ".xml", ".sdf", ".mjcf")
 
-Loader = Callable[[dict[str, Any], Path], Gripper]
+Loader = Callable[[dict[str, Any], Path, bool], Gripper]
 
 
-def _load_jaws(data: dict[str, Any], folder: Path) -> ParallelGripper:
+def _load_jaws(data: dict[str, Any], folder: Path, checked: bool) -> ParallelGripper:
     jaws = TypeAdapter(ParallelGripper).validate_python(data)
-    check_jaws(jaws)
+    if checked:
+        check_jaws(jaws)
     return jaws
 
 
-def _load_cup(data: dict[str, Any], folder: Path) -> SuctionGripper:
+def _load_cup(data: dict[str, Any], folder: Path, checked: bool) -> SuctionGripper:
     cup = TypeAdapter(SuctionGripper).validate_python(data)
-    check_cup(cup)
+    if checked:
+        check_cup(cup)
     return cup
 
 
@@ -111,7 +113,7 @@ KINDS: dict[str, Loader] = {
     "suction": _load_cup,
     "multi_finger": load_multi_finger,
 }
-"""How each kind is made of its file's content and folder."""
+"""How each kind is made of its file's content and folder, checked whether its shapes are where its numbers say or not."""
 
 
 def shipped_grippers() -> list[str]:
@@ -123,8 +125,12 @@ def _shipped_folder() -> Path:
     return Path(str(resources.files("manitwin.robots.grippers") / "definitions"))
 
 
-def load_gripper(name_or_path: str) -> Gripper:
-    """Load a gripper by its shipped name or from a TOML file; raises UsageError naming what would be valid."""
+def load_gripper(name_or_path: str, *, checked: bool = True) -> Gripper:
+    """Load a gripper by its shipped name or from a TOML file; raises UsageError naming what would be valid.
+
+    Unless ``checked`` its shapes may be elsewhere than its numbers say, so that it can be looked at, and nothing else: the
+    openings of a hand's postures may be missing.
+    """
     if name_or_path.endswith(".toml"):
         path = Path(name_or_path)
         if not path.is_file():
@@ -147,7 +153,7 @@ def load_gripper(name_or_path: str) -> Gripper:
         raise UsageError(f"gripper file {path}: {choose_from('kind', str(kind), KINDS)}")
     data["sha256"] = hashlib.sha256(content).hexdigest()
     try:
-        gripper = KINDS[kind](data, path.parent)
+        gripper = KINDS[kind](data, path.parent, checked)
         if gripper.name in shipped_grippers():
             _check_name(gripper.name, path, content)
         return gripper

@@ -79,10 +79,10 @@ class _File(HandNumbers):
     postures: tuple[_PostureField, ...]
 
 
-def load_multi_finger(data: dict[str, Any], folder: Path) -> MultiFingerGripper:
+def load_multi_finger(data: dict[str, Any], folder: Path, checked: bool) -> MultiFingerGripper:
     """Make a hand of its file's content; raises UsageError or ValueError where file and URDF do not agree.
 
-    ConfigError where the URDF cannot be read.
+    ConfigError where the URDF cannot be read. Unless ``checked`` its postures are as the file has them.
     """
     file = TypeAdapter(_File).validate_python(data)
     path, root = _urdf_path(file.name, file.urdf, folder)
@@ -115,7 +115,7 @@ def load_multi_finger(data: dict[str, Any], folder: Path) -> MultiFingerGripper:
         urdf_path=path,
         urdf_root=root,
     )
-    return _settled(hand)
+    return _settled(hand) if checked else hand
 
 
 def _settled(hand: MultiFingerGripper) -> MultiFingerGripper:
