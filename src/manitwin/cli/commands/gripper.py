@@ -71,7 +71,6 @@ def _postures(hand: MultiFingerGripper) -> list[str]:
         opposition_tilt_rad,
         posture_gaps_m,
         posture_reach_m,
-        tip_centers_m,
     )
 
     tips = Fingertips(hand)
@@ -85,10 +84,10 @@ def _postures(hand: MultiFingerGripper) -> list[str]:
         )
         gaps_m, reach_m = posture_gaps_m(tips, rows), posture_reach_m(tips, rows)
         for opening_m, gap_m, end_m, row in zip(openings_m, gaps_m, reach_m, rows, strict=True):
-            centers_m = tip_centers_m(tips, row)
+            centers_m = tips.centers_m(row)
             thumb, fingers = centers_m[0], centers_m[1:]
             lines.append(
-                f"  opening {1000 * opening_m:4.0f} mm: {1000 * gap_m:4.0f} mm between the tips, which reach to a depth of"
+                f"  opening {1000 * opening_m:4.0f} mm: {1000 * gap_m:4.0f} mm along X between the tips, which reach to depth"
                 f" {1000 * end_m:.0f}; thumb at x {1000 * thumb[0]:.0f}, z {1000 * thumb[2]:.0f}, fingers at x"
                 f" {_span(fingers[:, 0])}, z {_span(fingers[:, 2])}"
             )

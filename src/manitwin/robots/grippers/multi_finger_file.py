@@ -19,7 +19,7 @@ from manitwin.robots.grippers.box import STRICT
 from manitwin.robots.grippers.coupled_joints import Coupling, couplings_of, with_followers
 from manitwin.robots.grippers.fingertip_gaps import Fingertips
 from manitwin.robots.grippers.multi_finger import HandNumbers, MultiFingerGripper, Posture, find_mesh
-from manitwin.robots.grippers.posture_checks import check_fingers, check_posture, measured_posture
+from manitwin.robots.grippers.posture_checks import check_closing, check_fingers, check_positions, measured_posture
 from manitwin.robots.grippers.quantities import Length, Position
 from manitwin.robots.links import Link, links_of
 from manitwin.robots.urdf_reader import HAND, read_urdf
@@ -27,8 +27,6 @@ from manitwin.twin.point_records import GraspType
 
 UNIT_TOLERANCE = 1e-6
 MAX_MESH_BYTES = 64 << 20
-_SETTLED: dict[str, tuple[Posture, ...]] = {}
-"""The postures of hands that were checked, by their digest: a build loads a hand often, and measuring takes a second."""
 
 
 class _UrdfField(BaseModel):
@@ -120,14 +118,13 @@ def load_multi_finger(data: dict[str, Any], folder: Path, checked: bool) -> Mult
 
 def _settled(hand: MultiFingerGripper) -> MultiFingerGripper:
     """Return the hand with its openings measured where its file leaves them, all postures checked."""
-    if hand.sha256 in _SETTLED:
-        return replace(hand, postures=_SETTLED[hand.sha256])
     check_fingers(hand)
     tips = Fingertips(hand)
     settled = []
     for posture in hand.postures:
-        measured = posture if posture.openings_m else measured_posture(hand, tips, posture)
-        check_posture(hand, tips, measured)
+        check_positions(hand, tips, posture)
+        measured = posture if posture.openings_m else measured_posture(tips, posture)
+        check_closing(hand, tips, measured)
         settled.append(measured)
     hand = replace(hand, postures=tuple(settled))
     if hand.opening_m <= 0:
@@ -135,7 +132,6 @@ def _settled(hand: MultiFingerGripper) -> MultiFingerGripper:
             f"clearance_m: the hand opens {hand.opening_m + 2 * hand.clearance_m:.4g} m, of which a clearance of"
             f" {hand.clearance_m:g} on each side leaves nothing; open it wider, or give less"
         )
-    _SETTLED[hand.sha256] = hand.postures
     return hand
 
 

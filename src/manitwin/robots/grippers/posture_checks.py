@@ -17,34 +17,27 @@ LIMIT_TOLERANCE = 1e-3
 LEAST_TRAVEL_M = 0.001
 
 
-def measured_posture(hand: MultiFingerGripper, tips: Fingertips, posture: Posture) -> Posture:
+def measured_posture(tips: Fingertips, posture: Posture) -> Posture:
     """Return a posture of two rows, closed and open, with the openings that the fingertips have between these.
 
-    Past the row in which thumb and fingers meet, openings go on into the negative as fast as they came. Raises ValueError
-    where they do not come nearer.
+    Raises ValueError where they do not come nearer.
     """
     closed, opened = np.array(posture.joints_rad)
-    share = np.linspace(0, 1, STEPS + 1)
-    rows = closed + share[:, None] * (opened - closed)
+    rows = closed + np.linspace(0, 1, STEPS + 1)[:, None] * (opened - closed)
     gaps_m = posture_gaps_m(tips, rows)
-    meet = int(np.flatnonzero(gaps_m <= 0).max(initial=-1))  # the last in which they overlap
-    first = max(meet, int(np.argmin(gaps_m)))
-    last = first + int(np.argmax(gaps_m[first:]))
-    if gaps_m[last] - gaps_m[first] < LEAST_TRAVEL_M:
+    last = int(np.argmax(gaps_m))
+    if gaps_m[last] - gaps_m[0] < LEAST_TRAVEL_M:
         raise ValueError(_not_closing(posture.name, float(gaps_m[0]), float(gaps_m[-1]), "closed_rad", "open_rad"))
-    kept = [first]
-    for index in range(first + 1, last + 1):
+    kept = [int(np.argmin(gaps_m[: last + 1]))]
+    for index in range(kept[0] + 1, last + 1):
         if gaps_m[index] > gaps_m[kept[-1]]:
             kept.append(index)
-    openings_m, joints = gaps_m[kept].tolist(), rows[kept]
-    if first > 0:  # the target of a squeeze lies behind the row in which they meet
-        speed = (gaps_m[last] - gaps_m[first]) / (share[last] - share[first])
-        openings_m, joints = [float(gaps_m[first] - speed * share[first]), *openings_m], np.vstack([closed, joints])
-    return replace(posture, openings_m=tuple(openings_m), joints_rad=tuple(map(tuple, joints.tolist())))
+    joints_rad = tuple(map(tuple, rows[kept].tolist()))
+    return replace(posture, openings_m=tuple(gaps_m[kept].tolist()), joints_rad=joints_rad)
 
 
 def posture_gaps_m(tips: Fingertips, joints_rad: np.ndarray) -> np.ndarray:
-    """Return the least distance of the thumb from the fingers that take part, in each row ``(K,)`` of joints ``(K, J)``.
+    """Return the least room along X between the thumb and the fingers that take part, in each row ``(K,)`` of ``(K, J)``.
 
     A finger takes part whose tip moves most from the first to the last row, or half as far; others stand aside.
     """
@@ -58,24 +51,19 @@ def posture_reach_m(tips: Fingertips, joints_rad: np.ndarray) -> np.ndarray:
     return np.minimum(reach_m[:, 0], reach_m[:, 1:][:, _taking_part(tips, joints_rad)].max(axis=1))
 
 
-def tip_centers_m(tips: Fingertips, joints_rad: np.ndarray) -> np.ndarray:
-    """Return the middle of each fingertip ``(F, 3)`` in the grasp frame, the thumb's first."""
-    return np.array([(points.min(0) + points.max(0)) / 2 for points in tips.points_m(joints_rad)])
-
-
 def opposition_tilt_rad(tips: Fingertips, joints_rad: np.ndarray) -> float:
     """Return how far the line from the thumb to the fingers that take part is turned from X towards Z, in the middle row.
 
     A turn of ``root_to_gripper`` by this about Y lays it along X, along which things are held.
     """
-    centers_m = tip_centers_m(tips, joints_rad[len(joints_rad) // 2])
+    centers_m = tips.centers_m(joints_rad[len(joints_rad) // 2])
     across_m = centers_m[1:][_taking_part(tips, joints_rad)].mean(0) - centers_m[0]
     return float(np.arctan2(across_m[2], across_m[0]))
 
 
 def _taking_part(tips: Fingertips, joints_rad: np.ndarray) -> np.ndarray:
     """Tell which fingers but the thumb take part ``(F - 1,)``."""
-    moved = np.ptp(np.array([tip_centers_m(tips, row) for row in (joints_rad[0], joints_rad[-1])]), axis=0)
+    moved = np.ptp(np.array([tips.centers_m(row) for row in (joints_rad[0], joints_rad[-1])]), axis=0)
     travel = np.linalg.norm(moved[1:], axis=-1)
     return np.asarray(travel >= travel.max() / 2)
 
@@ -96,8 +84,8 @@ def check_fingers(hand: MultiFingerGripper) -> None:
             )
 
 
-def check_posture(hand: MultiFingerGripper, tips: Fingertips, posture: Posture) -> None:
-    """Raise ValueError where a posture is beyond its joints' limits, moves the palm, or does not close as the file says."""
+def check_positions(hand: MultiFingerGripper, tips: Fingertips, posture: Posture) -> None:
+    """Raise ValueError where a posture is beyond its joints' limits, moves the palm, or has the thumb on the wrong side."""
     rows = np.array(posture.joints_rad)
     owner = dict(zip((link.joint for link in hand.links), hand.finger_of_link, strict=True))
     limits = {link.joint: link.limits for link in hand.links}
@@ -115,21 +103,7 @@ def check_posture(hand: MultiFingerGripper, tips: Fingertips, posture: Posture) 
                 f"{where}: joint {joint!r} moves, but the link that it holds is of no finger; name that under fingers, or"
                 " keep the joint at one position"
             )
-    _check_closing(hand, tips, posture, rows)
-
-
-def _check_closing(hand: MultiFingerGripper, tips: Fingertips, posture: Posture, rows: np.ndarray) -> None:
-    where, ends = f"posture {posture.name!r}", rows[[0, -1]]
-    closed_m, open_m = posture_gaps_m(tips, ends)
-    if open_m - closed_m < LEAST_TRAVEL_M:
-        raise ValueError(_not_closing(posture.name, closed_m, open_m, "the first row", "the last"))
-    least_m = posture.openings_m[-1] - 2 * hand.clearance_m
-    if open_m < least_m:
-        raise ValueError(
-            f"{where}: its widest opening is said to be {posture.openings_m[-1]:.4g} m, thumb and fingers of the URDF are then"
-            f" {open_m:.4g} m apart; mend openings_m, or give closed_rad and open_rad, between which openings are measured"
-        )
-    centers = tip_centers_m(tips, rows[-1])
+    centers = tips.centers_m(rows[-1])
     thumb, fingers = centers[0], centers[1:].mean(0)
     if thumb[0] >= fingers[0]:
         raise ValueError(
@@ -141,6 +115,20 @@ def _check_closing(hand: MultiFingerGripper, tips: Fingertips, posture: Posture,
             f"{where}: the fingertips are at z = {fingers[2]:.3f} of the grasp frame, the palm's front at"
             f" {hand.palm_front_m:.3f}; +Z points out of the palm: turn root_to_gripper, or mend palm_front_m"
         )
+
+
+def check_closing(hand: MultiFingerGripper, tips: Fingertips, posture: Posture) -> None:
+    """Raise ValueError where a posture does not close, opens less than it says, or holds deeper than its tips reach."""
+    where, rows = f"posture {posture.name!r}", np.array(posture.joints_rad)
+    closed_m, open_m = posture_gaps_m(tips, rows[[0, -1]])
+    if open_m - closed_m < LEAST_TRAVEL_M:
+        raise ValueError(_not_closing(posture.name, closed_m, open_m, "the first row", "the last"))
+    least_m = posture.openings_m[-1] - 2 * hand.clearance_m
+    if open_m < least_m:
+        raise ValueError(
+            f"{where}: its widest opening is said to be {posture.openings_m[-1]:.4g} m, thumb and fingers of the URDF are then"
+            f" {open_m:.4g} m apart along X; mend openings_m, or give closed_rad and open_rad, between which they are measured"
+        )
     reach_m = float(posture_reach_m(tips, rows).max())
     if posture.depth_m[1] > reach_m:
         raise ValueError(
@@ -151,6 +139,6 @@ def _check_closing(hand: MultiFingerGripper, tips: Fingertips, posture: Posture,
 
 def _not_closing(name: str, closed_m: float, open_m: float, closed: str, opened: str) -> str:
     return (
-        f"posture {name!r}: thumb and fingers do not come nearer as it closes, they are {closed_m:.4g} m apart in {closed} and"
-        f" {open_m:.4g} m in {opened}; look at the signs of the positions: each joint turns about its <axis>"
+        f"posture {name!r}: thumb and fingers do not come nearer as it closes, they are {closed_m:.4g} m apart along X in"
+        f" {closed} and {open_m:.4g} m in {opened}; look at the signs of the positions: each joint turns about its <axis>"
     )
