@@ -123,7 +123,11 @@ def _grippers(config: BuildConfig) -> list[tuple[Gripper, str]]:
     grippers = [load_gripper(name) for name in config.grippers]
     names = [gripper.name for gripper in grippers]
     if len(set(names)) < len(names):
-        raise UsageError(f"grippers {', '.join(names)}: each may be named once")
+        twice = sorted({name for name in names if names.count(name) > 1})
+        raise UsageError(
+            f"grippers {', '.join(names)}: each may be named once, as grasps are told apart by the name; name"
+            f" {', '.join(twice)} once, or give one of two files another name"
+        )
     return [(gripper, f"-{gripper.name}" if number else "") for number, gripper in enumerate(grippers)]
 
 
