@@ -11,7 +11,9 @@ import pytest
 from synthetic_episodes import attempt
 
 from manitwin.episodes import attempts as table
-from manitwin.episodes.attempts import OUTCOMES, Attempt, success_of
+from manitwin.episodes.attempts import ATTEMPTS, OUTCOMES, Attempt, success_of
+from manitwin.episodes.batch import BATCH_RECORD, BATCHES
+from manitwin.episodes.collect import collect
 from manitwin.errors import EpisodesError
 
 
@@ -63,6 +65,20 @@ def test_what_grasps_failed_of_and_who_has_none_is_counted_of_attempts_that_were
     assert list(counted.plan_failures.items()) == [("lift_blocked", 4), ("no_path", 3)]
     assert counted.without_grasp == (("lid", "lid"),)
     assert counted.total.executed == 1
+
+
+def test_end_of_a_run_tells_of_grasps_that_are_of_another_gripper(tmp_path: Path) -> None:
+    batch = tmp_path / BATCHES / "aa" / "one"
+    batch.mkdir(parents=True)
+    (batch / BATCH_RECORD).write_text("{}")
+    table.write_attempts(
+        batch / ATTEMPTS, [attempt(1, outcome="dropped", transferred=True), attempt(2, outcome="dropped")]
+    )
+    told = collect(tmp_path, []).lines
+    said = "1 of 2 executed took grasps that were verified for other jaws, not for the robot's gripper"
+    assert said in told and "manitwin build --gripper" in told[told.index(said) + 1]
+    table.write_attempts(batch / ATTEMPTS, [attempt(1, outcome="dropped"), attempt(2, outcome="dropped")])
+    assert not any("other jaws" in line for line in collect(tmp_path, []).lines)
 
 
 def test_unknown_outcomes_and_other_tables_are_refused(tmp_path: Path) -> None:

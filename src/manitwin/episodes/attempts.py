@@ -208,7 +208,7 @@ class Success:
     """Attempts in all, by category and by outcome, and the objects (id, category) that never succeeded.
 
     ``plan_failures``: of attempts without a plan, what grasps failed of, frequent reasons first. ``without_grasp``: the objects
-    that have no grasp for the hand.
+    that have no grasp for the hand. ``transferred``: attempts with a grasp that was verified for other jaws.
     """
 
     total: Tally = field(default_factory=Tally)
@@ -217,6 +217,7 @@ class Success:
     never: tuple[tuple[str, str], ...] = ()
     plan_failures: Mapping[str, int] = field(default_factory=dict)
     without_grasp: tuple[tuple[str, str], ...] = ()
+    transferred: int = 0
 
 
 def _frequent_first(counted: Counter[str]) -> dict[str, int]:
@@ -227,8 +228,9 @@ def success_of(attempts: Iterable[Attempt]) -> Success:
     """Return the counts of attempts, in all and by category and outcome."""
     total, by_category, outcomes = Tally(), dict[str, Tally](), Counter[str]()
     categories, successful = dict[str, str](), set[str]()
-    failures, without_grasp = Counter[str](), set[tuple[str, str]]()
+    failures, without_grasp, transferred = Counter[str](), set[tuple[str, str]](), 0
     for attempt in attempts:
+        transferred += attempt.transferred
         total.add(attempt)
         outcomes[attempt.outcome] += 1
         if attempt.outcome == "no_plan":
@@ -247,4 +249,5 @@ def success_of(attempts: Iterable[Attempt]) -> Success:
         tuple(sorted((each, name) for each, name in categories.items() if each not in successful)),
         _frequent_first(failures),
         tuple(sorted(without_grasp)),
+        transferred,
     )

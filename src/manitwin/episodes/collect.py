@@ -97,6 +97,17 @@ def collect(out: Path, formats: list[str]) -> Collected:
     return _collected(out)
 
 
+def _whose_grasps(success: Success) -> list[str]:
+    """Write how many episodes took grasps that are not the gripper's own, with the remedy."""
+    if not success.transferred:
+        return []
+    return [
+        f"{success.transferred} of {success.total.executed} executed took grasps that were verified for other jaws, not for the"
+        " robot's gripper",
+        "  remedy: build the twins for it too: manitwin build --gripper, see docs/grippers.md",
+    ]
+
+
 def _why_never_executed(success: Success) -> list[str]:
     """Write what grasps could not be planned for, and whose twins have none for the hand, with the remedy."""
     lines = []
@@ -120,6 +131,7 @@ def _collected(out: Path) -> Collected:
         f"{total.attempted} attempted, {total.executed} planned and executed, {total.succeeded} succeeded"
         f" ({total.succeeded / max(1, total.executed):.1%} of the executed), {total.kept} kept",
         f"not kept: {failed or 'none'}",
+        *_whose_grasps(success),
         *_why_never_executed(success),
     ]
     if success.never:
