@@ -29,7 +29,7 @@ def test_hand_is_told_with_what_its_links_have(tmp_path: Path, capsys: pytest.Ca
     text = said(capsys)
     assert "6 joints: thumb_1, thumb_2, index_1" in text
     assert (
-        "opening 60 mm: 60 mm along X between the tips, which reach to depth 98; thumb at x -36, z 80, fingers at x 36, z 80"
+        "opening 60 mm: 60 mm along X between the tips, which reach depth 98; thumb at x -36, z 80, fingers at x 36, z 80"
         in text
     )
     assert "note" not in text

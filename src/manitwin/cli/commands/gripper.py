@@ -87,7 +87,7 @@ def _postures(hand: MultiFingerGripper) -> list[str]:
             centers_m = tips.centers_m(row)
             thumb, fingers = centers_m[0], centers_m[1:]
             lines.append(
-                f"  opening {1000 * opening_m:4.0f} mm: {round(1000 * gap_m):4d} mm along X between the tips, which reach to depth"
+                f"  opening {1000 * opening_m:4.0f} mm: {round(1000 * gap_m):4d} mm along X between the tips, which reach depth"
                 f" {1000 * end_m:.0f}; thumb at x {1000 * thumb[0]:.0f}, z {1000 * thumb[2]:.0f}, fingers at x"
                 f" {_span(fingers[:, 0])}, z {_span(fingers[:, 2])}"
             )
