@@ -8,13 +8,15 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from publishable_run import write_record
 from synthetic_episodes import attempt
 
 from manitwin.episodes import attempts as table
 from manitwin.episodes.attempts import ATTEMPTS, OUTCOMES, Attempt, success_of
-from manitwin.episodes.batch import BATCH_RECORD, BATCHES
+from manitwin.episodes.batch import BATCHES
 from manitwin.episodes.collect import collect
 from manitwin.errors import EpisodesError
+from manitwin.twin.loaded_twin import TwinSource
 
 
 def some(count: int) -> list[Attempt]:
@@ -70,7 +72,7 @@ def test_what_grasps_failed_of_and_who_has_none_is_counted_of_attempts_that_were
 def test_end_of_a_run_tells_of_grasps_that_are_of_another_gripper(tmp_path: Path) -> None:
     batch = tmp_path / BATCHES / "aa" / "one"
     batch.mkdir(parents=True)
-    (batch / BATCH_RECORD).write_text("{}")
+    write_record(batch, TwinSource(str(tmp_path)), set())
     table.write_attempts(
         batch / ATTEMPTS, [attempt(1, outcome="dropped", transferred=True), attempt(2, outcome="dropped")]
     )

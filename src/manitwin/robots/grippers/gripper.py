@@ -165,7 +165,8 @@ def load_gripper(name_or_path: str, *, checked: bool = True) -> Gripper:
 
 def _check_name(name: str, path: Path, content: bytes) -> None:
     """Raise ValueError where another gripper has the name of a shipped one, for which exports, pages and robots would take it."""
-    if content != (_shipped_folder() / f"{name}.toml").read_bytes():
+    shipped = _shipped_folder() / f"{name}.toml"
+    if content != read_bytes(shipped, MAX_TOML_BYTES, UsageError, name=str(shipped)):
         raise ValueError(f"name: {name!r} is the name of a gripper that comes with the package; give this one another")
 
 
