@@ -67,3 +67,7 @@ def main() -> None:
     for by in ("category", "primitive", "elevation_deg"):
         print(table(families(results), by), end="\n\n")
     print(*(f"{count:4d} {reason}" for reason, count in summary_reasons(results)), sep="\n")
+
+
+if __name__ == "__main__":
+    main()
