@@ -14,16 +14,16 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, Field, ValidationError, field_validator
+from pydantic import BaseModel, Field, ValidationError
 
 from manitwin.errors import ConfigError, Unavailable, UsageError, choose_from
 from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.toml_file import MAX_TOML_BYTES, parse_toml
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.robots.grippers.box import STRICT
+from manitwin.robots.grippers.quantities import Rotation
 from manitwin.robots.robot import Workspace
 
-UNIT_TOLERANCE = 1e-6
 PACKAGE, FILE = "package://", "file://"
 MAX_FILE_BYTES = 64 << 20
 """The largest mesh of the shipped robots' 98 files is 1.4 MB."""
@@ -34,14 +34,7 @@ class PoseField(BaseModel):
 
     model_config = STRICT
     position_m: tuple[float, float, float]
-    quaternion_wxyz: tuple[float, float, float, float]
-
-    @field_validator("quaternion_wxyz")
-    @classmethod
-    def _unit(cls, value: tuple[float, ...]) -> tuple[float, ...]:
-        if abs(np.linalg.norm(value) - 1) > UNIT_TOLERANCE:
-            raise ValueError("a rotation is a quaternion wxyz of length 1")
-        return value
+    quaternion_wxyz: Rotation
 
     def matrix(self) -> np.ndarray:
         """Return the pose ``(4, 4)``."""

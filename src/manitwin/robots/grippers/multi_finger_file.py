@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, TypeAdapter, field_validator
+from pydantic import BaseModel, TypeAdapter
 
 from manitwin.errors import UsageError, choose_from
 from manitwin.formats.bounded_file import read_bytes
@@ -20,12 +20,11 @@ from manitwin.robots.grippers.coupled_joints import Coupling, couplings_of, with
 from manitwin.robots.grippers.fingertip_gaps import Fingertips
 from manitwin.robots.grippers.multi_finger import HandNumbers, MultiFingerGripper, Posture, find_mesh
 from manitwin.robots.grippers.posture_checks import check_closing, check_fingers, check_positions, measured_posture
-from manitwin.robots.grippers.quantities import Length, Position
+from manitwin.robots.grippers.quantities import Length, Position, Rotation
 from manitwin.robots.links import Link, links_of
 from manitwin.robots.urdf_reader import HAND, read_urdf
 from manitwin.twin.point_records import GraspType
 
-UNIT_TOLERANCE = 1e-6
 MAX_MESH_BYTES = 64 << 20
 
 
@@ -43,14 +42,7 @@ class _RootField(BaseModel):
 
     model_config = STRICT
     position_m: tuple[Position, Position, Position]
-    quaternion_wxyz: tuple[float, float, float, float]
-
-    @field_validator("quaternion_wxyz")
-    @classmethod
-    def _unit(cls, value: tuple[float, ...]) -> tuple[float, ...]:
-        if abs(np.linalg.norm(value) - 1) > UNIT_TOLERANCE:
-            raise ValueError("a rotation is a quaternion wxyz of length 1")
-        return value
+    quaternion_wxyz: Rotation
 
 
 @dataclass(frozen=True)

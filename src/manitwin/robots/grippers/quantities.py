@@ -1,4 +1,4 @@
-"""The quantities of grippers' files: what each may be, and the unit that a value out of its range was likely given in."""
+"""The quantities of grippers' and robots' files: what each may be, and the unit a value out of its range was likely given in."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ MAX_VACUUM_PA = 101_325.0
 """The standard atmosphere: outside there is no more that could press."""
 KILOPASCALS = MAX_VACUUM_PA / 1000
 """What is no more than this is a vacuum in kilopascals."""
+UNIT_TOLERANCE = 1e-6
 MAX_NAME = 64
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 
@@ -47,6 +48,12 @@ def _vacuum(value: float) -> float:
     return value
 
 
+def _of_unit_length(value: tuple[float, ...]) -> tuple[float, ...]:
+    if abs(np.linalg.norm(value) - 1) > UNIT_TOLERANCE:
+        raise ValueError("a rotation is a quaternion wxyz of length 1")
+    return value
+
+
 def _name(value: str) -> str:
     if not _NAME.fullmatch(value) or len(value) > MAX_NAME:
         wanted = f"letters, digits, '_', '-' and '.', at most {MAX_NAME}, the first a letter or digit"
@@ -64,12 +71,14 @@ _METRES = "give metres, not millimetres"
 _SENSE = "give its size, without a sign"
 _RADIANS = "give radians, not degrees"
 
-Length = Annotated[float, AfterValidator(_number(0, MAX_LENGTH_M, f"{_METRES}"))]
+Length = Annotated[float, AfterValidator(_number(0, MAX_LENGTH_M, _METRES))]
 """A size in metres."""
 Gap = Annotated[float, AfterValidator(_number(0, MAX_LENGTH_M, _METRES, least_too=True))]
 """A size in metres that may be zero."""
 Position = Annotated[float, AfterValidator(_position)]
 """A coordinate in metres."""
+Rotation = Annotated[tuple[float, float, float, float], AfterValidator(_of_unit_length)]
+"""A quaternion wxyz of length 1."""
 Positive = Annotated[float, AfterValidator(_number(0, np.inf, _SENSE))]
 """A force, a friction coefficient, a gain or a speed."""
 NotNegative = Annotated[float, AfterValidator(_number(0, np.inf, _SENSE, least_too=True))]
