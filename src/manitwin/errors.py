@@ -26,7 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
-from typing import Any, TypeGuard
+from typing import Any
 
 _SHOWN_CHARACTERS = 100
 _MOST_CHARACTERS = 3000
@@ -133,16 +133,6 @@ class BadReply(BackendError):
 
 class RendererMissing(Unavailable):
     """No Vulkan device that SAPIEN can render with."""
-
-
-def of_newer_schema(place: object, version: int, newest: int) -> str:
-    """Return the one line about a file of a schema that only a newer version of this package knows."""
-    return f"{place}: of schema {version}, this version reads up to {newest}; use the version that wrote it, or a newer one"
-
-
-def is_newer(version: object, newest: int) -> TypeGuard[int]:
-    """Tell whether what a file says of its schema is a later version than the newest that is known here."""
-    return type(version) is int and version > newest
 
 
 def encodable(text: str) -> str:

@@ -13,8 +13,9 @@ from manitwin.engine.recipe import Ending, Tables
 from manitwin.engine.stage import Draft
 from manitwin.engine.stage_runner import StageCost
 from manitwin.engine.task import Payload
-from manitwin.errors import ManiTwinError, NewerVersion, Rejected, TwinError, is_newer, of_newer_schema
+from manitwin.errors import ManiTwinError, NewerVersion, Rejected, TwinError
 from manitwin.formats.json_file import parse_json_object
+from manitwin.formats.schema_version import is_newer, of_newer_schema
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import canonical_json, sha256_of_json, write_bytes_atomically
 

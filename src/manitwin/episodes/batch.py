@@ -14,8 +14,9 @@ from pydantic import ValidationError
 
 from manitwin.engine.folder_recipe import FolderRecord
 from manitwin.engine.task import Payload
-from manitwin.errors import EpisodesError, UsageError, is_newer, of_newer_schema
+from manitwin.errors import EpisodesError, UsageError
 from manitwin.formats.json_file import read_json_object
+from manitwin.formats.schema_version import is_newer, of_newer_schema
 from manitwin.twin.store import sha256_of_json
 
 BATCHES = "batches"

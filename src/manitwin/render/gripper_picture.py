@@ -15,7 +15,6 @@ from manitwin.robots.grippers.gripper import Gripper
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.robots.grippers.suction import SuctionGripper
-from manitwin.robots.links import LinkShape
 
 TILE_PX, LABEL_PX = 420, 34
 PALM, THUMB, FINGER = (120, 128, 144), (196, 92, 60), (84, 134, 200)
@@ -107,18 +106,8 @@ def _hand_parts(hand: MultiFingerGripper, joints_rad: np.ndarray) -> list[trimes
     parts = []
     for link, pose, finger in zip(hand.links, hand.link_poses(joints_rad), hand.finger_of_link, strict=True):
         color = PALM if finger < 0 else THUMB if finger == 0 else FINGER
-        parts += [plain_part(_solid(shape).apply_transform(pose @ shape.shape_to_link), color) for shape in link.shapes]
+        parts += [plain_part(shape.solid().apply_transform(pose), color) for shape in link.shapes]
     return parts
-
-
-def _solid(shape: LinkShape) -> trimesh.Trimesh:
-    if shape.half_extents_m is not None:
-        return trimesh.creation.box(2 * shape.half_extents_m)
-    if shape.radius_m is not None:
-        return trimesh.creation.icosphere(3, shape.radius_m)
-    if shape.corners_m is None:
-        raise AssertionError("a shape is a box, a sphere or corners")
-    return trimesh.convex.convex_hull(shape.corners_m)
 
 
 def _box(pose: np.ndarray, half_extents_m: np.ndarray) -> trimesh.Trimesh:

@@ -40,6 +40,18 @@ class LinkShape:
         low, high = self.corners_m.min(0), self.corners_m.max(0)
         return self.shape_to_link @ transform(translation=(low + high) / 2), (high - low) / 2
 
+    def solid(self) -> trimesh.Trimesh:
+        """Return the shape as a mesh in the link's frame; a sphere as 1280 triangles inside it."""
+        if self.half_extents_m is not None:
+            mesh = trimesh.creation.box(2 * self.half_extents_m)
+        elif self.radius_m is not None:
+            mesh = trimesh.creation.icosphere(3, self.radius_m)
+        elif self.corners_m is not None:
+            mesh = trimesh.convex.convex_hull(self.corners_m)
+        else:
+            raise AssertionError("a shape is a box, a sphere or corners")
+        return mesh.apply_transform(self.shape_to_link)
+
 
 @dataclass(frozen=True)
 class Link:

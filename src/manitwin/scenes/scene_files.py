@@ -7,10 +7,11 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from manitwin.errors import UsageError, is_newer, of_newer_schema
+from manitwin.errors import UsageError
 from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.json_file import MAX_JSON_BYTES, parse_json_object, read_json_object
 from manitwin.formats.printable import printable_line
+from manitwin.formats.schema_version import is_newer, of_newer_schema
 from manitwin.scenes.scene import SCENE, SCENE_SCHEMA_VERSION, SceneRecord
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import canonical_json, write_bytes_atomically

@@ -13,10 +13,11 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from manitwin.errors import NewerVersion, TwinError, UsageError, is_newer, of_newer_schema
+from manitwin.errors import NewerVersion, TwinError, UsageError
 from manitwin.formats.bounded_file import open_regular, read_bytes
 from manitwin.formats.json_file import MAX_JSON_BYTES, parse_json_object, read_json_object
 from manitwin.formats.printable import printable, printable_line
+from manitwin.formats.schema_version import is_newer, of_newer_schema
 from manitwin.twin.migration import SCHEMA_VERSION, migrated
 from manitwin.twin.record import TwinRecord
 from manitwin.twin.record_values import CONTROLS

@@ -79,8 +79,8 @@ def _postures(hand: MultiFingerGripper) -> list[str]:
         openings_m = np.linspace(max(0.0, posture.openings_m[0]), posture.openings_m[-1], SHOWN_ROWS)
         rows = posture.joints_at(openings_m)
         lines.append(
-            f"posture {posture.name}, for {', '.join(posture.grasp_types)}: holds at depths of"
-            f" {1000 * posture.depth_m[0]:.0f} to {1000 * posture.depth_m[1]:.0f} mm"
+            f"posture {posture.name}, for {', '.join(posture.grasp_types)}: holds at a depth of"
+            f" {_span(np.array(posture.depth_m))} mm"
         )
         gaps_m, reach_m = posture_gaps_m(tips, rows), posture_reach_m(tips, rows)
         for opening_m, gap_m, end_m, row in zip(openings_m, gaps_m, reach_m, rows, strict=True):

@@ -12,8 +12,9 @@ from typing import Any, Literal
 
 from manitwin.dataset.collect.facts import BANDS, GROUPS, UNKNOWN
 from manitwin.dataset.collect.schema import APPLICATION, MIGRATIONS, migrate
-from manitwin.errors import UsageError, of_newer_schema
+from manitwin.errors import UsageError
 from manitwin.formats.bounded_file import open_regular
+from manitwin.formats.schema_version import of_newer_schema
 from manitwin.formats.sqlite_store import BUSY_S, damaged, errors_named, flaw_in, transaction
 
 Kind = Literal["image", "mesh", "asset", "url"]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sqlite3
 
-from manitwin.errors import UsageError, is_newer, of_newer_schema
+from manitwin.errors import UsageError
+from manitwin.formats.schema_version import is_newer, of_newer_schema
 
 MIGRATIONS = (
     """

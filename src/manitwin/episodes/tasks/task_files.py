@@ -9,10 +9,11 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from manitwin.episodes.tasks.task_record import TASK_SCHEMA_VERSION, TaskRecord
-from manitwin.errors import UsageError, is_newer, of_newer_schema
+from manitwin.errors import UsageError
 from manitwin.formats.bounded_file import decode_text, read_bytes
 from manitwin.formats.json_file import parse_json_object
 from manitwin.formats.printable import printable_line
+from manitwin.formats.schema_version import is_newer, of_newer_schema
 from manitwin.twin.store import write_bytes_atomically
 
 TASKS = "tasks.jsonl"

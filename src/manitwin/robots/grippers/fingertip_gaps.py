@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import trimesh
 
 from manitwin.geometry.poses import transform_points
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
-from manitwin.robots.links import LinkShape
 
 
 class Fingertips:
@@ -26,7 +24,7 @@ class Fingertips:
                 )
             self.links.append(max(shaped, key=lambda index: _depth(hand, index)))
         self._corners_m = [
-            np.concatenate([_corners(shape) for shape in hand.links[index].shapes]) for index in self.links
+            np.concatenate([shape.solid().vertices for shape in hand.links[index].shapes]) for index in self.links
         ]
 
     def bounds_m(self, joints_rad: np.ndarray) -> np.ndarray:
@@ -55,16 +53,3 @@ def _depth(hand: MultiFingerGripper, index: int) -> int:
     while (index := hand.links[index].parent) >= 0:
         depth += 1
     return depth
-
-
-def _corners(shape: LinkShape) -> np.ndarray:
-    """Return corners of a shape ``(V, 3)`` in the link's frame; of a ball, points all over it."""
-    if shape.radius_m is not None:
-        local_m = np.asarray(trimesh.creation.icosphere(3, shape.radius_m).vertices)
-    elif shape.half_extents_m is not None:
-        local_m = np.asarray(trimesh.creation.box(2 * shape.half_extents_m).vertices)
-    elif shape.corners_m is not None:
-        local_m = shape.corners_m
-    else:
-        raise AssertionError("a shape is a box, a sphere or corners")
-    return transform_points(shape.shape_to_link, local_m)
