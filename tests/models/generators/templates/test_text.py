@@ -118,8 +118,8 @@ def test_what_a_thing_smells_or_is_of_is_not_the_thing(text: str, category: str)
     "text",
     [
         *("a lemon squeezer", "apple sauce", "an egg carton", "a chess board", "an egg slicer"),
-        *("a banana split", "a basketball", "a chess set", "a brake disc", "an ice cube", "a lime", "a toy truck"),
-        *("a cherry tomato", "a garlic bulb", "an apple pie", "a ball of yarn", "a golf club"),
+        *("a banana split", "a toy truck", "a rugby ball", "a chess set", "a brake disc", "an ice cube", "a peach stone"),
+        *("a cherry tomato", "a celery stick", "an apple pie", "a ball of yarn", "a golf club"),
         *(
             "a sugar cube",
             "a stock cube",
@@ -152,13 +152,13 @@ def test_text_that_names_no_template_is_refused_in_one_line(text: str) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        *("pruning shears", "garlic bulb", "a muffin tin", "a VR headset", "a cricket ball", "a steel ball"),
+        *("pruning shears", "a waffle iron", "a nail file", "a VR headset", "a squash ball", "a snow globe"),
         *(
             "a cordless screwdriver",
             "a name plate",
-            "a napkin holder",
+            "an incense holder",
             "a bar clamp",
-            "a sieve",
+            "a muffin stand",
             "a saw blade",
             "a drill bit",
         ),
@@ -171,7 +171,7 @@ def test_text_that_names_no_template_is_refused_in_one_line(text: str) -> None:
             "a boot",
             "a pocket watch",
         ),
-        *("a ring binder", "a door handle", "a light", "a carton of eggs", "a lantern", "a stick of chalk"),
+        *("a ring binder", "a door handle", "a light", "a carton of eggs", "a lantern", "a stick of celery"),
     ],
 )
 def test_another_thing_whose_name_ends_as_a_templates_is_refused(text: str) -> None:
@@ -183,7 +183,7 @@ def test_nearest_categories_are_named() -> None:
     with pytest.raises(UsageError, match=r"did you mean hammer"):
         read("a hamer")
     with pytest.raises(
-        UsageError, match=r"'a steel coffee pot'; of its shape there are: carafe, french press, kettle, pitcher\."
+        UsageError, match=r"'a steel coffee pot'; of its shape there are: carafe, french press, gravy boat, kettle\."
     ):
         read("a steel coffee pot")  # spelt like a bottle
 
@@ -227,25 +227,8 @@ def test_a_thing_that_holds_others_is_not_one_of_them(text: str, category: str) 
 @pytest.mark.parametrize(
     "text",
     [
-        *(
-            "a kettlebell",
-            "a gavel",
-            "a pulley",
-            "a toy hammer",
-            "a stone",
-            "a potted plant",
-            "a hacksaw",
-            "a vise",
-        ),
-        *(
-            "a nail",
-            "a thumbtack",
-            "a pocket knife",
-            "a corkscrew",
-            "a lint roller",
-            "an impact driver",
-            "a coffee scoop",
-        ),
+        *("a toy hammer", "a stone", "a potted plant", "a vise", "a doorbell", "a wind chime", "a jerry can"),
+        *("a thumbtack", "a pocket knife", "a corkscrew", "a lint roller", "an impact driver", "a safety pin"),
     ],
 )
 def test_kin_of_another_shape_is_not_made(text: str) -> None:

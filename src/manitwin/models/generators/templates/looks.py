@@ -186,6 +186,15 @@ FOODS: dict[str, Look] = {
         _look("sugar glaze", "food skin", "ea8fae", 0.3, 1200),
         _look("cheese", "food skin", "f0c452", 0.5, 1070),
         _look("chocolate", "food skin", "4a2818", 0.35, 1250),
+        _look("sausage meat", "food skin", "a8502f", 0.35, 1000),
+        _look("grilled patty", "food skin", "553220", 0.8, 950),
+        _look("ice cream", "food skin", "f3e6c8", 0.6, 600),
+        _look("flavoured ice", "food skin", "e0553d", 0.25, 900),
+        _look("wafer", "food skin", "cf9a55", 0.8, 350),
+        _look("boiled sugar", "food skin", "d43b4a", 0.15, 1450),
+        _look("butter", "food skin", "f3dc8c", 0.45, 930),
+        _look("boiled rice", "food skin", "f3f0e6", 0.7, 1050),
+        _look("raw fish", "food skin", "ee8a5e", 0.35, 1060),
     )
 }
 """Looks of food, which tables name and texts do not: what a chocolate mug is of, its name does not say.

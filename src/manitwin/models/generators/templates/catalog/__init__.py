@@ -28,6 +28,7 @@ FAMILIES = (
     "cutting_tools", "workshop", "kitchen_tools", "cookware",
     "computing", "instruments", "appliances", "packages", "accessories", "clothing", "stationery", "homeware",
     "drinkware", "cosmetics", "batteries", "blocks", "chess_pieces", "clamps", "presses", "vegetables", "plastic_bottles",
+    "fruit", "roots", "bakery", "snacks", "sports", "flat_goods", "tableware", "bakeware", "fittings", "shop_tools",
 )  # fmt: skip
 
 

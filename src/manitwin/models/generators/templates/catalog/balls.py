@@ -10,11 +10,11 @@ from manitwin.geometry.solids.sweep import tube
 from manitwin.models.generators.templates.template import Model, template
 
 
-def _sphere(width_m: float, sides: int = 56) -> Manifold:
+def sphere(width_m: float, sides: int = 56) -> Manifold:
     return ellipsoid(width_m, width_m, width_m, sides=chords(sides))
 
 
-def _placed(model: Model, width_m: float, top: str = "body", side: str = "body") -> Model:
+def laid_ball(model: Model, width_m: float, top: str = "body", side: str = "body") -> Model:
     """Note the upper side and the side of a ball about the origin, and lay it down."""
     r = 0.5 * width_m
     model.point("top", "surface", top, (0.0, 0.0, r), (0.0, 0.0, 1.0))
@@ -29,7 +29,7 @@ def ball(*, width_m: float, stripe: float) -> Model:
     angles = np.concatenate([below, np.linspace(-edge, edge, 7)[1:-1], above])
     model = Model().add("body", lathe(np.column_stack([r * np.cos(angles), r * np.sin(angles)])))
     model.region("stripe", "body", lambda c: np.abs(c[:, 2]) < stripe * r, "stripe")
-    return _placed(model, width_m, side="stripe")
+    return laid_ball(model, width_m, side="stripe")
 
 
 @template("baseball")
@@ -42,7 +42,7 @@ def baseball(*, width_m: float, seam_m: float) -> Model:
     line *= (r - 0.3 * seam_m) / np.linalg.norm(line, axis=1)[:, None]
     halves = [line[:82], np.concatenate([line[80:], line[:2]])]  # a tube that overlaps itself would be no solid
     seam = union([tube(half, seam_m, sides=8, across=(0, 0, 1)) for half in halves])
-    model = Model().add("body", _sphere(width_m, 64)).add("seam", seam, "seam")
+    model = Model().add("body", sphere(width_m, 64)).add("seam", seam, "seam")
     stitches = []
     for at in range(1, 160, 4):
         here, on = line[at], line[(at + 1) % 160] - line[at - 1]
@@ -53,7 +53,7 @@ def baseball(*, width_m: float, seam_m: float) -> Model:
             path *= (r - 0.25 * seam_m) / np.linalg.norm(path, axis=1)[:, None]
             stitches.append(tube(path, 0.65 * seam_m, sides=6, across=tuple(out)))
     model.add("seam", union(stitches), "seam")
-    return _placed(model, width_m)
+    return laid_ball(model, width_m)
 
 
 def _twelve() -> np.ndarray:
@@ -79,10 +79,10 @@ def soccer_ball(*, width_m: float, patch: float) -> Model:
                 ends = corner + np.linspace(patch / 3, 1 - patch / 3, 8)[:, None] * (corners[b] - corner)
                 path = r * ends / np.linalg.norm(ends, axis=1)[:, None]
                 seams.append(tube(path, 0.006 * width_m, sides=6))
-    model = Model().add("body", _sphere(width_m, 72))
-    model.add("pentagons", _sphere(1.003 * width_m, 72) ^ union(pentagons), "pentagons")
+    model = Model().add("body", sphere(width_m, 72))
+    model.add("pentagons", sphere(1.003 * width_m, 72) ^ union(pentagons), "pentagons")
     model.cut("seams", union(seams), "pentagons")
-    return _placed(model, 1.003 * width_m, top="pentagons")
+    return laid_ball(model, 1.003 * width_m, top="pentagons")
 
 
 @template("golf ball")
@@ -94,10 +94,10 @@ def golf_ball(*, width_m: float, dimple: float) -> Model:
     places = np.column_stack([np.sqrt(1 - z**2) * np.cos(angle), np.sqrt(1 - z**2) * np.sin(angle), z])
     half = 0.5 * dimple * width_m
     at_m = float(np.sqrt(r**2 - half**2) + 0.75 * half)
-    dent = _sphere(2 * 1.25 * half, 20)
+    dent = sphere(2 * 1.25 * half, 20)
     depth = r - (at_m - 1.25 * half)
     dents = union([dent.translate(at_m * place) for place in places])
-    model = Model().add("body", _sphere(width_m, 72)).cut("dimples", dents)
+    model = Model().add("body", sphere(width_m, 72)).cut("dimples", dents)
     top, side = int((places @ (0, 0, 1.0)).argmax()), int((places @ (0, -1.0, 0)).argmax())
     for label, at in (("top", top), ("side", side)):
         x, y, up = (float(v) for v in places[at])
@@ -109,11 +109,11 @@ def golf_ball(*, width_m: float, dimple: float) -> Model:
 def table_tennis_ball(*, width_m: float, seam: float) -> Model:
     """Build a table tennis ball, the seam of its halves around it."""
     r, half = 0.5 * width_m, 0.5 * seam * width_m
-    model = Model().add("body", _sphere(width_m))
+    model = Model().add("body", sphere(width_m))
     model.add(
         "seam", lathe([(0, -half), (r + 0.00008, -half), (r + 0.00008, half), (0, half)], sides=chords(56)), "seam"
     )
-    return _placed(model, width_m)
+    return laid_ball(model, width_m)
 
 
 @template("marble")
@@ -122,8 +122,8 @@ def marble(*, width_m: float, twist: float) -> Model:
     r = 0.5 * width_m
     star = CrossSection([np.array([(0, 0), (1.2 * r, -0.16 * r), (1.2 * r, 0.16 * r)])])
     star = star + star.rotate(120) + star.rotate(240)
-    bands = star.extrude(2.1 * r, 120, 360 * twist).translate((0, 0, -1.05 * r)) ^ _sphere(1.006 * width_m, 64)
-    model = Model().add("body", _sphere(width_m, 64)).add("bands", bands, "bands")
+    bands = star.extrude(2.1 * r, 120, 360 * twist).translate((0, 0, -1.05 * r)) ^ sphere(1.006 * width_m, 64)
+    model = Model().add("body", sphere(width_m, 64)).add("bands", bands, "bands")
     model.region("top", "body", lambda c: c[:, 2] > 0.9 * r)
     r *= 1.006
     model.point("top", "surface", "bands", (0.0, 0.0, r), (0.0, 0.0, 1.0))
@@ -134,5 +134,5 @@ def marble(*, width_m: float, twist: float) -> Model:
 def billiard_ball(*, width_m: float, spot: float) -> Model:
     """Build a billiard ball with a white spot at its front and its back, whose width is ``spot`` of the ball's."""
     drum = cylinder(0.5 * spot * width_m, 2 * width_m).translate((0, 0, -width_m)).rotate((90, 0, 0))
-    model = Model().add("body", _sphere(width_m, 64)).add("spot", _sphere(1.002 * width_m, 64) ^ drum, "spot")
-    return _placed(model, width_m, side="spot")
+    model = Model().add("body", sphere(width_m, 64)).add("spot", sphere(1.002 * width_m, 64) ^ drum, "spot")
+    return laid_ball(model, width_m, side="spot")
