@@ -39,7 +39,7 @@ PARTS_OF: dict[str, tuple[str, ...]] = {
     "housing": ("body",), "shoulder": ("shoulders",),
     "head": (
         "head", "face", "claw", "blade", "bowl", "jaw", "pan", "edge", "wires", "tines", "neck", "glass", "frame", "channel",
-        "forehand", "backhand", "mane",
+        "forehand", "backhand", "mane", "strings",
     ),
     "working end": ("outlet",), "ear cup": ("cups",), "headband": ("band",), "core": ("core",), "outside": ("body",),
     "inner side": ("bore", "hole"), "barrel": ("barrel", "sleeve"), "lens": ("lens", "glass"), "switch": ("switch",),

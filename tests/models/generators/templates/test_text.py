@@ -118,7 +118,15 @@ def test_what_a_thing_smells_or_is_of_is_not_the_thing(text: str, category: str)
     "text",
     [
         *("a lemon squeezer", "apple sauce", "an egg carton", "a chess board", "an egg slicer"),
-        *("a banana split", "a toy truck", "a rugby ball", "a chess set", "a brake disc", "an ice cube", "a peach stone"),
+        *(
+            "a banana split",
+            "a toy truck",
+            "a rugby ball",
+            "a chess set",
+            "a brake disc",
+            "an ice cube",
+            "a peach stone",
+        ),
         *("a cherry tomato", "a celery stick", "an apple pie", "a ball of yarn", "a golf club"),
         *(
             "a sugar cube",

@@ -205,18 +205,11 @@ def drum_stick(*, length_m: float, width_m: float, taper: float, bead: float) ->
         (taper * r, end - 0.014),
     ]
     tip = [(0.9 * bead * r, end - 0.01), (bead * r, end - 0.006), (0.75 * bead * r, end - 0.001), (0.3 * bead * r, end)]
-    model = Model().add("handle", lying(lathe([(0, -end), *profile, (0, end - 0.014)])))
+    model = Model().add("shaft", lying(lathe([(0, -end), *profile, (0, end - 0.014)])))
     model.add("tip", lying(lathe([(0, end - 0.0148), (taper * r, end - 0.0148), *tip, (0, end)])), "tip")
-    model.region("head", "handle", lambda c: c[:, 0] > 0.22 * length_m)
     model.point("tip", "tip", "tip", (end, 0.0, 0.0), (1.0, 0.0, 0.0))
-    model.point(
-        "head",
-        "surface",
-        "head",
-        (0.3 * length_m, 0.0, float(np.interp(0.3, [0.2, 0.5 - 0.018 / length_m], [r, taper * r]))),
-        (0.0, 0.0, 1.0),
-    )
-    return model.point("handle", "surface", "handle", (-0.3 * length_m, 0.0, r), (0.0, 0.0, 1.0)).laid()
+    model.point("shaft", "surface", "shaft", (0.0, 0.0, r), (0.0, 0.0, 1.0))
+    return model.point("shaft end", "face", "shaft", (-end, 0.0, 0.0), (-1.0, 0.0, 0.0)).laid()
 
 
 @template("maraca")
