@@ -1,7 +1,8 @@
 """A command that a test interrupts: ``python interrupted_program.py NAME FOLDER MODE``, registered in the command line.
 
 It notes in FOLDER that it is at work (``started``) and that it is ending (``ending``). MODE ``busy`` computes until it is
-interrupted; ``slow`` then takes for ever over its end; ``late`` gets a second one as Python takes the process down;
+interrupted; ``slow`` then takes for ever over its end, ``deaf`` too, in native code; ``lost`` has the first one come where Python
+drops it; ``late`` gets a second one as Python takes the process down;
 ``run`` has two workers asleep in a stage; ``native`` is in native code; ``server`` serves, and waits longer
 for its last answers than native code may take; ``listing``,
 ``manifest`` and ``inspection`` look at inputs.
@@ -17,7 +18,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import manitwin.cli.main as cli
 from manitwin.cli.interrupt import NATIVE_PATIENCE_S, first_interrupt_calls
@@ -37,16 +38,32 @@ def work() -> None:
             serve()
             return
         (FOLDER / "started").touch()
-        if MODE == "native":  # which answers no signal, and lets other threads run
-            while True:
-                ctypes.CDLL(None).usleep(1_000)
-                ctypes.CDLL(None).sem_wait(ctypes.byref(ctypes.create_string_buffer(64)))
+        if MODE == "native":
+            be_deaf()
+        if MODE == "lost":
+            Dropping()
         while True:
             sum(range(1000))
     finally:
         (FOLDER / "ending").touch()
         while MODE == "slow":
             time.sleep(0.01)
+        if MODE == "deaf":
+            be_deaf()
+
+
+def be_deaf() -> NoReturn:
+    """Wait in native code, which answers no signal and lets other threads run."""
+    while True:
+        ctypes.CDLL(None).usleep(1_000)
+        ctypes.CDLL(None).sem_wait(ctypes.byref(ctypes.create_string_buffer(64)))
+
+
+class Dropping:
+    """Is interrupted as it is collected, whose exceptions Python prints and drops."""
+
+    def __del__(self) -> None:
+        signal.raise_signal(signal.SIGINT)
 
 
 def serve() -> None:

@@ -91,6 +91,22 @@ def test_second_interrupt_ends_a_slow_end_at_once(
     assert found == status and len(lines) == 1 and "interrupted" in lines[0]
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_second_interrupt_ends_native_code_in_a_slow_end(tmp_path: Path, number: signal.Signals) -> None:
+    program = Interrupted(tmp_path, "render", "deaf")
+    program.wait_for("started")
+    program.send(signal.SIGINT)
+    program.wait_for("ending")
+    program.send(number)
+    assert program.end() == (4, [f"manitwin render: interrupted{AGAIN}"])
+
+
+def test_an_interrupt_that_python_drops_is_not_lost(tmp_path: Path) -> None:
+    program = Interrupted(tmp_path, "layout", "lost")
+    assert program.end() == (4, [f"manitwin layout: interrupted{AGAIN}"])
+    assert (tmp_path / "ending").exists()
+
+
 @pytest.mark.parametrize("times", [1, 2, pytest.param(3, marks=pytest.mark.slow)])
 def test_interrupts_of_a_run_leave_no_worker_and_no_traceback(tmp_path: Path, times: int) -> None:
     program = Interrupted(tmp_path, "run", "run")

@@ -17,6 +17,8 @@ from functools import cache
 from types import FrameType
 from typing import NoReturn
 
+from manitwin.engine.interrupts import SIGNALS, is_deferred
+
 RESUMABLE = frozenset(
     {"build", "run", "layout", "tasks", "trajectories", "render", "publish", "import", "collect add", "collect draw"}
 )
@@ -24,9 +26,12 @@ RESUMABLE = frozenset(
 RESUMABLE_STATUS = 4
 INTERRUPTED_STATUS = 130
 """128 and the number of SIGINT, as shells say it: nothing is there that the same command could go on with."""
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 NATIVE_PATIENCE_S = 1.5
 """So long native code, in which Python answers no signal, may go on after one: DuckDB's or pyarrow's, say."""
+AGAIN = 0
+"""What is written to the thread that watches for signals where an interrupt was lost: no signal has this number."""
+AGAIN_AFTER_S = 0.02
+"""By then the function that lost the interrupt has returned."""
 WATCH = "interrupts"
 """The name of the thread that ends a command in native code; it waits for a signal, and holds no lock."""
 TRACKER_WARNING = "ignore:resource_tracker"
@@ -167,18 +172,38 @@ class Interrupts:
         self._watch_native_code()
 
     def _watch_native_code(self) -> None:
-        """Have a thread end the process where a signal came and the main thread is in native code that does not return."""
+        """Have a thread end the process where the main thread does not answer a signal, or goes on after a second one.
+
+        It may be in native code that does not return, or wait for a lock. An interrupt that came in a function whose exceptions
+        Python only prints, as it collects garbage, is lost: it is sent again.
+        """
         heard, tell = os.pipe()
         os.set_blocking(tell, False)
         signal.set_wakeup_fd(tell, warn_on_full_buffer=False)  # written by Python's handler in C, which runs at once
+        main = threading.main_thread().ident
+        print_unraisable = sys.unraisablehook
+
+        def unraisable(lost: sys.UnraisableHookArgs) -> None:
+            if not isinstance(lost.exc_value, KeyboardInterrupt):
+                print_unraisable(lost)
+            elif not self._over:
+                os.write(tell, bytes((AGAIN,)))
 
         def watch() -> None:
+            came = 0
             while number := os.read(heard, 1):
                 if number[0] in SIGNALS:
+                    came += 1
                     time.sleep(NATIVE_PATIENCE_S)
-                    if self._seen == 0 and not self._over:
+                    unanswered = self._seen == 0 and not is_deferred()
+                    if not self._over and (unanswered or came > 1):
                         self._leave_at_once()
+                elif number[0] == AGAIN and main is not None:
+                    time.sleep(AGAIN_AFTER_S)
+                    came = self._seen = 0
+                    signal.pthread_kill(main, signal.SIGINT)
 
+        sys.unraisablehook = unraisable
         threading.Thread(target=watch, daemon=True, name=WATCH).start()
 
     def say(self) -> None:
@@ -206,8 +231,9 @@ class Interrupts:
 
     def _leave_at_once(self) -> NoReturn:
         self.say()
-        import multiprocessing
-
-        for child in multiprocessing.active_children():
-            child.kill()
-        os._exit(self.status)
+        try:
+            processes = sys.modules.get("multiprocessing.process")  # imported elsewhere, or there are none
+            for child in processes.active_children() if processes is not None else ():
+                child.kill()
+        finally:
+            os._exit(self.status)

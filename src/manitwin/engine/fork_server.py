@@ -25,6 +25,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, NoReturn
 
+from manitwin.engine.interrupts import SIGNALS, deferred_interrupts
 from manitwin.engine.process_bounds import die_with, one_thread_each
 
 RUN = logging.getLogger("manitwin.run")
@@ -99,7 +100,12 @@ def _thread_names() -> list[str]:
 
 
 def _start() -> None:
-    """Fork the server, and tell multiprocessing of it."""
+    """Fork the server, and tell multiprocessing of it; a signal that comes is the program's, of which the server is a copy."""
+    with deferred_interrupts():
+        _fork_server()
+
+
+def _fork_server() -> None:
     resource_tracker.ensure_running()
     address = connection.arbitrary_address("AF_UNIX")  # type: ignore[attr-defined]
     driver = os.getpid()
@@ -112,10 +118,12 @@ def _start() -> None:
         gc.freeze()  # else the first collection of each worker would write into all objects, which copies their memory
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # of Python 3.12 and later: idle threads are threads
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
             server = os.fork()
         if server == 0:
             os.close(kept)
             _serve(driver, listener.detach(), alive)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
         gc.unfreeze()
         os.close(alive)
     _state._forkserver_address, _state._forkserver_alive_fd, _state._forkserver_pid = address, kept, server
@@ -140,11 +148,11 @@ def _forget_program() -> None:
     SIGINT stays blocked, as ``spared_from_interrupts`` has it.
     """
     atexit._clear()
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     signal.set_wakeup_fd(-1)
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    for number in SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_SETMASK, {signal.SIGINT})
     for logger in (logging.getLogger(), *map(logging.getLogger, logging.Logger.manager.loggerDict)):
         logger.handlers = [each for each in logger.handlers if isinstance(each, logging.NullHandler)]
 
@@ -164,12 +172,13 @@ def _runs() -> bool:
 
 def _stop() -> None:
     """End the server, and with it all workers that are left."""
-    if _runs():
-        server = _state._forkserver_pid
-        _forget_server()
-        with suppress(ProcessLookupError, ChildProcessError):
-            os.kill(server, signal.SIGKILL)
-            os.waitpid(server, 0)
+    with deferred_interrupts():
+        if _runs():
+            server = _state._forkserver_pid
+            _forget_server()
+            with suppress(ProcessLookupError, ChildProcessError):
+                os.kill(server, signal.SIGKILL)
+                os.waitpid(server, 0)
 
 
 def _forget_server() -> None:

@@ -30,8 +30,9 @@ def spared_from_interrupts() -> Iterator[None]:
     started before: starting it lifts the mask of the thread that does (bugs.python.org/issue33613).
     """
     resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
     try:
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # raises what a handler does, the mask set
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -51,7 +51,7 @@ def wait(executor: LocalExecutor, until: Callable[[], bool] = lambda: False) -> 
 
 
 def workers(executor: LocalExecutor) -> list[int]:
-    return [process.pid or 0 for pool in executor._pools.values() for process in pool.context._started]
+    return [process.pid or 0 for pool in executor._pools.values() for process in pool._context._started]
 
 
 @pytest.mark.parametrize("text", ["eat:a:2", "bad_alloc:a"])

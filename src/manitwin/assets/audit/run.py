@@ -19,7 +19,7 @@ from manitwin.errors import UsageError, choose_from
 from manitwin.formats.isolated import ProcessCrashed, called, limit_address_space, run_isolated
 
 if TYPE_CHECKING:
-    from pebble import ProcessPool
+    from manitwin.engine.worker_pool import WorkerPool
 
 ENGINES = ("mujoco", "sapien", "pybullet")
 TAKEN_BY = ("mujoco", "pybullet", "sapien", "physx", "gazebo")
@@ -140,22 +140,15 @@ def _in_processes(
     engines: Sequence[str],
     engine: str | None,
 ) -> Iterator[Audited]:
-    from pebble import ProcessPool
-
-    from manitwin.engine.worker_processes import WorkerContext, hidden_main_module
+    from manitwin.engine.worker_pool import WorkerPool
+    from manitwin.engine.worker_processes import hidden_main_module
 
     with hidden_main_module():
-        pool = ProcessPool(
-            max_workers=min(jobs, len(paths)),
-            context=WorkerContext(),
-            initializer=_begin,
-            initargs=(LIMITS.memory_bytes,),
-        )
+        pool = WorkerPool(min(jobs, len(paths)), initializer=_begin, initargs=(LIMITS.memory_bytes,))
         try:
             yield from _from_pool(pool, paths, rules, jobs, fix, named, engines, engine)
         finally:
             pool.stop()
-            pool.join()
 
 
 def _begin(memory_bytes: int) -> None:
@@ -165,7 +158,7 @@ def _begin(memory_bytes: int) -> None:
 
 
 def _from_pool(
-    pool: ProcessPool,
+    pool: WorkerPool,
     paths: Sequence[Path],
     rules: Sequence[RuleText],
     jobs: int,
@@ -178,19 +171,18 @@ def _from_pool(
     waiting: deque[tuple[Path, Any]] = deque()
     for path in paths:
         arguments = (path, codes, fix, root_of(path, named), tuple(engines), engine)
-        waiting.append((path, pool.schedule(called, args=(AUDIT, arguments), timeout=LIMITS.seconds)))
+        waiting.append((path, pool.schedule(called, (AUDIT, arguments), timeout_s=LIMITS.seconds)))
         if len(waiting) >= AHEAD * jobs:
-            yield _result(*waiting.popleft(), rules)
+            yield _result(pool, *waiting.popleft(), rules)
     while waiting:
-        yield _result(*waiting.popleft(), rules)
-    pool.close()
+        yield _result(pool, *waiting.popleft(), rules)
 
 
-def _result(path: Path, future: Any, rules: Sequence[RuleText]) -> Audited:
+def _result(pool: WorkerPool, path: Path, future: Any, rules: Sequence[RuleText]) -> Audited:
     from pebble import ProcessExpired
 
     try:
-        result: Audited = future.result()
+        result: Audited = pool.result(future)
         return result
     except (ProcessExpired, TimeoutError, MemoryError) as error:
         return _unread(path, why_ended(error), rules)

@@ -7,13 +7,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from pebble import ProcessExpired, ProcessPool
+from pebble import ProcessExpired
 from pyarrow.fs import LocalFileSystem
 
 from manitwin.dataset.index.part_list import INDEX, IndexPart, PartList, in_order_of_twins, no_dataset, sweep
 from manitwin.dataset.index.parts import merged, rows_of_twins, write_rows
 from manitwin.dataset.index.tables import TABLES, joined, parquet
-from manitwin.engine.worker_processes import WorkerContext, hidden_main_module
+from manitwin.engine.worker_pool import WorkerPool
+from manitwin.engine.worker_processes import hidden_main_module
 from manitwin.errors import TwinError
 from manitwin.twin.dataset_root import DatasetRoot
 
@@ -85,21 +86,19 @@ def _first_unused_number(root: DatasetRoot) -> int:
 
 
 def _read_all(root: DatasetRoot, chunks: list[list[str]], scratch: Path, jobs: int) -> Iterator[_Read]:
-    pool = ProcessPool(max_workers=jobs, context=WorkerContext())
+    pool = WorkerPool(jobs)
     try:
-        futures = [pool.schedule(_read, args=(root, chunk, scratch, number)) for number, chunk in enumerate(chunks)]
+        futures = [pool.schedule(_read, (root, chunk, scratch, number)) for number, chunk in enumerate(chunks)]
         for chunk, future in zip(chunks, futures, strict=True):
             try:
-                yield future.result()
+                yield pool.result(future)
             except ProcessExpired as error:
                 raise TwinError(
                     f"{root.url}: a process died (exit code {error.exitcode}) while it read twins {chunk[0]} to {chunk[-1]}; "
                     f"run manitwin check {root.url}"
                 ) from error
-        pool.close()
     finally:
         pool.stop()
-        pool.join()
 
 
 def _read(root: DatasetRoot, ids: list[str], scratch: Path, number: int) -> _Read:

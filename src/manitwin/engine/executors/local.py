@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import logging
 import os
 import queue
@@ -17,17 +18,19 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from pebble import ProcessExpired, ProcessPool
+from pebble import ProcessExpired
 
 from manitwin.config import Resource, RunConfig
 from manitwin.engine.executors.local_worker import LastWords, do, start
 from manitwin.engine.executors.stage_notes import EVERY_S, drop_note, read_notes
+from manitwin.engine.interrupts import deferred_interrupts
 from manitwin.engine.jobs import Failure, Job, Reply, RunStage, StageRejected, WorkerSetup
 from manitwin.engine.machine_share import available_workers
 from manitwin.engine.stage import StagePart
 from manitwin.engine.stage_runner import StageCost
 from manitwin.engine.worker import too_large
-from manitwin.engine.worker_processes import WorkerContext, hidden_main_module, spared_from_interrupts
+from manitwin.engine.worker_pool import WorkerPool
+from manitwin.engine.worker_processes import hidden_main_module
 from manitwin.errors import Unavailable
 
 RUN = logging.getLogger("manitwin.run")
@@ -42,23 +45,9 @@ class _Given:
     """A job that was given to a pool, how long it has run, and whether that was too long."""
 
     job: Job
-    future: Any
+    future: Any = None
     seconds: float = 0.0
     late: bool = False
-
-
-@dataclass(frozen=True)
-class _Pool:
-    """A pool, and the processes that were started for it."""
-
-    processes: ProcessPool
-    context: WorkerContext
-
-    def stop(self) -> None:
-        """End all processes at once, also one that is stopped (SIGSTOP) or in native code."""
-        self.processes.stop()
-        self.context.kill()
-        self.processes.join()
 
 
 class LocalExecutor:
@@ -84,7 +73,7 @@ class LocalExecutor:
             "cpu": cpu, "gpu": settings.gpu, "vlm": settings.vlm, "generator": settings.generator
         }  # fmt: skip
         self._slots = {needs: slots if items is None else max(1, min(slots, items)) for needs, slots in wanted.items()}
-        self._pools: dict[Resource, _Pool] = {}
+        self._pools: dict[Resource, WorkerPool] = {}
         self._given: dict[int, _Given] = {}
         self._failed_pools = 0
         self._ended: queue.SimpleQueue[tuple[int, Reply]] = queue.SimpleQueue()
@@ -92,6 +81,7 @@ class LocalExecutor:
         self._looked_at, self._counted_at = 0.0, time.monotonic()
         self._main = hidden_main_module()
         self._main.__enter__()
+        atexit.register(self.close)  # an interrupt may come just before: a worker that nobody ends would be waited for
 
     def __enter__(self) -> LocalExecutor:
         return self
@@ -107,9 +97,10 @@ class LocalExecutor:
 
     def submit(self, ticket: int, job: Job) -> None:
         """Give a job to the pool of what it needs."""
-        given = _Given(job, self._schedule(ticket, job))
-        self._given[ticket] = given
-        given.future.add_done_callback(partial(self._hand_over, ticket, given))
+        with deferred_interrupts():
+            given = _Given(job)
+            given.future = self._schedule(ticket, given)
+            self._given[ticket] = given
 
     def ended(self, timeout_s: float) -> list[tuple[int, Reply]]:
         """Wait for the next job that ends, and return all that have; end those that take too long."""
@@ -134,21 +125,22 @@ class LocalExecutor:
 
     def close(self) -> None:
         """Stop all processes at once."""
-        for pool in self._pools.values():
-            pool.processes.stop()
-        for pool in self._pools.values():
-            pool.stop()
-        self._pools.clear()
-        self._stacks.cleanup()
-        self._main.__exit__(None, None, None)
+        with deferred_interrupts():
+            atexit.unregister(self.close)
+            for pool in self._pools.values():
+                pool.refuse()
+            for pool in self._pools.values():
+                pool.stop()
+            self._pools.clear()
+            self._stacks.cleanup()
+            self._main.__exit__(None, None, None)
 
-    def _schedule(self, ticket: int, job: Job) -> Any:
+    def _schedule(self, ticket: int, given: _Given) -> Any:
         """Give a job to its pool; to a new one where all processes of the pool died before they had a job."""
         while True:
-            pool = self._pool(job.needs)
+            pool = self._pool(given.job.needs)
             try:
-                with spared_from_interrupts():
-                    return pool.processes.schedule(do, args=(ticket, job))
+                return pool.schedule(do, (ticket, given.job), on_end=partial(self._hand_over, ticket, given))
             except RuntimeError as error:  # pebble's, of a pool that is broken
                 self._failed_pools += 1
                 if self._failed_pools >= FAILED_POOLS:
@@ -164,25 +156,23 @@ class LocalExecutor:
         """End the jobs that have run longer than they may. Time is monotonic: no clock that is set ends or spares one."""
         now = time.monotonic()
         step, self._counted_at = min(now - self._counted_at, LONGEST_STEP_S), now
-        for given in list(self._given.values()):
-            if not given.late and given.future.running():
-                given.seconds += step
-                if given.seconds > self._settings.stage_timeout_s:
-                    given.late = True
-                    given.future.cancel()  # pebble ends its process
+        with deferred_interrupts():  # a future has a lock, which the threads of its pool want too
+            for given in list(self._given.values()):
+                if not given.late and given.future.running():
+                    given.seconds += step
+                    if given.seconds > self._settings.stage_timeout_s:
+                        given.late = True
+                        given.future.cancel()  # pebble ends its process
 
-    def _pool(self, needs: Resource) -> _Pool:
+    def _pool(self, needs: Resource) -> WorkerPool:
         needs = "cpu" if self._one_pool else needs
         if needs not in self._pools:
-            context = WorkerContext()
-            processes = ProcessPool(
-                max_workers=self._slots[needs],
+            self._pools[needs] = WorkerPool(
+                self._slots[needs],
                 max_tasks=JOBS_A_PROCESS,
-                context=context,
                 initializer=start,
                 initargs=(self._setup, self._stacks.name, os.getpid()),
             )
-            self._pools[needs] = _Pool(processes, context)
         return self._pools[needs]
 
     def _hand_over(self, ticket: int, given: _Given, future: Any) -> None:
