@@ -10,6 +10,7 @@ import pytest
 import manitwin
 from foreign_assets import mug_urdf
 from scene_twins import slab, write_things
+from small_hand import write_hand
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +80,20 @@ def test_assets_are_imported_whether_or_not_somebody_reads_the_answer(tmp_path: 
     by_error = {each.error is None: each for each in manitwin.import_assets(tmp_path / "assets", tmp_path / "out")}
     assert (tmp_path / "out" / "mug" / "asset.glb").is_file()
     assert by_error[True].folder == tmp_path / "out" / "mug" and by_error[False].folder is None
+
+
+def test_gripper_is_loaded_by_name_and_by_file(tmp_path: Path) -> None:
+    shipped = manitwin.load_gripper("panda")
+    file = Path(write_hand(tmp_path))
+    assert (shipped.name, shipped.opening_m) == ("panda", 0.08)
+    assert manitwin.load_gripper(file).sha256 == manitwin.load_gripper(str(file)).sha256 != shipped.sha256
+
+
+def test_gripper_that_is_not_there_is_a_usage_error(tmp_path: Path) -> None:
+    with pytest.raises(manitwin.UsageError, match=r"pandas.*panda"):
+        manitwin.load_gripper("pandas")
+    with pytest.raises(manitwin.UsageError, match=r"none\.toml is not there"):
+        manitwin.load_gripper(tmp_path / "none.toml")
 
 
 def test_index_is_made_of_the_twins_folders(twins: Path) -> None:

@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     )
     from manitwin.physics.sapien.robot import SapienRobot
     from manitwin.pipeline.build_report import BuildReport
+    from manitwin.robots.grippers.gripper import load_gripper
     from manitwin.robots.load import load_robot
     from manitwin.robots.robot import Robot
     from manitwin.scenes.loaded_scene import Scene
@@ -111,6 +112,7 @@ __all__ = [
     "import_assets",
     "load",
     "load_config",
+    "load_gripper",
     "load_robot",
     "load_scene",
     "make_env",
@@ -199,6 +201,7 @@ _DEFINED_IN = {
     ),
     "manitwin.physics.sapien.robot": ("SapienRobot",),
     "manitwin.pipeline.build_report": ("BuildReport",),
+    "manitwin.robots.grippers.gripper": ("load_gripper",),
     "manitwin.robots.load": ("load_robot",),
     "manitwin.robots.robot": ("Robot",),
     "manitwin.scenes.settings": ("LayoutsConfig",),

@@ -12,11 +12,13 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
+import manitwin
 from json_documents import check_keys
 from manitwin.cli.main import app
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.store import read_record
 from scene_twins import THINGS, write_things
+from small_hand import TOML, write_hand
 
 NONE = dict.fromkeys(("open", "accepted", "rejected", "failed", "duplicate"), 0)
 
@@ -45,6 +47,39 @@ def bad(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "c.obj").write_text("no mesh")
     (folder / "notes.txt").write_text("hello")
     return folder
+
+
+@pytest.mark.parametrize("name", ["panda", "suction", "hand"])
+def test_gripper_tells_what_its_lines_say(name: str, tmp_path: Path) -> None:
+    given = write_hand(tmp_path) if name == "hand" else name
+    document = told("gripper", given)
+    check_keys(document, "gripper")
+    loaded = manitwin.load_gripper(given)
+    assert (document["name"], document["kind"], document["sha256"]) == (loaded.name, loaded.kind, loaded.sha256)
+    assert document["opening_m"] == (None if name == "suction" else loaded.opening_m) and document["picture"] is None
+    assert (document["tip_depth_m"], document["force_n"]) == (loaded.tip_depth_m, loaded.force_n)
+    assert document["remarks"] == []
+    if name != "hand":
+        assert document["joints"] == document["postures"] == []
+        return
+    assert document["joints"][:2] == ["thumb_1", "thumb_2"]
+    widest = document["postures"][0]["openings"][-1]
+    assert widest["gap_m"] == pytest.approx(widest["opening_m"], abs=0.002)
+    assert widest["centers_m"][0][0] < 0 < widest["centers_m"][1][0], "the thumb is on -X"
+
+
+def test_gripper_tells_where_it_was_drawn(tmp_path: Path) -> None:
+    picture = tmp_path / "panda.png"
+    assert told("gripper", "panda", "--draw", picture)["picture"] == str(picture) and picture.is_file()
+
+
+def test_gripper_whose_file_is_wrong_is_told_as_an_error(tmp_path: Path) -> None:
+    wrong = write_hand(tmp_path, TOML.replace("force_n = 8.0", "force_n = -8.0"))
+    done = subprocess.run(
+        [sys.executable, "-m", "manitwin", "gripper", wrong, "--json"], capture_output=True, text=True, check=False
+    )
+    error = json.loads(done.stdout)["error"]
+    assert done.returncode == 2 and error["type"] == "UsageError" and "force_n" in error["message"]
 
 
 def test_build_tells_every_input_and_why(bad: Path, tmp_path: Path) -> None:

@@ -125,12 +125,13 @@ def _shipped_folder() -> Path:
     return Path(str(resources.files("manitwin.robots.grippers") / "definitions"))
 
 
-def load_gripper(name_or_path: str, *, checked: bool = True) -> Gripper:
-    """Load a gripper by its shipped name or from a TOML file; raises UsageError naming what would be valid.
+def load_gripper(name_or_path: str | Path, *, checked: bool = True) -> Gripper:
+    """Load a gripper by its shipped name or from a TOML file; raises UsageError naming what is wrong and what would be valid.
 
     Unless ``checked`` its shapes may be elsewhere than its numbers say, so that it can be looked at, and nothing else: the
     openings of a hand's postures may be missing.
     """
+    name_or_path = str(name_or_path)
     if name_or_path.endswith(".toml"):
         path = Path(name_or_path)
         if not path.is_file():
