@@ -2,15 +2,16 @@
 
 It notes in FOLDER that it is at work (``started``) and that it is ending (``ending``). MODE ``busy`` computes until it is
 interrupted; ``slow`` then takes for ever over its end, ``deaf`` too, in native code; ``lost`` has the first one come where Python
-drops it; ``late`` gets a second one as Python takes the process down;
-``run`` has two workers asleep in a stage; ``native`` is in native code; ``server`` serves, and waits longer
-for its last answers than native code may take; ``listing``,
-``manifest`` and ``inspection`` look at inputs.
+drops it, ``import`` has it come in a module that goes on without another one, ``imports`` imports for ever; ``late`` gets a
+second one as Python takes the process down; ``run`` has two workers asleep in a stage; ``native`` is in native code; ``server``
+serves, and waits longer for its last answers than native code may take; ``listing``, ``manifest`` and ``inspection`` look at
+inputs.
 """
 
 from __future__ import annotations
 
 import ctypes
+import importlib
 import os
 import signal
 import sys
@@ -42,6 +43,16 @@ def work() -> None:
             be_deaf()
         if MODE == "lost":
             Dropping()
+        if MODE == "import":
+            sys.path.insert(0, str(FOLDER))
+            (FOLDER / "careless.py").write_text(CARELESS)
+            importlib.import_module("careless")
+        if MODE == "imports":
+            sys.path.insert(0, str(FOLDER))
+            (FOLDER / "endless.py").write_text(
+                f"open({str(FOLDER / 'importing')!r}, 'w').close()\nwhile True: sum(range(100))"
+            )
+            importlib.import_module("endless")
         while True:
             sum(range(1000))
     finally:
@@ -50,6 +61,19 @@ def work() -> None:
             time.sleep(0.01)
         if MODE == "deaf":
             be_deaf()
+
+
+CARELESS = """
+import os, signal
+try:
+    os.kill(os.getpid(), signal.SIGINT)
+    import statistics
+    sum(range(1000))
+except BaseException:
+    statistics = None
+if statistics is None:
+    os.write(2, b"the module goes on without another one")
+"""
 
 
 def be_deaf() -> NoReturn:

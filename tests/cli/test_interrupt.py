@@ -101,10 +101,26 @@ def test_second_interrupt_ends_native_code_in_a_slow_end(tmp_path: Path, number:
     assert program.end() == (4, [f"manitwin render: interrupted{AGAIN}"])
 
 
-def test_an_interrupt_that_python_drops_is_not_lost(tmp_path: Path) -> None:
-    program = Interrupted(tmp_path, "layout", "lost")
+@pytest.mark.parametrize("where", ["lost", "import"])
+def test_an_interrupt_that_is_dropped_or_caught_on_its_way_is_not_lost(tmp_path: Path, where: str) -> None:
+    program = Interrupted(tmp_path, "layout", where)
     assert program.end() == (4, [f"manitwin layout: interrupted{AGAIN}"])
     assert (tmp_path / "ending").exists()
+
+
+def test_second_interrupt_ends_an_import_at_once(tmp_path: Path) -> None:
+    program = Interrupted(tmp_path, "layout", "imports")
+    program.wait_for("importing")
+    program.send(signal.SIGINT)
+    program.send(signal.SIGTERM)
+    assert program.end() == (4, [f"manitwin layout: interrupted{AGAIN}"])
+
+
+def test_an_import_that_does_not_end_is_ended(tmp_path: Path) -> None:
+    program = Interrupted(tmp_path, "layout", "imports")
+    program.wait_for("importing")
+    program.send(signal.SIGINT)
+    assert program.end() == (4, [f"manitwin layout: interrupted{AGAIN}"])
 
 
 @pytest.mark.parametrize("times", [1, 2, pytest.param(3, marks=pytest.mark.slow)])

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import atexit
 import os
+import select
 import signal
 import sys
 import threading
@@ -14,7 +15,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
-from types import FrameType
+from types import CodeType, FrameType
 from typing import NoReturn
 
 from manitwin.engine.interrupts import SIGNALS, is_deferred
@@ -29,9 +30,11 @@ INTERRUPTED_STATUS = 130
 NATIVE_PATIENCE_S = 1.5
 """So long native code, in which Python answers no signal, may go on after one: DuckDB's or pyarrow's, say."""
 AGAIN = 0
-"""What is written to the thread that watches for signals where an interrupt was lost: no signal has this number."""
-AGAIN_AFTER_S = 0.02
-"""By then the function that lost the interrupt has returned."""
+"""What is written to the thread that watches for signals where an interrupt is to come again: no signal has this number."""
+LOOKS_EVERY_S = 0.02
+"""Between two looks whether what lost an interrupt, or would lose one, has returned."""
+IMPORT = "<frozen importlib._bootstrap>"
+"""The file name of the functions that a module is imported by."""
 WATCH = "interrupts"
 """The name of the thread that ends a command in native code; it waits for a signal, and holds no lock."""
 TRACKER_WARNING = "ignore:resource_tracker"
@@ -142,6 +145,9 @@ class Interrupts:
         self._seen = 0
         self._said = False
         self._over = False
+        self._tell: int | None = None
+        self._sent_again = False
+        self._begun_in: CodeType | None = None
 
     @property
     def interrupted(self) -> bool:
@@ -160,51 +166,95 @@ class Interrupts:
         return f"{f'manitwin {self.command}'.rstrip()}: interrupted{again}"
 
     def listen(self) -> None:
-        """Raise KeyboardInterrupt at the first signal, and end the process at the second."""
+        """Raise KeyboardInterrupt at the first signal, and end the process at the second.
+
+        None is raised while a module is imported: modules that can do without another one catch whatever its import raises
+        (trimesh: ``except BaseException``), and the command would go on without it. It comes once that is done.
+        """
         keep_exit_status()
         # a second signal leaves no time to remove semaphores: the tracker of this process does, and need not say so
         filters = os.environ.get("PYTHONWARNINGS", "")
         if TRACKER_WARNING not in filters.split(","):
             os.environ["PYTHONWARNINGS"] = ",".join(filter(None, (filters, TRACKER_WARNING)))
+        self._begun_in = sys._getframe(1).f_code
+        self._watch()
         for number in SIGNALS:
             if signal.getsignal(number) is not signal.SIG_IGN:  # as a shell's background jobs have it
                 signal.signal(number, self._caught)
-        self._watch_native_code()
 
-    def _watch_native_code(self) -> None:
+    def _watch(self) -> None:
         """Have a thread end the process where the main thread does not answer a signal, or goes on after a second one.
 
         It may be in native code that does not return, or wait for a lock. An interrupt that came in a function whose exceptions
-        Python only prints, as it collects garbage, is lost: it is sent again.
+        Python only prints, as it collects garbage, is lost: it is sent again, as is one that came while a module was imported.
         """
-        heard, tell = os.pipe()
-        os.set_blocking(tell, False)
-        signal.set_wakeup_fd(tell, warn_on_full_buffer=False)  # written by Python's handler in C, which runs at once
-        main = threading.main_thread().ident
+        heard, self._tell = os.pipe()
+        os.set_blocking(self._tell, False)
+        signal.set_wakeup_fd(
+            self._tell, warn_on_full_buffer=False
+        )  # written by Python's handler in C, which runs at once
         print_unraisable = sys.unraisablehook
 
         def unraisable(lost: sys.UnraisableHookArgs) -> None:
             if not isinstance(lost.exc_value, KeyboardInterrupt):
                 print_unraisable(lost)
             elif not self._over:
-                os.write(tell, bytes((AGAIN,)))
-
-        def watch() -> None:
-            came = 0
-            while number := os.read(heard, 1):
-                if number[0] in SIGNALS:
-                    came += 1
-                    time.sleep(NATIVE_PATIENCE_S)
-                    unanswered = self._seen == 0 and not is_deferred()
-                    if not self._over and (unanswered or came > 1):
-                        self._leave_at_once()
-                elif number[0] == AGAIN and main is not None:
-                    time.sleep(AGAIN_AFTER_S)
-                    came = self._seen = 0
-                    signal.pthread_kill(main, signal.SIGINT)
+                self._ask_again()
 
         sys.unraisablehook = unraisable
-        threading.Thread(target=watch, daemon=True, name=WATCH).start()
+        threading.Thread(target=self._wait_for_signals, args=(heard,), daemon=True, name=WATCH).start()
+
+    def _wait_for_signals(self, heard: int) -> None:
+        came = own = 0
+        asked_at: float | None = None
+        ends_at: float | None = None
+        while True:
+            waits = [] if ends_at is None else [ends_at - time.monotonic()]
+            waits += [] if asked_at is None else [LOOKS_EVERY_S]
+            ready, _, _ = select.select([heard], [], [], max(0.0, min(waits)) if waits else None)
+            numbers = os.read(heard, 64) if ready else b""
+            now = time.monotonic()
+            for number in numbers:
+                if number == AGAIN:
+                    asked_at = now
+                elif number in SIGNALS and own:
+                    own -= 1
+                elif number in SIGNALS:
+                    came, ends_at = came + 1, now + NATIVE_PATIENCE_S
+            if ends_at is not None and now >= ends_at:
+                ends_at = None
+                if (self._seen == 0 and not is_deferred()) or came > 1:
+                    self._leave_unless_over()
+            if asked_at is not None and not ready and not self._main_imports():
+                asked_at, own = None, own + 1
+                self._send_again()
+            elif asked_at is not None and now > asked_at + NATIVE_PATIENCE_S:
+                self._leave_unless_over()
+
+    def _ask_again(self) -> None:
+        if self._tell is not None:
+            os.write(self._tell, bytes((AGAIN,)))
+
+    def _send_again(self) -> None:
+        main = threading.main_thread().ident
+        if main is not None and not self._over:
+            self._sent_again = True
+            signal.pthread_kill(main, signal.SIGINT)
+
+    def _leave_unless_over(self) -> None:
+        if not self._over:
+            self._leave_at_once()
+
+    def _main_imports(self) -> bool:
+        return self._imports(sys._current_frames().get(threading.main_thread().ident or 0))
+
+    def _imports(self, frame: FrameType | None) -> bool:
+        """Tell whether a module is imported in a frame, since the command began."""
+        while frame is not None and frame.f_code is not self._begun_in:
+            if frame.f_code.co_filename == IMPORT:
+                return True
+            frame = frame.f_back
+        return False
 
     def say(self) -> None:
         """Say once that the command was interrupted: straight to stderr, so that a second signal can do it anywhere."""
@@ -224,10 +274,16 @@ class Interrupts:
             signal.signal(number, leave)
 
     def _caught(self, number: int, frame: FrameType | None) -> None:
-        self._seen += 1
-        if self._seen == 1:
+        if self._sent_again:
+            self._sent_again = False
+        else:
+            self._seen += 1
+        if self._seen > 1:
+            self._leave_at_once()
+        if self._imports(frame):
+            self._ask_again()
+        else:
             raise KeyboardInterrupt
-        self._leave_at_once()
 
     def _leave_at_once(self) -> NoReturn:
         self.say()

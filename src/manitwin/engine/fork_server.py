@@ -148,6 +148,7 @@ def _forget_program() -> None:
     SIGINT stays blocked, as ``spared_from_interrupts`` has it.
     """
     atexit._clear()
+    sys.unraisablehook = sys.__unraisablehook__
     signal.set_wakeup_fd(-1)
     for number in SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:

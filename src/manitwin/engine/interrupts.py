@@ -9,6 +9,7 @@ is started and that nobody has noted yet.
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -67,4 +68,4 @@ def deferred_interrupts() -> Iterator[None]:
         deferring = False  # one that comes from here on goes to the handler that it is meant for
         for each, handler in before.items():
             signal.signal(each, handler)
-        call_first(None)
+        call_first(sys._getframe())
