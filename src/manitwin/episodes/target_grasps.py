@@ -11,6 +11,7 @@ from manitwin.episodes.planning.problem import Grasp
 from manitwin.geometry.poses import transform
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
+from manitwin.robots.grippers.of_twins import require_same
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.twin.grasp_table import JOINTS
 from manitwin.twin.loaded_twin import Grasps, Twin
@@ -39,8 +40,10 @@ def usable_grasps(twin: Twin, gripper: Gripper) -> tuple[TargetGrasp, ...]:
     """Return the verified grasps that are not retired: the gripper's own, else, of jaws, those of other jaws, transferred.
 
     A transferred grasp has its fingertips where they were verified; what does not fit between the pads is left out. Whose
-    grasps are of jaws their rows tell, as no file of a gripper of one's own need be at hand.
+    grasps are of jaws their rows tell, as no file of a gripper of one's own need be at hand. Raises UsageError where the twin
+    has grasps of another gripper of this one's name.
     """
+    require_same(gripper, [(twin.record.twin_id, _digest_of(twin, gripper.name))])
     for name in _sources(twin, gripper):
         if found := _of_gripper(twin, name, gripper):
             return found
@@ -52,6 +55,15 @@ def shuffled(grasps: Iterable[TargetGrasp], rng: np.random.Generator) -> tuple[T
     chosen = tuple(grasps)
     keys = SHARPNESS * np.array([grasp.value for grasp in chosen]) + rng.gumbel(size=len(chosen))
     return tuple(chosen[i] for i in np.argsort(-keys, kind="stable"))
+
+
+def _digest_of(twin: Twin, name: str) -> dict[str, str]:
+    """Return the digest of a gripper's file that a twin has grasps of, by its name; nothing where it has none."""
+    summary = twin.record.grasps
+    if summary is not None and summary.gripper != name:
+        other = summary.other_grippers.get(name)
+        summary = None if other is None else other.summary
+    return {} if summary is None else {name: summary.gripper_sha256}
 
 
 def _sources(twin: Twin, gripper: Gripper) -> list[str]:

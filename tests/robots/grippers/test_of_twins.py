@@ -8,7 +8,7 @@ import pytest
 
 from manitwin.errors import UsageError
 from manitwin.robots.grippers.gripper import load_gripper
-from manitwin.robots.grippers.of_twins import gripper_of
+from manitwin.robots.grippers.of_twins import gripper_of, is_another, require_same
 from small_hand import write_hand
 
 
@@ -27,3 +27,24 @@ def test_own_gripper_is_taken_from_those_given_if_it_is_the_twins(tmp_path: Path
         gripper_of("other", hand.sha256, [hand])
     with pytest.raises(UsageError, match="a twin has only its name; give its file with --gripper"):
         gripper_of("small_hand", hand.sha256)
+
+
+def test_another_gripper_of_the_same_name_is_told_by_its_digest(tmp_path: Path) -> None:
+    hand = load_gripper(write_hand(tmp_path))
+    assert not is_another(hand, {"small_hand": hand.sha256}) and not is_another(hand, {"panda": "0" * 64})
+    assert is_another(hand, {"panda": "1" * 64, "small_hand": "0" * 64})
+    twins = [
+        ("first", {"small_hand": hand.sha256}),
+        ("second", {"small_hand": "0" * 64}),
+        ("third", {"small_hand": "1" * 64}),
+    ]
+    require_same(hand, twins[:1], "my_arm")
+    with pytest.raises(
+        UsageError,
+        match=r"twin second \(and 1 more of 3\) has grasps of a gripper small_hand .* the small_hand of my_arm; build",
+    ):
+        require_same(hand, twins, "my_arm")
+
+
+def test_shipped_gripper_of_an_earlier_version_goes_on() -> None:
+    require_same(load_gripper("panda"), [("first", {"panda": "0" * 64})])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from manitwin.errors import UsageError
 from manitwin.robots.grippers.gripper import Gripper, load_gripper, shipped_grippers
@@ -27,3 +27,31 @@ def gripper_of(name: str, sha256: str, given: Sequence[Gripper] = ()) -> Gripper
             f"gripper {name} does not come with the package, and a twin has only its name{named}; give its file with --gripper"
         )
     return load_gripper(name)
+
+
+def is_another(gripper: Gripper, grippers: Mapping[str, str]) -> bool:
+    """Tell whether a twin has grasps of another gripper of the same name; ``grippers`` are the digests of its grippers by name.
+
+    The name of one that comes with the package no other file can have, so its numbers alone may be those of another version.
+    """
+    return (
+        gripper.name in grippers and grippers[gripper.name] != gripper.sha256 and gripper.name not in shipped_grippers()
+    )
+
+
+def require_same(gripper: Gripper, twins: Iterable[tuple[str, Mapping[str, str]]], carrier: str = "") -> None:
+    """Raise UsageError where twins, each with the digests of its grippers by name, have grasps of another of the same name.
+
+    ``carrier`` is the robot that has the gripper. What was verified with other numbers would be executed as if with these.
+    """
+    given = list(twins)
+    others = [twin for twin, grippers in given if is_another(gripper, grippers)]
+    if not others:
+        return
+    more = f" (and {len(others) - 1:,} more of {len(given):,})" if len(others) > 1 else ""
+    of = f" of {carrier}" if carrier else ""
+    raise UsageError(
+        f"twin {others[0]}{more} has grasps of a gripper {gripper.name} whose file is another than that of the"
+        f" {gripper.name}{of}; build the twins again with this one (--gripper FILE.toml), give the file that they were built"
+        " with, or give the changed file a name of its own and build for it too"
+    )
