@@ -31,7 +31,7 @@ def test_what_is_no_scene_says_so(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="its JSON is broken"):
         read_scene(tmp_path)
     (tmp_path / SCENE).write_text(json.dumps({"schema_version": 99}))
-    with pytest.raises(UsageError, match="of schema 99, this version reads up to 1"):
+    with pytest.raises(UsageError, match="of schema 99, this version reads up to 2"):
         read_scene(tmp_path)
     (tmp_path / SCENE).write_text(json.dumps({"schema_version": 1, "seed": "x"}))
     with pytest.raises(UsageError, match=r"scene_id: Field required"):

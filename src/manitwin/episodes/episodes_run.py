@@ -21,6 +21,7 @@ from manitwin.engine.stage_runner import StageCost
 from manitwin.episodes.attempts import ATTEMPTS, read_attempts
 from manitwin.episodes.batch import BATCH_RECORD, BATCH_SCHEMA_VERSION, Batch, BatchRecord, batch_name, batches
 from manitwin.episodes.configuration import read_configuration
+from manitwin.episodes.episodes_source import EpisodesSource
 from manitwin.episodes.episodes_stage import EPISODES, EpisodesStage
 from manitwin.episodes.retirement import Retirement, find_retirements, retire
 from manitwin.episodes.setting import Begins
@@ -28,14 +29,15 @@ from manitwin.episodes.settings import TrajectoriesConfig
 from manitwin.episodes.skills.hands import check_grasps, check_hand
 from manitwin.episodes.skills.registry import load_skill
 from manitwin.episodes.skills.skill import Skill
-from manitwin.episodes.tasks.task_files import TASKS, read_tasks
+from manitwin.episodes.tasks.task_files import read_tasks
 from manitwin.episodes.tasks.task_record import TaskRecord
 from manitwin.errors import Rejected, UsageError
 from manitwin.formats.json_file import parse_json_object
+from manitwin.robots.grippers.of_twins import require_same
 from manitwin.robots.load import load_robot
 from manitwin.scenes.layouts.pool import Pool, PoolTwin, pool_of
 from manitwin.scenes.run_settings import check_settings
-from manitwin.scenes.scene_files import SCENES, read_scene, scene_ids, scene_name
+from manitwin.scenes.scene_files import scene_ids
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.store import RUN, canonical_json, digests_below, sha256_of_json, write_bytes_atomically
@@ -107,57 +109,6 @@ class EpisodesRecipe(FolderRecipe[BatchRecord]):
         return Ending("accepted", record.revision, None, detail)
 
 
-@dataclass(frozen=True)
-class EpisodesSource:
-    """The source of episodes: a data set of twins, and scenes of them or none; tasks in these scenes or none."""
-
-    dataset: str
-    scenes: str | None
-    tasks: str | None = None
-
-    @classmethod
-    def of(cls, place: str | Path, twins: str | Path | None = None) -> EpisodesSource:
-        """Tell scenes from twins; raises UsageError for what is neither, and for scenes whose twins are gone.
-
-        ``twins`` names where those of the scenes are now, None: where they were as the layouts were made.
-        """
-        root = DatasetRoot(place)
-        path = root.absolute()
-        if root.exists(TASKS) and root.exists(CONFIG):
-            return cls._of_tasks(root, path, twins)
-        if root.exists(SCENES) and root.exists(CONFIG):
-            said = root.read_json(CONFIG, UsageError, remedy="make the layouts again")
-            if not isinstance(said.get("dataset"), str):
-                raise UsageError(
-                    f"{place}/{CONFIG}: does not say whose twins these scenes are of; make the layouts again"
-                )
-            dataset = said["dataset"] if twins is None else DatasetRoot(twins).absolute()
-            _check_twins(dataset, Path(path))
-            return cls(dataset, path)
-        if twins is not None:
-            raise UsageError(f"{place}: holds no scenes, whose twins could be elsewhere; leave --twins out")
-        return cls(path, None)
-
-    @classmethod
-    def _of_tasks(cls, root: DatasetRoot, path: str, twins: str | Path | None) -> EpisodesSource:
-        said = root.read_json(CONFIG, UsageError, remedy="make the tasks again")
-        dataset = said.get("dataset") if twins is None else DatasetRoot(twins).absolute()
-        scenes = said.get("scenes")
-        if not isinstance(dataset, str) or not isinstance(scenes, str):
-            raise UsageError(f"{root.url}/{CONFIG}: does not say of which scenes its tasks are; make the tasks again")
-        _check_twins(dataset, Path(scenes))
-        return cls(dataset, scenes, path)
-
-
-def _check_twins(dataset: str, scenes: Path) -> None:
-    """Raise UsageError where twins of the scenes are not there: every batch with one of them would fail."""
-    source = TwinSource(dataset)
-    named = {
-        each.twin_id for scene_id in scene_ids(scenes) for each in read_scene(scenes / scene_name(scene_id)).objects
-    }
-    source.check(named)
-
-
 def _check_asked(config: TrajectoriesConfig, source: EpisodesSource) -> None:
     """Raise UsageError for settings that the source has its own answer to: they would be left out without a word."""
     if source.tasks is not None and config.skill != TrajectoriesConfig.model_fields["skill"].default:
@@ -206,10 +157,10 @@ def make_episodes(
 
     ``twins`` names where the twins of scenes are now, None: where they were as the layouts were made.
     ``count`` is how many there are at the end; where there are as many already, none is made.
-    Raises UsageError for a place without twins or scenes, twins of which none has a grasp for the robot's hand, settings that
-    tasks or scenes answer themselves, an unknown robot or skill, an ``out`` that has episodes of scenes where twins are given or
-    the other way, or made with other settings, or where another run is at work there; EpisodesError for an ``out`` whose
-    episodes an earlier version made that recorded less of them.
+    Raises UsageError for a place without twins or scenes, scenes whose twins stand otherwise now, twins of which none has a grasp
+    for the robot's hand or one has those of another hand of its name, settings that tasks or scenes answer themselves, an unknown
+    robot or skill, an ``out`` that has episodes of scenes where twins are given or the other way, or made with other settings, or
+    where another run is at work there; EpisodesError for an ``out`` whose episodes an earlier version made that recorded less.
     """
     if not 1 <= count <= LARGEST_COUNT:
         raise UsageError(f"{count:.6g} episodes; ask for 1 or more, at most {LARGEST_COUNT}")
@@ -220,6 +171,7 @@ def make_episodes(
     config = _with_robot_of(tasks, config)
     robot = load_robot(config.robot)
     check_hand(robot, skill)
+    source.check_grippers(robot)
     for name in sorted({step.skill for task in tasks for step in task.steps}):
         check_hand(robot, load_skill(name))
     _check_out(root, source)
@@ -236,6 +188,7 @@ def make_episodes(
         elif source.scenes is None:
             stage = EpisodesStage(config, source.dataset, None)
             pool = pool_of(source.dataset)
+            require_same(robot.gripper, ((twin.twin_id, twin.grippers) for twin in pool.twins), robot.name)
             check_grasps(robot, skill, [twin.twin_id for twin in pool.twins], stage.has_grasps)
             twin_ids = twins_for(skill, pool, stage.begins)
             deal = batches(robot.name, count, config.batch, twin_ids=twin_ids, there=there)
@@ -247,6 +200,7 @@ def make_episodes(
         EpisodesRecipe(config, source.dataset, source.scenes, source.tasks), deal, root, config.run,
         configuration=configuration, **run,
     )  # fmt: skip
+    report.remarks.extend(source.remarks)
     before = sum(batch.count for batch in there)
     if before > count:
         report.remarks.append(f"{before} episodes are there already, more than the {count} asked for; none was added")

@@ -11,6 +11,7 @@ from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.geometry.rigid_body import PlacedObject, RigidBody, StaticBox
 from manitwin.scenes.scene import Furniture, SceneObject, SceneRecord
 from manitwin.scenes.scene_files import read_scene
+from manitwin.scenes.twins_now import StatesNow, changed_twins
 from manitwin.twin.loaded_twin import Twin, TwinSource
 
 if TYPE_CHECKING:
@@ -48,6 +49,11 @@ class Scene:
         if twin_id not in self._bodies:
             self._bodies[twin_id] = self.twin(twin_id).rigid_body()
         return self._bodies[twin_id]
+
+    @property
+    def stale(self) -> str | None:
+        """A line on twins that were made again and stand otherwise now than in the scene; None where there are none."""
+        return changed_twins([self.record], StatesNow(self._source)).line
 
     def placed_objects(self) -> list[PlacedObject]:
         """Return the objects with their bodies, in the record's order; raises UsageError for a twin that is not there."""

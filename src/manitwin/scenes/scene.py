@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, AllowInfNan, BaseModel, ConfigDict, Field
+from pydantic import (
+    AfterValidator,
+    AllowInfNan,
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+)
 
-SCENE_SCHEMA_VERSION = 1
+SCENE_SCHEMA_VERSION = 2
+"""Version 2 says what each object's twin was as it came to rest (``body_sha256``); version 1, its revision alone."""
+SCENE_SCHEMA_VERSIONS = (1, SCENE_SCHEMA_VERSION)
+"""Those that are read. A scene stays as it was written: tasks name it by its digest."""
 SCENE = "scene.json"
 
 
@@ -68,7 +79,8 @@ class SceneObject(_Record):
     """A twin in the scene, at rest. ``supported_by`` is another object's name, or None for the furniture; ``relation`` on or in.
 
     ``placement`` is the index of the twin's placement that it stands in; None for what came to rest as it fell, in a
-    container. ``surface`` names the support that it, or what holds it, stands on.
+    container. ``surface`` names the support that it, or what holds it, stands on. ``body_sha256`` is the digest of what decides
+    how the twin comes to rest (``manitwin.twin.record_digests``); None in scenes of earlier versions, which do not have the key.
     """
 
     name: Name
@@ -81,6 +93,14 @@ class SceneObject(_Record):
     supported_by: str | None = None
     relation: Literal["on", "in"] = "on"
     surface: str = "table"
+    body_sha256: str | None = None
+
+    @model_serializer(mode="wrap")
+    def _as_read(self, written: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        said: dict[str, Any] = written(self)
+        if self.body_sha256 is None:
+            del said["body_sha256"]
+        return said
 
 
 class Light(_Record):

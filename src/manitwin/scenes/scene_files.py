@@ -12,7 +12,7 @@ from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.json_file import MAX_JSON_BYTES, parse_json_object, read_json_object
 from manitwin.formats.printable import printable_line
 from manitwin.formats.schema_version import is_newer, of_newer_schema
-from manitwin.scenes.scene import SCENE, SCENE_SCHEMA_VERSION, SceneRecord
+from manitwin.scenes.scene import SCENE, SCENE_SCHEMA_VERSION, SCENE_SCHEMA_VERSIONS, SceneRecord
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import canonical_json, write_bytes_atomically
 
@@ -47,10 +47,10 @@ def parse_scene(content: bytes, path: str | Path = SCENE) -> SceneRecord:
     version = data.get("schema_version")
     if is_newer(version, SCENE_SCHEMA_VERSION):
         raise UsageError(of_newer_schema(path, version, SCENE_SCHEMA_VERSION))
-    if version != SCENE_SCHEMA_VERSION:
+    if version not in SCENE_SCHEMA_VERSIONS or isinstance(version, bool):
         version = printable_line(str(version), max_characters=40)
         raise UsageError(
-            f"{path}: scene version {version}, this package reads {SCENE_SCHEMA_VERSION}; sample the layout again"
+            f"{path}: scene version {version}, this package reads 1 to {SCENE_SCHEMA_VERSION}; sample the layout again"
         )
     try:
         return SceneRecord(**data)

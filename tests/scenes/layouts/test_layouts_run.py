@@ -103,11 +103,11 @@ def test_a_scene_of_a_newer_version_is_refused_and_left(tmp_path: Path, monkeypa
     out, config = tmp_path / "made", CONFIG.model_copy(update={"run": RunConfig(keep_work=False, attempts=1)})
     make_layouts(tmp_path / "twins_here", out, 1, config, executor="inline")
     (scene,) = out.glob("scenes/*/*/scene.json")
-    scene.write_text(json.dumps({**json.loads(scene.read_text()), "schema_version": 2, "weather": "fine"}))
+    scene.write_text(json.dumps({**json.loads(scene.read_text()), "schema_version": 3, "weather": "fine"}))
     before = scenes_of(out)
     monkeypatch.setattr(LayoutStage, "version", "another")
     assert make_layouts(tmp_path / "twins_here", out, 1, config, executor="inline").exit_code == 4
     with read_ledger(out / "ledger.sqlite") as ledger:
         (detail,) = ledger.execute("SELECT detail FROM items").fetchone()
-    assert "scene.json: of schema 2, this version reads up to 1; use the version that wrote it" in detail
+    assert "scene.json: of schema 3, this version reads up to 2; use the version that wrote it" in detail
     assert scenes_of(out) == before

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from manitwin.cli import choices, options
-from manitwin.cli.console import note_old_layout, out_console, print_error
+from manitwin.cli.console import err_console, note_old_layout, out_console, print_error
 from manitwin.formats.plurals import counted
 
 if TYPE_CHECKING:
@@ -71,11 +71,16 @@ def scenes_among(given: list[str]) -> list[Path]:
 
 def export_scenes(files: list[Path], out: Path, to: str) -> None:
     """Write ``OUT/<scene>/<format>/`` of every scene; raises UsageError for a format that scenes have not, ExportError."""
-    from manitwin.api import export_scene
+    from manitwin.api import export_scene, load_scene
 
     for file in files:
-        written = export_scene(file, [name.strip() for name in to.split(",")], out)
+        scene = load_scene(file)
+        written = export_scene(scene, [name.strip() for name in to.split(",")], out)
         out_console.print(f"{file.parent.name}: {', '.join(written)}")
+        if scene.stale is not None:
+            err_console.print(
+                f"{file}: {scene.stale}: they may fall or overlap; sample the layouts again into a new folder"
+            )
     out_console.print(f"{counted(len(files), 'scenes')} exported to {out}")
 
 

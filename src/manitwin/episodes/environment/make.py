@@ -23,6 +23,8 @@ from manitwin.errors import UsageError
 from manitwin.formats.json_file import read_json_object
 from manitwin.robots.load import load_robot
 from manitwin.scenes.layouts.pool import pool_of
+from manitwin.scenes.scene_files import read_scene, scene_name
+from manitwin.scenes.twins_now import require_same_twins
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import TwinSource
 
@@ -60,6 +62,8 @@ def make_env(
     for step in task.steps:
         check_hand(chosen, load_skill(step.skill))
     source, planner = TwinSource(dataset), planner_of(chosen, settings.timestep_s)
+    scene = Path(said["scenes"]) / scene_name(task.scene_id)
+    require_same_twins([read_scene(scene)], source, str(scene))
 
     @lru_cache(maxsize=64)
     def grasps(twin_id: str) -> tuple[TargetGrasp, ...]:

@@ -11,7 +11,7 @@ from typing import Any, Unpack
 
 from manitwin.engine.drive import RunOptions, RunReport, drive
 from manitwin.engine.ledger.location import CONFIG
-from manitwin.episodes.episodes_run import EpisodesSource
+from manitwin.episodes.episodes_source import EpisodesSource
 from manitwin.episodes.settings import TasksConfig
 from manitwin.episodes.tasks.bddl import write_bddl
 from manitwin.episodes.tasks.task_files import TASKS, read_tasks, write_tasks
@@ -58,14 +58,16 @@ def make_tasks(
 ) -> tuple[RunReport, TaskTotals | None]:
     """Draw tasks in all scenes of a folder and write ``tasks.jsonl`` and ``tasks_report.json``; no totals: not all has ended.
 
-    Scenes whose tasks are there are left. Raises UsageError for a place without scenes, an unknown robot or model, an ``out``
-    with tasks of other settings, or where another run is at work there.
+    Scenes whose tasks are there are left. Raises UsageError for a place without scenes, scenes whose twins stand otherwise now or
+    have grasps of another hand of the name of the robot's, an unknown robot or model, an ``out`` with tasks of other settings,
+    or where another run is at work there.
     """
-    load_robot(config.robot)
+    robot = load_robot(config.robot)
     chat_of(config.vlm, "propose tasks")
     source, root = EpisodesSource.of(scenes, twins), DatasetRoot(out)
     if source.scenes is None:
         raise UsageError(f"{scenes}: no scenes; `manitwin layout DATASET -o SCENES` makes some")
+    source.check_grippers(robot)
     configuration = {"kind": KIND, "dataset": source.dataset, "scenes": source.scenes, **config.model_dump(mode="json")}
     check_settings(root, configuration, free=DECIDE_NO_TASK, made="scenes' tasks")
     recipe = TasksRecipe(config, source.dataset, source.scenes)
@@ -73,6 +75,7 @@ def make_tasks(
     report = drive(
         recipe, map(TaskedScene, ids), root, config.run, configuration=configuration, **run,
     )  # fmt: skip
+    report.remarks.extend(source.remarks)
     if report.exit_code == 4:
         return report, None
     return report, collect_tasks(Path(out), config)

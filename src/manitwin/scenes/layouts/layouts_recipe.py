@@ -57,7 +57,7 @@ class LayoutStage:
     """
 
     name = "layout"
-    version = "2"
+    version = "3"
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = (SCENE,)
     needs: Resource = "cpu"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Unpack
@@ -14,13 +16,15 @@ from manitwin.engine.ledger.location import CONFIG, local_ledger
 from manitwin.engine.ledger.reading import read_ledger
 from manitwin.errors import UsageError
 from manitwin.scenes.layouts.layouts_recipe import LayoutNumber, LayoutsRecipe
-from manitwin.scenes.layouts.pool import pool_of
+from manitwin.scenes.layouts.pool import Pool, pool_of
 from manitwin.scenes.layouts.slot_drawing import least_objects
 from manitwin.scenes.run_settings import check_settings, earlier_settings
 from manitwin.scenes.scene import SCENE, SceneRecord
-from manitwin.scenes.scene_files import parse_scene, scene_name
+from manitwin.scenes.scene_files import parse_scene, scene_name, scene_there
 from manitwin.scenes.settings import LayoutsConfig
+from manitwin.scenes.twins_now import changed_twins
 from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.record_digests import TwinState
 
 CONTACT_SHEET = "contact_sheet.webp"
 DECIDE_NO_SCENE = frozenset(("dataset", "run", "pictures", "picture_px"))
@@ -77,9 +81,35 @@ def make_layouts(
             run["on_start"](items, opened)
 
     watched: RunOptions = {**run, "on_start": started}
-    return drive(
+    remarks = _stale_scenes(root, pool)
+    report = drive(
         recipe, map(LayoutNumber, range(count)), root, config.run, configuration=configuration, **watched
     )  # fmt: skip
+    report.remarks.extend(remarks)
+    return report
+
+
+def _stale_scenes(root: DatasetRoot, pool: Pool) -> list[str]:
+    """Return remarks on the scenes that are there already and whose twins stand otherwise now: they stay as they are."""
+    if not local_ledger(root).is_file():
+        return []
+
+    def there() -> Iterator[SceneRecord]:
+        for scene_id in accepted_scenes(root.url):
+            with suppress(UsageError):  # of a newer version: the run says so
+                if (content := scene_there(root, scene_id)) is not None:
+                    yield parse_scene(content)
+
+    def now(twin_id: str) -> TwinState | None:
+        twin = pool.find(twin_id)
+        return None if twin is None else TwinState(twin.revision, twin.body_sha256 or "", twin.grippers)
+
+    found = changed_twins(there(), now)
+    if found.line is None:
+        return [] if found.remark is None else [found.remark]
+    return [
+        f"{found.line}, which stay as they are: tasks and episodes refuse them; sample the layouts again into a new folder"
+    ]
 
 
 def _with_pictures_there(config: LayoutsConfig, before: dict[str, Any], place: str) -> LayoutsConfig:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from manitwin.geometry.rigid_body import RigidBody
 from manitwin.scenes.layouts.twin_frames import LabelledPoint, TwinFrame, twin_frames
 from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.record import Placement
+from manitwin.twin.record_digests import state_of
 from manitwin.twin.store import RECORD, REMEDY, in_present_version, parse_record
 
 KEPT_BODIES = 256
@@ -44,6 +45,7 @@ class PoolTwin:
     """A twin as far as drawing it needs; ``vessel``: it has an opening that its hulls keep.
 
     ``frames`` are those of its functional points. ``jointed``: it has joints, though it is one rigid body in scenes.
+    ``body_sha256`` is the digest of what decides how it comes to rest, ``grippers`` has those of its grippers' files by name.
     """
 
     twin_id: str
@@ -53,6 +55,8 @@ class PoolTwin:
     vessel: bool
     frames: tuple[TwinFrame, ...] = ()
     jointed: bool = False
+    body_sha256: str | None = None
+    grippers: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def stands(self) -> bool:
@@ -105,6 +109,10 @@ class Pool:
                 f"no twin {twin_id!r} that stays where it is set down; build it again, or name its data set"
             )
         return self._by_id[twin_id]
+
+    def find(self, twin_id: str) -> PoolTwin | None:
+        """Return a twin by its id; None where there is none."""
+        return self._by_id.get(twin_id)
 
     @cached_property
     def _by_id(self) -> dict[str, PoolTwin]:
@@ -224,12 +232,15 @@ def _pool_twin(content: bytes, name: str) -> PoolTwin | None:
     )
     if not poses:
         return None
+    state = state_of(data, name)
     return PoolTwin(
         record.twin_id,
-        record.revision,
+        state.revision,
         record.language.category,
         poses,
         record.mesh.hulls.keeps_opening is True,
         twin_frames(record.points.functional),
         jointed=bool(record.joints),
+        body_sha256=state.body_sha256,
+        grippers=state.grippers,
     )

@@ -240,6 +240,7 @@ def _objects(slots: list[Slot], judgement: Judgement) -> tuple[SceneObject, ...]
                 supported_by=None if slot.parent is None else names[slot.parent.number],
                 relation="in" if slot.role == "in" else "on",
                 surface=slot.put.surface,
+                body_sha256=slot.twin.body_sha256,
             )
         )
     return tuple(found)

@@ -20,6 +20,7 @@ from manitwin.scenes.locate.world_frame import WorldFrame
 from manitwin.scenes.scene import SCENE_SCHEMA_VERSION, Furniture, SceneMeasures, SceneObject, SceneRecord
 from manitwin.scenes.settings import LayoutSettings
 from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.record_digests import body_sha256
 
 LOCATED = "located"
 """What ``clutter`` says of a scene that was seen and not sampled."""
@@ -163,6 +164,7 @@ def _scene_object(each: LocatedObject, pose: np.ndarray, bearer: str | None) -> 
         position_m=triple(pose[:3, 3]),
         quaternion_wxyz=(w, i, j, k),
         supported_by=bearer,
+        body_sha256=body_sha256(record.model_dump(mode="json")),
     )
 
 

@@ -1,0 +1,80 @@
+"""What episodes and tasks are made of: a data set of twins, or scenes of them, or tasks in these scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from manitwin.engine.ledger.location import CONFIG
+from manitwin.episodes.tasks.task_files import TASKS
+from manitwin.errors import UsageError
+from manitwin.robots.grippers.of_twins import require_same
+from manitwin.robots.robot import Robot
+from manitwin.scenes.scene_files import SCENES, read_scene, scene_ids, scene_name
+from manitwin.scenes.twins_now import require_same_twins
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.loaded_twin import TwinSource
+from manitwin.twin.record_digests import TwinState
+
+
+@dataclass(frozen=True)
+class EpisodesSource:
+    """The source of episodes: a data set of twins, and scenes of them or none; tasks in these scenes or none.
+
+    ``states`` are those of the twins in the scenes, ``remarks`` are on these twins.
+    """
+
+    dataset: str
+    scenes: str | None
+    tasks: str | None = None
+    states: Mapping[str, TwinState] = field(default_factory=dict, compare=False)
+    remarks: tuple[str, ...] = field(default=(), compare=False)
+
+    @classmethod
+    def of(cls, place: str | Path, twins: str | Path | None = None) -> EpisodesSource:
+        """Tell scenes from twins; raises UsageError for what is neither, and for scenes whose twins are gone or stand otherwise.
+
+        ``twins`` names where those of the scenes are now, None: where they were as the layouts were made.
+        """
+        root = DatasetRoot(place)
+        path = root.absolute()
+        if root.exists(TASKS) and root.exists(CONFIG):
+            return cls._of_tasks(root, path, twins)
+        if root.exists(SCENES) and root.exists(CONFIG):
+            said = root.read_json(CONFIG, UsageError, remedy="make the layouts again")
+            if not isinstance(said.get("dataset"), str):
+                raise UsageError(
+                    f"{place}/{CONFIG}: does not say whose twins these scenes are of; make the layouts again"
+                )
+            dataset = said["dataset"] if twins is None else DatasetRoot(twins).absolute()
+            return cls(dataset, path, None, *_check_twins(dataset, Path(path)))
+        if twins is not None:
+            raise UsageError(f"{place}: holds no scenes, whose twins could be elsewhere; leave --twins out")
+        return cls(path, None)
+
+    @classmethod
+    def _of_tasks(cls, root: DatasetRoot, path: str, twins: str | Path | None) -> EpisodesSource:
+        said = root.read_json(CONFIG, UsageError, remedy="make the tasks again")
+        dataset = said.get("dataset") if twins is None else DatasetRoot(twins).absolute()
+        scenes = said.get("scenes")
+        if not isinstance(dataset, str) or not isinstance(scenes, str):
+            raise UsageError(f"{root.url}/{CONFIG}: does not say of which scenes its tasks are; make the tasks again")
+        return cls(dataset, scenes, path, *_check_twins(dataset, Path(scenes)))
+
+    def check_grippers(self, robot: Robot) -> None:
+        """Raise UsageError where twins of the scenes have grasps of another gripper of the name of the robot's."""
+        require_same(robot.gripper, ((each, state.grippers) for each, state in self.states.items()), robot.name)
+
+
+def _check_twins(dataset: str, scenes: Path) -> tuple[dict[str, TwinState], tuple[str, ...]]:
+    """Return the states of the twins of scenes, and remarks.
+
+    Raises UsageError where one is not there: every batch with it would fail; and where one is another than came to rest there:
+    what is done with it would be done in a scene that no physics has settled.
+    """
+    source, ids = TwinSource(dataset), scene_ids(scenes)
+    source.check({each.twin_id for scene_id in ids for each in read_scene(scenes / scene_name(scene_id)).objects})
+    read = (read_scene(scenes / scene_name(scene_id)) for scene_id in ids)
+    now, remarks = require_same_twins(read, source, str(scenes))
+    return {twin_id: state for twin_id, state in now.states.items() if state is not None}, tuple(remarks)
