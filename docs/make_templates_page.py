@@ -41,7 +41,9 @@ the right part; their source is `template:CATEGORY`. What is not here is refused
   each: measures, colours and materials, of a stated material the colours that such things have. The same seed gives the same
   twenty. A text is one thing: "two forks" and "a set of spoons" are refused and point here; a pair of pliers is one.
 - **What it is**: one of the names below, or another word for it that the [priors](priors.md) know. The last noun counts: a mug
-  rack is no mug. The twin is called as the text calls it (a skillet is a skillet, made by the frying pan's template).
+  rack is no mug. A name that is marked *alone* means it where no other noun is said with it: a white king is a chess king, and
+  a king size bed is refused. Where a thing's name is not in the text, the build says what it was taken as. The twin is called
+  as the text calls it (a skillet is a skillet, made by the frying pan's template).
 - **How it looks**: colours and materials before or after the name are those of the whole (a colour of a steel tool is its
   handle's); behind *with*, of a part, and of further ones behind *and*: `a small hammer with a red handle and a black head`.
   As shops write it behind a comma, too: `screwdriver, shaft 15 cm, red handle`, `a mug, white outside and yellow inside`. A
@@ -173,7 +175,8 @@ def first_thing(template: Template) -> Made:
 def row(template: Template, made: Made) -> str:
     """Return the row of one template: its names, the parts of a thing that it made, and what is known of it."""
     points = ", ".join(dict.fromkeys(point.label for point in made.points))
-    names = ", ".join((template.category, *template.names))
+    alone = (f"{name} (alone)" for name in template.bare)
+    names = ", ".join((template.category, *template.names, *alone))
     return f"| {names} | {', '.join(made.mesh.names)} | {points} |"
 
 

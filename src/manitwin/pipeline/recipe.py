@@ -53,6 +53,8 @@ from manitwin.twin.wholeness import size_damage
 
 RUN = logging.getLogger("manitwin.run")
 _STAGES_NAMED = 4
+OF_TEMPLATE = "template:"
+"""What a generator's model begins with where a template made the thing."""
 
 
 def check_names(config: BuildConfig) -> None:
@@ -321,9 +323,20 @@ def ending_of(record: TwinRecord) -> Ending:
         detail = record.rejection.detail
     else:
         detail = f"{record.grasps.verified} of {record.grasps.simulated} grasps verified" if record.grasps else ""
+    if (meant := _taken_as(record)) is not None:
+        detail += f"; taken as a {meant}"
     if record.provenance.rehearsed:
         detail += "; a rehearsal"
     return Ending(record.status, record.revision, reason, detail, name_hint(record))
+
+
+def _taken_as(record: TwinRecord) -> str | None:
+    """Return what a text was taken as by a template, where it does not say so itself: a king, as a chess king."""
+    model = record.provenance.stages["generate"].model if "generate" in record.provenance.stages else None
+    if record.source.kind != "text" or model is None or not model.startswith(OF_TEMPLATE):
+        return None
+    category, said = model.removeprefix(OF_TEMPLATE).partition(",")[0], (record.source.prompt or "").casefold()
+    return None if category in " ".join(said.split()) else category
 
 
 def estimate_usd(config: BuildConfig) -> dict[str, float]:

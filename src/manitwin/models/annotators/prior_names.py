@@ -62,6 +62,12 @@ def named(name: str) -> Prior | None:
     return next((index[phrase] for phrase in singulars(normalised(name)) if phrase in index), None)
 
 
+def named_together(name: str) -> Prior | None:
+    """Return the prior of a name that is written as one word where its own is two, or None: a doorknob."""
+    together = _written_together()
+    return next((named(together[each]) for each in singulars(normalised(name)) if each in together), None)
+
+
 def lookup(name: str | None) -> Prior | None:
     """Find the prior of what a person calls a thing; None where the table has no such thing (``found_by``)."""
     found = found_by(name)

@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from itertools import pairwise
 
 from manitwin.errors import UsageError
-from manitwin.models.annotators.prior_names import lookup, named
+from manitwin.models.annotators.prior_names import lookup, named, named_together
 from manitwin.models.annotators.prior_records import Prior
 from manitwin.models.annotators.priors import load_priors
 from manitwin.models.generators.templates.described import is_described, own_materials
@@ -18,7 +18,7 @@ from manitwin.models.generators.templates.matter import is_food
 from manitwin.models.generators.templates.other_shapes import KIN_OF_ANOTHER_SHAPE, is_of_another_shape
 from manitwin.models.generators.templates.standard_sizes import is_size_code
 from manitwin.models.generators.templates.template import Template
-from manitwin.models.generators.templates.vocabulary import FILLER_WORDS, PURPOSE, speaks_of_others
+from manitwin.models.generators.templates.vocabulary import FILLER_WORDS, PURPOSE, RELATIVE, speaks_of_others
 
 _BEHIND = (
     frozenset({"of", "in", "from", "made", "that", "which", "painted", "colored", "coloured", ","})
@@ -117,7 +117,8 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
     but for those behind a preposition (a cup of tea is a cup, and so is a box of pencils a box). A material that the name says,
     of those that such a thing is of, is one of the words around it: a wooden spoon is of wood, but a wood chisel is not. Where
     the longer phrase is another thing that the priors know, a shorter one is that only where both have one form and the size
-    fits: a jam jar is a jar, and a garlic bulb no light bulb.
+    fits: a jam jar is a jar, and a garlic bulb no light bulb. A template's bare name means it with nothing before it but how it
+    looks: a white king is a chess piece, and a drama king is none.
 
     Raises UsageError for words that name no category, or several things.
     """
@@ -125,6 +126,7 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
     names = {
         name: template.category for template in templates.values() for name in (template.category, *template.names)
     }
+    bare = {name: template for template in templates.values() for name in template.bare}
     parted = next((at for at in range(1, len(words)) if _parts(words, at)), len(words))
     shown = bool({*words[:parted]} & (_SHOWN_AS | _GROUPS | _COUNTS))
     other: Prior | None = None
@@ -136,7 +138,11 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
             if words[start] in FILLER_WORDS or "," in words[start:end] or (start > parted and not shown):
                 continue
             phrase = " ".join(words[start:end])
-            prior = named(phrase) or named(phrase.replace(" ", ""))
+            prior = (
+                named(phrase)
+                or named(phrase.replace(" ", ""))
+                or (named_together(phrase) if end - start == 1 else None)
+            )
             if _says_how_it_looks(words, start, end, prior, names):
                 continue
             if is_of_another_shape(phrase, words[:start]):
@@ -144,6 +150,8 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
             meant = [names.get(phrase)]
             if prior is not None:
                 meant += [prior.category, None if prior.category in KIN_OF_ANOTHER_SHAPE else prior.kin_of]
+            if phrase in bare and other is None and _is_alone(words[:start], tail, bare[phrase]):
+                meant.append(bare[phrase].category)
             category = next((name for name in meant if name in templates), None)
             if category is None:
                 other = other or prior
@@ -156,11 +164,21 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
     raise UsageError(_no_category(text, words, templates))
 
 
+def _is_alone(before: Sequence[str], tail: Sequence[str], template: Template) -> bool:
+    """Tell whether words before a bare name say no more than how a thing looks, and all of a material that such things are of."""
+    usual = {look_of(choice).surface for choices in template.slots.values() for choice in choices if choice}
+    looks = [look for word in (*before, *tail) if (look := material_of(word)) is not None]
+    said = all(word in FILLER_WORDS or word in RELATIVE or is_described(word) for word in before)
+    return said and all(look.surface in usual for look in looks)
+
+
 def _says_more(tail: Sequence[str]) -> bool:
     """Tell whether words behind a thing's name say more of it, and are no part of the name: 'in red', 'A5', 'size 42'."""
     first, *rest = tail
-    if first in _BEHIND or speaks_of_others(tail, 0) or is_size_code(first) or (first == "size" and rest):
+    if first in _BEHIND or speaks_of_others(tail, 0) or is_size_code(first):
         return True
+    if first == "size":  # 'size 42', and no 'king size bed'
+        return bool(rest) and (_says_more(rest) or rest[0] in RELATIVE)
     if any(character.isdigit() for character in first) and not _is_number(first):
         return True
     coated = bool(rest) and rest[0].endswith("ed") and _ADJECTIVE.fullmatch(rest[0]) is not None  # 'zinc plated'

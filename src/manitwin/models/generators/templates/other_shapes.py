@@ -42,7 +42,7 @@ _COMPOUNDS = _listed(
     """
     cookie cutter, biscuit cutter, glass cutter, pipe cutter, bolt cutter, tile cutter, cigar cutter, fried egg, scrambled
     egg, poached egg,
-    ice cube, sugar cube, stock cube, bouillon cube, black pepper,
+    ice cube, cube tray, sugar cube, stock cube, bouillon cube, black pepper,
     white pepper, cayenne pepper, candy corn, baby corn, hose clamp, pipe
     clamp, horse shoe, snow shoe, brake shoe, onion ring, boxing ring, piston ring,
     socket wrench, socket spanner, torque wrench, pipe wrench, strap wrench

@@ -115,7 +115,8 @@ class Template:
     ``nominal_times``, is what such a tool is called by: a wrench of 13 mm has a jaw so wide. What has ``any_proportions``, a
     box, is as long, wide and high as is said; other things keep near their intervals. What has ``any_front``, an apple, has no
     side that is its front: of a photo it is the side that is seen. What is ``told_in_full`` is not meant by the last word of
-    its name alone: who says bottle means no perfume bottle.
+    its name alone: who says bottle means no perfume bottle. ``bare`` are names that mean it in a text where no other noun is said
+    with them: king.
     """
 
     category: str
@@ -134,6 +135,7 @@ class Template:
     any_proportions: bool = False
     any_front: bool = False
     told_in_full: bool = False
+    bare: tuple[str, ...] = ()
 
     def drawn(self, rng: np.random.Generator) -> dict[str, float]:
         """Return a value of each measure, by name, drawn within its interval."""

@@ -7,7 +7,8 @@ the interval that nearly all such things are in. A name that ends in ``_m`` is i
 of ceramic; other materials have walls of their own (``looks``), but for metal where the thing is ``of_plate``. A length without a
 direction is that of the whole, or of the part ``length_of``. What has ``any_proportions`` is as long, wide and high as a text
 says, other things keep near their measures. What has ``any_front`` has no side of its own that is the front; what is
-``told_in_full`` is not meant by the last word of its name alone. Typical retail sizes; ``docs/templates.md`` says how they were
+``told_in_full`` is not meant by the last word of its name alone, but in a text by its ``bare`` names where no other noun is said
+with them. Typical retail sizes; ``docs/templates.md`` says how they were
 checked.
 """
 
@@ -74,6 +75,7 @@ def _template(category: str, row: dict[str, Any], build: Builder) -> Template:
         any_proportions=row.get("any_proportions", False),
         any_front=row.get("any_front", False),
         told_in_full=row.get("told_in_full", False),
+        bare=tuple(row.get("bare", ())),
     )
 
 
