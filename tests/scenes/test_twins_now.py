@@ -143,6 +143,12 @@ def test_twins_of_an_earlier_scene_are_told_where_nobody_knows(twins: Path, scen
     )
 
 
+def test_twin_that_cannot_be_read_is_left_to_what_reads_it(twins: Path, scene: SceneRecord) -> None:
+    (twins / twin_name(scene.objects[0].twin_id) / RECORD).write_text("{}")
+    now, remarks = require_same_twins([scene], TwinSource(twins), "scenes")
+    assert not remarks and list(now.states) == [scene.objects[1].twin_id]
+
+
 def test_many_twins_are_counted(scene: SceneRecord) -> None:
     first = scene.objects[0]
     objects = tuple(first.model_copy(update={"twin_id": f"twin_{number}"}) for number in range(5))

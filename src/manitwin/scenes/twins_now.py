@@ -52,7 +52,10 @@ class ChangedTwins:
 
 
 def changed_twins(scenes: Iterable[SceneRecord], now: Callable[[str], TwinState | None]) -> ChangedTwins:
-    """Compare the twins of scenes with what they are ``now``: None for one that is no accepted twin any more."""
+    """Compare the twins of scenes with what they are ``now``: None for one that is no accepted twin any more.
+
+    Twins whose records cannot be read (TwinError) are left out.
+    """
     changed: dict[str, str] = {}
     unknown: dict[str, str] = {}
     stale = count = 0
@@ -60,7 +63,10 @@ def changed_twins(scenes: Iterable[SceneRecord], now: Callable[[str], TwinState 
         count += 1
         found = False
         for each in scene.objects:
-            state = now(each.twin_id)
+            try:
+                state = now(each.twin_id)
+            except TwinError:  # what reads it says so, of what is made with it alone
+                continue
             if state is not None and each.body_sha256 is None and state.revision != each.revision:
                 unknown[each.twin_id] = each.category
             elif state is None or (each.body_sha256 is not None and state.body_sha256 != each.body_sha256):
@@ -73,7 +79,7 @@ def changed_twins(scenes: Iterable[SceneRecord], now: Callable[[str], TwinState 
 class StatesNow:
     """What the twins of a data set are now, each read once: call it with an id. None for one that was rejected.
 
-    Raises UsageError where there is no such twin, TwinError where it cannot be read.
+    Raises UsageError where there is no such twin, TwinError where its record cannot be read.
     """
 
     def __init__(self, twins: TwinSource):
