@@ -11,6 +11,9 @@ from manitwin.models.generators.templates.catalog.balls import laid_ball, sphere
 from manitwin.models.generators.templates.catalog.organic import lying
 from manitwin.models.generators.templates.template import Model, template
 
+STRINGS, STRING_M = (18, 16), 0.0014
+"""How many across and along a racket's head, and how thick they are."""
+
 
 def _seam(points: np.ndarray, radius_m: float, half_width_m: float) -> Manifold:
     """Return a thin line through points ``(N, 3)``, moved onto a sphere."""
@@ -147,16 +150,14 @@ def _racket(
         np.vstack([loop[36:], loop[1:3]]), frame_m, sides=14, across=(0, 0, 1)
     )
     model = Model().add("head", frame)
-    strings: list[Manifold] = []
-    count = 12 if throat else 14
-    for number in range(-count // 2 + 1, count // 2):
-        share = number / (0.5 * count)
-        reach = float(np.sqrt(1 - share**2))
-        bar = cylinder(0.0008, 2 * reach * (half_x - frame_m), sides=6)
-        strings.append(lying(bar).translate((cx - reach * (half_x - frame_m), share * (half_y - frame_m), 0)))
-        across = cylinder(0.0008, 2 * reach * (half_y - frame_m), sides=6).rotate((-90, 0, 0))
-        strings.append(across.translate((cx + share * (half_x - frame_m), -reach * (half_y - frame_m), 0)))
-    model.add("strings", union(strings), "strings")
+    inner_x, inner_y = half_x - frame_m, half_y - frame_m
+    bed = cylinder(1.0, STRING_M, sides=chords(64)).scale((inner_x, inner_y, 1)).translate((cx, 0, -0.5 * STRING_M))
+    model.add("strings", bed, "strings")
+    model.perforate(
+        "strings between",
+        lambda: _between_strings(inner_x - frame_m, inner_y - frame_m).translate((cx, 0, 0)),
+        "strings",
+    )
     low, handle = cx - half_x, -0.5 * length_m + grip * length_m
     if throat:
         for side in (1.0, -1.0):
@@ -179,6 +180,19 @@ def _racket(
     model.point("front edge", "tip", "head", (0.5 * length_m, 0.0, 0.0), (1.0, 0.0, 0.0))
     middle = -0.5 * length_m + 0.5 * grip * length_m
     return model.point("handle", "surface", "handle", (middle, 0.0, 0.92 * grip_m), (0.0, 0.0, 1.0)).laid()
+
+
+def _between_strings(half_x_m: float, half_y_m: float) -> Manifold:
+    """Return pins through an oval of these half axes, between strings that run along it and across it."""
+    x, y = half_x_m / STRINGS[0], half_y_m / STRINGS[1]
+    pin = box(2 * x - STRING_M, 2 * y - STRING_M, 0.02).translate((0, 0, -0.01))
+    places = [
+        (x * (2 * u + 1 - STRINGS[0]), y * (2 * v + 1 - STRINGS[1]))
+        for u in range(STRINGS[0])
+        for v in range(STRINGS[1])
+    ]
+    oval = cylinder(1.0, 0.02, sides=chords(64)).scale((half_x_m, half_y_m, 1)).translate((0, 0, -0.01))
+    return union([pin.translate((*place, 0)) for place in places]) ^ oval
 
 
 @template("tennis racket")
