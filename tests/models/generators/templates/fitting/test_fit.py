@@ -329,3 +329,11 @@ def test_a_nameless_ellipse_is_what_explains_it_better_than_any_ellipse_is() -> 
         from_photo(plate, None, likely=(("frying pan", 0.4), ("plate", 0.3))).notes["primitive"]
         == "shape of template:plate"
     )
+
+
+def test_a_cup_with_a_lip_and_a_question_mark_for_an_ear_gets_both() -> None:
+    measures = {"flare": 0.13, "join": 0.22, "hook": 1.0, "bottom": 0.5}
+    fitted = fit("tea cup", photo_of("tea cup", View(0.35, np.radians(14), 0.0, 0.2), measures))
+    assert fitted is not None and fitted.confidence > 0.98 and fitted.residual.outline < 0.0025
+    found = fitted.made.measures
+    assert found["flare"] > 0.08 and found["join"] == pytest.approx(0.22, abs=0.05) and found["hook"] > 0.7

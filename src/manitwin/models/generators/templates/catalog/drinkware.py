@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from manitwin.geometry.solids.shapes import box, cylinder, lathe, rounded
-from manitwin.models.generators.templates.catalog.vessel import bulge, ear, hollowed, teacup_profile
+from manitwin.models.generators.templates.catalog.cup_shapes import EAR_SHARE, CupSide, cup_ear
+from manitwin.models.generators.templates.catalog.vessel import bulge, hollowed, put_together
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -53,12 +54,29 @@ def carafe(*, height_m: float, width: float, neck: float, flare: float, wall_m: 
 
 
 @template("tea cup")
-def tea_cup(*, width_m: float, rim: float, belly: float, taper: float, handle: float, wall_m: float) -> Model:
-    """Build a cup with an ear that swells from its foot; ``rim`` is its height over its width, ``handle`` of the height."""
+def tea_cup(
+    *,
+    width_m: float,
+    rim: float,
+    belly: float,
+    bottom: float,
+    taper: float,
+    flare: float,
+    handle: float,
+    join: float,
+    hook: float,
+    wall_m: float,
+) -> Model:
+    """Build a cup with an ear, its bottom round, its lip leaning outward.
+
+    ``rim`` is its height over its width; ``belly`` the radius where its bottom ends over the rim's, and ``bottom`` the height of
+    that over the whole; ``taper`` its foot and ``flare`` the lip's lean over the rim's radius; ``handle`` how far the ear reaches
+    out and ``join`` where it comes back to the wall, over the height; ``hook`` is 0 for an even ear, 1 for a question mark.
+    """
     model, radius, height = Model(), 0.5 * width_m, rim * width_m
-    wide = belly * radius
-    grip = ear(model, 0.5 * (wide + radius), 0.84 * height, 0.26 * height, handle * height, 0.007)
-    return hollowed(model, teacup_profile(radius, height, wide, taper * radius), wall_m, 1.6 * wall_m, grip)
+    side = CupSide(radius, height, belly * radius, bottom * height, taper * radius, flare * radius, wall_m)
+    grip = cup_ear(model, side, reach_m=handle * height, join=join, hook=hook, thick_m=EAR_SHARE * width_m)
+    return put_together(model, *side.solids(), height, side.foot_m, grip)
 
 
 @template("ramekin")

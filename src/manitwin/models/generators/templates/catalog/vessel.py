@@ -27,18 +27,27 @@ def shell(profile: list[Point], wall_m: float, floor_m: float) -> tuple[Manifold
 def hollowed(
     model: Model, profile: list[Point], wall_m: float, floor_m: float, *handles: tuple[str, Manifold]
 ) -> Model:
-    """Put a vessel together: ``body`` with ``handles``, cut out at its ``inside``, its upper edge the ``rim``."""
-    height = profile[-1][1]
+    """Put a vessel of a profile together, as ``put_together`` does."""
     outer, inner = shell(profile, wall_m, floor_m)
+    return put_together(model, outer, inner, profile[-1][1], profile[0][0], *handles)
+
+
+def put_together(
+    model: Model, outer: Manifold, inner: Manifold, height_m: float, foot_m: float, *handles: tuple[str, Manifold]
+) -> Model:
+    """Put a vessel together: ``body`` with ``handles``, cut out at its ``inside``, its upper edge the ``rim``.
+
+    ``foot_m`` is the radius that it stands on.
+    """
     model.add("body", outer)
     for name, solid in handles:
         model.add(name, solid, "handle" if name == "handle" else "")
     model.cut("inside", inner)
     for part in ("body", "inside"):
-        model.region("rim", part, lambda centers: centers[:, 2] > (1 - RIM_SHARE) * height)
-    model.region("base", "body", lambda centers: centers[:, 2] < 0.02 * height)
-    model.point("opening", "opening", "rim", (0.0, 0.0, height), (0.0, 0.0, 1.0))
-    return model.point("base", "face", "base", (0.4 * profile[0][0], 0.0, 0.0), (0.0, 0.0, -1.0))
+        model.region("rim", part, lambda centers: centers[:, 2] > (1 - RIM_SHARE) * height_m)
+    model.region("base", "body", lambda centers: centers[:, 2] < 0.02 * height_m)
+    model.point("opening", "opening", "rim", (0.0, 0.0, height_m), (0.0, 0.0, 1.0))
+    return model.point("base", "face", "base", (0.4 * foot_m, 0.0, 0.0), (0.0, 0.0, -1.0))
 
 
 def ear(
@@ -71,12 +80,6 @@ def stick(
         "handle", "surface", "handle", (float(middle[0]), 0.0, float(middle[2]) + 0.65 * half_m), (0.0, 0.0, 1.0)
     )
     return "handle", tube(path, half_m, flatten=0.65)
-
-
-def teacup_profile(radius_m: float, height_m: float, wide_m: float, foot_m: float) -> list[Point]:
-    """Return the side of a cup that swells from its foot to a wide belly and opens towards its rim: radii, counted upward."""
-    side = [(wide_m, 0.35 * height_m), (0.5 * (wide_m + 0.96 * radius_m), 0.68 * height_m), (radius_m, height_m)]
-    return bulge([(foot_m, 0.0), (0.4 * foot_m + 0.6 * wide_m, 0.1 * height_m), *side])
 
 
 def bulge(points: list[Point], *, rows: int = 20) -> list[Point]:

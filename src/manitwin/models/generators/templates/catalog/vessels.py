@@ -8,7 +8,8 @@ import numpy as np
 
 from manitwin.geometry.solids.shapes import box, cylinder, lathe, polygon, prism, rounded
 from manitwin.geometry.solids.sweep import arc, tube
-from manitwin.models.generators.templates.catalog.vessel import RIM_SHARE, bulge, ear, hollowed, shell, teacup_profile
+from manitwin.models.generators.templates.catalog.cup_shapes import EAR_SHARE, HIGHEST_JOIN, CupSide, cup_ear
+from manitwin.models.generators.templates.catalog.vessel import RIM_SHARE, bulge, ear, hollowed, shell
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -104,25 +105,41 @@ def plate(*, width_m: float, height: float, wall_m: float, well: float) -> Model
 
 @template("cup and saucer")
 def cup_and_saucer(
-    *, width_m: float, saucer: float, cup: float, rim: float, belly: float, taper: float, handle: float, wall_m: float
+    *,
+    width_m: float,
+    saucer: float,
+    cup: float,
+    rim: float,
+    belly: float,
+    bottom: float,
+    taper: float,
+    flare: float,
+    handle: float,
+    join: float,
+    hook: float,
+    wall_m: float,
 ) -> Model:
     """Build a cup with an ear that stands on its saucer.
 
-    ``saucer`` is the saucer's height over its width, ``cup`` the cup's rim over the saucer's width, ``rim`` the cup's height over
-    its rim's width, ``belly`` and ``taper`` the radius of its lower half and its foot over the rim's, ``handle`` how far the ear
-    reaches out over the cup's height.
+    ``saucer`` is the saucer's height over its width, ``cup`` the cup's rim over the saucer's width; the others are the cup's, as
+    a ``tea cup`` has them.
     """
     model, dish, radius = Model(), 0.5 * width_m, 0.5 * cup * width_m
-    foot, wide, height, up = taper * radius, belly * radius, rim * cup * width_m, saucer * width_m
+    foot, height, up = taper * radius, rim * cup * width_m, saucer * width_m
     floor = wall_m + 0.0005
     well = 1.15 * foot
-    under, hollow = shell(
-        bulge([(well, 0.0), (0.6 * well + 0.4 * dish, 0.28 * up), (0.25 * well + 0.75 * dish, 0.64 * up), (dish, up)]),
-        wall_m,
-        floor + 0.0005,
+    dish_side = bulge(
+        [(well, 0.0), (0.6 * well + 0.4 * dish, 0.28 * up), (0.25 * well + 0.75 * dish, 0.64 * up), (dish, up)]
     )
-    outer, inner = shell(teacup_profile(radius, height, wide, foot), wall_m, 1.5 * wall_m)
-    name, grip = ear(model, 0.5 * (wide + radius), 0.86 * height, 0.3 * height, handle * height, 0.008)
+    under, hollow = shell(dish_side, wall_m, floor + 0.0005)
+    side = CupSide(radius, height, belly * radius, bottom * height, foot, flare * radius, wall_m)
+    outer, inner = side.solids()
+    reach, thick = handle * height, EAR_SHARE * cup * width_m
+    # an ear keeps clear of a high saucer, from which a question mark's lower half is far
+    outward = radius + (0.9 - 0.4 * float(np.clip(hook, 0.0, 1.0))) * reach
+    below_ear = float(np.interp(outward, *np.array(dish_side).T)) - floor
+    joined = max(join, min((below_ear + thick) / height, HIGHEST_JOIN))
+    name, grip = cup_ear(model, side, reach_m=reach, join=joined, hook=hook, thick_m=thick)
     raised = [(x, y, z + floor) for x, y, z in (point.position_m for point in model.points)]
     model.points = [replace(point, position_m=at) for point, at in zip(model.points, raised, strict=True)]
     model.add("saucer", under).cut("saucer inside", hollow)
