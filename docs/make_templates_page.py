@@ -89,6 +89,10 @@ stands for its kinds: a can may be a drink can where that explains the photo bet
   shape of a template of its likeliest names (from a tenth on) where that explains the photo closely, and much better than a body
   of revolution: a cup that may be a mug or a bucket is hollow in either case, and is called neither. What none explains is
   lifted, and is rejected where the outline is an ellipse: a disc seen at an angle has it as well as an egg.
+- **Unlike such a thing**: what its template and prior say is not round is not lifted to a body of revolution (a shoe seen from
+  its toe has the outline of one), nor is anything lifted to a solid that is more than twice as long over its width or thickness,
+  or less than half, as all that the template makes (a pencil nearly from its end, a frisbee at its edge). The template's own fit
+  is taken where it is believed above 0.12, else the photo is rejected, with the proportions found and usual ones.
 - **From the end** nothing of a length is seen: what is tall or long by its name, is seen from above or along its length, and
   has an outline that an ellipse explains much better than the template, is rejected (of a glass or a jar the rim alone). Take
   the photo from the side.

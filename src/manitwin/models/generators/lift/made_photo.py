@@ -19,12 +19,13 @@ from manitwin.models.generators.lift.end_on import reject_end_on
 from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name, is_cylinder, why_no_cylinder, why_not_round
 from manitwin.models.generators.lift.lifting import Lifted, lift
 from manitwin.models.generators.lift.lobes import reject_several_round
-from manitwin.models.generators.lift.nameless import OF_PLAIN_SOLIDS, Alone, explains_more, shape_without_name
+from manitwin.models.generators.lift.nameless import OF_PLAIN_SOLIDS, ROUND, Alone, explains_more, shape_without_name
 from manitwin.models.generators.lift.plain_solids import PRIMITIVES, PlainSolids, plain_solids
 from manitwin.models.generators.lift.roundness import is_round, is_round_along
 from manitwin.models.generators.lift.seen_corners import box_from_corner
 from manitwin.models.generators.lift.surface import unseen_share
 from manitwin.models.generators.lift.texture import beside
+from manitwin.models.generators.lift.usual_shape import why_never_turned, why_other_proportions
 from manitwin.models.generators.photo_material import photo_material
 from manitwin.models.generators.templates.fitting.fit import (
     LEAST_AGAINST_INFLATION,
@@ -90,9 +91,16 @@ def from_photo(
         return _shape_alone(box, rgba, primitive="box", source="the outline's six corners")
     if fitted is None or fitted.confidence < LEAST_CONFIDENCE:
         solid = plain_solids(rgba, hint, focal_mm).close
-        if solid is not None and why_not_round(name, np.ptp(solid.made.mesh.vertices, axis=0)) is None:
+        if solid is not None and _why_no_plain(solid, name) is None:
             return _plain(solid, rgba)
     return fitted_or_lifted(fitted, rgba, name)
+
+
+def _why_no_plain(solid: Fitted, name: str | None) -> str | None:
+    """Return why a thing of this name is no such plain solid; None where it may be."""
+    extents = np.ptp(solid.made.mesh.vertices, axis=0)
+    turned = why_never_turned(name) if PRIMITIVES[solid.category] in ROUND else None
+    return turned or why_not_round(name, extents)
 
 
 def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) -> Job:
@@ -138,6 +146,16 @@ def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) 
             f"{odd}; check the name and the cut-out, or take the photo from another side",
             "generate",
         )
+    unlike = _why_unlike(lifted, name)
+    if unlike is not None and fitted is not None and fitted.confidence >= LEAST_AGAINST_INFLATION:
+        return from_fit(fitted, rgba, name)
+    if unlike is not None:
+        raise Rejected(
+            "generator_failed",
+            f"{unlike}; take the photo from another side, from which its length and its width show, or give several photos of it;"
+            " check the name and the cut-out",
+            "generate",
+        )
     if lifted.notes.get("elevation_deg"):  # about the upright axis, from above
         above = np.radians(lifted.notes["elevation_deg"])
         extents, toward_camera = np.ptp(lifted.surface.vertices, axis=0), np.array([0.0, np.sin(above), np.cos(above)])
@@ -154,6 +172,13 @@ def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) 
         )
     notes = lifted.notes if fitted is None else lifted.notes | {"poor_fit": notes_of(fitted)}
     return _lifted_job(lifted, notes)
+
+
+def _why_unlike(lifted: Lifted, name: str | None) -> str | None:
+    """Return why a thing of this name is no solid like the one that its outline was lifted to; None where it may be."""
+    turned = lifted.notes["primitive"] == "revolution"
+    extents = np.ptp(lifted.surface.vertices, axis=0)
+    return (why_never_turned(name) if turned else None) or why_other_proportions(name, extents, turned=turned)
 
 
 def _how_far(fitted: Fitted) -> str:

@@ -1,0 +1,112 @@
+"""Solids that an outline was lifted to, against what a thing of that name is like: round or not, and of which proportions."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from manitwin.errors import Rejected
+from manitwin.geometry.solids.shapes import box, cylinder
+from manitwin.models.generators.lift.made_photo import fitted_or_lifted
+from manitwin.models.generators.lift.usual_shape import (
+    LEAST_TURNED_SHARE,
+    turned_share,
+    why_never_turned,
+    why_other_proportions,
+)
+
+
+def outline(points: list[tuple[float, float]]) -> np.ndarray:
+    """An RGBA picture of a polygon and of its mirror image about the picture's middle column."""
+    rgba = np.zeros((600, 600, 4), np.uint8)
+    mask = np.zeros((600, 600), np.uint8)
+    whole = points + [(600 - x, y) for x, y in reversed(points)]
+    cv2.fillPoly(mask, [np.round(whole).astype(np.int32)], 1)
+    rgba[mask > 0] = (120, 120, 130, 255)
+    return rgba
+
+
+TOE = outline([(235, 110), (230, 200), (215, 300), (190, 400), (180, 470), (190, 520)])
+"""A high shoe seen from its toe."""
+STUB = outline([(270, 120), (270, 480)])
+"""A bar six times as long as wide."""
+
+
+def test_a_square_bar_is_not_round_and_a_hexagonal_one_nearly() -> None:
+    assert turned_share(cylinder(0.02, 0.1)) > 0.95
+    assert turned_share(cylinder(0.02, 0.1) - cylinder(0.018, 0.2)) > 0.95  # a hollow counts as filled
+    assert turned_share(cylinder(0.02, 0.1, sides=6)) > LEAST_TURNED_SHARE
+    assert turned_share(box(0.04, 0.04, 0.1)) < LEAST_TURNED_SHARE - 0.04
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["shoe", "sneaker", "hairbrush", "toothpaste", "nail clipper", "headphones", "toy car", "glue gun", "backpack"],
+)
+def test_what_is_not_round_by_its_template_or_its_prior_is_no_body_of_revolution(name: str) -> None:
+    why = why_never_turned(name)
+    assert why is not None and "is not round" in why
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "mug",
+        "cup and saucer",
+        "pump bottle",
+        "kettle",
+        "screwdriver",
+        "pencil",
+        "basket",
+        "potted plant",
+        "deodorant",
+        "snow globe",
+        None,
+    ],
+)
+def test_what_is_round_but_for_its_handle_and_what_nobody_knows_may_be_one(name: str | None) -> None:
+    assert why_never_turned(name) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "extents", "side"),
+    [
+        ("pencil", (0.06, 0.02, 0.02), "wide"),
+        ("yellow pencil", (0.06, 0.02, 0.02), "wide"),
+        ("book", (0.2, 0.03, 0.02), "wide"),
+        ("laptop", (0.33, 0.23, 0.008), "thick"),
+    ],
+)
+def test_proportions_that_no_such_thing_has_are_told(name: str, extents: tuple[float, ...], side: str) -> None:
+    why = why_other_proportions(name, np.array(extents))
+    assert why is not None and f"times as long as {side}" in why
+
+
+@pytest.mark.parametrize(
+    ("name", "extents"),
+    [
+        ("pencil", (0.18, 0.0075, 0.007)),
+        ("pencil", (0.0075, 0.18, 0.007)),  # however it lies
+        ("box", (0.4, 0.02, 0.01)),  # of any proportions
+        ("boot", (0.3, 0.28, 0.1)),  # a kind of shoe, but none that the template makes
+        ("figurine", (0.1, 0.01, 0.01)),  # no template
+        (None, (0.1, 0.01, 0.01)),
+    ],
+)
+def test_proportions_within_twice_the_usual_and_of_what_is_not_known_are_not(
+    name: str | None, extents: tuple[float, ...]
+) -> None:
+    assert why_other_proportions(name, np.array(extents)) is None
+
+
+def test_a_shoe_seen_from_its_toe_is_refused_and_a_vase_of_that_outline_made() -> None:
+    with pytest.raises(Rejected, match=r"a shoe is not round; take the photo from another side.*several photos"):
+        fitted_or_lifted(None, TOE, "shoe")
+    assert fitted_or_lifted(None, TOE, "vase").notes["primitive"] == "revolution"
+
+
+def test_a_pencil_seen_nearly_from_its_end_is_refused_and_a_candle_of_that_outline_made() -> None:
+    with pytest.raises(Rejected, match=r"a pencil is so .* times"):
+        fitted_or_lifted(None, STUB, "pencil")
+    assert fitted_or_lifted(None, STUB, "candle").notes["primitive"] == "revolution"
