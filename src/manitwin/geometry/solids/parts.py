@@ -65,6 +65,18 @@ class Assembly:
         volumes = [(name, solid.translate(offset_m)) for name, solid in self._volumes]
         return Assembly(self._solid.translate(offset_m), dict(self._names), moved_regions, volumes)
 
+    def turned(self, rotation: np.ndarray) -> Assembly:
+        """Return the assembly turned about the origin by a rotation ``(3, 3)``, its regions still given in the frame before."""
+        matrix = np.column_stack([rotation, np.zeros(3)])
+        turned_regions = [(name, of, _turned(where, rotation)) for name, of, where in self._regions]
+        volumes = [(name, solid.transform(matrix)) for name, solid in self._volumes]
+        return Assembly(self._solid.transform(matrix), dict(self._names), turned_regions, volumes)
+
+    def triangles_m(self) -> np.ndarray:
+        """Return the corners of the union's faces ``(F, 3, 3)``, wound outward."""
+        mesh = self._solid.to_mesh()
+        return np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3][np.asarray(mesh.tri_verts, dtype=np.int64)]
+
     def lowest_m(self) -> float:
         """Return the height of the lowest point."""
         return float(self._solid.bounding_box()[2])
@@ -109,6 +121,10 @@ class Assembly:
         own = solid.as_original()
         self._names[own.original_id()] = name
         return own
+
+
+def _turned(where: Callable[[np.ndarray], np.ndarray], rotation: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    return lambda centers: where(centers @ rotation)
 
 
 def _shifted(where: Callable[[np.ndarray], np.ndarray], shift: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:

@@ -7,17 +7,37 @@ from manifold3d import Manifold
 
 from manitwin.geometry.solids.shapes import box, cylinder, ellipsoid, lathe, polygon, prism, rounded, union
 from manitwin.geometry.solids.sweep import arc, tube
+from manitwin.models.generators.templates.resting import rested
 from manitwin.models.generators.templates.template import Model, template
+
+SPOON_NECK_HALF_M, FORK_NECK_HALF_M = 0.0042, 0.0045
+"""Half the width of a handle where it meets the bowl or the tines."""
 
 
 def slim(
-    start_m: float, end_m: float, half_m: float, *, flatten: float, wide_end: float = 1.6, lift_m: float = 0.0
+    start_m: float,
+    end_m: float,
+    half_m: float,
+    *,
+    flatten: float,
+    wide_end: float = 1.6,
+    lift_m: float = 0.0,
+    arch_m: float = 0.0,
 ) -> Manifold:
-    """Return a handle along X from ``start_m`` down to ``end_m``, broader by ``wide_end`` and raised by ``lift_m`` at its end."""
+    """Return a handle along X from ``start_m`` down to ``end_m``, broader by ``wide_end`` and raised by ``lift_m`` at its end.
+
+    Its middle is higher by ``arch_m`` besides.
+    """
     along = np.linspace(0.0, 1.0, 24)
     tip = np.minimum(1.0, np.sqrt(np.clip((1 - along) / 0.06, 0.03, 1.0)))
-    path = np.stack([start_m + along * (end_m - start_m), 0 * along, lift_m * np.sin(0.5 * np.pi * along)], axis=1)
+    height = lift_m * np.sin(0.5 * np.pi * along) + arch_m * np.sin(np.pi * along)
+    path = np.stack([start_m + along * (end_m - start_m), 0 * along, height], axis=1)
     return tube(path, half_m * tip * (1 + (wide_end - 1) * along**2), flatten=flatten)
+
+
+def arched(arch: float, length_m: float) -> float:
+    """Return how much higher the middle of a handle is than its ends: -0.03 to 0.07 of the length, straight at 0.3."""
+    return 0.1 * (arch - 0.3) * length_m
 
 
 def scoop(long_m: float, wide_m: float, deep_m: float, wall_m: float) -> tuple[Manifold, Manifold]:
@@ -36,6 +56,8 @@ def _spoon(
     wall_m: float,
     lift: float,
     flatten: float = 0.35,
+    wide_end: float = 1.6,
+    arch_m: float = 0.0,
 ) -> Model:
     long = bowl * length_m
     at, low = 0.5 * (length_m - long), deep * width_m
@@ -44,18 +66,29 @@ def _spoon(
     start, end = at - 0.47 * long, -0.5 * length_m
     model.add(
         "handle",
-        slim(start, end, half_m, flatten=flatten, lift_m=lift * low).translate((0, 0, -flatten * half_m)),
+        slim(start, end, half_m, flatten=flatten, wide_end=wide_end, lift_m=lift * low, arch_m=arch_m).translate(
+            (0, 0, -flatten * half_m)
+        ),
         "handle",
     )
     model.point("bowl", "opening", "inside", (at, 0.0, 0.0), (0.0, 0.0, 1.0))
-    model.point("handle", "surface", "handle", (0.35 * start + 0.65 * end, 0.0, 0.85 * lift * low), (0.0, 0.0, 1.0))
+    high = 0.85 * lift * low + arch_m * float(np.sin(0.65 * np.pi))
+    model.point("handle", "surface", "handle", (0.35 * start + 0.65 * end, 0.0, high), (0.0, 0.0, 1.0))
     return model.laid()
 
 
 @template("spoon")
-def spoon(*, length_m: float, bowl: float, width_m: float) -> Model:
-    """Build a spoon lying on its bowl."""
-    return _spoon(length_m, bowl, width_m, 0.22, 0.0042, 0.0012, 0.7)
+def spoon(*, length_m: float, bowl: float, width_m: float, grip: float, arch: float, end: float) -> Model:
+    """Build a spoon lying on its bowl.
+
+    ``grip`` is the width of its handle's end over the length; ``arch`` bends the handle, whose middle is below the line of its
+    ends at 0 and above it at 1 (``arched``); ``end`` is how much higher its end is than the bowl's edge over the bowl's depth.
+    """
+    wide_end = 0.5 * grip * length_m / SPOON_NECK_HALF_M
+    arch_m = arched(arch, length_m)
+    return rested(
+        _spoon(length_m, bowl, width_m, 0.22, SPOON_NECK_HALF_M, 0.0012, end, wide_end=wide_end, arch_m=arch_m)
+    )
 
 
 @template("ladle")
@@ -71,8 +104,8 @@ def cooking_spoon(*, length_m: float, bowl: float, width_m: float) -> Model:
 
 
 @template("fork")
-def fork(*, length_m: float, head: float, width_m: float) -> Model:
-    """Build a fork with four tines, their points raised."""
+def fork(*, length_m: float, head: float, width_m: float, grip: float, arch: float) -> Model:
+    """Build a fork with four tines, their points raised; ``grip`` and ``arch`` are those of a ``spoon``."""
     long = head * length_m
     start, thick, gap = 0.5 * length_m - long, 0.002, 0.13 * width_m
     outline = [(start, -0.11 * width_m), (start + 0.3 * long, -0.5 * width_m), (0.5 * length_m, -0.46 * width_m)]
@@ -92,14 +125,24 @@ def fork(*, length_m: float, head: float, width_m: float) -> Model:
     model = Model().add("tines", head_solid)
     model.add(
         "handle",
-        slim(start + 0.02 * length_m, -0.5 * length_m, 0.0045, flatten=0.32, lift_m=0.004).translate((0, 0, back)),
+        slim(
+            start + 0.02 * length_m,
+            -0.5 * length_m,
+            FORK_NECK_HALF_M,
+            flatten=0.32,
+            wide_end=0.5 * grip * length_m / FORK_NECK_HALF_M,
+            lift_m=0.004,
+            arch_m=arched(arch, length_m),
+        ).translate((0, 0, back)),
         "handle",
     )
     model.region("neck", "tines", lambda centers: centers[:, 0] < 0.5 * length_m - tine)
     tip = float(-curve[-2]) + 0.5 * thick
     model.point("tines", "tip", "tines", (0.5 * length_m, 0.06 * width_m, tip), (1.0, 0.0, 0.0))
-    model.point("handle", "surface", "handle", (-0.25 * length_m, 0.0, back + 0.0045), (0.0, 0.0, 1.0))
-    return model.laid()
+    along = (start + 0.27 * length_m) / (start + 0.52 * length_m)
+    high = 0.004 * float(np.sin(0.5 * np.pi * along)) + arched(arch, length_m) * float(np.sin(np.pi * along))
+    model.point("handle", "surface", "handle", (-0.25 * length_m, 0.0, back + high + 0.0015), (0.0, 0.0, 1.0))
+    return rested(model)
 
 
 def _knife(length_m: float, blade: float, width_m: float, back_m: float, handle_half_m: float, belly: float) -> Model:
@@ -161,8 +204,12 @@ def table_knife(*, length_m: float, blade: float, width_m: float, back_m: float)
 
 
 @template("spatula")
-def spatula(*, length_m: float, head: float, width_m: float) -> Model:
-    """Build a slotted turner whose handle rises from its blade."""
+def spatula(*, length_m: float, head: float, width_m: float, rise: float, crank: float, grip: float) -> Model:
+    """Build a slotted turner whose handle rises from its blade.
+
+    ``rise`` is the height of the handle's end over the length, ``crank`` the share of it that the neck rises by, close to the
+    blade, and ``grip`` the width of the handle's end over the length.
+    """
     long = head * length_m
     at = 0.5 * (length_m - long)
     outline = [
@@ -174,18 +221,24 @@ def spatula(*, length_m: float, head: float, width_m: float) -> Model:
     blade = prism(polygon(outline, radius_m=0.006), 0.0022)
     for place in (-0.22, 0.0, 0.22):
         blade = blade - box(0.55 * long, 0.007, 0.02, radius_m=0.003).translate((at, place * width_m, -0.01))
+    end, neck = rise * length_m, crank * rise * length_m
     path = arc(
-        [(at - 0.42 * long, 0, 0.0015), (at - 0.6 * long, 0, 0.012), (0, 0, 0.03), (-0.5 * length_m, 0, 0.042)],
+        [
+            (at - 0.42 * long, 0, 0.0015),
+            (at - 0.6 * long, 0, neck),
+            (0, 0, 0.4 * neck + 0.6 * end),
+            (-0.5 * length_m, 0, end),
+        ],
         samples=32,
     )
-    half = np.interp(np.linspace(0, 1, len(path)), [0, 0.2, 0.35, 1], [0.006, 0.005, 0.009, 0.011])
+    broad = 0.5 * grip * length_m
+    half = np.interp(np.linspace(0, 1, len(path)), [0, 0.2, 0.35, 1], [0.006, 0.005, 0.8 * broad, broad])
     model = Model().add("blade", blade, "head").add("handle", tube(path, half, flatten=0.5), "handle")
     model.region("edge", "blade", lambda centers: centers[:, 0] > at + 0.42 * long)
     model.point("edge", "edge", "edge", (at + 0.5 * long, 0.0, 0.001), (1.0, 0.0, 0.0))
     middle = path[22]
-    return model.point(
-        "handle", "surface", "handle", (float(middle[0]), 0.0, float(middle[2]) + 0.005), (0.0, 0.0, 1.0)
-    ).laid()
+    model.point("handle", "surface", "handle", (float(middle[0]), 0.0, float(middle[2]) + 0.005), (0.0, 0.0, 1.0))
+    return rested(model)
 
 
 @template("rolling pin")
