@@ -152,8 +152,7 @@ def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) 
     if unlike is not None:
         raise Rejected(
             "generator_failed",
-            f"{unlike}; take the photo from another side, from which its length and its width show, or give several photos of it;"
-            " check the name and the cut-out",
+            f"{unlike}; take the photo from another side, or give several photos of it; check the name and the cut-out",
             "generate",
         )
     if lifted.notes.get("elevation_deg"):  # about the upright axis, from above

@@ -73,7 +73,7 @@ def why_other_proportions(name: str | None, extents: np.ndarray, *, turned: bool
         usual = f"{least:.1f} to {most:.1f}" if f"{least:.1f}" != f"{most:.1f}" else f"{least:.1f}"
         return (
             f"it would be {ratio:.1f} times as long as {side}, and {article(category)} {category} is so {usual} times: its"
-            " outline from here does not tell its shape"
+            f" outline from here does not tell how {side} it is"
         )
     return None
 
