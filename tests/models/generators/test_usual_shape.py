@@ -110,3 +110,8 @@ def test_a_pencil_seen_nearly_from_its_end_is_refused_and_a_candle_of_that_outli
     with pytest.raises(Rejected, match=r"a pencil is so .* times"):
         fitted_or_lifted(None, STUB, "pencil")
     assert fitted_or_lifted(None, STUB, "candle").notes["primitive"] == "revolution"
+
+
+def test_what_lies_flat_may_be_thinner_than_the_template_where_little_of_it_is_missing() -> None:
+    assert why_other_proportions("spatula", np.array([0.3, 0.08, 0.0045])) is None  # 0.02 of its length
+    assert "thick" in (why_other_proportions("door knob", np.array([0.06, 0.06, 0.008])) or "")
