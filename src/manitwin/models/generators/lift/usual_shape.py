@@ -35,7 +35,7 @@ things of 93 kinds that were lifted without their templates 72 are beyond: all b
 true thing (0.25 in the median), the others 0.72 in the median."""
 
 LEAST_MISSING = 0.03
-"""Of the length: so much may be missing of the thickness of what lies flat, such as a turner seen from above, and its surfaces are
+"""Of the length: so much may be missing of the thickness of what lies flat, such as a turner seen from above. Its surfaces are
 then half as far off; of the 351 lifted things surfaces are off by 0.026 in the median."""
 
 
