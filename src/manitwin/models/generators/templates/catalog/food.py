@@ -27,20 +27,21 @@ def apple(*, width_m: float, tall: float, shoulder: float, stem_m: float) -> Mod
     return model.point("side", "surface", "body", (0.0, -r, 0.58 * h), (0.0, -1.0, 0.0)).laid()
 
 
-def citrus(width_m: float, tall: float) -> Manifold:
+def citrus(width_m: float, tall: float, mark: float) -> Model:
+    """Build a round citrus fruit with the mark of its stem up, which is ``mark`` of its width."""
+    r, h = 0.5 * width_m, tall * width_m
     profile = [(0, 0.02), (0.3, 0.015), (0.62, 0.11), (0.9, 0.3), (1, 0.5), (0.9, 0.7), (0.62, 0.89), (0.3, 0.985)]
-    return turned([*profile, (0.1, 0.985), (0, 0.975)], width_m, tall * width_m)
+    model = Model().add("body", turned([*profile, (0.1, 0.985), (0, 0.975)], width_m, h))
+    star = ribbed(cylinder(mark * r, 0.02 * h, sides=chords(40)), lambda angle: 1 + 0.25 * np.cos(5 * angle))
+    model.add("stem", star.translate((0, 0, 0.97 * h)), "stem")
+    model.point("upper side", "surface", "stem", (0.0, 0.0, 0.99 * h), (0.0, 0.0, 1.0))
+    return model.point("side", "surface", "body", (0.0, -r, 0.5 * h), (0.0, -1.0, 0.0)).laid()
 
 
 @template("orange")
 def orange(*, width_m: float, tall: float, mark: float) -> Model:
     """Build an orange with the mark of its stem up."""
-    r, h = 0.5 * width_m, tall * width_m
-    model = Model().add("body", citrus(width_m, tall))
-    star = ribbed(cylinder(mark * r, 0.02 * h, sides=chords(40)), lambda angle: 1 + 0.25 * np.cos(5 * angle))
-    model.add("stem", star.translate((0, 0, 0.97 * h)), "stem")
-    model.point("upper side", "surface", "stem", (0.0, 0.0, 0.99 * h), (0.0, 0.0, 1.0))
-    return model.point("side", "surface", "body", (0.0, -r, 0.5 * h), (0.0, -1.0, 0.0)).laid()
+    return citrus(width_m, tall, mark)
 
 
 @template("lemon")

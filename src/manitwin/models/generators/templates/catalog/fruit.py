@@ -27,12 +27,7 @@ def lime(*, length_m: float, width: float, nipple: float) -> Model:
 @template("grapefruit")
 def grapefruit(*, width_m: float, tall: float, mark: float) -> Model:
     """Build a grapefruit with the mark of its stem up."""
-    r, h = 0.5 * width_m, tall * width_m
-    model = Model().add("body", citrus(width_m, tall))
-    star = ribbed(cylinder(mark * r, 0.02 * h, sides=chords(40)), lambda angle: 1 + 0.2 * np.cos(5 * angle))
-    model.add("stem", star.translate((0, 0, 0.97 * h)), "stem")
-    model.point("upper side", "surface", "stem", (0.0, 0.0, 0.99 * h), (0.0, 0.0, 1.0))
-    return model.point("side", "surface", "body", (0.0, -r, 0.5 * h), (0.0, -1.0, 0.0)).laid()
+    return citrus(width_m, tall, mark)
 
 
 @template("kiwi")
