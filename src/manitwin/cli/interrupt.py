@@ -190,9 +190,8 @@ class Interrupts:
         """
         heard, self._tell = os.pipe()
         os.set_blocking(self._tell, False)
-        signal.set_wakeup_fd(
-            self._tell, warn_on_full_buffer=False
-        )  # written by Python's handler in C, which runs at once
+        # written by Python's handler in C, which runs at once
+        signal.set_wakeup_fd(self._tell, warn_on_full_buffer=False)
         print_unraisable = sys.unraisablehook
 
         def unraisable(lost: sys.UnraisableHookArgs) -> None:

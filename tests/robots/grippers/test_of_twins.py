@@ -47,4 +47,6 @@ def test_another_gripper_of_the_same_name_is_told_by_its_digest(tmp_path: Path) 
 
 
 def test_shipped_gripper_of_an_earlier_version_goes_on() -> None:
-    require_same(load_gripper("panda"), [("first", {"panda": "0" * 64})])
+    shipped, earlier = load_gripper("panda"), {"panda": "0" * 64}
+    assert shipped.sha256 != earlier["panda"] and not is_another(shipped, earlier)
+    require_same(shipped, [("first", earlier)])

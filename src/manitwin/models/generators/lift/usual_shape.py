@@ -33,7 +33,6 @@ MARGIN = 2.0
 """Beyond what the template's measures give by more than this factor, a proportion is that of no such thing. Of 351 photos of made
 things of 93 kinds that were lifted without their templates 72 are beyond: all but one share at most 0.53 of their volume with the
 true thing (0.25 in the median), the others 0.72 in the median."""
-
 LEAST_MISSING = 0.03
 """Of the length: so much may be missing of the thickness of what lies flat, such as a turner seen from above. Its surfaces are
 then half as far off; of the 351 lifted things surfaces are off by 0.026 in the median."""

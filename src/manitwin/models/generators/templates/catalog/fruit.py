@@ -7,7 +7,7 @@ import numpy as np
 from manitwin.geometry.solids.shapes import chords, cylinder, ellipsoid, union
 from manitwin.geometry.solids.sweep import arc, tube
 from manitwin.models.generators.templates.catalog.food import citrus
-from manitwin.models.generators.templates.catalog.organic import lying, ribbed, stalk, turned
+from manitwin.models.generators.templates.catalog.organic import furrow, lying, ribbed, stalk, turned
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -72,12 +72,7 @@ def apricot(*, width_m: float, tall: float, cleft: float) -> Model:
     r, h = 0.5 * width_m, tall * width_m
     profile = [(0, 0.0), (0.3, 0.014), (0.66, 0.12), (0.92, 0.32), (1, 0.52), (0.92, 0.76), (0.7, 0.93), (0.42, 0.995)]
     body = turned([*profile, (0.2, 0.97), (0.06, 0.92), (0, 0.91)], width_m, h, sides=80)
-
-    def cleaved(angle: np.ndarray) -> np.ndarray:
-        off = np.abs(np.angle(np.exp(1j * (angle + 0.5 * np.pi))))
-        return np.asarray(1 - cleft * np.exp(-((off / 0.11) ** 2)))
-
-    model = Model().add("body", ribbed(body, cleaved))
+    model = Model().add("body", ribbed(body, furrow(cleft, 0.11, -0.5 * np.pi)))
     model.add("stem", cylinder(0.07 * r, 0.08 * h, sides=chords(12)).translate((0, 0, 0.88 * h)), "stem")
     model.point("upper side", "surface", "stem", (0.0, 0.0, 0.96 * h), (0.0, 0.0, 1.0))
     return model.point("side", "surface", "body", (r, 0.0, 0.52 * h), (1.0, 0.0, 0.0)).laid()

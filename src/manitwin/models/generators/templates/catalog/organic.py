@@ -36,6 +36,16 @@ def ribbed(solid: Manifold, scale: Radii) -> Manifold:
     return solid.warp_batch(moved)
 
 
+def furrow(depth: float, half_width_rad: float, toward_rad: float) -> Radii:
+    """Return scales for ``ribbed``: a furrow of a depth, in radii, along the side that an angle about Z looks to."""
+
+    def scale(angle: np.ndarray) -> np.ndarray:
+        off = np.abs(np.angle(np.exp(1j * (angle - toward_rad))))
+        return np.asarray(1 - depth * np.exp(-((off / half_width_rad) ** 2)))
+
+    return scale
+
+
 def stalk(points: Sequence[Sequence[float]], start_m: float, end_m: float, *, sides: int = 10) -> Manifold:
     """Return a thin bent stalk through points, of radii that change from its start to its end."""
     path = arc(points, samples=10)

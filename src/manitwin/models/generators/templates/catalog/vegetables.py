@@ -7,7 +7,7 @@ from manifold3d import Manifold
 
 from manitwin.geometry.solids.shapes import chords, cylinder, lathe
 from manitwin.geometry.solids.sweep import arc, tube
-from manitwin.models.generators.templates.catalog.organic import leaves, lying, ribbed, stalk, turned
+from manitwin.models.generators.templates.catalog.organic import furrow, leaves, lying, ribbed, stalk, turned
 from manitwin.models.generators.templates.template import Model, template
 
 
@@ -17,12 +17,7 @@ def plum(*, length_m: float, width: float, cleft: float) -> Model:
     wide = width * length_m
     profile = [(0, 0.0), (0.2, 0.008), (0.58, 0.08), (0.88, 0.25), (1, 0.48), (0.93, 0.72), (0.68, 0.91), (0.4, 0.985)]
     body = turned([*profile, (0.24, 0.985), (0.08, 0.945), (0, 0.94)], wide, length_m, sides=80)
-
-    def cleaved(angle: np.ndarray) -> np.ndarray:
-        off = np.abs(np.angle(np.exp(1j * (angle - np.pi))))
-        return np.asarray(1 - cleft * np.exp(-((off / 0.12) ** 2)))
-
-    laid = lying(ribbed(body, cleaved).translate((0, 0, -0.5 * length_m)))
+    laid = lying(ribbed(body, furrow(cleft, 0.12, np.pi)).translate((0, 0, -0.5 * length_m)))
     scar = lying(cylinder(0.06 * wide, 0.03 * length_m, sides=chords(14))).translate((0.42 * length_m, 0, 0))
     model = Model().add("body", laid).add("stem", scar, "stem")
     model.point("upper side", "surface", "body", (0.0, 0.12 * wide, 0.485 * wide), (0.0, 0.25, 0.968))
