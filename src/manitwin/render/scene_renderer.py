@@ -140,8 +140,7 @@ class SceneRenderer:
         for each in uploaded.surfaces:
             seen.attach(each.clone())  # a shape belongs to one body; its clone shares vertices and textures
         entity = self._placed(seen, np.eye(4) if pose is None else pose)
-        for part in seen._internal_node.children:  # the only way to it in SAPIEN 3.0.3
-            part.cast_shadow = False
+        _throw_no_shadow(seen)
         self._entities[name] = number, entity
         self._casters[name] = self._shadow_caster(uploaded.shadow, entity.pose)
         return number
@@ -255,6 +254,13 @@ class SceneRenderer:
         body = self._sapien.render.RenderBodyComponent()
         body.attach(shape)
         self._placed(body, np.eye(4))
+        _throw_no_shadow(body)  # nothing is below it
+
+
+def _throw_no_shadow(body: Any) -> None:
+    """Leave a body that is in a scene out of the maps of shadows and heights."""
+    for part in body._internal_node.children:  # the only way to it in SAPIEN 3.0.3
+        part.cast_shadow = False
 
 
 @dataclass(frozen=True)
