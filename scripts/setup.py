@@ -23,6 +23,8 @@ VENV = ROOT / ".venv"
 STAMP = VENV / "manitwin-setup.sha256"
 LIBRARIES_STAMP = VENV / "manitwin-libraries.sha256"
 BACKPORTS = Path("/etc/apt/sources.list.d/manitwin-backports.sources")
+ENVIRONMENT_BYTES = 3_800_000_000
+"""What the installed packages take (du of ``.venv``: 3.9e9); pip wants more while it installs."""
 
 
 def say(text: str) -> None:
@@ -96,11 +98,24 @@ def wanted_digest() -> str:
     return hashlib.sha256(b"\0".join([*parts, sys.version.encode()])).hexdigest()
 
 
+def require_room() -> None:
+    """Stop where the packages cannot fit on the disk: pip finds that out after minutes of downloads."""
+    there = sum(path.lstat().st_blocks for path in VENV.rglob("*")) * 512
+    free = shutil.disk_usage(ROOT).free
+    if free + there < ENVIRONMENT_BYTES:
+        stop(
+            f"{ROOT} has {free / 1e9:.1f} GB free, the packages take {(ENVIRONMENT_BYTES - there) / 1e9:.1f} GB and some more"
+            " while they are installed; free the disk or set up on another one"
+        )
+
+
 def install_packages() -> None:
     """Install the locked packages, by hash, and this package in place."""
     digest = wanted_digest()
     if STAMP.is_file() and STAMP.read_text() == digest:
         return
+    if not STAMP.is_file():
+        require_room()
     pip = [str(VENV / "bin" / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
     say("installing the locked packages (a few minutes, once)")
     for what in (

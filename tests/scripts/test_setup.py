@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import importlib
+import shutil
 import sys
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import pytest
 
@@ -45,6 +46,23 @@ def test_a_probe_that_says_nothing_is_a_no(setup: ModuleType, monkeypatch: pytes
     silent.chmod(0o755)
     monkeypatch.setattr(setup, "VENV", tmp_path)
     assert setup.can_render() is False
+
+
+@pytest.mark.parametrize(("free", "there", "stops"), [(2e9, 0, True), (5e9, 0, False), (2e9, 2.5e9, False)])
+def test_set_up_stops_at_once_where_the_packages_cannot_fit(
+    setup: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, free: float, there: float, stops: bool
+) -> None:
+    class Entry:
+        def lstat(self) -> SimpleNamespace:
+            return SimpleNamespace(st_blocks=int(there) // 512)
+
+    monkeypatch.setattr(setup, "VENV", SimpleNamespace(rglob=lambda pattern: [Entry()]))
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=int(free)))
+    if not stops:
+        setup.require_room()
+        return
+    with pytest.raises(SystemExit, match=r"2\.0 GB free, the packages take 3\.8 GB"):
+        setup.require_room()
 
 
 def test_set_up_stops_where_no_package_has_a_missing_library(
