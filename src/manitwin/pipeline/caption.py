@@ -20,7 +20,7 @@ class CaptionStage:
     """Ask the annotator for words."""
 
     name: ClassVar[str] = "caption"
-    version: ClassVar[str] = "21"
+    version: ClassVar[str] = "22"
     reads: ClassVar[tuple[str, ...]] = (
         "visual.glb",
         "solid.npz",

@@ -26,7 +26,8 @@ from manitwin.models.generators.templates.text import MAX_CHARACTERS, read_text
         ("claw hammer", "hammer"),
         ("wooden spoon", "cooking spoon"),
         ("ballpoint pen", "pen"),
-        ("a jam jar", "jar"),
+        ("a jam jar", "jam jar"),
+        ("a pesto jar", "jar"),
         ("a travel mug", "travel mug"),
         ("a tooth brush", "toothbrush"),
         ("a No. 2 pencil", "pencil"),
@@ -108,7 +109,7 @@ def test_glass_behind_a_thing_and_a_comma_is_what_it_is_of(text: str, category: 
 
 @pytest.mark.parametrize(
     ("text", "category"),
-    [("a jam jar, strawberry", "jar"), ("a soap, lemon", "soap"), ("a mortar that is marble", "mortar")],
+    [("a jam jar, strawberry", "jam jar"), ("a soap, lemon", "soap"), ("a mortar that is marble", "mortar")],
 )
 def test_what_a_thing_smells_or_is_of_is_not_the_thing(text: str, category: str) -> None:
     assert read(text).category == category
@@ -117,10 +118,10 @@ def test_what_a_thing_smells_or_is_of_is_not_the_thing(text: str, category: str)
 @pytest.mark.parametrize(
     "text",
     [
-        *("a lemon squeezer", "apple sauce", "an egg carton", "a chess board", "an egg slicer"),
+        *("a lemon squeezer", "apple sauce", "an egg separator", "a chess board", "an egg slicer"),
         *(
             "a banana split",
-            "a toy truck",
+            "a toy bus",
             "a rugby ball",
             "a chess set",
             "a brake disc",
@@ -160,7 +161,7 @@ def test_text_that_names_no_template_is_refused_in_one_line(text: str) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        *("pruning shears", "a waffle iron", "a nail file", "a VR headset", "a squash ball", "a snow globe"),
+        *("pruning shears", "a waffle iron", "a nail file", "a VR headset", "a beach ball pump", "a wine rack"),
         *(
             "a cordless screwdriver",
             "a name plate",
@@ -173,13 +174,13 @@ def test_text_that_names_no_template_is_refused_in_one_line(text: str) -> None:
         *(
             "a laptop stand",
             "a laptop charger",
-            "a shoe horn",
+            "a shoe rack",
             "a bottle cap",
             "a playing card",
             "a boot",
             "a pocket watch",
         ),
-        *("a ring binder", "a door handle", "a light", "a carton of eggs", "a lantern", "a stick of celery"),
+        *("a ring binder", "a door handle", "a light", "a crate of eggs", "a lantern", "a stick of celery"),
     ],
 )
 def test_another_thing_whose_name_ends_as_a_templates_is_refused(text: str) -> None:
@@ -191,9 +192,9 @@ def test_nearest_categories_are_named() -> None:
     with pytest.raises(UsageError, match=r"did you mean hammer"):
         read("a hamer")
     with pytest.raises(
-        UsageError, match=r"'a steel coffee pot'; of its shape there are: carafe, french press, gravy boat, kettle\."
+        UsageError, match=r"'a steel watering sprayer'; of its shape there are: pump bottle, spray bottle\."
     ):
-        read("a steel coffee pot")  # spelt like a bottle
+        read("a steel watering sprayer")  # by its shape, not by how it is spelt
 
 
 @pytest.mark.parametrize(
@@ -236,7 +237,7 @@ def test_a_thing_that_holds_others_is_not_one_of_them(text: str, category: str) 
     "text",
     [
         *("a toy hammer", "a stone", "a potted plant", "a vise", "a doorbell", "a wind chime", "a jerry can"),
-        *("a thumbtack", "a pocket knife", "a corkscrew", "a lint roller", "an impact driver", "a safety pin"),
+        *("a hairpin", "a multitool", "an apple corer", "a staple remover", "an impact driver", "a safety pin"),
     ],
 )
 def test_kin_of_another_shape_is_not_made(text: str) -> None:

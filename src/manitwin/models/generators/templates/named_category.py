@@ -117,7 +117,7 @@ def find_category(words: Sequence[str], text: str, templates: Mapping[str, Templ
     but for those behind a preposition (a cup of tea is a cup, and so is a box of pencils a box). A material that the name says,
     of those that such a thing is of, is one of the words around it: a wooden spoon is of wood, but a wood chisel is not. Where
     the longer phrase is another thing that the priors know, a shorter one is that only where both have one form and the size
-    fits: a jam jar is a jar, and a garlic bulb no light bulb. A template's bare name means it with nothing before it but how it
+    fits: a pesto jar is a jar, and a garlic bulb no light bulb. A template's bare name means it with nothing before it but how it
     looks: a white king is a chess piece, and a drama king is none.
 
     Raises UsageError for words that name no category, or several things.

@@ -281,7 +281,7 @@ def test_outline_of_a_box_is_no_round_thing_where_the_name_says_that_it_is_not_r
     [
         ("pink storage tray", "serving tray"), ("storage tray", "serving tray"), ("red ceramic mug", "mug"), ("a", None),
         ("Bravo apple juice", "milk carton"), ("chapstick", "glue stick"), ("comic book", "book"),
-        ("whipping cream", "milk carton"), ("Arla sour cream", "yogurt cup"), ("ink bottle", None), ("nectarine", None),
+        ("whipping cream", "milk carton"), ("Arla sour cream", "yogurt cup"), ("ink bottle", "ink bottle"), ("nectarine", None),
     ],
 )  # fmt: skip
 def test_template_is_that_of_the_last_words_of_a_name(name: str, category: str | None) -> None:

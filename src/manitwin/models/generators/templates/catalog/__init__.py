@@ -29,7 +29,9 @@ FAMILIES = (
     "cutting_tools", "workshop", "kitchen_tools", "cookware",
     "computing", "instruments", "appliances", "packages", "accessories", "clothing", "stationery", "homeware",
     "drinkware", "cosmetics", "batteries", "blocks", "chess_pieces", "clamps", "presses", "vegetables", "plastic_bottles",
-    "fruit", "roots", "bakery", "snacks", "sports", "flat_goods", "tableware", "bakeware", "fittings", "shop_tools",
+    "fruit", "roots", "bakery", "snacks", "sports", "flat_goods", "tableware", "bakeware", "fittings", "shop_tools", "packs",
+    "keepsakes", "small_goods", "home_goods", "kitchen_smalls", "small_foods",
+    "toy_vehicles", "playthings",
 )  # fmt: skip
 
 
