@@ -27,11 +27,11 @@ def snow_globe(*, height_m: float, base: float, foot: float) -> Model:
     r = 0.5 * (h - 0.86 * low)
     wide = foot * r
     side = [(wide, 0.0), (wide, 0.3 * low), (0.93 * wide, 0.42 * low), (0.8 * wide, 0.86 * low), (0.74 * wide, low)]
-    model = Model().add("base", lathe(rounded([(0.0, 0.0), *side, (0.0, low)], 0.0025)), "base")
+    model = Model().add("pedestal", lathe(rounded([(0.0, 0.0), *side, (0.0, low)], 0.0025)), "base")
     model.add("globe", ellipsoid(2 * r, 2 * r, 2 * r).translate((0, 0, h - r)))
-    model.region("underside", "base", lambda centers: centers[:, 2] < 1e-5)
+    model.region("base", "pedestal", lambda centers: centers[:, 2] < 1e-5)
     model.point("globe", "surface", "globe", (0.0, 0.0, h), (0.0, 0.0, 1.0))
-    return model.point("base", "face", "underside", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
+    return model.point("base", "face", "base", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
 
 
 @template("christmas ornament")
@@ -59,7 +59,7 @@ def trophy(*, height_m: float, width: float, base: float, bowl: float) -> Model:
     """Build a cup with two ears on a block: ``base`` and ``bowl`` are their shares of the height, ``width`` the cup's over it."""
     h, r = height_m, 0.5 * width * height_m
     low, start, side = base * h, (1 - bowl) * h, 1.15 * width * height_m
-    model = Model().add("base", box(side, side, low, radius_m=0.003), "base")
+    model = Model().add("pedestal", box(side, side, low, radius_m=0.003), "base")
     stem = [(0.78 * r, low - 0.001), (0.7 * r, low + 0.02 * h), (0.2 * r, low + 0.3 * (start - low)), (0.16 * r, start)]
     cup = [
         (0.5 * r, start + 0.08 * bowl * h),
@@ -86,12 +86,12 @@ def trophy(*, height_m: float, width: float, base: float, bowl: float) -> Model:
     model.cut("inside", hollow)
     for part in ("body", "inside"):
         model.region("rim", part, lambda centers: centers[:, 2] > 0.985 * h)
-    model.region("underside", "base", lambda centers: centers[:, 2] < 1e-5)
+    model.region("base", "pedestal", lambda centers: centers[:, 2] < 1e-5)
     model.point("top", "opening", "rim", (0.0, 0.0, h), (0.0, 0.0, 1.0))
     model.point(
         "stem", "surface", "body", (0.0, -0.17 * r, 0.5 * (low + start) + 0.1 * (start - low)), (0.0, -1.0, 0.0)
     )
-    return model.point("base", "face", "underside", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
+    return model.point("base", "face", "base", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
 
 
 @template("medal")

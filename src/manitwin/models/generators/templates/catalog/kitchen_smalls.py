@@ -157,7 +157,7 @@ def moka_pot(*, height_m: float, width: float, waist: float, handle: float) -> M
     )
     model.add("lid", cover)
     knob = lathe(rounded([(0, 0.94 * h), (0.12 * r, 0.94 * h), (0.17 * r, 0.98 * h), (0.1 * r, h), (0, h)], 0.003))
-    model.add("knob", knob, "handle")
+    model.add("lid", knob, "handle")
     reach, thick = handle * h, 0.075 * r + 0.003
     path = arc(
         [

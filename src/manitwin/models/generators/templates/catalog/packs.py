@@ -33,6 +33,8 @@ def printed_box(*, height_m: float, width: float, depth: float) -> Model:
     model.region("back", "body", lambda centers: centers[:, 1] > 0.499 * y, "front")
     model.region("top", "body", lambda centers: centers[:, 2] > 0.999 * height_m)
     model.region("base", "body", lambda centers: centers[:, 2] < 0.001 * height_m)
+    if x > height_m:  # it is opened at an end
+        model.region("flap", "body", lambda centers: abs(centers[:, 0]) > 0.499 * x)
     model.point("front", "face", "front", (0.0, -0.5 * y, 0.5 * height_m), (0.0, -1.0, 0.0))
     model.point("top", "face", "top", (0.0, 0.0, height_m), (0.0, 0.0, 1.0))
     return model.point("base", "face", "base", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
@@ -108,6 +110,8 @@ def oblong_tin(*, length_m: float, width: float, height: float, corner: float) -
     model.add("ring", (ring + tongue).translate((0.5 * x - 0.42 * y - wall, 0, h - 0.0024)), "seams")
     model.region("top", "body", lambda centers: centers[:, 2] > h - 0.0022, "seams")
     model.region("base", "body", lambda centers: centers[:, 2] < 0.0022, "seams")
+    model.region("top", "seams", lambda centers: centers[:, 2] > h - 2e-4)
+    model.region("base", "seams", lambda centers: centers[:, 2] < 2e-4)
     model.point("top", "face", "top", (-0.2 * x, 0.0, h - 0.002), (0.0, 0.0, 1.0))
     return model.point("base", "face", "base", (0.0, 0.0, 0.002), (0.0, 0.0, -1.0))
 
@@ -170,9 +174,8 @@ def glue_bottle(*, height_m: float, width: float, flat: float, shoulder: float, 
         (0.0, h),
     ]
     model = Model().add("body", body).add("cap", lathe(rounded([(0.0, top - 0.004), *tip], 0.001)), "cap")
-    model.region("nozzle", "cap", lambda centers: centers[:, 2] > top + 0.45 * high)
     model.region("base", "body", lambda centers: centers[:, 2] < 0.005 * h)
-    model.point("nozzle", "tip", "nozzle", (0.0, 0.0, h), (0.0, 0.0, 1.0))
+    model.point("nozzle", "tip", "cap", (0.0, 0.0, h), (0.0, 0.0, 1.0))
     return model.point("base", "face", "base", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
 
 

@@ -175,7 +175,7 @@ def binder_clip(*, length_m: float, tall: float, deep: float, levers: float) -> 
     section = polygon(outer) - polygon(inner)
     body = prism(section, n).translate((0, 0, -0.5 * n)).rotate((90, 0, 90))
     model = Model().add("body", body)
-    model.region("jaws", "body", lambda centers: centers[:, 2] > 0.93 * h)
+    model.region("jaws", "body", lambda centers: centers[:, 2] > 0.86 * h)
     wire, reach = 0.017 * n, levers * h
     for side in (-1.0, 1.0):
 
