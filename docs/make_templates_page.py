@@ -127,10 +127,10 @@ are verified (96.7 %). 111 of them were built before openings and poses were las
 Rejected are two speakers wider than the gripper opens, two rolling pins, which roll, and a trash
 can and a serving tray that fell from every grip at their rims.
 
-`python benchmarks/text_sizes.py`: with two sides of another such thing stated, length and height, 263 of 278 categories are
-made, with three 253, each side within 0.2 %; the others, knives and brushes most of all, have a side that no measure of
-theirs changes, and say so. All of 57 vessels but a nail polish bottle can be told that they hold 400 ml. It costs 0.09 CPU-s
-in the median.
+`python benchmarks/text_sizes.py`: with two sides of another such thing stated, length and height, 425 of 446 categories are
+made, with three 415, each side within 0.2 %; the others, knives, saws and rackets most of all, have a side that no measure of
+theirs changes, and say so. Of 89 vessels 86 can be told that they hold 400 ml: a nail polish bottle is smaller, a napkin holder
+is no vessel, and a moka pot is made without its hollow. It costs 0.1 CPU-s in the median.
 
 `python benchmarks/points.py --held-out`: the annotator `rules`, which is told none of a template's points, puts 97.8 % of
 them at their place (496 of 507; 58 categories x 3 seeds; 3 are not judged), and 97.8 % in the half by which the rules
@@ -157,6 +157,13 @@ Of the 21 kinds made last (chess pieces to bell peppers; three of each, `--quick
 put 164 of 169 of their points at their place (3 seeds), those of eight of them by labels written for them. French presses are
 heavy for their handles: 172 of 312 of their grasps hold. Of 18 rendered photos of six of them, named, 17 are accepted,
 with volumes that overlap the true ones by 0.97 in the median.
+
+Of 81 kinds made after those (packs as shops sell them, keepsakes, small goods, toys; one of each, `--quick`, seed 3) 76 are
+verified; three packs are wider than the gripper opens, a tool box is too heavy, a drinking straw rolls. The rules, which had
+been shown none of them, put 393 of 420 of their points at their place (93.6 %; two seeds, 49 not judged): wrong are ends of what
+is alike at both, the blade of a folded knife and the spout of a moka pot. Of 96 rendered photos of 32 packs
+(`photo_generation.py OUT --held-out`, named) 94 are accepted, and their volumes overlap the true ones by 0.98 in the median,
+least that of a glue bottle (0.84).
 
 `python benchmarks/frames.py --held-out`: frames from geometry, asked for at the candidate nearest to a known point, are
 right (opening 5 mm and 3 degrees, face 3 mm and 3, hole 2 mm and 5, edge 10 degrees, tip 5 mm and 10, button 3 mm and 10)
