@@ -43,7 +43,8 @@ STANDARDS = {
     "aa battery": (0.0505, None), "golf ball": (0.04267, 0.0459), "billiard ball": (0.05715, 0.163),
     "hockey puck": (0.0762, 0.163), "id card": (0.0856, None), "drink can": (0.122, 0.345),
     "basketball": (0.242, 0.6), "volleyball": (0.21, 0.27), "handball": (0.188, 0.45), "squash ball": (0.04, 0.024),
-    "cricket ball": (0.072, 0.16), "rugby ball": (0.29, 0.435),
+    "cricket ball": (0.072, 0.16), "rugby ball": (0.29, 0.435), "bowling ball": (0.217, 7.25), "hockey ball": (0.073, 0.16),
+    "lacrosse ball": (0.0635, 0.145), "croquet ball": (0.092, 0.454), "water polo ball": (0.22, 0.42),
 }  # fmt: skip
 
 
@@ -507,3 +508,11 @@ def test_names_that_a_name_is_a_word_of_are_told() -> None:
     assert names_with("beer")[:2] == ["beer bottle", "beer can"] and names_with("Cola 500 ml") == ["cola can"]
     assert names_with("Gear part")[0] == "gear" and lookup("Gear part") is None
     assert names_with("thingamajig") == names_with("500 ml") == names_with("大象") == []
+
+
+def test_balls_of_games_have_numbers_of_their_own() -> None:
+    """A bowling ball was any ball: of 7 cm and 80 g."""
+    bowling, beach, gym = (lookup(name) for name in ("red bowling ball", "beach ball", "gym ball"))
+    assert bowling is not None and bowling.longest_axis_m.typical > 0.2 and bowling.mass_kg.typical > 4
+    assert beach is not None and beach.longest_axis_m.low >= 0.2 and beach.mass_kg.high < 0.5
+    assert gym is not None and gym.longest_axis_m.typical > 0.5

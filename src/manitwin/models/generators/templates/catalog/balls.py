@@ -136,3 +136,30 @@ def billiard_ball(*, width_m: float, spot: float) -> Model:
     drum = cylinder(0.5 * spot * width_m, 2 * width_m).translate((0, 0, -width_m)).rotate((90, 0, 0))
     model = Model().add("body", sphere(width_m, 64)).add("spot", sphere(1.002 * width_m, 64) ^ drum, "spot")
     return laid_ball(model, width_m, side="spot")
+
+
+@template("bowling ball")
+def bowling_ball(*, width_m: float, hole: float, span: float) -> Model:
+    """Build a bowling ball, its holes about the top: ``hole`` is one's width, ``span`` from fingers to thumb, over the ball's."""
+    r, radius_m = 0.5 * width_m, 0.5 * hole * width_m
+    drill = cylinder(radius_m, r).translate((0, 0, 0.55 * r))
+    apart, away = np.degrees(1.3 * hole), np.degrees(span)
+    finger = drill.rotate((0, away, 0))
+    holes = union([finger.rotate((0, 0, apart / np.sin(span))), finger.rotate((0, 0, -apart / np.sin(span)))])
+    thumb = drill.rotate((0, -away, 0))
+    model = Model().add("body", sphere(width_m, 72)).cut("holes", holes + thumb, "holes")
+    return laid_ball(model, width_m)
+
+
+@template("beach ball")
+def beach_ball(*, width_m: float, cap: float) -> Model:
+    """Build a beach ball of six strips, every other one coloured, that end at a disc above and below; ``cap`` is its width."""
+    r = 0.5 * width_m
+
+    def is_coloured(centers: np.ndarray) -> np.ndarray:
+        sector = np.floor(np.degrees(np.arctan2(centers[:, 1], centers[:, 0])) / 60)
+        return np.asarray((sector % 2 == 1) & (np.hypot(centers[:, 0], centers[:, 1]) > cap * r))
+
+    model = Model().add("body", sphere(width_m, 72))
+    model.region("stripes", "body", is_coloured, "stripes")
+    return laid_ball(model, width_m, side="stripes")
