@@ -83,7 +83,9 @@ def from_photo(
     if name is None:
         return _without_name(rgba, likely, focal_mm, plain_solids(rgba, hint, focal_mm))
     fitted = (
-        None if template is None else fit(template.category, rgba, or_of=kinds_of(template.category), focal_mm=focal_mm)
+        None
+        if template is None
+        else fit(template.category, rgba, or_of=kinds_of(template.category, name), focal_mm=focal_mm)
     )
     lies = fitted is not None and not fitted.upright  # otherwise than the template rests
     box = box_from_corner(rgba, focal_mm) if lies else None

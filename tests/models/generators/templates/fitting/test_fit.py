@@ -186,6 +186,8 @@ def test_names_of_templates_and_of_priors_find_a_template() -> None:
     assert not {"food container", "matchbox"} & set(kinds_of("box")), "a box has no clips, and no drawer"
     assert {"mug", "cup and saucer"} <= set(kinds_of("cup")) and "cup" not in kinds_of("mug")
     assert "mallet" in kinds_of("hammer"), "the priors have it beside the hammer"
+    assert "mallet" in kinds_of("hammer", "small hammer") and "mallet" not in kinds_of("hammer", "my claw hammer")
+    assert "cap" in kinds_of("hat", "red hats") and "cap" not in kinds_of("hat", "sun hat")
     assert {"ketchup bottle", "detergent bottle", "spray bottle"} <= set(kinds_of("bottle"))
     told_in_full = {category for category, template in load_templates().items() if template.told_in_full}
     assert "perfume bottle" in told_in_full, "a brown bottle was one"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manitwin.geometry.solids.shapes import SolidError
-from manitwin.models.annotators.prior_names import lookup, named
+from manitwin.models.annotators.prior_names import found_by, lookup, named
 from manitwin.models.annotators.prior_records import Prior
 from manitwin.models.annotators.priors import load_priors
 from manitwin.models.generators.templates.catalog import load_templates
@@ -74,13 +74,14 @@ def template_for(name: str | None) -> Template | None:
     return by_name.get(prior.category) or templates.get(beside or "")
 
 
-def kinds_of(category: str) -> list[str]:
+def kinds_of(category: str, name: str | None = None) -> list[str]:
     """Return the categories that people may mean by a category's name: a can may be a drink can, a water bottle a bottle.
 
     They share its last word, or the priors have them beside it, a mallet beside the hammer, and are about as large: nobody calls
     a watering can a can. A plain name stands also for what has a name with that last word, a mug that is called a coffee cup, and
     for that with something, a cup and saucer; but for what keeps things in it or not as its own things do: no glass is a
-    magnifying glass.
+    magnifying glass. A longer ``name`` of the category by which a thing is called says which of what stands beside another it
+    is: a hat may be a cap, and a sun hat is none.
     """
     templates, last = load_templates(), category.split()[-1]
     said = lookup(category)
@@ -90,9 +91,17 @@ def kinds_of(category: str) -> list[str]:
         kinds = [other for other in templates if other != category and last in _heads(templates[other])]
         kinds = [other for other in kinds if not templates[other].told_in_full]
         kinds = [other for other in kinds if said is not None and load_priors()[other].container == said.container]
-    beside = [other for other in templates if load_priors()[other].kin_of == category]
+    beside = [
+        other for other in templates if load_priors()[other].kin_of == category and not _says_which(name, category)
+    ]
     kinds += [other for other in beside if other not in kinds and not templates[other].told_in_full]
     return [other for other in kinds if said is not None and _about_as_large(lookup(other), said)][:_MOST_KINDS]
+
+
+def _says_which(name: str | None, category: str) -> bool:
+    """Tell whether a name is found by one that has the category's and a word before it: a claw hammer."""
+    found = found_by(name)
+    return found is not None and found[1].endswith(f" {category}")
 
 
 def _heads(template: Template) -> set[str]:
