@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from manitwin.errors import Rejected
-from manitwin.models.generators.lift.end_on import reject_end_on
+from manitwin.models.generators.lift.end_on import reject_end_on, shows_no_more_than_an_end
 from manitwin.models.generators.lift.made_photo import from_photo
 from manitwin.models.generators.lift.roundness import is_round, is_round_along
 from manitwin.models.generators.templates.catalog import load_templates
@@ -38,6 +38,14 @@ def test_a_rim_seen_from_above_is_no_tall_thing(name: str, half_axes_px: tuple[i
 @pytest.mark.parametrize("name", ["bowl", "egg"])
 def test_what_has_an_ellipse_for_its_outline_is_made(name: str) -> None:
     assert from_photo(_ellipse(170, 220), name).notes["primitive"] == f"template:{name}"
+
+
+def test_a_circle_is_no_end_of_a_long_thing_that_is_only_likely() -> None:
+    circle = _ellipse(200, 200)
+    made = from_photo(circle, None, likely=[("salt shaker", 0.6)]).notes["primitive"]
+    assert made != "shape of template:salt shaker"
+    assert shows_no_more_than_an_end(TALL, ABOVE, circle)
+    assert not shows_no_more_than_an_end(TALL, ASIDE, circle) and not shows_no_more_than_an_end(WIDE, ABOVE, circle)
 
 
 def test_only_a_long_thing_that_the_camera_looks_along_is_its_end() -> None:

@@ -31,12 +31,8 @@ def reject_end_on(
     which is the alpha, than the solid, which overlaps with it by ``silhouette_iou``. ``extents (3,)`` are the solid's sides,
     ``toward_camera (3,)`` is the unit vector to the camera along their axes. Raises Rejected ``generator_failed``.
     """
-    shorter, longest = np.argsort(extents)[1:]
-    is_long = extents[longest] >= LONG * extents[shorter]
-    if not is_long or abs(toward_camera[longest]) < np.sqrt(0.5):
-        return
-    ellipse_iou = analyse_silhouette(crop_object(rgba, CROP_SIDE_PX).mask).ellipse_iou
-    if ellipse_iou < DISC_ELLIPSE_IOU or 1 - ellipse_iou > CLEARLY_LESS * (1 - silhouette_iou):
+    ellipse_iou = _end_ellipse_iou(extents, toward_camera, rgba)
+    if ellipse_iou is None or 1 - ellipse_iou > CLEARLY_LESS * (1 - silhouette_iou):
         return
     raise Rejected(
         "generator_failed",
@@ -44,3 +40,21 @@ def reject_end_on(
         f" {category}: how long it is does not show; take the photo from the side",
         "generate",
     )
+
+
+def shows_no_more_than_an_end(extents: np.ndarray, toward_camera: np.ndarray, rgba: np.ndarray) -> bool:
+    """Tell whether of a solid as in ``reject_end_on`` the camera looks along its length and the outline is an ellipse.
+
+    A ball has that outline as well: what nobody has named is no long thing by it, however closely it goes with one.
+    """
+    return _end_ellipse_iou(extents, toward_camera, rgba) is not None
+
+
+def _end_ellipse_iou(extents: np.ndarray, toward_camera: np.ndarray, rgba: np.ndarray) -> float | None:
+    """Return how far an ellipse explains what is seen of a long thing along its length; None where it does not, or across."""
+    shorter, longest = np.argsort(extents)[1:]
+    is_long = extents[longest] >= LONG * extents[shorter]
+    if not is_long or abs(toward_camera[longest]) < np.sqrt(0.5):
+        return None
+    ellipse_iou = analyse_silhouette(crop_object(rgba, CROP_SIDE_PX).mask).ellipse_iou
+    return ellipse_iou if ellipse_iou >= DISC_ELLIPSE_IOU else None

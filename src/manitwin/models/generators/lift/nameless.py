@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manitwin.errors import Rejected
-from manitwin.models.generators.lift.end_on import CLEARLY_LESS, DISC_ELLIPSE_IOU
+from manitwin.models.generators.lift.end_on import CLEARLY_LESS, DISC_ELLIPSE_IOU, shows_no_more_than_an_end
 from manitwin.models.generators.lift.hint import ShapeHint
 from manitwin.models.generators.lift.lifting import Lifted, lift
 from manitwin.models.generators.lift.likely_round import is_likely_round
@@ -140,4 +140,6 @@ def _best_template(rgba: np.ndarray, likely: Sequence[tuple[str, float]], focal_
     found = fit(kinds[0], rgba, or_of=kinds[1:], focal_mm=focal_mm) if kinds else None
     if found is None or found.residual.iou < NAMELESS_IOU or found.residual.outline > NAMELESS_OUTLINE:
         return None
-    return found
+    # a ball goes with the end of any round thing
+    extents = np.ptp(found.made.mesh.vertices, axis=0)
+    return None if shows_no_more_than_an_end(extents, found.view.object_to_camera[2], rgba) else found
