@@ -46,6 +46,22 @@ def test_two_tomatoes_that_touch_are_no_tomato() -> None:
     assert caught.value.reason == "several_objects" and caught.value.stage == "generate"
 
 
+@pytest.mark.parametrize("name", ["tennis balls", "pool ball"])
+def test_two_balls_that_touch_are_no_ball(name: str) -> None:
+    with pytest.raises(Rejected, match=r"its outline has 2 bellies .* has not; crop the photo to one of them$"):
+        reject_several_round(_discs((150, 200, 100), (330, 200, 100)), name)
+
+
+def test_of_a_name_that_is_only_likely_most_has_to_be_round() -> None:
+    two, one = _discs((150, 200, 100), (330, 200, 100)), _discs((250, 200, 150))
+    with pytest.raises(Rejected, match=r"one round thing has not; .* say what it is with --name") as caught:
+        reject_several_round(two, None, [("lemon", 0.4), ("apple", 0.2), ("dumbbell", 0.1)])
+    assert caught.value.reason == "several_objects"
+    reject_several_round(two, None, [("lemon", 0.3), ("dumbbell", 0.6)])
+    reject_several_round(one, None, [("lemon", 0.4), ("apple", 0.2)])
+    reject_several_round(two, "dumbbell", [("lemon", 0.9)])
+
+
 @pytest.mark.parametrize("name", [None, "dumbbell", "bunch of grapes", "cherries", "ginger"])
 def test_what_is_not_said_to_be_one_round_thing_may_have_any_outline(name: str | None) -> None:
     reject_several_round(_discs((150, 200, 100), (330, 200, 100)), name)

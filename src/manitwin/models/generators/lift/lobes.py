@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 from scipy import ndimage
@@ -17,6 +19,8 @@ LEAST_BELLY = 0.7
 """Of the largest one's half width: a stem, a crown of leaves, the neck of a squash are narrower."""
 BUNCHES = frozenset({"grape", "cherry"})
 """What is called so may be several that hang together."""
+LEAST_LIKELY = 0.5
+"""Of the probability of what nobody has named: that much is of round food and balls."""
 
 
 def bellies(mask: np.ndarray) -> int:
@@ -35,15 +39,30 @@ def bellies(mask: np.ndarray) -> int:
     return most
 
 
-def reject_several_round(mask: np.ndarray, name: str | None) -> None:
-    """Raise Rejected (``several_objects``) where a mask ``(H, W) bool`` is that of several things of a ``name`` of round food."""
+def reject_several_round(mask: np.ndarray, name: str | None, likely: Sequence[tuple[str, float]] = ()) -> None:
+    """Raise Rejected (``several_objects``) where a mask ``(H, W) bool`` is that of several things of a ``name``.
+
+    That is where the name is of round food or balls. What nobody has named is such a thing where most of what it is ``likely``
+    called, by name and probability, is.
+    """
     prior = lookup(name)
-    if prior is None or prior.domain != "food" or prior.shape != "round" or prior.category in BUNCHES:
+    is_round = _is_round(name) if name is not None else sum(p for each, p in likely if _is_round(each)) >= LEAST_LIKELY
+    if not is_round or (count := bellies(mask)) == 1:
         return
-    if (count := bellies(mask)) > 1:
-        raise Rejected(
-            "several_objects",
-            f"its outline has {count} bellies with a waist between, as several have that touch or hide one another, and one"
-            f" {prior.category} has not; crop the photo to one of them",
-            "generate",
-        )
+    one = "round thing" if prior is None else prior.category
+    raise Rejected(
+        "several_objects",
+        f"its outline has {count} bellies with a waist between, as several have that touch or hide one another, and one"
+        f" {one} has not; crop the photo to one of them{'' if prior else ', or say what it is with --name'}",
+        "generate",
+    )
+
+
+def _is_round(name: str) -> bool:
+    prior = lookup(name)
+    return (
+        prior is not None
+        and prior.domain in ("food", "toys")
+        and prior.shape == "round"
+        and prior.category not in BUNCHES
+    )

@@ -16,6 +16,7 @@ from manitwin.geometry.poses import GLTF_TO_OBJECT
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.words import article
 from manitwin.models.generators.lift.end_on import reject_end_on
+from manitwin.models.generators.lift.heaps import reject_heap
 from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name, is_cylinder, why_no_cylinder, why_not_round
 from manitwin.models.generators.lift.lifting import Lifted, lift
 from manitwin.models.generators.lift.lobes import reject_several_round
@@ -71,9 +72,9 @@ def from_photo(
     lies otherwise than its template does where a box explains it much better (a long speaker). What has no template, or one whose
     fit is not believed, is a plain solid where one explains the photo closely. What has no name has the shape that explains the
     photo best (``nameless``), a template's of the ``likely`` names, each with its probability, among others.
-    ``focal_mm`` is the lens as 35 mm equivalent, where it is known. Several round things that touch are rejected.
+    ``focal_mm`` is the lens as 35 mm equivalent, where it is known. Several things of the name that touch are rejected.
     """
-    reject_several_round(rgba[..., 3] > 127, name)
+    reject_several_round(rgba[..., 3] > 127, name, likely)
     template = template_for(name)
     hint = hint_from_name(name)
     if template is None and (hint == ShapeHint() or hint.boxy):
@@ -91,6 +92,8 @@ def from_photo(
     box = box_from_corner(rgba, focal_mm) if lies else None
     if box is not None and fitted is not None and explains_more(box, fitted.residual.iou):
         return _shape_alone(box, rgba, primitive="box", source="the outline's six corners")
+    if template is not None and fitted is not None:
+        reject_heap(fitted, name, template.category)
     if fitted is None or fitted.confidence < LEAST_CONFIDENCE:
         solid = plain_solids(rgba, hint, focal_mm).close
         if solid is not None and _why_no_plain(solid, name) is None:
