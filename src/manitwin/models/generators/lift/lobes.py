@@ -49,11 +49,11 @@ def reject_several_round(mask: np.ndarray, name: str | None, likely: Sequence[tu
     is_round = _is_round(name) if name is not None else sum(p for each, p in likely if _is_round(each)) >= LEAST_LIKELY
     if not is_round or (count := bellies(mask)) == 1:
         return
-    one = "round thing" if prior is None else prior.category
+    one, remedy = ("round thing", ", or say what it is with --name") if prior is None else (prior.category, "")
     raise Rejected(
         "several_objects",
-        f"its outline has {count} bellies with a waist between, as several have that touch or hide one another, and one"
-        f" {one} has not; crop the photo to one of them{'' if prior else ', or say what it is with --name'}",
+        f"its outline has {count} bellies with a waist between, as several have that touch or hide one another, or one with its"
+        f" mirror image, and one {one} has not; crop the photo to one of them{remedy}",
         "generate",
     )
 

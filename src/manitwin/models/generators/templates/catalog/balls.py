@@ -162,4 +162,4 @@ def beach_ball(*, width_m: float, cap: float) -> Model:
 
     model = Model().add("body", sphere(width_m, 72))
     model.region("stripes", "body", is_coloured, "stripes")
-    return laid_ball(model, width_m, side="stripes")
+    return laid_ball(model, width_m)
