@@ -16,6 +16,7 @@ from manitwin.geometry.poses import GLTF_TO_OBJECT
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.words import article
 from manitwin.models.generators.lift.end_on import reject_end_on
+from manitwin.models.generators.lift.filled_holes import reject_filled_holes
 from manitwin.models.generators.lift.heaps import reject_heap
 from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name, is_cylinder, why_no_cylinder, why_not_round
 from manitwin.models.generators.lift.lifting import Lifted, lift
@@ -174,6 +175,8 @@ def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) 
             " check the name and the cut-out",
             "generate",
         )
+    if fitted is not None:
+        reject_filled_holes(fitted, rgba)
     notes = lifted.notes if fitted is None else lifted.notes | {"poor_fit": notes_of(fitted)}
     return _lifted_job(lifted, notes)
 
