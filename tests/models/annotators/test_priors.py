@@ -516,3 +516,5 @@ def test_balls_of_games_have_numbers_of_their_own() -> None:
     assert bowling is not None and bowling.longest_axis_m.typical > 0.2 and bowling.mass_kg.typical > 4
     assert beach is not None and beach.longest_axis_m.low >= 0.2 and beach.mass_kg.high < 0.5
     assert gym is not None and gym.longest_axis_m.typical > 0.5
+    ping_pong = lookup("ping pong ball")
+    assert ping_pong is not None and ping_pong.mass_kg.high < 0.01, "it had a racquetball's"
