@@ -200,6 +200,13 @@ def test_a_bottle_that_lies_in_the_world_of_its_file_is_stood_up_and_one_that_a_
         assert _stood(lying, choice).extents[2] == pytest.approx(height, abs=1e-3), choice.reason
 
 
+def test_a_container_with_its_long_axis_level_is_put_on_no_end_in_the_world_of_its_file() -> None:
+    caddy = trimesh.creation.box((0.4, 0.16, 0.16))  # of square section: round about its long axis, as moments have it
+    for level, height in ((True, 0.16), (False, 0.4)):
+        choice = choose_up(caddy, user="z", stands=True, opens_up=True, level=level, by_convention=True)
+        assert _stood(caddy, choice).extents[2] == pytest.approx(height, abs=1e-3), choice.reason
+
+
 def test_a_thing_that_lies_and_stands_on_its_end_in_the_world_of_its_file_is_laid_down() -> None:
     rod = trimesh.creation.capsule(0.12, 0.008)
     for by_convention, stands, height in ((True, False, 0.016), (False, False, 0.136), (True, None, 0.136)):
