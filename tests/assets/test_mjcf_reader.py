@@ -67,6 +67,34 @@ def test_texture_of_the_material_is_on_the_mesh(tmp_path: Path) -> None:
     assert {file.name for file in asset.files} == {"q.obj", "paint.png", "object.xml"}
 
 
+def _base_colors(path: Path) -> list[tuple[int, ...]]:
+    return [tuple(int(c) for c in material_of(part).baseColorFactor[:3]) for part in read_asset(path).visual]
+
+
+def test_a_material_whose_texture_is_not_there_has_no_colour_but_its_tint(tmp_path: Path) -> None:
+    before = (
+        '<asset><texture name="t" type="2d" file="gone.png"/><material name="plain" texture="t"/>'
+        '<material name="tinted" texture="t" rgba="1 0 0 1"/></asset>'
+    )
+    geoms = '<geom type="box" size="1 1 1" material="plain"/><geom type="box" size="1 1 1" material="tinted"/>'
+    path = mjcf(tmp_path, f"<body>{geoms}</body>", before)
+    assert read_asset(path).missing_files == ("gone.png",)
+    assert _base_colors(path) == [(204, 204, 204), (255, 0, 0)], "the default grey: white is what no texture said"
+
+
+def test_colours_are_those_of_a_plain_texture_and_of_the_geom_before_its_material(tmp_path: Path) -> None:
+    before = (
+        '<asset><texture name="t" type="cube" builtin="flat" width="8" height="8" rgb1="0 1 0"/>'
+        '<material name="green" texture="t"/><material name="red" rgba="1 0 0 1"/></asset>'
+    )
+    geoms = (
+        '<geom type="box" size="1 1 1" material="green"/><geom type="box" size="1 1 1" material="red"/>'
+        '<geom type="box" size="1 1 1" material="red" rgba="0 0 1 1"/>'
+    )
+    path = mjcf(tmp_path, f"<body>{geoms}</body>", before)
+    assert _base_colors(path) == [(0, 255, 0), (255, 0, 0), (0, 0, 255)]
+
+
 def test_mesh_that_is_not_there_is_missing(tmp_path: Path) -> None:
     asset_xml = '<asset><mesh name="m" file="../../gone.stl"/></asset>'
     geoms = '<geom type="mesh" mesh="m"/><geom size="0.1"/>'

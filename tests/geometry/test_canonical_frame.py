@@ -207,6 +207,19 @@ def test_a_container_with_its_long_axis_level_is_put_on_no_end_in_the_world_of_i
         assert _stood(caddy, choice).extents[2] == pytest.approx(height, abs=1e-3), choice.reason
 
 
+def test_a_long_container_that_opens_along_the_axis_of_its_file_stays_so_in_its_world() -> None:
+    outside = trimesh.creation.box((0.18, 0.09, 0.09))
+    inside = trimesh.creation.box((0.17, 0.08, 0.09)).apply_translation((0, 0, 0.005))
+    trough = trimesh.boolean.difference([outside, inside], engine="manifold")
+    for euler_deg, height in (
+        ((0, 0, 0), 0.09),
+        ((180, 0, 0), 0.18),
+    ):  # with its opening down, an end is as good as any
+        turned = _turned(trough, euler_deg)
+        choice = choose_up(turned, user="z", stands=True, opens_up=True, by_convention=True)
+        assert _stood(turned, choice).extents[2] == pytest.approx(height, abs=1e-3), choice.reason
+
+
 def test_a_thing_that_lies_and_stands_on_its_end_in_the_world_of_its_file_is_laid_down() -> None:
     rod = trimesh.creation.capsule(0.12, 0.008)
     for by_convention, stands, height in ((True, False, 0.016), (False, False, 0.136), (True, None, 0.136)):

@@ -79,18 +79,18 @@ def choose_up(
     that what stands has its long axis level, as vehicles do, and is stood on no end. ``said_by`` names who said the axis
     ``user``, for the reason; ``by_convention``: nobody meant this thing by it, it is the up axis of its world.
 
-    In order: that axis, but by convention after the long axis of a round, long vessel (unless such a thing has it level), and the
-    likeliest side of what lies and does not rest with that axis up; for things that lie, their likeliest side, the file's if
-    nearly as likely; an opening upward, but of one that the file has underneath; for round, long things that stand and round
-    vessels, their axis; the file's axis; for things that stand, another axis of the file that is as likely as what is near the
-    file's own, then the file's axis downward; the likeliest side. All but an unstable axis that was said are snapped onto the
-    support facet.
+    In order: that axis, but by convention after the long axis of a round, long vessel (unless such a thing has it level, or this
+    one opens along the file's axis), and the likeliest side of what lies and does not rest with that axis up; for things that
+    lie, their likeliest side, the file's if nearly as likely; an opening upward, but of one that the file has underneath; for
+    round, long things that stand and round vessels, their axis; the file's axis; for things that stand, another axis of the file
+    that is as likely as what is near the file's own, then the file's axis downward; the likeliest side. All but an unstable axis
+    that was said are snapped onto the support facet.
     """
     poses = stable_poses(solid.vertices, _center_of_mass(solid))
     if user != "auto":
         upright_vessel = by_convention and bool(opens_up) and not level
         stood = _stood_up(solid, poses, _axis(user), vessel=True) if upright_vessel else None
-        if stood is not None:
+        if stood is not None and not _opens_along(solid, _axis(user)):
             return _turned(stood, user, _LAY.format(user))
         if by_convention and stands is False and _likeliest_within(poses, _axis(user), _TILTED_DEG) is None:
             return _turned(_likeliest_side(poses, _axis(user)), user, _ON_END.format(user))
@@ -165,6 +165,11 @@ def _open_below(poses: list[StablePose], axes: list[str], opening: np.ndarray) -
         if near is not None and float(opening @ near.rotation[2]) < -np.cos(np.radians(_TILTED_DEG)):
             return axis, near
     return None
+
+
+def _opens_along(solid: trimesh.Trimesh, up: np.ndarray) -> bool:
+    opening = find_opening(solid)
+    return opening is not None and float(opening.axis @ up) > np.cos(np.radians(_TILTED_DEG))
 
 
 def _stood_up(solid: trimesh.Trimesh, poses: list[StablePose], up: np.ndarray, *, vessel: bool) -> StablePose | None:

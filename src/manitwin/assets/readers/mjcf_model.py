@@ -26,19 +26,33 @@ LEAST_MASS_KG, LEAST_INERTIA_KG_M2 = 1e-9, 1e-12
 _LEAST_ROWS, _FEW_MESHES = 2, 3
 NO_OBJECTS = "planes and height fields were left out: they are no objects"
 _RGB = int(mujoco.mjtTextureRole.mjTEXROLE_RGB)
+_FLAT = int(mujoco.mjtBuiltin.mjBUILTIN_FLAT)
 
 
 @dataclass(frozen=True)
 class CompiledMjcf:
     """An MJCF file after MuJoCo's compiler: the spec, the model, and by name what was read from files.
 
-    ``meshes`` are the parts of each mesh, scaled, in the axes of its asset; ``textures`` the colour image of each material.
+    ``meshes`` are the parts of each mesh, scaled, in the axes of its asset.
     """
 
     spec: Any
     model: Any
     meshes: dict[str, list[trimesh.Trimesh]]
-    textures: dict[str, Image.Image]
+    paint: MaterialTextures
+
+
+@dataclass(frozen=True)
+class MaterialTextures:
+    """What the textures of materials show, by the material's name.
+
+    ``images`` are colour images, ``plain`` the sRGB colour ``(3,)`` of those that MuJoCo fills with one, ``lost`` has the
+    materials whose image could not be read.
+    """
+
+    images: dict[str, Image.Image]
+    plain: dict[str, np.ndarray]
+    lost: frozenset[str]
 
 
 def compiled(source: MjcfSource, files: AssetFiles, chosen: Callable[[Any], set[int]] | None = None) -> CompiledMjcf:
@@ -54,7 +68,7 @@ def compiled(source: MjcfSource, files: AssetFiles, chosen: Callable[[Any], set[
     spec.compiler.fusestatic = False  # both would take away bodies and geoms that the file has
     spec.compiler.discardvisual = False
     found = _find_meshes(source, spec, files)
-    textures = _take_textures(source, spec, files)
+    paint = _take_textures(source, spec, files)
     _take_height_fields(source, spec, files)
     meshes = _take_meshes(spec, found, _wanted(spec, found, chosen), files)
     try:
@@ -71,7 +85,7 @@ def compiled(source: MjcfSource, files: AssetFiles, chosen: Callable[[Any], set[
         raise AssetError(f"{name}: MuJoCo cannot compile it: {_line(error)}") from error
     if source.total_mass_kg is not None:
         mujoco.mj_setTotalmass(model, source.total_mass_kg)
-    return CompiledMjcf(spec, model, meshes, textures)
+    return CompiledMjcf(spec, model, meshes, paint)
 
 
 def _specified(source: MjcfSource, files: AssetFiles) -> Any:
@@ -152,26 +166,29 @@ def _reference(mesh: Any) -> np.ndarray:
     return transform(rotation, -rotation @ np.array(mesh.refpos))
 
 
-def _take_textures(source: MjcfSource, spec: Any, files: AssetFiles) -> dict[str, Image.Image]:
+def _take_textures(source: MjcfSource, spec: Any, files: AssetFiles) -> MaterialTextures:
     """Read the colour textures of materials and take all textures out of the spec."""
-    images: dict[str, Image.Image] = {}
+    shown: dict[str, Image.Image | np.ndarray | None] = {}
     for texture in spec.textures:
-        if not texture.file:
-            continue
-        image = _image(_find(source, texture.file, files), files, files.limits)
-        if image is not None:
-            images[texture.name or Path(source.places[texture.file][0]).stem] = image
-    by_material = {}
+        if texture.file:
+            name = texture.name or Path(source.places[texture.file][0]).stem
+            shown[name] = _image(_find(source, texture.file, files), files, files.limits)
+        elif int(texture.builtin) == _FLAT:
+            shown[texture.name] = np.array(texture.rgb1, float)
+    by_material: dict[str, Image.Image | np.ndarray | None] = {}
     for material in spec.materials:
-        names = list(material.textures)
-        chosen = next((names[i] for i in (_RGB, 0) if names[i] in images), None)
-        if chosen is not None:
-            by_material[material.name] = images[chosen]
-        for role in range(len(names)):
+        named = [name for name in (material.textures[_RGB], material.textures[0]) if name in shown]
+        if named:
+            by_material[material.name] = next((shown[name] for name in named if shown[name] is not None), None)
+        for role in range(len(material.textures)):
             material.textures[role] = ""
     for texture in list(spec.textures):
         spec.delete(texture)
-    return by_material
+    return MaterialTextures(
+        {name: what for name, what in by_material.items() if isinstance(what, Image.Image)},
+        {name: what for name, what in by_material.items() if isinstance(what, np.ndarray)},
+        frozenset(name for name, what in by_material.items() if what is None),
+    )
 
 
 def _take_height_fields(source: MjcfSource, spec: Any, files: AssetFiles) -> None:

@@ -16,6 +16,7 @@ from manitwin.assets.asset_files import AssetFiles, joined
 from manitwin.assets.readers.mjcf_model import NO_OBJECTS, CompiledMjcf
 from manitwin.formats.meshes.textures import (
     bake_transform,
+    color_of_lost_texture,
     make_part,
     material_of,
     normals_of,
@@ -27,6 +28,12 @@ from manitwin.geometry.poses import inverse, rotation_from_quaternion_wxyz, tran
 
 SHOWN_GROUPS = 3
 """MuJoCo's viewer shows groups 0 to 2 (mjvOption.geomgroup)."""
+_DEFAULT_RGBA = (
+    0.5,
+    0.5,
+    0.5,
+    1.0,
+)  # a geom with any other colour has it, and not its material's (MJCF reference, geom/rgba)
 _KINDS = mujoco.mjtGeom
 _SHEET_M, _UNBOUNDED_M = 1e-3, 1.0  # how thick a plane is shown, and how wide one without an end
 _GROUND_KINDS = (int(_KINDS.mjGEOM_PLANE), int(_KINDS.mjGEOM_HFIELD))
@@ -119,13 +126,18 @@ class BodyShapes:
 
     def _material(self, geom: int) -> PBRMaterial:
         model, index = self._model, int(self._model.geom_matid[geom])
-        rgba = np.array(model.geom_rgba[geom] if index < 0 else model.mat_rgba[index], float)
+        own = index < 0 or not np.allclose(model.geom_rgba[geom], _DEFAULT_RGBA)
+        rgba = np.array(model.geom_rgba[geom] if own else model.mat_rgba[index], float)
         name = None if index < 0 else model.mat(index).name
         alpha = float(np.clip(rgba[3], 0, 1))
+        paint = self._compiled.paint
+        if name is not None and name in paint.plain:
+            rgba[:3] *= paint.plain[name]
+        base_color = (*srgb_to_linear(np.clip(rgba[:3], 0, 1)).tolist(), alpha)
         return pbr_material(
             name,
-            base_color=(*srgb_to_linear(np.clip(rgba[:3], 0, 1)), alpha),
-            base_color_texture=None if name is None else self._compiled.textures.get(name),
+            base_color=color_of_lost_texture(base_color) if name in paint.lost else base_color,
+            base_color_texture=None if name is None else paint.images.get(name),
             alpha_mode="BLEND" if alpha < 1 else None,
         )
 
