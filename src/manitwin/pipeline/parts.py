@@ -39,7 +39,7 @@ class PartsStage:
     """Give each face of ``visual.glb`` its part, or none where geometry does not tell it."""
 
     name: ClassVar[str] = "parts"
-    version: ClassVar[str] = "15"
+    version: ClassVar[str] = "16"
     reads: ClassVar[tuple[str, ...]] = (
         "solid.npz", "visual.glb", "points", "physical", "language", "geometry", "naming?",
     )  # fmt: skip

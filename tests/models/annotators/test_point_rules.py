@@ -54,6 +54,44 @@ def test_a_cup_with_a_handle_is_held_by_it_and_one_without_is_not() -> None:
     assert parts == ["open", "open"], "what it is without one is as before"
 
 
+def bottle(*, handle: bool, wide_m: float = 0.07) -> trimesh.Trimesh:
+    """A closed bottle, 70 mm deep and 200 mm tall, with a ring of a handle at +x or without; oval where it is wider."""
+    profile = np.array([(0, 0), (35, 0), (35, 140), (15, 165), (15, 200), (0, 200)]) / 1000.0
+    body = trimesh.creation.revolve(profile, sections=48)
+    body.apply_scale((wide_m / 0.07, 1, 1))
+    if not handle:
+        return body
+    ring = trimesh.creation.torus(major_radius=0.035, minor_radius=0.006)
+    ring.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, (1, 0, 0)))
+    return trimesh.boolean.union([body, ring.apply_translation((0.042, 0, 0.09))], engine="manifold")
+
+
+def test_a_bottle_with_a_handle_is_lifted_by_it_and_one_that_is_only_flat_has_none() -> None:
+    with_one, without = select(bottle(handle=True), "thermos"), select(bottle(handle=False), "thermos")
+    assert labelled(with_one, "handle")[0] > 0.04 and with_one.grasp[0].scenario.endswith("by the handle")
+    assert "handle" not in [point.label for point in without.functional]
+    flat = select(bottle(handle=False, wide_m=0.12), "shampoo bottle")
+    assert [point.label for point in flat.functional] == ["cap", "body", "base"]
+
+
+@pytest.mark.parametrize("sides_m", [(0.07, 0.07), (0.09, 0.06)])
+def test_corners_of_a_square_glass_are_no_handles(sides_m: tuple[float, float]) -> None:
+    outside = trimesh.creation.box((*sides_m, 0.1))
+    inside = trimesh.creation.box((sides_m[0] - 0.006, sides_m[1] - 0.006, 0.1)).apply_translation((0, 0, 0.004))
+    glass = trimesh.boolean.difference([outside, inside], engine="manifold").apply_translation((0, 0, 0.05))
+    assert "handle" not in [point.label for point in select(glass, "glass").functional]
+
+
+def test_what_is_no_hollow_and_no_tray_has_no_inside() -> None:
+    post, slab = trimesh.creation.box((0.06, 0.06, 0.12)), trimesh.creation.box((0.2, 0.15, 0.03))
+    for mesh, has_one in ((post, False), (slab, True)):
+        labels = [
+            point.label
+            for point in select(mesh.apply_translation((0, 0, -mesh.bounds[0, 2])), "storage box").functional
+        ]
+        assert ("inside" in labels) is has_one, labels
+
+
 def test_a_hammer_strikes_with_its_head_and_is_held_by_its_handle() -> None:
     selected = select(hammer(), "hammer")
     assert labelled(selected, "head")[0] < 0.03

@@ -456,6 +456,29 @@ def test_what_holds_no_drink_is_not_poured(category: str) -> None:
     assert not re.search(r"pour|drink|food|contents", words)
 
 
+NOT_OF_THEM = (  # what a thing of that form is used for, and not this one
+    ("light bulb", "spray"), ("light bulb", "neck"), ("donut", "put on"), ("pretzel", "goes around"), ("plunger", "strike"),
+    ("yogurt cup", "turn"), ("pudding cup", "turn"), ("butter dish", "turn"), ("aerosol can", "pour"), ("rattle", "put on"),
+    ("teether", "put on"), ("tambourine", "put on"), ("printer", "opened"), ("projector", "flap"), ("dispenser", "flap"),
+    ("vr headset", "pressed"), ("earbuds", "pressed"), ("charger", "pressed"), ("pencil sharpener", "pressed"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("category", "word"), NOT_OF_THEM)
+def test_use_that_a_form_lends_is_true_of_the_thing(category: str, word: str) -> None:
+    prior = load_priors()[category]
+    told = [
+        *(f"{part.label} {part.description}" for part in prior.functional),
+        *(part.scenario for part in prior.grasp),
+    ]
+    assert not [words for words in told if word in words]
+
+
+@pytest.mark.parametrize("category", ["jewelry box", "music box", "chest", "tool box", "egg carton"])
+def test_a_box_with_a_lid_is_opened_at_its_top(category: str) -> None:
+    assert {part.label: part.feature for part in load_priors()[category].functional}["lid"] == "top"
+
+
 def test_only_a_vase_among_cups_is_filled_with_flowers() -> None:
     assert "flowers" in load_priors()["vase"].functional[0].description
     assert "drink" in load_priors()["cup"].functional[0].description

@@ -58,9 +58,15 @@ def _away_from_handle(shape: Shape, points: SurfacePoints) -> np.ndarray:
     return 0.75 - 0.25 * np.cos(shape.body.azimuth(points.positions_m) - shape.side_handle.azimuth_rad)
 
 
-def _inside(shape: Shape, points: SurfacePoints) -> np.ndarray:
+_FLAT = 0.5  # of its width: what is higher and has no opening is no plate or tray that things are put on
+
+
+def _inside(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
     up = points.normals[:, 2]
     if shape.opening is None:
+        extents_m = np.ptp(shape.bounds_m, axis=0)
+        if extents_m[2] > _FLAT * extents_m[:2].max():
+            return None
         radial = np.linalg.norm(points.positions_m[:, :2] - shape.bounds_m[:, :2].mean(0), axis=1)
         return np.maximum(up, 0) * _near(radial, 0.3 * shape.size_m)
     opening = shape.opening

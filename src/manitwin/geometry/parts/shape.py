@@ -144,6 +144,11 @@ def _head_share(width: np.ndarray) -> float:
 _SAMPLES = 6000
 _IN_LINE_DEG = 15.0  # within which the smallest box fits a thing that leans or has a handle a little askew
 _MIRRORED_BOX = 1.5  # times the volume of the smallest box: of what leans, that along its mirror axis is no box of it
+_AT_THE_FOOT = 0.05  # of the body's height
+_LOW_BULGE = 0.25  # of the body's radius: fingers go behind no handle as low as that
+_SIXTH_RAD = np.pi / 6  # on each side of its middle
+_OPPOSITE_RAD = np.pi / 6
+_AS_FAR = 0.6  # of the reach of the one opposite: the axis of a body with two bulges lies between them
 LEAST_HANDLE_REACH = 0.08  # of the body's radius, beyond the outline's own margin: less is relief, no handle
 _TALLER, _STEEPER = 1.1, 2.0  # a handle beside a long spout: its outer half, and that by its reach
 _ELONGATED, _ELONGATED_LYING = 1.6, 1.15  # length by width from which a thing has ends rather than sides
@@ -185,6 +190,24 @@ class Shape:
         first, tallest = large[0], max(large, key=lambda p: p.height_m)
         steeper = tallest.height_m / tallest.reach_m > _STEEPER * first.height_m / first.reach_m
         return tallest if steeper and tallest.height_m > _TALLER * first.height_m else first
+
+    @property
+    def added_handle(self) -> Protrusion | None:
+        """The side handle, but None where it is only the outline of a body that is not round: a square glass, a flat bottle.
+
+        Such a bulge starts where the body does, and it is low, goes a sixth round, or has another one opposite.
+        """
+        handle = self.side_handle
+        if handle is None or handle.bail is not None or handle.low_m > _AT_THE_FOOT * self.body.top_m:
+            return handle
+        if handle.half_width_rad >= _SIXTH_RAD or handle.reach_m < _LOW_BULGE * self.body.radius_m.max():
+            return None
+        opposite = [
+            each.reach_m
+            for each in self.body.protrusions
+            if abs(abs(each.azimuth_rad - handle.azimuth_rad) - np.pi) < _OPPOSITE_RAD
+        ]
+        return None if max(opposite, default=0.0) > _AS_FAR * handle.reach_m else handle
 
     @property
     def front(self) -> np.ndarray:

@@ -165,7 +165,7 @@ class Prior(Form):
 
         A tea cup or a basket may have a handle, or none; and a teapot whose lid is on has a lid where one without has an opening.
         """
-        fitted, handle = self, shape.side_handle
+        fitted, handle = self, shape.added_handle
         if handle is not None:
             places = self.with_handle if handle.bail is None else self.with_bail or self.with_handle
             fitted = self if places is None else self.model_copy(update=dict(places))
