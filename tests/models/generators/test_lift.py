@@ -193,7 +193,7 @@ def test_inflated_strip_is_a_round_bar() -> None:
 
 
 def test_generator_answers_the_protocol_with_the_same_bytes(tmp_path: Path) -> None:
-    request = GenerationRequest(_drawn([(200, 100), (400, 100), (430, 500), (170, 500)]), None, "coffee can", seed=0)
+    request = GenerationRequest(_drawn([(200, 100), (400, 100), (430, 500), (170, 500)]), None, "humidifier", seed=0)
     files = []
     for run in range(2):
         generator = LiftGenerator()
