@@ -6,38 +6,12 @@ from manitwin.errors import Rejected
 from manitwin.models.annotators.prior_names import found_by, normalised, singulars
 from manitwin.models.generators.templates.fitting.fit import Fitted
 
-GROWN = frozenset(
-    {
-        *(
-            "apple",
-            "apricot",
-            "avocado",
-            "banana",
-            "beetroot",
-            "bell pepper",
-            "carrot",
-            "corn",
-            "cucumber",
-            "eggplant",
-            "fig",
-        ),
-        *(
-            "garlic",
-            "grapefruit",
-            "kiwi",
-            "lemon",
-            "lime",
-            "mango",
-            "mushroom",
-            "onion",
-            "orange",
-            "papaya",
-            "peach",
-            "pear",
-        ),
-        *("plum", "pomegranate", "potato", "pumpkin", "radish", "strawberry", "sweet potato", "tomato", "turnip"),
-    }
-)
+GROWN = frozenset({
+    "apple", "apricot", "avocado", "banana", "beetroot", "bell pepper", "carrot", "corn", "cucumber", "eggplant",
+    "fig", "garlic", "grapefruit", "kiwi", "lemon", "lime", "mango", "mushroom", "onion", "orange", "papaya",
+    "peach", "pear", "plum", "pomegranate", "potato", "pumpkin", "radish", "strawberry", "sweet potato", "tomato",
+    "turnip",
+})  # fmt: skip
 """Templates of what grows: one is much like another, so that the outline of each of them is near the template's."""
 FAR_OUTLINE = 0.017
 """Of the thing's length, in the mean, from which on an outline is not that of one such thing. Of 61 outlines of one, of 16 kinds,
