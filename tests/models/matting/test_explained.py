@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import cv2
@@ -11,6 +11,7 @@ import pytest
 
 from kept_opinions import kept_opinions
 from manitwin.errors import Rejected
+from manitwin.models.generators.templates.fitting import outline_check
 from manitwin.models.generators.templates.fitting.outline_check import template_outline_check
 from manitwin.models.matting import matte_photo
 from manitwin.models.matting.study import EXPLAINED_ODDS, study_photo
@@ -101,6 +102,21 @@ def test_outline_of_a_template_is_told_from_one_with_a_shadow_or_without_a_part(
     less[:, 280:] = 0
     said = [explains(np.dstack([np.full((400, 400, 3), 160, np.uint8), mask])) for mask in (whole, with_shadow, less)]
     assert said == [True, False, False]
+
+
+@pytest.mark.parametrize(("name", "may_be_a_cap"), [("hat", True), ("sun hat", False)])
+def test_outline_of_what_a_longer_name_does_not_mean_is_no_evidence(
+    monkeypatch: pytest.MonkeyPatch, name: str, may_be_a_cap: bool
+) -> None:
+    asked: list[str] = []
+
+    def fit(category: str, rgba: np.ndarray, *, or_of: Sequence[str], focal_mm: float | None) -> None:
+        asked.extend([category, *or_of])
+
+    monkeypatch.setattr(outline_check, "fit", fit)
+    explains = template_outline_check(name)
+    assert explains is not None and not explains(np.zeros((8, 8, 4), np.uint8))
+    assert asked[0] == "hat" and ("cap" in asked) == may_be_a_cap
 
 
 def test_what_has_no_template_has_no_outline() -> None:

@@ -28,12 +28,8 @@ from manitwin.geometry.poses import inverse, rotation_from_quaternion_wxyz, tran
 
 SHOWN_GROUPS = 3
 """MuJoCo's viewer shows groups 0 to 2 (mjvOption.geomgroup)."""
-_DEFAULT_RGBA = (
-    0.5,
-    0.5,
-    0.5,
-    1.0,
-)  # a geom with any other colour has it, and not its material's (MJCF reference, geom/rgba)
+_DEFAULT_RGBA = (0.5, 0.5, 0.5, 1.0)
+"""A geom with any other colour has it, and not its material's (MJCF reference, geom/rgba)."""
 _KINDS = mujoco.mjtGeom
 _SHEET_M, _UNBOUNDED_M = 1e-3, 1.0  # how thick a plane is shown, and how wide one without an end
 _GROUND_KINDS = (int(_KINDS.mjGEOM_PLANE), int(_KINDS.mjGEOM_HFIELD))

@@ -31,7 +31,7 @@ def from_views(views: Sequence[PhotoView], name: str | None, unit_m: float | Non
     template = template_for(name)
     poor: SeveralFitted | None = None
     if template is not None:
-        found = _fitted(template.category, views)
+        found = _fitted(template.category, name, views)
         if found is not None and found.confidence >= LEAST_CONFIDENCE:
             made = _from_fit(found, views, name)
             return made if unit_m is None or not are_posed(views) else sized_by_poses(made, views, unit_m)
@@ -59,9 +59,9 @@ def _stated(views: Sequence[PhotoView]) -> list[float] | None:
     return turns if len(turns) == len(views) else None
 
 
-def _fitted(category: str, views: Sequence[PhotoView]) -> SeveralFitted | None:
+def _fitted(category: str, name: str | None, views: Sequence[PhotoView]) -> SeveralFitted | None:
     """Fit the kind of thing that explains the first photo best; at the stated turns where there are any."""
-    kinds, photos, turns = kinds_of(category), [view.rgba for view in views], _stated(views)
+    kinds, photos, turns = kinds_of(category, name), [view.rgba for view in views], _stated(views)
     focals_mm = [view.focal_mm for view in views]
     meant = fit(category, photos[0], or_of=kinds, focal_mm=focals_mm[0]) if kinds else None
     category = category if meant is None else meant.category

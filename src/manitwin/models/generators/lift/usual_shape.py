@@ -89,7 +89,7 @@ def _meant(name: str | None) -> list[Template]:
     if template is None:
         return []
     templates = load_templates()
-    return [template, *(templates[kind] for kind in kinds_of(template.category))]
+    return [template, *(templates[kind] for kind in kinds_of(template.category, name))]
 
 
 def _is_own_name(template: Template, name: str | None) -> bool:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from manitwin.geometry.solids.shapes import box, cylinder, lathe, polygon, prism, rectangle, rounded
 from manitwin.models.generators.templates.catalog.bottles import capped
 from manitwin.models.generators.templates.catalog.vessel import hollowed
@@ -50,10 +52,8 @@ def flip_top_pack(*, height_m: float, width: float, depth: float, lid: float) ->
     slit = prism(line, 2 * x).rotate((90, 0, 90)).translate((-x, 0, 0))
     core = box(x - 0.0012, y - 0.0012, 2 * h).translate((0, 0, -0.5 * h))
     model.cut("seam", slit - core, "seam")
-    at_front = low + (back - low) * 0.25  # of the slit's line, which runs over twice the depth
-    model.region(
-        "lid", "body", lambda centers: centers[:, 2] > at_front + (back - low) * (centers[:, 1] / y + 0.5) * 0.5, "lid"
-    )
+    rise = (back - low) / (2 * y)  # the slit is cut from twice the depth
+    model.region("lid", "body", lambda centers: centers[:, 2] > low + rise * (centers[:, 1] + y), "lid")
     model.region("base", "body", lambda centers: centers[:, 2] < 0.001 * h)
     model.point("lid", "face", "lid", (0.0, 0.0, h), (0.0, 0.0, 1.0))
     return model.point("base", "face", "base", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
@@ -116,6 +116,11 @@ def oblong_tin(*, length_m: float, width: float, height: float, corner: float) -
     return model.point("base", "face", "base", (0.0, 0.0, 0.002), (0.0, 0.0, -1.0))
 
 
+def _labelled(model: Model, low_m: float, high_m: float) -> Model:
+    """Give the body's wall between two heights, at which its profile has points, the looks of a label."""
+    return model.region("label", "body", lambda centers: (centers[:, 2] > low_m) & (centers[:, 2] < high_m), "label")
+
+
 @template("jam jar")
 @template("honey jar")
 @template("pickle jar")
@@ -133,10 +138,7 @@ def labelled_jar(*, height_m: float, width: float, neck: float, cap: float, labe
     low, high = (0.46 - 0.5 * label) * top, (0.46 + 0.5 * label) * top
     profile = [(r, 0.0), (r, low), (r, high), (r, 0.88 * top), (n, top), (n, top + 0.003)]
     cover = [(1.03 * n, top), (1.03 * n, h), (0.0, h)]
-    model = capped(Model(), profile, cover, 0.1 * h)
-    return model.region(
-        "label", "body", lambda centers: abs(centers[:, 2] - 0.5 * (low + high)) < 0.5 * (high - low), "label"
-    )
+    return _labelled(capped(Model(), profile, cover, 0.1 * h), low, high)
 
 
 @template("oil bottle")
@@ -147,10 +149,8 @@ def tall_bottle(*, height_m: float, width: float, shoulder: float, neck: float, 
     n, top, side = max(neck * r, 0.009), (1 - cap) * h, shoulder * h
     low, high = (0.48 - 0.5 * label) * side, (0.48 + 0.5 * label) * side
     profile = [(r, 0.0), (r, low), (r, high), (r, side), (n, 0.5 * (side + top)), (n, top)]
-    model = capped(Model(), profile, [(1.12 * n, top - 0.004), (1.12 * n, h), (0.0, h)], 0.08 * h)
-    return model.region(
-        "label", "body", lambda centers: abs(centers[:, 2] - 0.5 * (low + high)) < 0.5 * (high - low), "label"
-    )
+    cover = [(1.12 * n, top - 0.004), (1.12 * n, h), (0.0, h)]
+    return _labelled(capped(Model(), profile, cover, 0.08 * h), low, high)
 
 
 @template("glue bottle")
@@ -161,10 +161,12 @@ def glue_bottle(*, height_m: float, width: float, flat: float, shoulder: float, 
     low = shoulder * top
     outline = rounded([(0.94 * r, 0.0), (r, 0.04 * top), (r, low), (n, 0.97 * top), (n, top)], 0.12 * h)
     body = lathe([(0.0, 0.0), *outline, (0.0, top)])
-    # the sides are flattened, the neck is not
-    body = body.warp(
-        lambda p: (p[0], p[1] * (flat + (1 - flat) * min(max((p[2] - low) / (0.97 * top - low), 0.0), 1.0)), p[2])
-    )
+
+    def flattened(vertices: np.ndarray) -> np.ndarray:
+        """Flatten the sides, less and less towards the neck, which stays round."""
+        neckward = np.clip((vertices[:, 2] - low) / (0.97 * top - low), 0.0, 1.0)
+        return np.column_stack([vertices[:, 0], vertices[:, 1] * (flat + (1 - flat) * neckward), vertices[:, 2]])
+
     high = h - top
     tip = [
         (1.05 * n, top - 0.004),
@@ -173,7 +175,8 @@ def glue_bottle(*, height_m: float, width: float, flat: float, shoulder: float, 
         (0.2 * n + 0.001, h),
         (0.0, h),
     ]
-    model = Model().add("body", body).add("cap", lathe(rounded([(0.0, top - 0.004), *tip], 0.001)), "cap")
+    model = Model().add("body", body.warp_batch(flattened))
+    model.add("cap", lathe(rounded([(0.0, top - 0.004), *tip], 0.001)), "cap")
     model.region("base", "body", lambda centers: centers[:, 2] < 0.005 * h)
     model.point("nozzle", "tip", "cap", (0.0, 0.0, h), (0.0, 0.0, 1.0))
     return model.point("base", "face", "base", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))

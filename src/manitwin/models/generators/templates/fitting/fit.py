@@ -91,9 +91,8 @@ def kinds_of(category: str, name: str | None = None) -> list[str]:
         kinds = [other for other in templates if other != category and last in _heads(templates[other])]
         kinds = [other for other in kinds if not templates[other].told_in_full]
         kinds = [other for other in kinds if said is not None and load_priors()[other].container == said.container]
-    beside = [
-        other for other in templates if load_priors()[other].kin_of == category and not _says_which(name, category)
-    ]
+    told_apart = _says_which(name, category)
+    beside = [other for other in templates if load_priors()[other].kin_of == category and not told_apart]
     kinds += [other for other in beside if other not in kinds and not templates[other].told_in_full]
     return [other for other in kinds if said is not None and _about_as_large(lookup(other), said)][:_MOST_KINDS]
 

@@ -20,10 +20,10 @@ def template_outline_check(name: str | None, focal_mm: float | None = None) -> C
     template = template_for(name)
     if template is None:
         return None
-    category = template.category
+    category, kinds = template.category, kinds_of(template.category, name)
 
     def explains(rgba: np.ndarray) -> bool:
-        found = fit(category, rgba, or_of=kinds_of(category), focal_mm=focal_mm)
+        found = fit(category, rgba, or_of=kinds, focal_mm=focal_mm)
         return found is not None and found.residual.outline <= MOST_OUTLINE and found.residual.iou >= LEAST_IOU
 
     return explains
