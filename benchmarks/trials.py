@@ -43,6 +43,7 @@ NO_LIMITS = {
     "max_lift_displacement_m": np.inf,
     "max_displacement_m": np.inf,
     "stable_speed_m_s": np.inf,
+    "doubts_tried_again": False,
 }
 
 
@@ -175,7 +176,7 @@ def _compare(folders: list[Path], count: int) -> None:
             beside = poses.copy()
             beside[:, :3, 3] += rng.normal(0, BESIDE_M, (len(poses), 3))
             near = SapienTrial().run(body, gripper, beside, fine)
-            plain = SapienTrial().run(body, gripper, poses, _settings())
+            plain = SapienTrial().run(body, gripper, poses, replace(_settings(), doubts_tried_again=False))
         as_run = SapienTrial().run(body, gripper, poses, _settings())
         for name, results in zip(verdicts, (reference, near, plain, as_run), strict=True):
             verdicts[name] += [result.outcome == "held" for result in results]

@@ -38,7 +38,7 @@ class PointTrialsStage:
     """
 
     name: ClassVar[str] = "point_trials"
-    version: ClassVar[str] = "12"
+    version: ClassVar[str] = "13"
     reads: ClassVar[tuple[str, ...]] = (
         *READS, "hulls.npz", "points", "spare_grasp_points", "physical", "placements", "geometry?", "canonical.npz?",
         PROPOSALS.format(""), VERDICTS.format(""),

@@ -89,6 +89,7 @@ def with_flags(settings: BuildConfig, flags: Flags) -> BuildConfig:
     if quick:
         update["second_opinion"] = settings.second_opinion.model_copy(update={"enabled": False})
         update["robustness"] = settings.robustness.model_copy(update={"enabled": False})
+        update["verify"] = settings.verify.model_copy(update={"doubts_tried_again": False})
     return validated(BuildConfig, settings.model_copy(update=update).model_dump(), "the arguments")
 
 

@@ -12,6 +12,7 @@ from manitwin.config import Resource, VerifyConfig
 from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
 from manitwin.physics.confirmed_trial import ConfirmedTrial
+from manitwin.physics.sapien.trial import SapienTrial
 from manitwin.physics.trial import GraspTrial, TrialResult, TrialSettings
 from manitwin.pipeline.grasps import PROPOSALS, UNFILTERED
 from manitwin.pipeline.gripper_kinds import KINDS
@@ -30,7 +31,7 @@ class VerifyStage:
     gripper rejects the object; another gripper does not.
     """
 
-    version = "8"
+    version = "9"
     needs: Resource = "cpu"
 
     def __init__(self, settings: VerifyConfig, trial: GraspTrial, gripper: Gripper, suffix: str = ""):
@@ -73,6 +74,8 @@ def trial_settings(settings: VerifyConfig, gripper: Gripper) -> TrialSettings:
 def describe(trial: GraspTrial, settings: TrialSettings, object_friction: float) -> Trial:
     """Return what a twin says of the trial that its grasps went through: the settings that a user may set, and frictions."""
     numbers = {name: value for name, value in asdict(settings).items() if name in Trial.model_fields}
+    first = trial.first if isinstance(trial, ConfirmedTrial) else trial
+    numbers["doubts_tried_again"] = settings.doubts_tried_again and isinstance(first, SapienTrial)
     return Trial(
         engine=trial.name,
         confirmed_by=trial.confirmed_by if isinstance(trial, ConfirmedTrial) else None,

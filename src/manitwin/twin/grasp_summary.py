@@ -14,7 +14,8 @@ Outcome = Literal["held", "collides", "unreachable", "misses", "penetrates", "dr
 class Trial(Record):
     """The settings of the grasp trial: a success rate means nothing without them.
 
-    ``timestep_s`` is the engine's own for what is not light. ``confirmed_by`` is the engine that has to hold, too, a grasp in
+    ``timestep_s`` is the engine's own for what is not light. Where ``doubts_tried_again``, what fell or was just held was tried
+    again at 1/960 s and with 40 iterations. ``confirmed_by`` is the engine that has to hold, too, a grasp in
     which the object moved; None where there is none.
     """
 
@@ -30,6 +31,7 @@ class Trial(Record):
     max_displacement_m: Finite
     slide_distance_m: Finite
     confirmed_by: str | None = None
+    doubts_tried_again: bool = False
 
 
 class SecondOpinion(Record):
