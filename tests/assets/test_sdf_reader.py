@@ -181,7 +181,7 @@ def test_no_file_outside_of_the_models_folder_is_read(tmp_path: Path, uri: str) 
     (tmp_path / "in" / "link.stl").symlink_to(tmp_path / "secret.stl")
     asset = read(tmp_path / "in", mesh(uri))
     assert asset.visual == () and asset.missing_files == (uri,)
-    assert any("outside the asset's folder" in remark for remark in asset.remarks)
+    assert any("lies outside the folder above which nothing is read" in remark for remark in asset.remarks)
 
 
 @pytest.mark.parametrize(

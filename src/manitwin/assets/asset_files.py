@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from manitwin.assets.root import upward, with_the_path
+from manitwin.assets.root import private_folders, upward, with_the_path
 from manitwin.errors import AssetError, InputError
 from manitwin.formats.meshes.read import MeshFile, read_mesh
 from manitwin.formats.meshes.source import MeshLimits
@@ -24,6 +24,7 @@ MAX_FACES = 8_000_000  # of all shapes together: one mesh may be named by many o
 UNREAD_FORMATS = frozenset({".vtk", ".vtu", ".wrl", ".iv", ".x3d", ".3ds", ".fbx", ".off", ".ac", ".bin", ".mesh"})
 """Of meshes that descriptions name: for some engines, or for none but the one that they were made for."""
 MESHES = frozenset({".obj", ".stl", ".dae", ".msh", ".glb", ".gltf", ".ply", ".usd", ".usda", ".usdc", ".usdz"})
+OUTSIDE = " lies outside the folder above which nothing is read"
 MOST_NAMED = 3
 """Of the parts that are left out: of a robot's or a building's, a person reads the count."""
 _MOST_VAIN_SEARCHES, _MOST_TRIED = 8, 8
@@ -86,7 +87,7 @@ class AssetFiles:
         ``name`` is what the asset calls it, ``below`` more of its path where the asset says that elsewhere. Where no candidate
         is there, its path is looked up elsewhere below the root (``with_the_path``).
         """
-        outside = False
+        outside: Path | None = None
         tried: list[Path] = []
         for candidate in candidates:
             tried.append(candidate)
@@ -95,16 +96,24 @@ class AssetFiles:
                 self._note_above(found)
                 self.used.add(found)
                 return found
-            outside = outside or not inside
+            outside = candidate if outside is None and not inside else outside
         elsewhere = (
             self._in_other_letters(name, tried) or self._in_renamed_root(name, tried) or self._elsewhere(below or name)
         )
         if elsewhere is not None:
             return elsewhere
         self.missing.append(_short(name))
-        if outside:
-            self.remark(f"{_short(name)} lies outside the asset's folder and was not read")
+        if outside is not None:
+            self.remark(f"{_short(name)}{OUTSIDE}{self._folder_of_both(outside)}")
         return None
+
+    def _folder_of_both(self, candidate: Path) -> str:
+        """Return in words where a file outside of the root may be: the folder of both named, unless it is a whole home."""
+        root, place = self.root.resolve(), candidate.resolve()
+        both = Path(os.path.commonpath([root, place]))
+        if both in private_folders():
+            return f", {root}; put it there, and its path into the asset's file"
+        return f", {root}; where it is there, import with --root {both}"
 
     def _below(self, candidate: Path) -> tuple[Path | None, bool]:
         """Return a file below the root with its links resolved, else None, and whether its place would be below."""

@@ -25,13 +25,19 @@ def root_of(path: Path, named: Iterable[Path] = ()) -> Path:
     holding = [folder for folder in within if own.is_relative_to(folder)]
     if holding:
         return min(holding, key=lambda folder: len(folder.parts))
-    private = {Path.home().resolve(), *Path.home().resolve().parents}
+    private = private_folders()
     above = [folder for folder in (own, *own.parents) if folder not in private]
     for marks in ((REPOSITORY_MARK,), PACKAGE_MARKS):
         for folder in above:
             if any((folder / mark).exists() for mark in marks):
                 return folder
     return own
+
+
+def private_folders() -> frozenset[Path]:
+    """Return the user's home folder and those above it, which hold far more than an asset."""
+    home = Path.home().resolve()
+    return frozenset({home, *home.parents})
 
 
 def upward(folder: Path, root: Path) -> Iterator[Path]:

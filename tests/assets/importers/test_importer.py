@@ -43,6 +43,34 @@ def test_urdf_is_brought_to_the_object_frame(tmp_path: Path) -> None:
     assert "mass" not in record.missing and "friction" not in record.missing
 
 
+def test_a_mesh_above_the_file_is_read_below_the_root_that_is_named(tmp_path: Path) -> None:
+    """``thing/urdf/mug.urdf`` beside ``thing/mesh/mug.stl``, with nothing that says that these are one package."""
+    thing = tmp_path / "thing"
+    file = mug_urdf(thing / "urdf")
+    (thing / "mesh").mkdir()
+    (thing / "urdf" / "mug.stl").rename(thing / "mesh" / "mug.stl")
+    file.write_text(file.read_text().replace('filename="mug.stl"', 'filename="../mesh/mug.stl"'))
+    (refused,) = import_assets([file], tmp_path / "out")
+    assert refused.folder is None and "missing" not in str(refused.error)
+    assert f"lies outside the folder above which nothing is read, {thing / 'urdf'}" in str(refused.error)
+    assert str(refused.error).endswith(f"import with --root {thing})")
+    (taken,) = import_assets([file], tmp_path / "out", root=thing)
+    assert taken.record is not None and taken.record.mass_kg == 0.32
+    for wrong in (tmp_path / "elsewhere", thing / "mesh", file):
+        with pytest.raises(UsageError, match="not below the root"):
+            list(import_assets([file], tmp_path / "out", root=wrong))
+
+
+def test_a_file_of_the_whole_home_is_not_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    file = tmp_path / "downloads" / "mug.urdf"
+    file.parent.mkdir()
+    mesh = '<visual><geometry><mesh filename="../meshes/mug.obj"/></geometry></visual>'
+    file.write_text(f'<robot name="mug"><link name="l">{mesh}</link></robot>')
+    (remark,) = [each for each in read_asset(file).remarks if "lies outside" in each]
+    assert remark.endswith("; put it there, and its path into the asset's file") and "--root" not in remark
+
+
 def test_another_asset_of_the_same_name_gets_that_of_its_file_too(tmp_path: Path) -> None:
     for place, side in (("red/cup.urdf", 0.1), ("red/small_cup.urdf", 0.05), ("blue/cup.urdf", 0.2)):
         path = tmp_path / "in" / place
@@ -200,7 +228,7 @@ def test_one_bad_asset_does_not_stop_the_others(tmp_path: Path) -> None:
     results = list(import_assets([tmp_path / "in"], tmp_path / "out"))
     assert [r.folder.name for r in results if r.folder] == ["mug"]
     assert [r.path.name for r in results if r.error] == ["bad.urdf", "empty.urdf"]
-    assert "../x.stl is missing" in str(results[1].error)
+    assert "../x.stl lies outside" in str(results[1].error)
 
 
 def test_another_asset_of_the_same_name_is_written_beside_the_first(tmp_path: Path) -> None:

@@ -55,29 +55,33 @@ def import_assets(
     format: Format | Literal["auto"] = "auto",
     lock_joints: bool = False,
     each_object: bool = False,
+    root: Path | None = None,
 ) -> Iterator[Imported]:
     """Import all assets at and below paths into ``out``, each into a folder of its name; yield what became of each.
 
     What moves by joints is kept with its links and joints where the format's reader keeps them, with ``lock_joints`` taken as one
     rigid body, as ``read_asset`` has it. ``each_object``: all objects of an MJCF file that are free to move, and not its first.
+    ``root``: the folder above which nothing is read, of each asset that of ``root_of`` where it is not given.
     An asset that cannot be read, or not within limits of time and memory, is said and left out. Nothing is written over: an
     asset that is there already is left as it is, and another one of the same name gets a folder with the name of its file, or
-    else with a digest of what was imported. Raises UsageError for a path that is not there, and where a folder of another kind
-    has the name.
+    else with a digest of what was imported. Raises UsageError for a path that is not there or not below ``root``, and where a
+    folder of another kind has the name.
     """
     joints: Joints = "lock" if lock_joints else "keep"
     for path in paths:
         if not os.path.exists(path):
             raise UsageError(f"{path}: not there; give an asset's file or folder, or a folder of assets")
+        if root is not None and not (root.is_dir() and path.resolve().is_relative_to(root.resolve())):
+            raise UsageError(f"{path}: not below the root {root}; name a folder that it lies in, or leave the root out")
         for place in _places(path, format):
-            root = root_of(place, [path])
+            below = root_of(place, [path] if root is None else [root])
             try:
-                free = within_limits(COUNT, place, format, root) if each_object else 0
+                free = within_limits(COUNT, place, format, below) if each_object else 0
             except AssetError as error:
                 yield Imported(place, None, None, str(error))
                 continue
             for number in range(free) if free else (None,):
-                yield _import(place, out, format, root, joints, number)
+                yield _import(place, out, format, below, joints, number)
 
 
 def _import(

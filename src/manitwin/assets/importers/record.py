@@ -11,6 +11,7 @@ import trimesh
 from pydantic import ValidationError
 
 from manitwin.assets.asset import AnnotatedFrame, AnnotatedGrasps, Asset
+from manitwin.assets.asset_files import OUTSIDE
 from manitwin.assets.importers.dropped import (
     CENTER,
     INERTIA,
@@ -234,6 +235,9 @@ def _why(asset: Asset) -> str:
     lines: Iterator[str] = iter([*(f"{name} is missing" for name in asset.missing_files), *asset.remarks])
     first = next(lines, None)
     elsewhere = next((name for name in asset.missing_files if name.startswith(PACKAGE_SCHEMES)), None)
+    outside = next((remark for remark in asset.remarks if OUTSIDE in remark), None)
+    if elsewhere is None and outside is not None:
+        return f" ({outside})"
     if elsewhere is not None:
         remedy = f"; give the folder that holds {_package(elsewhere)!r} too{_where_a_package_is(asset)}"
     else:

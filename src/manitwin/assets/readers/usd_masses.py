@@ -15,6 +15,7 @@ from manitwin.assets.readers.usd_shapes import Felt, in_metres
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.usd_places import PlacedPrim
+from manitwin.formats.meshes.usd_units import kilograms_per_unit, metres_per_unit
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 
 _LARGEST_UNIT = 1e6
@@ -31,8 +32,10 @@ class StageUnits:
     @classmethod
     def of(cls, stage: Usd.Stage, source: MeshSource) -> StageUnits:
         """Read the units of a stage; raises AssetError for one that is no number above 0."""
-        declared = bool(UsdGeom.StageHasAuthoredMetersPerUnit(stage))
-        unit_m, unit_kg = UsdGeom.GetStageMetersPerUnit(stage), UsdPhysics.GetStageKilogramsPerUnit(stage)
+        said_m, said_kg = metres_per_unit(stage), kilograms_per_unit(stage)
+        declared = said_m is not None
+        unit_m = float(UsdGeom.LinearUnits.centimeters) if said_m is None else said_m
+        unit_kg = float(UsdPhysics.MassUnits.kilograms) if said_kg is None else said_kg
         if not (np.isfinite(unit_m) and 0 < unit_m < _LARGEST_UNIT):
             raise AssetError(
                 f"{source.path}: its metersPerUnit is {unit_m}; give a number above 0 and below {_LARGEST_UNIT:g}, such as 1"

@@ -46,6 +46,14 @@ def import_(
             "--each-object", help="Take every object of a scene (MJCF) that is free to move, not its first alone."
         ),
     ] = False,
+    root: Annotated[
+        Path | None,
+        typer.Option(
+            help="The folder above which nothing is read; else an asset's repository, package or own folder.",
+            metavar="FOLDER",
+            callback=choices.must_exist("a folder that the assets lie in"),
+        ),
+    ] = None,
     report: Annotated[
         Path | None,
         typer.Option(help="Also write as JSON what was kept and dropped of each asset, and why.", metavar="FILE"),
@@ -58,7 +66,8 @@ def import_(
     done = there = same = failed = 0
     first: dict[str, Path] = {}
     every = []
-    taken = import_assets(paths, out, format=format, lock_joints=lock_joints, each_object=each_object)  # type: ignore[arg-type]
+    wanted = {"lock_joints": lock_joints, "each_object": each_object, "root": root}
+    taken = import_assets(paths, out, format=format, **wanted)  # type: ignore[arg-type]
     for imported in taken:
         every.append(imported)
         if imported.record is None or imported.folder is None:

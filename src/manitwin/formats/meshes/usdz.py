@@ -16,6 +16,7 @@ from manitwin.formats.meshes.usd_errors import broken
 from manitwin.formats.meshes.usd_places import placed_prims
 from manitwin.formats.meshes.usd_skin import Skeletons, is_bound
 from manitwin.formats.meshes.usd_surfaces import PreviewSurfaces, UsdSurface
+from manitwin.formats.meshes.usd_units import metres_per_unit
 from manitwin.formats.meshes.usdz_package import UsdzArchive
 
 _UV_NAMES = ("st", "st0", "st_0", "UVMap", "uv", "map1", "Texture_uv")
@@ -44,7 +45,7 @@ def read_usdz(
 def _read(
     stage: Usd.Stage, archive: UsdzArchive, source: MeshSource
 ) -> tuple[list[trimesh.Trimesh], float | None, str | None]:
-    unit_m = UsdGeom.GetStageMetersPerUnit(stage) if UsdGeom.StageHasAuthoredMetersPerUnit(stage) else None
+    unit_m = metres_per_unit(stage)
     if unit_m is not None and not (np.isfinite(unit_m) and unit_m > 0):
         source.find(f"its metersPerUnit is {unit_m} and was not used")
         unit_m = None
