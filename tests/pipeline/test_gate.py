@@ -122,6 +122,13 @@ def test_what_is_as_large_as_such_things_are_is_told_so(tmp_path: Path, name: st
     assert rejection.reason == "absurd_size" and rejection.detail.endswith(said)
 
 
+def test_of_an_imported_asset_the_unit_of_its_file_is_to_blame(tmp_path: Path) -> None:
+    draft = _draft(tmp_path, _box(side=0.001))
+    draft.payload = Item(file=None, given="import.json")
+    said = "its file says so: mend the unit there and import it again, or give the longest side in metres"
+    assert _rejection(draft, tmp_path).detail.endswith(said)
+
+
 def test_four_things_side_by_side_are_rejected_with_their_number(tmp_path: Path) -> None:
     four = trimesh.util.concatenate([_box(0.08 * i) for i in range(4)])
     rejection = _rejection(_draft(tmp_path, four), tmp_path)

@@ -60,6 +60,7 @@ class GateStage:
                 self.settings.min_longest_side_m,
                 self.settings.max_longest_side_m,
                 prior=lookup(object_name(draft)),
+                imported=draft.payload.given is not None,
             ),
             self._check_single_object(draft, solid),
         ]
@@ -110,11 +111,18 @@ def check_positive_volume(solid: trimesh.Trimesh, min_thickness_share: float) ->
 
 
 def check_plausible_size(
-    solid: trimesh.Trimesh, metric: bool, smallest_m: float, largest_m: float, prior: Prior | None = None
+    solid: trimesh.Trimesh,
+    metric: bool,
+    smallest_m: float,
+    largest_m: float,
+    prior: Prior | None = None,
+    *,
+    imported: bool = False,
 ) -> Check:
     """Check the longest side where the scale is known; raises Rejected absurd_size.
 
-    ``prior``: what is usual of such things. It tells what truly is too large for hands from what has the wrong unit.
+    ``prior``: what is usual of such things. It tells what truly is too large for hands from what has the wrong unit, which
+    an ``imported`` asset's own file has.
     """
     side_m = float(np.ptp(solid.vertices, axis=0).max())
     if not metric:
@@ -123,6 +131,8 @@ def check_plausible_size(
         )
     if not smallest_m <= side_m <= largest_m:
         remedy = "give the right units (m, cm, mm), or the longest side in metres"
+        if imported:
+            remedy = "its file says so: mend the unit there and import it again, or give the longest side in metres"
         if side_m > largest_m and prior is None:
             remedy += "; what truly is that large, no gripper here holds"
         elif prior is not None and largest_m < side_m <= _LITTLE_LARGER * prior.longest_axis_m.high:

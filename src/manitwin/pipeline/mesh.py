@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -47,7 +47,7 @@ class MeshStage:
     settings: MeshConfig
 
     name: ClassVar[str] = "mesh"
-    version: ClassVar[str] = "19"
+    version: ClassVar[str] = "20"
     reads: ClassVar[tuple[str, ...]] = (f"{_GENERATED}?", "generation?", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry")
     needs: ClassVar[Resource] = "cpu"
@@ -65,7 +65,10 @@ class MeshStage:
         file = read_mesh(path, limits=self._limits())
         prior = lookup(object_name(draft))
         unit = _unit(file, draft, generated, prior)
-        parts = [bake_transform(part, np.diag([unit.factor, unit.factor, unit.factor, 1.0])) for part in file.parts]
+        if not generated:
+            unit = replace(unit, factor=unit.factor * _to_about_stated_size(file, unit.factor, draft))
+        to_metres = np.diag([unit.factor] * 3 + [1.0])
+        parts = [bake_transform(part, to_metres) for part in file.parts]
         soup = _soup(parts)
         _check_extent(soup, path)
         try:
@@ -98,7 +101,7 @@ class MeshStage:
             moved = ImportRecord.model_validate(known).moved(to_mesh)
             geometry["known"] = (moved if larger == 1.0 else moved.scaled(larger)).model_dump(mode="json")
         if draft.payload.given is not None:  # what else is given of the mesh has to follow it
-            geometry["input_to_object"] = (to_object @ np.diag([unit.factor] * 3 + [1.0])).tolist()
+            geometry["input_to_object"] = (sized @ to_metres).tolist()
         return {"geometry": geometry}
 
     def _solid(
@@ -160,6 +163,24 @@ def _input_path(draft: Draft[Item], generated: bool) -> Path:
     return Path(draft.payload.file)
 
 
+def _to_about_stated_size(file: MeshFile, factor: float, draft: Draft[Item]) -> float:
+    """Return the factor that brings the file's longest side, ``factor`` m for each of its units, to the length that was stated.
+
+    Repair goes by lengths in metres, such as the wall of an open sheet; turned as it stands, the thing may be a little longer.
+    """
+    longest_m = _stated_m(draft)
+    if longest_m is None:
+        return 1.0
+    side_m = factor * _longest(file)
+    return longest_m / side_m if side_m >= _LEAST_LENGTH_M else 1.0
+
+
+def _stated_m(draft: Draft[Item]) -> float | None:
+    """Return the longest side (m) that a person stated, in a review or with the input; None where nobody did."""
+    said = said_size(draft)
+    return draft.payload.longest_side_m if said is None else said.value
+
+
 def _to_stated_size(
     vertices: np.ndarray, faces: np.ndarray, draft: Draft[Item], prior: Prior | None, *, may_hold: bool
 ) -> tuple[float, bool]:
@@ -168,8 +189,7 @@ def _to_stated_size(
     ``may_hold``: else the volume that its name says it holds counts (``stated_volume``); not of a mesh of its own, which may
     have its walls.
     """
-    said = said_size(draft)
-    longest_m = draft.payload.longest_side_m if said is None else said.value
+    longest_m = _stated_m(draft)
     if longest_m is not None:
         return longest_m / float(extents_along_sides(vertices).max()), True
     volume_m3 = stated_volume_m3(object_name(draft), prior) if may_hold else None
@@ -199,16 +219,20 @@ def _up_is_convention(draft: Draft[Item]) -> bool:
 
 
 def _unit(file: MeshFile, draft: Draft[Item], generated: bool, prior: Prior | None) -> LengthUnit:
-    points = np.concatenate([part.vertices[np.unique(part.faces)] for part in file.parts])
-    longest = float(np.ptp(points, axis=0).max())
     if generated:
         # a generator's glTF says metres because glTF has no other unit; only the generator knows whether it meant them
         metric = bool(draft.field("generation").get("metric", False))
         return LengthUnit(file.unit_m or 1.0, metric, "declared" if metric else "unknown", None)
     usual = None if prior is None else (prior.longest_axis_m.low, prior.longest_axis_m.high)
     return decide_unit(
-        longest, user=draft.payload.units, file_unit_m=file.unit_m, expected_m=usual, file_format=file.format
+        _longest(file), user=draft.payload.units, file_unit_m=file.unit_m, expected_m=usual, file_format=file.format
     )
+
+
+def _longest(file: MeshFile) -> float:
+    """Return the longest side of a mesh along the axes of its file, in its units."""
+    points = np.concatenate([part.vertices[np.unique(part.faces)] for part in file.parts])
+    return float(np.ptp(points, axis=0).max())
 
 
 def _soup(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:

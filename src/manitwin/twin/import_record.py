@@ -116,6 +116,12 @@ class ImportRecord(Record):
         return bool(self.functional_points or self.grasp_points or self.grasps or self.rests) or self.format == "twin"
 
     @property
+    def has_lengths(self) -> bool:
+        """Whether the asset gives lengths beside its mesh: places, a centre of mass, an inertia, joints or parts."""
+        of_its_size = (self.center_of_mass_m, self.inertia_kg_m2, self.articulation, self.parts)
+        return self.has_places or any(each is not None for each in of_its_size)
+
+    @property
     def missing_files(self) -> list[str]:
         """The files that the asset names and that were not there, as it names them."""
         return [what.removeprefix(MISSING_FILE) for what in self.missing if what.startswith(MISSING_FILE)]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from typer import Typer
 from typer.testing import CliRunner
 
@@ -18,6 +19,7 @@ from manitwin.config import MeshConfig
 from manitwin.engine.ledger.ledger import Ledger
 from manitwin.engine.stage import Draft
 from manitwin.errors import UsageError
+from manitwin.formats.meshes.read import read_mesh
 from manitwin.formats.packed_source import pack_source
 from manitwin.geometry.poses import OBJECT_TO_GLTF
 from manitwin.pipeline.item import Item, twin_id
@@ -46,6 +48,29 @@ def test_imported_folder_is_one_item_in_metres_and_y_up(tmp_path: Path) -> None:
     )
     ((named,), _) = collect_items([folder], name="cup", license="MIT")
     assert (named.name, named.license) == ("cup", "MIT")
+
+
+def test_a_stated_longest_side_counts_where_the_mesh_alone_has_lengths(tmp_path: Path) -> None:
+    """A cylinder whose file has centimetres for metres, lying, so that it is also turned."""
+    shape = '<origin rpy="1.5707963267948966 0 0"/><geometry><cylinder radius="0.0003" length="0.002"/></geometry>'
+    (tmp_path / "bottle.urdf").write_text(
+        f'<robot name="bottle"><link name="a"><visual>{shape}</visual></link></robot>'
+    )
+    (one,) = import_assets([tmp_path / "bottle.urdf"], tmp_path / "imported")
+    assert one.folder is not None, one.error
+    ((item,), _) = collect_items([one.folder], longest_side_m=0.2)
+    assert (item.units, item.longest_side_m) == ("m", 0.2)
+    geometry = MeshStage(MeshConfig()).run(Draft("id", item, 0), tmp_path)["geometry"]
+    with np.load(tmp_path / "canonical.npz") as solid:
+        low, high = solid["vertices"].min(axis=0), solid["vertices"].max(axis=0)
+    assert (high - low).tolist() == pytest.approx([0.06, 0.06, 0.2], abs=1e-3)
+    (mesh,) = read_mesh(one.folder / "asset.glb").parts
+    moved = trimesh.transform_points(mesh.vertices, np.array(geometry["input_to_object"]))
+    assert np.allclose([moved.min(axis=0), moved.max(axis=0)], [low, high], atol=1e-6), "what is given follows the mesh"
+    with pytest.raises(
+        UsageError, match="declares a centre of mass, an inertia, places or joints at a size of its own"
+    ):
+        collect_items([imported(tmp_path)], longest_side_m=0.2)
 
 
 def test_folder_of_imported_assets_and_meshes_gives_each_once(tmp_path: Path) -> None:
