@@ -36,6 +36,12 @@ from manitwin.geometry.length_unit import decide_unit
         ),  # a chess piece, no garden one
         (3.7, {"expected_m": (0.08, 0.13)}, 0.0254, True, "guessed"),  # a mug in inches
         (1.8, {"expected_m": (0.05, 0.5)}, 0.0254, False, "guessed"),  # a thing of any size, and as likely 1.8 m long
+        (165.0, {"file_unit_m": 1.0, "file_format": "glb"}, 0.001, True, "guessed"),  # glTF has no unit but metres
+        (165.0, {"file_unit_m": 0.01, "file_format": "dae"}, 0.001, False, "guessed"),  # somebody wrote centimetres
+        (165.0, {"file_unit_m": 0.01, "file_format": "dae", "expected_m": (0.1, 0.2)}, 0.001, True, "guessed"),
+        (50.4, {"file_unit_m": 0.0254, "file_format": "step"}, 0.0254, True, "declared"),  # a tool of 1.28 m
+        (1000.0, {"file_unit_m": 0.001, "file_format": "3mf"}, 0.001, True, "declared"),  # a metre, and no unit cube
+        (50.4, {"file_unit_m": 0.0254, "file_format": "step", "user": "mm"}, 0.001, True, "user"),
         (0.89, {"file_unit_m": 1.0, "user": "none"}, 1.0, False, "user"),
     ],
 )

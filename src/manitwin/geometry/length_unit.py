@@ -25,6 +25,10 @@ _ANYTHING_M = (0.02, 0.6)  # the usual longest axis of a thing that nobody has n
 _OTHER_SIZE_SHARE = 0.1  # toys, samples and giants of a kind
 _DEVIATIONS_ACROSS = 3.29  # a usual interval holds nine of ten
 _NORMALISED = (1.0, 2.0)  # the longest axis of meshes that a generator or a viewer scaled to a unit cube
+_MADE_TO_SIZE = frozenset({"step", "3mf"})
+"""Formats of what is designed to be made: their unit is part of the design, and no viewer scales it."""
+_CHOICE_OF_UNIT = frozenset({"dae", "fbx", "usdz"})
+"""Formats that let their writer say any unit, and whose viewers do not care; glTF has metres alone, which many ignore."""
 _SLACK = 2.0  # a size outside the usual interval by more than this speaks against the unit
 
 
@@ -64,6 +68,8 @@ def decide_unit(
         return LengthUnit(factor, False, "user", None)
     if user != "auto":
         return LengthUnit(UNITS_M[user], True, "user", None)
+    if declared and file_format in _MADE_TO_SIZE:
+        return LengthUnit(factor, True, "declared", None)
     size_m = longest_axis * factor
     if expected_m is not None and _usual(size_m, expected_m):
         return LengthUnit(factor, True, "declared" if declared else "assumed", None)
@@ -93,7 +99,9 @@ def _guessed(
     shares = _STL_SHARES if file_format == "stl" else _SHARES
     weights = {n: shares[n] * _density(longest_axis * u, expected_m or _ANYTHING_M) for n, u in fitting.items()}
     best = max(weights, key=lambda name: weights[name])
-    if weights[best] >= _SURE * (sum(weights.values()) + _NO_UNIT_SHARE * _any_density()):
+    # a unit that somebody chose is no other one because it is wrong: the file may as well mean none, or a large thing
+    contradicts = declared and file_format in _CHOICE_OF_UNIT and expected_m is None
+    if not contradicts and weights[best] >= _SURE * (sum(weights.values()) + _NO_UNIT_SHARE * _any_density()):
         finding = f"{said}, which is implausible; read as {best}: {longest_axis * fitting[best]:.3g} m"
         return LengthUnit(fitting[best], True, "guessed", finding)
     usual = {

@@ -23,19 +23,19 @@ def _read(folder: Path, text: str, limits: MeshLimits | None = None) -> MeshFile
 
 
 @pytest.mark.parametrize("unit_cm", [1.0, 100.0, 2.54])
-def test_a_box_is_in_metres_where_it_is_placed(tmp_path: Path, unit_cm: float) -> None:
+def test_a_box_is_in_its_unit_where_it_is_placed(tmp_path: Path, unit_cm: float) -> None:
     read = _read(tmp_path, fbx_box(unit_cm=unit_cm))
     (part,) = read.parts
-    assert (read.format, read.unit_m, read.up, read.findings) == ("fbx", 1.0, "y", [])
-    metres = unit_cm / 100
-    assert np.allclose(part.extents, np.array([10, 20, 30]) * metres, rtol=1e-5)
-    assert np.allclose(part.bounds.mean(axis=0), [100 * metres, 0, 0], atol=1e-5)
-    assert part.volume == pytest.approx(6000 * metres**3, rel=1e-4), "faces look outward"
+    assert (read.format, read.up, read.findings) == ("fbx", "y", [])
+    assert read.unit_m == pytest.approx(unit_cm / 100)
+    assert np.allclose(part.extents, [10, 20, 30], rtol=1e-5), "which is what --units is about"
+    assert np.allclose(part.bounds.mean(axis=0), [100, 0, 0], rtol=1e-5, atol=1e-3)
+    assert part.volume == pytest.approx(6000, rel=1e-4), "faces look outward"
 
 
 def test_a_file_with_z_up_is_turned(tmp_path: Path) -> None:
     (part,) = _read(tmp_path, fbx_box(up=2)).parts
-    assert np.allclose(part.extents, [0.1, 0.3, 0.2], rtol=1e-5)
+    assert np.allclose(part.extents, [10, 30, 20], rtol=1e-5)
 
 
 def test_colours_are_kept(tmp_path: Path) -> None:

@@ -6,13 +6,14 @@ import tempfile
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import trimesh
 from trimesh.visual.material import PBRMaterial
 
 from manitwin.formats.fbx_names import beside, embedded_files
+from manitwin.formats.fbx_unit import fbx_unit_m
 from manitwin.formats.isolated import Limits, ProcessCrashed, run_isolated
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import (
@@ -67,8 +68,8 @@ class FbxMaterial:
     normal_texture: str | None
 
 
-def read_fbx(source: MeshSource) -> list[trimesh.Trimesh]:
-    """Read all meshes of an FBX file into parts in metres with Y up, whatever unit and axes it says; transforms are baked.
+def read_fbx(source: MeshSource) -> tuple[list[trimesh.Trimesh], float, Literal["y"]]:
+    """Read all meshes of an FBX file: parts in its unit with Y up, whatever axes it says, transforms baked; unit in metres.
 
     Raises InputError ``wrong_type`` where what ``manitwin[fbx]`` installs is missing, ``unreadable``, ``too_large``.
     """
@@ -92,7 +93,9 @@ def read_fbx(source: MeshSource) -> list[trimesh.Trimesh]:
         source.find("it is bound to a skeleton, or has morph targets; it was taken as it was modelled")
     held = embedded_files(data)
     known = [_material(each, held, source) for each in materials]
-    return [_part(mesh, known, source) for mesh in meshes]
+    unit_m = fbx_unit_m(data)
+    to_units = np.diag([*[1 / unit_m] * 3, 1.0])
+    return [bake_transform(_part(mesh, known, source), to_units) for mesh in meshes], unit_m, "y"
 
 
 def scene_of(data: bytes, max_faces: int) -> tuple[list[FbxMesh], list[FbxMaterial]]:

@@ -106,7 +106,7 @@ def _read(format: str, source: MeshSource) -> tuple[list[trimesh.Trimesh], float
     if format == "3mf":
         return *read_three_mf(source), None
     if format == "fbx":
-        return read_fbx(source), 1.0, "y"
+        return read_fbx(source)
     if format == "step":
         return read_step(source), 1.0, None
     readers = {"obj": read_obj, "ply": read_ply, "stl": read_stl, "msh": read_msh, "off": read_off}
