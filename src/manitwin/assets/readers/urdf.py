@@ -19,6 +19,7 @@ from manitwin.assets.licence_text import stated_licence
 from manitwin.assets.read import only_file
 from manitwin.assets.readers.drake_friction import drake_contact
 from manitwin.assets.readers.joint_elements import urdf_joints
+from manitwin.assets.readers.partnet_mobility import with_category
 from manitwin.assets.readers.upright import Shapes, joined, upright_shapes
 from manitwin.assets.readers.urdf_links import Placed, chosen_links
 from manitwin.assets.readers.urdf_shapes import LinkShapes
@@ -66,7 +67,8 @@ def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS,
     remark, or held as the file stands (``joints``). Raises AssetError naming what is broken. Source: the URDF XML
     specification of ROS.
     """
-    return asset_of(open_urdf(path, root, limits, joints=joints), path)
+    found = open_urdf(path, root, limits, joints=joints)
+    return with_category(asset_of(found, path), found.file, found.files)
 
 
 def open_urdf(
