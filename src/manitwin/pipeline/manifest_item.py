@@ -16,7 +16,7 @@ from manitwin.pipeline.inspection import imported
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.stated_place import BOX, MASK, require_of_photo, stated_box_px, stated_mask
 from manitwin.pipeline.stated_size import stated_size_m, with_defaults
-from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH, is_imported, read_import_record
+from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH, is_imported
 
 _COLUMNS_SHOWN = 20
 LONGEST = {"name": 200, "text": 4000, "license": 200, "attribution": 4000, "file": 4095, "poses": 4095, "mask": 4095}
@@ -134,13 +134,9 @@ def shortened(path: str) -> str:
 def _imported_item(folder: Path, values: dict[str, Any], where: str) -> Item:
     """Return the item of an imported asset; unit and axes are those that the import wrote, whatever the user says.
 
-    A stated longest side counts where nothing but the mesh is of that size: files of some converters have the wrong unit.
+    A stated longest side counts: files of some converters have the wrong unit, and those of some data sets have none.
     """
     longest_side_m = stated_size_m(values, where)
-    if longest_side_m is not None and read_import_record(folder / IMPORT_RECORD).has_lengths:
-        cause = "the asset declares a centre of mass, an inertia, places or joints at a size of its own"
-        remedy = f"mend the unit in its file and import it again, or build its {IMPORTED_MESH} alone, with --units none"
-        raise UsageError(f"{where}: longest_side_m: {cause}; {remedy}")
     require_of_photo(values, str(folder / IMPORTED_MESH), where)
     name, license_, attribution = imported(folder / IMPORT_RECORD)
     return Item(

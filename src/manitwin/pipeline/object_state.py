@@ -26,6 +26,8 @@ from manitwin.render.cameras import Camera
 from manitwin.twin.grasp_table import JOINTS
 from manitwin.twin.import_record import ImportRecord, read_import_record
 
+_ROUNDING = 1e-9  # of a factor of one
+
 KEPT = 3
 """A worker has the stages of so many items in turn where two work: of each of two, one is done and one waits beside it;
 one more would spare a worker a few loads, and costs it 10 MB."""
@@ -155,7 +157,13 @@ def read_given(draft: Draft[Item]) -> ImportRecord | None:
     if draft.payload.given is None:
         return None
     record = read_import_record(Path(draft.payload.given))
-    return record.moved(np.array(draft.field("geometry")["input_to_object"]) @ OBJECT_TO_GLTF)
+    to_object = np.array(draft.field("geometry")["input_to_object"]) @ OBJECT_TO_GLTF
+    larger = float(np.cbrt(np.linalg.det(to_object[:3, :3])))  # than its file says, where a person does
+    if abs(larger - 1.0) <= _ROUNDING:
+        return record.moved(to_object)
+    rigid = np.eye(4)
+    rigid[:3] = to_object[:3] / larger
+    return record.moved(rigid).resized(larger)
 
 
 def object_name(draft: Draft[Item]) -> str | None:

@@ -116,12 +116,6 @@ class ImportRecord(Record):
         return bool(self.functional_points or self.grasp_points or self.grasps or self.rests) or self.format == "twin"
 
     @property
-    def has_lengths(self) -> bool:
-        """Whether the asset gives lengths beside its mesh: places, a centre of mass, an inertia, joints or parts."""
-        of_its_size = (self.center_of_mass_m, self.inertia_kg_m2, self.articulation, self.parts)
-        return self.has_places or any(each is not None for each in of_its_size)
-
-    @property
     def missing_files(self) -> list[str]:
         """The files that the asset names and that were not there, as it names them."""
         return [what.removeprefix(MISSING_FILE) for what in self.missing if what.startswith(MISSING_FILE)]
@@ -170,6 +164,23 @@ class ImportRecord(Record):
                     for point in getattr(self, name)
                 ]
                 for name in ("functional_points", "grasp_points")
+            }
+        )
+
+    def resized(self, factor: float) -> ImportRecord:
+        """Return the record of an asset whose file has wrong lengths: all are ``factor`` times as long, its masses stay.
+
+        Grasps are left out: their jaws do not grow with it.
+        """
+        center, inertia = self.center_of_mass_m, self.inertia_kg_m2
+        grown = np.diag([factor, factor, factor, 1.0])
+        return self.scaled(factor).model_copy(
+            update={
+                "center_of_mass_m": None if center is None else (factor * np.array(center)).tolist(),
+                "inertia_kg_m2": None if inertia is None else (factor**2 * np.array(inertia)).tolist(),
+                "grasps": [],
+                "rests": [(grown @ np.array(rest) @ np.linalg.inv(grown)).tolist() for rest in self.rests],
+                "articulation": None if self.articulation is None else self.articulation.scaled(factor),
             }
         )
 

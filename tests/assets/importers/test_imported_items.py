@@ -11,6 +11,7 @@ import trimesh
 from typer import Typer
 from typer.testing import CliRunner
 
+from articulated_assets import write_assets
 from foreign_assets import mug_urdf
 from input_items import collect_items
 from manitwin.assets.importers.importer import import_assets
@@ -24,6 +25,7 @@ from manitwin.formats.packed_source import pack_source
 from manitwin.geometry.poses import OBJECT_TO_GLTF
 from manitwin.pipeline.item import Item, twin_id
 from manitwin.pipeline.mesh import MeshStage
+from manitwin.pipeline.object_state import read_given
 
 EARLIER = ("file", "text", "name", "units", "up", "license", "attribution")
 """What an item was before it could be imported, varied or shown by several photos."""
@@ -50,7 +52,7 @@ def test_imported_folder_is_one_item_in_metres_and_y_up(tmp_path: Path) -> None:
     assert (named.name, named.license) == ("cup", "MIT")
 
 
-def test_a_stated_longest_side_counts_where_the_mesh_alone_has_lengths(tmp_path: Path) -> None:
+def test_a_stated_longest_side_counts(tmp_path: Path) -> None:
     """A cylinder whose file has centimetres for metres, lying, so that it is also turned."""
     shape = '<origin rpy="1.5707963267948966 0 0"/><geometry><cylinder radius="0.0003" length="0.002"/></geometry>'
     (tmp_path / "bottle.urdf").write_text(
@@ -67,10 +69,36 @@ def test_a_stated_longest_side_counts_where_the_mesh_alone_has_lengths(tmp_path:
     (mesh,) = read_mesh(one.folder / "asset.glb").parts
     moved = trimesh.transform_points(mesh.vertices, np.array(geometry["input_to_object"]))
     assert np.allclose([moved.min(axis=0), moved.max(axis=0)], [low, high], atol=1e-6), "what is given follows the mesh"
-    with pytest.raises(
-        UsageError, match="declares a centre of mass, an inertia, places or joints at a size of its own"
-    ):
-        collect_items([imported(tmp_path)], longest_side_m=0.2)
+
+
+def test_what_an_asset_gives_grows_to_the_longest_side_that_is_stated(tmp_path: Path) -> None:
+    """A chest of drawers whose lengths are too short: masses stay, and neither an axis nor a turn is scaled."""
+    (tmp_path / "in").mkdir()
+    (one,) = import_assets([write_assets(tmp_path / "in")["drawers"]], tmp_path / "out")
+    assert one.folder is not None and one.record is not None, one.error
+    given = []
+    for longest_side_m in (None, 0.9):
+        ((item,), _) = collect_items([one.folder], longest_side_m=longest_side_m)
+        draft = Draft("id", item, 0)
+        draft.fields |= MeshStage(MeshConfig()).run(draft, tmp_path)
+        with np.load(tmp_path / "canonical.npz") as solid:
+            longest_m = float(np.ptp(solid["vertices"], axis=0).max())
+        found = read_given(draft)
+        assert found is not None and found.articulation is not None
+        given.append((longest_m, found, found.articulation))
+    (was_m, before, stood), (is_m, after, moves) = given
+    factor = is_m / was_m
+    assert is_m == pytest.approx(0.9) and factor > 1.5
+    for old, new in zip(stood.joints, moves.joints, strict=True):
+        assert np.allclose(new.axis, old.axis)
+        assert np.allclose(new.origin_m, factor * np.array(old.origin_m))
+        assert old.type == "prismatic" and old.upper is not None and new.upper == pytest.approx(factor * old.upper)
+    for old_link, new_link in zip(stood.links, moves.links, strict=True):
+        assert new_link.mass_kg == old_link.mass_kg
+        assert np.allclose(new_link.inertia_kg_m2, factor**2 * np.array(old_link.inertia_kg_m2), rtol=1e-6, atol=0)
+    assert after.mass_kg == before.mass_kg is not None
+    assert np.allclose(after.center_of_mass_m, factor * np.array(before.center_of_mass_m), atol=1e-9)
+    assert np.allclose(after.inertia_kg_m2, factor**2 * np.array(before.inertia_kg_m2), rtol=1e-6, atol=1e-12)
 
 
 def test_folder_of_imported_assets_and_meshes_gives_each_once(tmp_path: Path) -> None:
