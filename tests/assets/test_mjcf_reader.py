@@ -95,6 +95,31 @@ def test_colours_are_those_of_a_plain_texture_and_of_the_geom_before_its_materia
     assert _base_colors(path) == [(0, 255, 0), (255, 0, 0), (0, 0, 255)]
 
 
+def test_a_picture_on_a_shape_without_texture_coordinates_is_its_mean_colour(tmp_path: Path) -> None:
+    """Unnamed textures have the name of their file; of a grid of pictures the named cells count."""
+    Image.new("RGB", (4, 4), (200, 100, 0)).save(tmp_path / "wood.png")
+    sides = Image.new("RGB", (40, 30), (0, 0, 0))
+    sides.paste((255, 0, 0), (10, 10, 20, 20))
+    sides.save(tmp_path / "sides.png")
+    before = (
+        '<asset><texture file="wood.png"/><material name="wooden" texture="wood"/>'
+        '<texture name="s" file="sides.png" gridsize="3 4" gridlayout=".....F......"/><material name="red" texture="s"/>'
+        '<texture name="c" type="cube" builtin="checker" width="8" height="8" rgb1="1 1 1" rgb2="0 0 1"/>'
+        '<material name="checked" texture="c"/></asset>'
+    )
+    geoms = "".join(f'<geom type="box" size="1 1 1" material="{name}"/>' for name in ("wooden", "red", "checked"))
+    path = mjcf(tmp_path, f"<body>{geoms}</body>", before)
+    wooden, red, checked = _base_colors(path)  # which are linear
+    assert np.allclose(
+        wooden, [round(255 * ((c / 255 + 0.055) / 1.055) ** 2.4) if c else 0 for c in (200, 100, 0)], atol=1
+    )
+    assert red == (255, 0, 0) and np.allclose(checked, (128, 128, 255), atol=1)
+    said = read_asset(path).remarks
+    assert any("shown as their mean colour" in each for each in said) and any(
+        "shown as one colour" in each for each in said
+    )
+
+
 def test_mesh_that_is_not_there_is_missing(tmp_path: Path) -> None:
     asset_xml = '<asset><mesh name="m" file="../../gone.stl"/></asset>'
     geoms = '<geom type="mesh" mesh="m"/><geom size="0.1"/>'

@@ -17,7 +17,7 @@ from manitwin.assets.readers.mjcf_dialects import MOST_LEFT_OUT, leave_out_unkno
 from manitwin.assets.readers.mjcf_document import MjcfSource
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.source import MeshLimits, MeshSource
-from manitwin.formats.meshes.textures import bake_transform, decode_texture
+from manitwin.formats.meshes.textures import bake_transform, decode_texture, linear_to_srgb, srgb_to_linear
 from manitwin.formats.xml_file import xml_text
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 
@@ -27,6 +27,10 @@ _LEAST_ROWS, _FEW_MESHES = 2, 3
 NO_OBJECTS = "planes and height fields were left out: they are no objects"
 _RGB = int(mujoco.mjtTextureRole.mjTEXROLE_RGB)
 _FLAT = int(mujoco.mjtBuiltin.mjBUILTIN_FLAT)
+_PATTERNS = (int(mujoco.mjtBuiltin.mjBUILTIN_GRADIENT), int(mujoco.mjtBuiltin.mjBUILTIN_CHECKER))
+_SIDES = "RLUDFB"
+"""Letters of the sides of a cube in the layout of a texture's grid (MJCF reference, texture/gridlayout)."""
+_CELL = 32
 
 
 @dataclass(frozen=True)
@@ -46,11 +50,12 @@ class CompiledMjcf:
 class MaterialTextures:
     """What the textures of materials show, by the material's name.
 
-    ``images`` are colour images, ``plain`` the sRGB colour ``(3,)`` of those that MuJoCo fills with one, ``lost`` has the
-    materials whose image could not be read.
+    ``images`` are colour images, ``means`` their linear mean colours ``(3,)``, ``plain`` the sRGB colour ``(3,)`` of those that
+    MuJoCo fills with one or draws a pattern of, ``lost`` has the materials whose image could not be read.
     """
 
     images: dict[str, Image.Image]
+    means: dict[str, np.ndarray]
     plain: dict[str, np.ndarray]
     lost: frozenset[str]
 
@@ -169,26 +174,65 @@ def _reference(mesh: Any) -> np.ndarray:
 def _take_textures(source: MjcfSource, spec: Any, files: AssetFiles) -> MaterialTextures:
     """Read the colour textures of materials and take all textures out of the spec."""
     shown: dict[str, Image.Image | np.ndarray | None] = {}
+    means: dict[str, np.ndarray] = {}
+    patterns: set[str] = set()
     for texture in spec.textures:
         if texture.file:
-            name = texture.name or Path(source.places[texture.file][0]).stem
-            shown[name] = _image(_find(source, texture.file, files), files, files.limits)
+            image = _image(_find(source, texture.file, files), files, files.limits)
+            # one without a name is called as its file, in whose place MuJoCo is given a key
+            for name in {texture.name, Path(source.places[texture.file][0]).stem} - {""}:
+                if name == texture.name or texture.name in ("", Path(texture.file).stem):
+                    shown[name] = image
+                    if image is not None:
+                        means[name] = _mean_color(image, texture)
         elif int(texture.builtin) == _FLAT:
             shown[texture.name] = np.array(texture.rgb1, float)
+        elif int(texture.builtin) in _PATTERNS:
+            both = np.clip(np.array([texture.rgb1, texture.rgb2], float), 0, 1)
+            shown[texture.name] = linear_to_srgb(srgb_to_linear(both).mean(axis=0))
+            patterns.add(texture.name)
+        elif any(texture.cubefiles):
+            shown[texture.name] = None
+            patterns.add(texture.name)
     by_material: dict[str, Image.Image | np.ndarray | None] = {}
+    mean_of: dict[str, np.ndarray] = {}
     for material in spec.materials:
-        named = [name for name in (material.textures[_RGB], material.textures[0]) if name in shown]
+        named = [name for name in (material.textures[_RGB], material.textures[0]) if name and name in shown]
         if named:
-            by_material[material.name] = next((shown[name] for name in named if shown[name] is not None), None)
+            chosen = next((name for name in named if shown[name] is not None), named[0])
+            by_material[material.name] = shown[chosen]
+            if chosen in means:
+                mean_of[material.name] = means[chosen]
+            if chosen in patterns:
+                files.remark(
+                    "patterns that MuJoCo draws, and pictures of the six sides of a cube, are shown as one colour"
+                )
         for role in range(len(material.textures)):
             material.textures[role] = ""
     for texture in list(spec.textures):
         spec.delete(texture)
     return MaterialTextures(
         {name: what for name, what in by_material.items() if isinstance(what, Image.Image)},
+        mean_of,
         {name: what for name, what in by_material.items() if isinstance(what, np.ndarray)},
         frozenset(name for name, what in by_material.items() if what is None),
     )
+
+
+def _mean_color(image: Image.Image, texture: Any) -> np.ndarray:
+    """Return the linear mean colour ``(3,)`` of a texture's image: of those cells of its grid that its layout names."""
+    rows, columns = (max(1, int(count)) for count in texture.gridsize)
+    layout = "".join(str(letter) for letter in texture.gridlayout)
+    named = [place for place in range(rows * columns) if place < len(layout) and layout[place] in _SIDES]
+    picture = image.convert("RGB")
+    width, height = picture.width / columns, picture.height / rows
+    boxes = [
+        (column * width, row * height, (column + 1) * width, (row + 1) * height)
+        for row, column in (divmod(place, columns) for place in (named if rows * columns > 1 else []))
+    ]
+    cells = [picture.resize((_CELL, _CELL), Image.Resampling.BOX, box) for box in boxes or [(0, 0, *picture.size)]]
+    seen = np.array([np.asarray(cell, float).reshape(-1, 3) for cell in cells]) / 255
+    return np.asarray(srgb_to_linear(seen).mean(axis=(0, 1)))
 
 
 def _take_height_fields(source: MjcfSource, spec: Any, files: AssetFiles) -> None:

@@ -91,9 +91,9 @@ class BodyShapes:
     def _parts(self, geom: int, body_to_asset: np.ndarray) -> list[trimesh.Trimesh]:
         model = self._model
         pose = body_to_asset @ transform(rotation_from_quaternion_wxyz(model.geom_quat[geom]), model.geom_pos[geom])
-        material = self._material(geom)
         if int(model.geom_type[geom]) in _MESH_KINDS:
-            return self._mesh(geom, pose, material)
+            return self._mesh(geom, pose)
+        material = self._material(geom, pictured=False)
         kind, size = int(model.geom_type[geom]), np.array(model.geom_size[geom])
         if self._planes and kind == int(_KINDS.mjGEOM_PLANE):
             solid: trimesh.Trimesh | None = _sheet(size)
@@ -108,19 +108,28 @@ class BodyShapes:
         name = model.geom(geom).name or f"geom_{geom:02d}"
         return [bake_transform(make_part(solid.vertices, solid.faces, material=material, name=name), pose)]
 
-    def _mesh(self, geom: int, pose: np.ndarray, material: PBRMaterial) -> list[trimesh.Trimesh]:
+    def _mesh(self, geom: int, pose: np.ndarray) -> list[trimesh.Trimesh]:
         model, mesh = self._model, int(self._model.geom_dataid[geom])
         parts = self._compiled.meshes.get(model.mesh(mesh).name)
         if parts is None:  # written out in the file: as MuJoCo has it, in the frame of its inertia
             vertices, faces = _written_out(model, mesh)
             self._files.count(len(faces))
+            material = self._material(geom, pictured=False)
             return [bake_transform(make_part(vertices, faces, material=material, name=model.mesh(mesh).name), pose)]
         self._files.count(sum(len(part.faces) for part in parts))
         inertia_to_mesh = transform(rotation_from_quaternion_wxyz(model.mesh_quat[mesh]), model.mesh_pos[mesh])
         to_asset = pose @ inverse(inertia_to_mesh)
-        return [bake_transform(_dressed(part, material), to_asset) for part in parts]
+        materials = {
+            has_uv: self._material(geom, pictured=has_uv) for has_uv in {uv_of(part) is not None for part in parts}
+        }
+        return [bake_transform(_dressed(part, materials[uv_of(part) is not None]), to_asset) for part in parts]
 
-    def _material(self, geom: int) -> PBRMaterial:
+    def _material(self, geom: int, *, pictured: bool) -> PBRMaterial:
+        """Return the material of a geom; ``pictured``: its shape says where a picture lies, else this is its mean colour.
+
+        MuJoCo lays pictures on shapes without texture coordinates by projection. Who measures pictures is told of them all.
+        """
+        pictured = pictured or not self._files.limits.decode_textures
         model, index = self._model, int(self._model.geom_matid[geom])
         own = index < 0 or not np.allclose(model.geom_rgba[geom], _DEFAULT_RGBA)
         rgba = np.array(model.geom_rgba[geom] if own else model.mat_rgba[index], float)
@@ -129,11 +138,17 @@ class BodyShapes:
         paint = self._compiled.paint
         if name is not None and name in paint.plain:
             rgba[:3] *= paint.plain[name]
-        base_color = (*srgb_to_linear(np.clip(rgba[:3], 0, 1)).tolist(), alpha)
+        linear = srgb_to_linear(np.clip(rgba[:3], 0, 1))
+        if name in paint.means and not pictured:
+            linear = linear * paint.means[name]
+            self._files.remark(
+                "pictures that MuJoCo projects onto shapes without texture coordinates are shown as their mean colour"
+            )
+        base_color = (*linear.tolist(), alpha)
         return pbr_material(
             name,
             base_color=color_of_lost_texture(base_color) if name in paint.lost else base_color,
-            base_color_texture=None if name is None else paint.images.get(name),
+            base_color_texture=paint.images.get(name) if name is not None and pictured else None,
             alpha_mode="BLEND" if alpha < 1 else None,
         )
 
