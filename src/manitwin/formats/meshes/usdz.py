@@ -87,7 +87,10 @@ def mesh_parts(
         return []
     points, sizes, indices = polygons
     if _is_subdivided(mesh):
-        source.find("subdivision surfaces in it were read as the meshes that control them, which are a little larger")
+        source.find(
+            "subdivision surfaces in it were read as the meshes that control them: larger than they are, with corners where"
+            " they are round, the more so the coarser the mesh"
+        )
     if is_bound(mesh.GetPrim()):
         source.find("it is bound to a skeleton; it was taken in the first pose that the file holds")
         points = skeletons.posed(mesh.GetPrim(), points)
