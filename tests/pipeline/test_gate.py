@@ -89,6 +89,21 @@ def test_film_and_inside_out_solid_are_degenerate(tmp_path: Path, flat: bool) ->
     assert _rejection(_draft(tmp_path, mesh), tmp_path).reason == "degenerate"
 
 
+@pytest.mark.parametrize("far_m", [0.0, 0.06])
+def test_a_solid_with_a_part_inside_out_is_degenerate_and_one_with_a_cavity_is_not(
+    tmp_path: Path, far_m: float
+) -> None:
+    """A box within the other, inside out, is a cavity; beside it, it weighs less than nothing there."""
+    hollow = trimesh.creation.box((0.03, 0.03, 0.03)).apply_translation((far_m, 0, 0.025))
+    hollow.invert()
+    draft = _draft(tmp_path, trimesh.util.concatenate([_box(), hollow]))
+    if far_m == 0.0:
+        assert _gate(draft, tmp_path)["positive_volume"]["passed"]
+        return
+    rejection = _rejection(draft, tmp_path)
+    assert rejection.reason == "degenerate" and rejection.detail.startswith("parts of the solid are inside out")
+
+
 def test_a_film_that_rounding_makes_negative_is_not_said_to_be_inside_out(tmp_path: Path) -> None:
     sheet = trimesh.Trimesh(
         [[0, 0, 1e-18], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 3], [1, 2, 3], [0, 3, 2], [0, 2, 1]]

@@ -12,6 +12,7 @@ import trimesh
 from manitwin.config import GateConfig, Resource
 from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
+from manitwin.geometry.mass_properties import solid_mass_properties
 from manitwin.geometry.repair.components import separate_objects
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.prior_records import Prior
@@ -22,6 +23,7 @@ from manitwin.pipeline.object_state import cut_out_photos, load_solid, object_na
 from manitwin.pipeline.size_remarks import TRULY_LARGE
 from manitwin.twin.record_values import Check
 
+_ROUNDING = 1e-9  # of the largest second moment
 _LITTLE_LARGER = 1.25
 """Times the largest such things: what is that little larger is a large one, and no unit explains it."""
 
@@ -33,7 +35,7 @@ class GateStage:
     """
 
     name: ClassVar[str] = "gate"
-    version: ClassVar[str] = "4"
+    version: ClassVar[str] = "5"
     reads: ClassVar[tuple[str, ...]] = (
         "canonical.npz", "canonical.glb", "geometry", "views/", "cameras", "naming?", "photo.png?", "photos/?",
     )  # fmt: skip
@@ -94,9 +96,10 @@ def check_watertight(watertight: bool, repairs: list[str]) -> Check:
 
 
 def check_positive_volume(solid: trimesh.Trimesh, min_thickness_share: float) -> Check:
-    """Check that the solid is not inside out and thicker than a film; raises Rejected degenerate.
+    """Check that the solid is not inside out, nor any large part of it, and thicker than a film; raises Rejected degenerate.
 
-    Thickness is twice the volume over the area: that of a plate with the same volume and area.
+    Thickness is twice the volume over the area: that of a plate with the same volume and area. Of matter that is nowhere less
+    than none the second moment is positive in every direction (else engines refuse the inertia: A + B < C).
     """
     thickness_m = 2 * float(solid.volume) / float(solid.area) if solid.area > 0 else 0.0
     limit_m = min_thickness_share * float(np.linalg.norm(np.ptp(solid.vertices, axis=0)))
@@ -105,6 +108,15 @@ def check_positive_volume(solid: trimesh.Trimesh, min_thickness_share: float) ->
         detail = (
             f"the solid is {what}: mean thickness {thickness_m:.3g} m, at least {limit_m:.3g} m;"
             " give a mesh that encloses a volume"
+        )
+        raise Rejected("degenerate", detail, "gate")
+    inertia = solid_mass_properties(solid, 1.0).inertia_kg_m2
+    known = bool(np.isfinite(inertia).all())
+    moments = np.linalg.eigvalsh(np.trace(inertia) / 2 * np.eye(3) - inertia) if known else np.full(3, np.nan)
+    if not moments[0] >= -_ROUNDING * moments[-1]:
+        detail = (
+            "parts of the solid are inside out: in one direction its second moment is below zero, as no body's is;"
+            " give a mesh that is closed, all of its faces looking outward"
         )
         raise Rejected("degenerate", detail, "gate")
     return Check(name="positive_volume", passed=True, value=thickness_m, limit=limit_m, message="mean thickness, m")
