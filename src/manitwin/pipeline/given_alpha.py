@@ -11,6 +11,7 @@ from manitwin.formats.image_file import MIN_SIDE_PX
 from manitwin.formats.outline_mask import read_mask
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.matting.matte import TRANSPARENT_SHARE, DoubtedCutOut, Matte
+from manitwin.pipeline.drawn_border import BORDERED, without_border
 
 OPAQUE = 250
 """Alpha from which a pixel counts as opaque: what compresses with losses is off by a few."""
@@ -37,13 +38,17 @@ def as_given(pixels: np.ndarray, name: str | None) -> Given:
     """Return what of a picture ``(H, W, 3 or 4) uint8`` is cut out, where a person calls the thing ``name``.
 
     Where what is opaque is an upright rectangle with bars around, the name says whether that is the thing (a book, a box) or a
-    picture of it, which is then taken out of its bars; it is doubted where there is no name, or one that is not known.
+    picture of it, which is then taken out of its bars; it is doubted where there is no name, or one that is not known. A border
+    that was drawn around a photo is cut off (``drawn_border``).
     """
     pixels, findings = usable(pixels)
+    rectangular = is_rectangular(name)
+    if pixels.shape[2] == 3 or pixels[..., 3].min() == 255:
+        inside = without_border(np.ascontiguousarray(pixels[..., :3]), rectangular)
+        return Given(pixels, findings) if inside is None else Given(inside, (*findings, BORDERED))
     framed = framed_picture(pixels)
     if framed is None:
         return Given(pixels, findings)
-    rectangular = is_rectangular(name)
     if rectangular is False:
         return Given(framed, (*findings, FRAMED))
     return Given(pixels, findings, is_doubted=rectangular is None)
