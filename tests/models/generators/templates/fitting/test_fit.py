@@ -188,6 +188,9 @@ def test_names_of_templates_and_of_priors_find_a_template() -> None:
     assert "mallet" in kinds_of("hammer"), "the priors have it beside the hammer"
     assert "mallet" in kinds_of("hammer", "small hammer") and "mallet" not in kinds_of("hammer", "my claw hammer")
     assert "cap" in kinds_of("hat", "red hats") and "cap" not in kinds_of("hat", "sun hat")
+    assert "tissue box" in kinds_of("box", "small brown box")
+    for told in ("box of pencils", "spark_plug_box", "a light bulb box"):
+        assert kinds_of("box", told) == [], "it keeps no tissues"
     assert {"ketchup bottle", "detergent bottle", "spray bottle"} <= set(kinds_of("bottle"))
     told_in_full = {category for category, template in load_templates().items() if template.told_in_full}
     assert "perfume bottle" in told_in_full, "a brown bottle was one"

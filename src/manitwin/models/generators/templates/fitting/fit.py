@@ -12,6 +12,7 @@ from manitwin.models.annotators.prior_names import found_by, lookup, named
 from manitwin.models.annotators.prior_records import Prior
 from manitwin.models.annotators.priors import load_priors
 from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.described import is_described
 from manitwin.models.generators.templates.fitting.evidence import Evidence, evidence_of
 from manitwin.models.generators.templates.fitting.least_squares import Placed
 from manitwin.models.generators.templates.fitting.residual import Residual
@@ -21,8 +22,10 @@ from manitwin.models.generators.templates.fitting.view import View
 from manitwin.models.generators.templates.looks import Look, look_of
 from manitwin.models.generators.templates.made import Made
 from manitwin.models.generators.templates.making import dressed
+from manitwin.models.generators.templates.named_category import is_adjective
 from manitwin.models.generators.templates.other_shapes import KIN_OF_ANOTHER_SHAPE
 from manitwin.models.generators.templates.template import Template
+from manitwin.models.generators.templates.vocabulary import FILLER_WORDS
 
 _MOST_KINDS, _SIZE_MARGIN = 8, 1.5
 LEAST_CONFIDENCE = 0.5
@@ -81,10 +84,13 @@ def kinds_of(category: str, name: str | None = None) -> list[str]:
     a watering can a can. A plain name stands also for what has a name with that last word, a mug that is called a coffee cup, and
     for that with something, a cup and saucer; but for what keeps things in it or not as its own things do: no glass is a
     magnifying glass. A longer ``name`` of the category by which a thing is called says which of what stands beside another it
-    is: a hat may be a cap, and a sun hat is none.
+    is: a hat may be a cap, and a sun hat is none. All boxes have the outline of a box, so that it does not tell one that is
+    called by what it keeps from another: a box of pencils, or a light bulb box, is no tissue box.
     """
     templates, last = load_templates(), category.split()[-1]
     said = lookup(category)
+    if said is not None and said.shape == "box-shaped" and _says_contents(name):
+        return []
     if category != last:
         kinds = [last] if last in templates else []
     else:
@@ -101,6 +107,15 @@ def _says_which(name: str | None, category: str) -> bool:
     """Tell whether a name is found by one that has the category's and a word before it: a claw hammer."""
     found = found_by(name)
     return found is not None and found[1].endswith(f" {category}")
+
+
+def _says_contents(name: str | None) -> bool:
+    """Tell whether a name has a noun before the one by which it is found, or 'of' behind it: a spark plug box."""
+    found, words = found_by(name), (name or "").lower().replace("_", " ").replace("-", " ").split()
+    if found is None:
+        return False
+    others = [word for word in words if word not in (*found[1].split(), *FILLER_WORDS)]
+    return "of" in words or any(not is_described(word) and not is_adjective(word) for word in others)
 
 
 def _heads(template: Template) -> set[str]:
