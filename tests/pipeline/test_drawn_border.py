@@ -53,6 +53,10 @@ def test_two_wide_bars_are_cut_off_what_has_no_upright_rectangle_for_its_outline
     inside = without_border(barred, False)
     assert inside is not None and WIDTH - 6 <= inside.shape[1] <= WIDTH
     assert without_border(barred, True) is None and without_border(barred, None) is None, "it may be the thing"
+    written = barred.copy()
+    cv2.putText(written, "for lease", (4, 225), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (90, 90, 90), 1)
+    inside = without_border(written, False)
+    assert inside is not None and WIDTH - 6 <= inside.shape[1] <= WIDTH
 
 
 def test_the_front_of_a_box_that_fills_its_picture_stays_in_it() -> None:

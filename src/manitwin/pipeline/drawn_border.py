@@ -15,6 +15,8 @@ WIDE = 0.45
 """Of a picture's side: a bar beside a picture, which has another like it at the opposite side."""
 LEAST_ALONG = 0.95
 """Of a side's length, along which a border has one colour, and ends in one row of pixels: the rest are corners and noise."""
+LEAST_OF_BAR = 0.9
+"""The same of a wide bar, across which somebody may have written."""
 ALIKE, STEP = 16, 24
 """Levels within which a border has one colour, and beyond which what follows is another: JPEG smears steps by less."""
 MIXED_PX = 2
@@ -57,7 +59,7 @@ def _lines(pixels: np.ndarray) -> tuple[int, int, int, int]:
 def _bars(pixels: np.ndarray) -> tuple[int, int, int, int]:
     """Return the rows and columns, as ``_lines`` does, of two bars of one colour at opposite sides; zeros without such."""
     sides = _from_each_side(pixels)
-    widths = [_bar(seen, int(WIDE * len(seen))) for seen in sides]
+    widths = [_bar(seen, int(WIDE * len(seen)), LEAST_OF_BAR) for seen in sides]
     colours = [np.median(seen[0].astype(np.float32), axis=0) for seen in sides]
     for first in (0, 2):
         if not (widths[first] and widths[first + 1]) or np.abs(colours[first] - colours[first + 1]).max() > ALIKE:
@@ -66,16 +68,17 @@ def _bars(pixels: np.ndarray) -> tuple[int, int, int, int]:
     return top, bottom, left, right
 
 
-def _bar(seen: np.ndarray, most_px: int) -> int:
+def _bar(seen: np.ndarray, most_px: int, least: float = LEAST_ALONG) -> int:
     """Return how many rows of ``seen (n, m, 3)``, from the first, are of one colour and end in a step along all of their length.
 
-    Rows that are mixed of both sides of the step count. 0 where these would be more than ``most_px``, or there is no such step.
+    ``least`` is the share of each row that has the colour. Rows that are mixed of both sides of the step count. 0 where these
+    would be more than ``most_px``, or there is no such step.
     """
     if most_px < 1:
         return 0
     rows = seen[: most_px + MIXED_PX + 1].astype(np.int16)
     off = np.abs(rows - np.median(rows[0], axis=0).astype(np.int16)).max(axis=2)
-    like = (off <= ALIKE).mean(axis=1) >= LEAST_ALONG
+    like = (off <= ALIKE).mean(axis=1) >= least
     width = len(like) if like.all() else int(np.argmin(like))
     if width == 0:
         return 0
