@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from composite_things import Thing
 
-Variant = Literal["plain", "labelled", "matched", "small", "shop"]
-VARIANTS: tuple[Variant, ...] = ("plain", "labelled", "matched", "small", "shop")
+Variant = Literal["plain", "labelled", "matched", "small", "shop", "black"]
+VARIANTS: tuple[Variant, ...] = ("plain", "labelled", "matched", "small", "shop", "black")
 
 SMALL_PX = 256
 SMALL_QUALITY = 65  # of JPEG; colours have half the resolution (4:2:0)

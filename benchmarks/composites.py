@@ -60,15 +60,16 @@ def composite(part: Part, number: int, variant: Variant = "plain") -> Composite:
     elif variant == "matched":
         under = cv2.warpAffine(main.coverage, placements[0], (WIDTH_PX, HEIGHT_PX)) > 0.5
         things[0] = matched(own_rng, main, ground[under].mean(0) if under.any() else ground.mean((0, 1)))
-    elif variant == "shop":
-        exact = draw_exact_ground(own_rng)
+    elif variant in ("shop", "black"):
+        exact = draw_exact_ground(own_rng) if variant == "shop" else np.zeros(3, np.uint8)
         things[0] = shop_thing(own_rng, main, exact)
         ground = np.broadcast_to(linear(exact), ground.shape).astype(np.float32)
-        setting = "shop"
+        setting = variant
     light = ground.copy()
     lamp = draw_lamp(rng)
     for thing, placement in zip(things, placements, strict=True):
         light *= light_left(rng, thing, placement, lamp)
+    shade = np.ones_like(light)
     if variant == "shop":
         shade = shade_of_shop(own_rng, light / np.maximum(ground, 1e-9))
         light = ground * shade
@@ -85,7 +86,7 @@ def composite(part: Part, number: int, variant: Variant = "plain") -> Composite:
         covered = np.maximum(covered, coverage)
     if main.clear:
         setting += ", clear"
-    if variant == "shop":
+    if variant in ("shop", "black"):
         return Composite(*shop_picture(own_rng, light, covered, shade, exact), kind, main.category, setting)
     rgb = _photographed(rng, light)
     if variant == "small":

@@ -1,7 +1,7 @@
 """Cut the object out of composites whose mask is known, and print what was accepted, how right it is, and what it cost.
 
     python benchmarks/matting.py [--part held-out|tuning|calibration] [--first 0] [--count 300] [--jobs 1] [--network isnet]
-                                 [--variant plain|labelled|matched|small] [--named] [--photos FOLDER] [--sheet PNG]
+                                 [--variant plain|labelled|matched|small|shop|black] [--named] [--photos FOLDER] [--sheet PNG]
 
 The pictures are made here (``composites.py``), of templates on grounds of the project's own making; the held-out part has other
 seeds and other grounds than the part that thresholds were set on. A composite of one whole thing is to be accepted; one that

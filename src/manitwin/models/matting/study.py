@@ -19,6 +19,7 @@ from manitwin.models.matting.candidates import (
     network_makers,
     network_mask,
 )
+from manitwin.models.matting.digital_ground import without_haze
 from manitwin.models.matting.enlarged import enlarged
 from manitwin.models.matting.fine_outline import fine_outline
 from manitwin.models.matting.learned import Network, learned_alpha
@@ -138,7 +139,7 @@ def judged_candidates(
     Of two networks the one counts that speaks better for a candidate, of three the second best: two must speak for it. A photo
     smaller than ``working_side_px`` is ``enlarged``, one that was trimmed to the thing is seen ``with_margin``.
     """
-    exact = exact_ground(rgb) is not None
+    exact = exact_ground(rgb)
     rgb, _ = with_margin(rgb)
     photo_side_px = max(rgb.shape[:2])
     rgb = enlarged(rgb, working_side_px)
@@ -146,7 +147,10 @@ def judged_candidates(
     if _longest_side(found.mask) < 0.5 * max(found.mask.shape) and max(rgb.shape[:2]) > 1.2 * working_side_px:
         found = segment(_scaled(rgb, 2 * working_side_px))  # a small thing is looked at again, closer
     asked = (*networks, None)
-    shares = [completed(network_share(rgb, max(found.mask.shape), each), found, exact=exact) for each in asked]
+    shares = [network_share(rgb, max(found.mask.shape), each) for each in asked]
+    if exact is not None:
+        shares = [without_haze(share, rgb, exact) for share in shares]
+    shares = [completed(share, found, exact=exact is not None) for share in shares]
     agreed = _seen_alike(shares[:-1], found.mask.shape)
     made = candidates(found, shares, zoom=photo_side_px / max(found.mask.shape))
     judged = []
