@@ -24,7 +24,7 @@ class GenerateStage:
     """Write ``generated.glb`` and the field ``generation``."""
 
     name: ClassVar[str] = "generate"
-    version: ClassVar[str] = "47"
+    version: ClassVar[str] = "48"
     reads: ClassVar[tuple[str, ...]] = ("photo.png?", "photos/?", "matte?", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("generated.glb", "generation")
 

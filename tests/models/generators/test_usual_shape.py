@@ -8,7 +8,7 @@ import pytest
 
 from manitwin.errors import Rejected
 from manitwin.geometry.solids.shapes import box, cylinder
-from manitwin.models.generators.lift.made_photo import fitted_or_lifted
+from manitwin.models.generators.lift.made_photo import fitted_or_lifted, from_photo
 from manitwin.models.generators.lift.usual_shape import (
     LEAST_TURNED_SHARE,
     turned_share,
@@ -115,3 +115,18 @@ def test_a_pencil_seen_nearly_from_its_end_is_refused_and_a_candle_of_that_outli
 def test_what_lies_flat_may_be_thinner_than_the_template_where_little_of_it_is_missing() -> None:
     assert why_other_proportions("spatula", np.array([0.3, 0.08, 0.0045])) is None  # 0.02 of its length
     assert "thick" in (why_other_proportions("door knob", np.array([0.06, 0.06, 0.008])) or "")
+
+
+def test_an_outline_that_the_template_of_the_name_covers_badly_is_not_lifted_under_that_name() -> None:
+    mask = np.zeros((240, 320), np.uint8)  # somebody who lies on a ball and holds something up
+    cv2.line(mask, (60, 170), (250, 150), 1, 34)
+    cv2.line(mask, (110, 160), (120, 50), 1, 18)
+    cv2.line(mask, (250, 150), (270, 225), 1, 30)
+    for middle, radius in (((55, 160), 24), ((140, 200), 36)):
+        cv2.circle(mask, middle, radius, 1, -1)
+    rgba = np.dstack([np.full((240, 320, 3), (60, 110, 160), np.uint8), 255 * mask])
+    with pytest.raises(Rejected, match=r"no dumbbell that the template makes has this outline .* overlap 0\.\d\d"):
+        from_photo(rgba, "dumbbell")
+    assert from_photo(rgba, "gizmo").notes["primitive"] == "inflation", (
+        "of a name without a template the outline is all"
+    )

@@ -175,6 +175,13 @@ def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) 
             " check the name and the cut-out",
             "generate",
         )
+    if fitted is not None and flat and fitted.residual.iou < LEAST_IOU:
+        raise Rejected(
+            "generator_failed",
+            f"no {fitted.category} that the template makes has this outline from any side: {_how_far(fitted)}; check the name,"
+            " and that the photo shows one alone, or take it from another side",
+            "generate",
+        )
     if fitted is not None:
         reject_filled_holes(fitted, rgba)
     notes = lifted.notes if fitted is None else lifted.notes | {"poor_fit": notes_of(fitted)}
