@@ -18,6 +18,7 @@ from manitwin.cli.build_plan import own_rate
 from manitwin.cli.main import app
 from manitwin.cli.measured_rates import (
     CHAIN_CPU_S,
+    DOUBTS_CPU_S,
     FURTHER_PHOTO_CPU_S,
     ROBUSTNESS_CPU_S,
     SECOND_ENGINE_CPU_S,
@@ -188,11 +189,11 @@ def test_wrong_use_is_wrong_use(tmp_path: Path) -> None:
 
 
 def test_measured_seconds_count_engines_and_grippers() -> None:
-    quick = BuildConfig(second_opinion={"enabled": False}, robustness={"enabled": False})
+    quick = with_flags(BuildConfig(), {"quick": True})
     for kind, chain in CHAIN_CPU_S.items():
         assert measured_rate(quick, kind).cpu_s == chain
         whole = measured_rate(BuildConfig(), kind).cpu_s
-        assert whole == pytest.approx(chain + SECOND_ENGINE_CPU_S + ROBUSTNESS_CPU_S)
+        assert whole == pytest.approx(chain + SECOND_ENGINE_CPU_S + ROBUSTNESS_CPU_S + DOUBTS_CPU_S)
         two = measured_rate(quick.model_copy(update={"grippers": ("panda", "wsg50_110")}), kind).cpu_s
         assert two == pytest.approx(chain + TRIALS_CPU_S)
     assert measured_rate(quick, "photos", 3).cpu_s == CHAIN_CPU_S["image"] + 2 * FURTHER_PHOTO_CPU_S

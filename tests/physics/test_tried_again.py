@@ -44,15 +44,14 @@ def test_only_what_is_doubtful_is_tried_again_and_with_the_settings_of_the_refer
 ) -> None:
     tried: list[tuple[float, int, bool]] = []
 
-    def answer(*given: Any, briefly: bool) -> TrialResult | None:
-        settings: TrialSettings = given[5]
+    def answer(grasp: Any, settings: TrialSettings, recorder: Any, *, briefly: bool) -> TrialResult | None:
         assert settings.frame_s == pytest.approx(SETTINGS.frame_s * timestep_s * 240), "the protocol's frames stay"
         tried.append((settings.timestep_s, settings.solver_iterations, briefly))
         if len(tried) > 1:
             return TrialResult("held", 0.0, 0.0, 0.0, (50.0, 50.0), 2)
         return None if first is None else TrialResult(first, moved_m, 0.0, 0.0, (50.0, 50.0), 1)
 
-    monkeypatch.setattr(sapien_trial, "_try_one", answer)
+    monkeypatch.setattr(sapien_trial, "_try_once", answer)
     settings = replace(SETTINGS, timestep_s=timestep_s, doubts_tried_again=asked)
     result = try_one(SapienTrial(), box(CUBE_M, 1.0), above([0, 0, 0]), settings)
     doubtful = asked and (first is None or first in {"drops", "unstable", "slips"} or moved_m == 0.006)
@@ -71,11 +70,11 @@ def test_trial_that_ran_out_of_time_or_is_the_reference_is_not_tried_again(
 ) -> None:
     tried: list[TrialSettings] = []
 
-    def answer(*given: Any, briefly: bool) -> TrialResult:
-        tried.append(given[5])
+    def answer(grasp: Any, given: TrialSettings, recorder: Any, *, briefly: bool) -> TrialResult:
+        tried.append(given)
         return TrialResult("unstable", 0.0, 0.0, 0.0, (50.0, 50.0), steps)
 
-    monkeypatch.setattr(sapien_trial, "_try_one", answer)
+    monkeypatch.setattr(sapien_trial, "_try_once", answer)
     assert try_one(SapienTrial(), box(CUBE_M, 1.0), above([0, 0, 0]), settings).outcome == "unstable"
     assert tried == [settings]
 

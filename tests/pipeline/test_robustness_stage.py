@@ -101,6 +101,19 @@ def test_a_vessel_that_weighs_less_has_less_in_it_and_its_centre_of_mass_lies_lo
     assert np.allclose([body.inertia_kg_m2[0, 0] for body in bodies], 0.001 * weights)
 
 
+def test_what_falls_at_first_is_not_tried_again(tmp_path: Path) -> None:
+    asked = []
+
+    def outcome(pose: np.ndarray, settings: object) -> str:
+        asked.append(settings.doubts_tried_again)
+        return "held"
+
+    run_all(
+        proposed_draft(tmp_path, ["held"]), tmp_path, RobustnessStage(STILL, VerifyConfig(), Scripted(outcome), PANDA)
+    )
+    assert VerifyConfig().doubts_tried_again and asked and not any(asked)
+
+
 def test_center_of_a_half_empty_vessel_is_moved_by_what_its_own_state_says() -> None:
     filling = FillCurve(np.array([0.1, 0.5]), np.zeros((2, 3)), np.zeros((2, 3, 3)), np.array([0.02, 0.0]))
     spread = Spread(0.0, 0.0, (1.0, 1.0), (1.0, 1.0), (0.1, 0.5), center_of_mass_m=0.02)

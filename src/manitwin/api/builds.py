@@ -69,7 +69,8 @@ def build(
       answers are added to
     - ``max_cost_usd``: once services have charged so much, items that would cost more are left unfinished
     - ``require_agreement`` verifies only grasps that a second engine holds too; ``second_opinion`` "sample" tries 20 of the held
-      ones there instead of all; ``quick`` leaves out second engine and robustness
+      ones there instead of all; ``quick`` leaves out second engine, robustness and second trials of
+      doubtful grasps
     - ``link``: of things with joints, which are locked, both fingertips of each grasp touch this link
 
     ``executor`` is local (``jobs`` processes), ray (a cluster at ``address``), or inline, in this process. ``on_estimate`` is

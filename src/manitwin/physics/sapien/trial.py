@@ -5,7 +5,7 @@ The engine is imported by the first trial: who only names this simulator, as the
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -33,11 +33,11 @@ CLEAR_M = 0.0005  # beyond the contact offsets of both: until then no finger fee
 # of the reference at 1/960 s and 40 iterations: pads kick them about, or out of the hand. At 1/480 s 94 %, at 1/960 s 96 %.
 MOST_JUMP_M_S = 4.0
 LEAST_TIMESTEP_S = 1 / 960
-LEAST_ITERATIONS_OF_DOUBTS = 40
+# What the closed hand loses, or holds only after this share of what the slides allow, is at the limit of friction, or trembles
+# between pads. Of 86 such falls at 1/240 s and 20 iterations a reference at 1/960 s and 40 iterations holds 30.
 FALLS: frozenset[Outcome] = frozenset({"drops", "unstable", "slips"})
 DOUBTFUL_SHARE = 0.5
-"""What the closed hand loses, or holds only after this share of the limit of the slides, is at the limit of friction, or trembles
-between pads. Of 86 such falls at 1/240 s and 20 iterations a reference at 1/960 s and 40 iterations holds 30."""
+REFERENCE_ITERATIONS = 40
 
 
 class SapienTrial:
@@ -59,7 +59,8 @@ class SapienTrial:
         hand, reach = of_kind(gripper, ParallelGripper), HandReach(body.hulls)
         settings = finer_for_what_is_light(settings, body.mass_kg)
         with COOKED.lent([body.hulls]) as (shapes,):
-            return [_try(body, shapes, reach, hand, inverse(pose), settings) for pose in gripper_to_object]
+            grasps = (_Grasp(body, shapes, reach, hand, inverse(pose)) for pose in gripper_to_object)
+            return [_verdict(grasp, settings) for grasp in grasps]
 
     def record(
         self,
@@ -76,7 +77,7 @@ class SapienTrial:
         object_to_hand = inverse(gripper_to_object)
         settings = finer_for_what_is_light(settings, body.mass_kg)
         with COOKED.lent([body.hulls]) as (shapes,):
-            result = _try(body, shapes, reach, hand, object_to_hand, settings, recorder)
+            result = _verdict(_Grasp(body, shapes, reach, hand, object_to_hand), settings, recorder)
         return recorder.recording(result, object_to_hand, np.full(2, hand.opening_m / 2))
 
 
@@ -100,29 +101,31 @@ def _with_half_the_step(settings: TrialSettings) -> TrialSettings:
     )
 
 
-def settings_of_doubts(settings: TrialSettings) -> TrialSettings:
-    """Return the same protocol at the least step, with at least the iterations that doubtful verdicts want."""
+def _reference(settings: TrialSettings) -> TrialSettings:
+    """Return the same protocol at the least step and the iterations of the reference, or more where more are asked for."""
     while _may_be_halved(settings):
         settings = _with_half_the_step(settings)
-    return replace(settings, solver_iterations=max(settings.solver_iterations, LEAST_ITERATIONS_OF_DOUBTS))
+    return replace(settings, solver_iterations=max(settings.solver_iterations, REFERENCE_ITERATIONS))
 
 
-def _try(
-    body: RigidBody,
-    shapes: HullShapes,
-    reach: HandReach,
-    gripper: ParallelGripper,
-    object_to_hand: np.ndarray,
-    settings: TrialSettings,
-    recorder: TrialRecorder | None = None,
-) -> TrialResult:
-    """Try a grasp briefly, and as a whole where that tells nothing; where it is doubtful, with the settings of doubts."""
-    arguments = (body, shapes, reach, gripper, object_to_hand)
-    result, finer = _try_one(*arguments, settings, recorder, briefly=True), settings_of_doubts(settings)
-    if settings.doubts_tried_again and finer != settings and (result is None or _is_doubtful(result, settings)):
-        result, settings = None, finer
+@dataclass(frozen=True)
+class _Grasp:
+    """What is tried: a body with the engine's shapes of its hulls, and a hand at a pose ``(4, 4)``."""
+
+    body: RigidBody
+    shapes: HullShapes
+    reach: HandReach
+    gripper: ParallelGripper
+    object_to_hand: np.ndarray
+
+
+def _verdict(grasp: _Grasp, settings: TrialSettings, recorder: TrialRecorder | None = None) -> TrialResult:
+    """Try a grasp briefly, and as a whole where that tells nothing; where it is doubtful, as the reference does."""
+    result, reference = _try_once(grasp, settings, recorder, briefly=True), _reference(settings)
+    if settings.doubts_tried_again and reference != settings and (result is None or _is_doubtful(result, settings)):
+        result, settings = None, reference
     if result is None:
-        result = _try_one(*arguments, settings, recorder, briefly=False)
+        result = _try_once(grasp, settings, recorder, briefly=False)
     assert result is not None  # a whole trial has a result
     return result
 
@@ -134,16 +137,8 @@ def _is_doubtful(result: TrialResult, settings: TrialSettings) -> bool:
     return result.outcome in FALLS and result.steps < settings.max_steps
 
 
-def _try_one(
-    body: RigidBody,
-    shapes: HullShapes,
-    reach: HandReach,
-    gripper: ParallelGripper,
-    object_to_hand: np.ndarray,
-    settings: TrialSettings,
-    recorder: TrialRecorder | None,
-    *,
-    briefly: bool,
+def _try_once(
+    grasp: _Grasp, settings: TrialSettings, recorder: TrialRecorder | None, *, briefly: bool
 ) -> TrialResult | None:
     """Try a grasp on the hulls that the hand can reach; where the object turned others towards it, on all.
 
@@ -152,6 +147,7 @@ def _try_one(
     from manitwin.physics.sapien.hand import FixedHand, free_frames
     from manitwin.physics.sapien.hand_scene import HandScene
 
+    reach, gripper, object_to_hand = grasp.reach, grasp.gripper, grasp.object_to_hand
     gaps = reach.gaps_m(gripper, object_to_hand[None])[0]
     near = gaps <= REACH_MARGIN_M
     if not near.any():
@@ -159,11 +155,11 @@ def _try_one(
 
     def simulate(some: np.ndarray) -> tuple[TrialResult | None, np.ndarray]:
         """Return what became of the object with some of its shapes, and the poses at which it was looked at."""
-        chosen = [shape for shape, is_in in zip(shapes, some, strict=True) if is_in]
+        chosen = [shape for shape, is_in in zip(grasp.shapes, some, strict=True) if is_in]
         travel_m = reach.free_travel_m(gripper, object_to_hand, some, 2 * settings.contact_offset_m + CLEAR_M)
         approach = free_frames(gripper, settings, travel_m)
         make_hand = partial(FixedHand, gripper=gripper, settings=settings, approach=approach)
-        scene = HandScene(body, chosen, object_to_hand, settings, make_hand)
+        scene = HandScene(grasp.body, chosen, object_to_hand, settings, make_hand)
         watch = None if recorder is None else recorder.watch(scene)
         run = run_brief_phases if briefly else run_phases
         result = run(scene, object_to_hand[:3, :3], settings, watch)
