@@ -120,6 +120,16 @@ def test_a_picture_on_a_shape_without_texture_coordinates_is_its_mean_colour(tmp
     )
 
 
+def test_a_grid_of_a_billion_cells_without_a_layout_is_one_picture(tmp_path: Path) -> None:
+    Image.new("RGB", (4, 4), (0, 255, 0)).save(tmp_path / "sides.png")
+    before = (
+        '<asset><texture name="s" file="sides.png" gridsize="1000000000 1000000000"/>'
+        '<material name="green" texture="s"/></asset>'
+    )
+    path = mjcf(tmp_path, '<body><geom type="box" size="1 1 1" material="green"/></body>', before)
+    assert _base_colors(path) == [(0, 255, 0)]
+
+
 def test_mesh_that_is_not_there_is_missing(tmp_path: Path) -> None:
     asset_xml = '<asset><mesh name="m" file="../../gone.stl"/></asset>'
     geoms = '<geom type="mesh" mesh="m"/><geom size="0.1"/>'

@@ -223,7 +223,7 @@ def _mean_color(image: Image.Image, texture: Any) -> np.ndarray:
     """Return the linear mean colour ``(3,)`` of a texture's image: of those cells of its grid that its layout names."""
     rows, columns = (max(1, int(count)) for count in texture.gridsize)
     layout = "".join(str(letter) for letter in texture.gridlayout)
-    named = [place for place in range(rows * columns) if place < len(layout) and layout[place] in _SIDES]
+    named = [place for place in range(min(rows * columns, len(layout))) if layout[place] in _SIDES]
     picture = image.convert("RGB")
     width, height = picture.width / columns, picture.height / rows
     boxes = [
