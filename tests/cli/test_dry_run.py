@@ -88,7 +88,7 @@ def test_it_names_every_input_and_writes_nothing(inputs: Path, tmp_path: Path) -
         document["estimate"]["cpu_seconds"] == pytest.approx(CHAIN_CPU_S["mesh"] + CHAIN_CPU_S["image"])
         and document["estimate"]["cost_usd"] == 0
     )
-    assert "measured.md" in document["estimate"]["each"]["mesh"]["source"]
+    assert "measured/cost.md" in document["estimate"]["each"]["mesh"]["source"]
     assert "2 to build, 3 would be rejected" in text and "about 0:00:14 of CPU time" in text and "0.00 USD" in text
     assert "box.stl (box, units m)" in text
 

@@ -13,10 +13,10 @@ SECOND_ENGINE_CPU_S = 3.4
 ROBUSTNESS_CPU_S = 7.9
 DOUBTS_CPU_S = 0.5
 TRIALS_CPU_S = 2.7
-"""Medians (docs/measured.md, "What an input takes"): the whole chain with ``--quick`` by the kind of input, what the second
+"""Medians (docs/measured/cost.md, "What an input takes"): the whole chain with ``--quick`` by the kind of input, what the second
 engine, robustness and second trials of doubtful grasps add for each gripper, and what each further gripper adds. Of
 generators the built-in one."""
-MEASURED = "docs/measured.md, medians"
+MEASURED = "docs/measured/cost.md, medians"
 
 
 @dataclass(frozen=True)

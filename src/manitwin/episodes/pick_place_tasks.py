@@ -16,7 +16,7 @@ from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose
 from manitwin.scenes.scene import SupportRegion
 
 MIN_MOVE_M = 0.15
-"""The shortest way from start to goal, as in the episodes of docs/measured.md."""
+"""The shortest way from start to goal, as in the episodes of docs/measured/robot_data.md."""
 MIN_GAP_M = 0.03
 """Between the footprints of two objects: room for a finger."""
 OTHERS_RADIUS_FACTOR = 1.2

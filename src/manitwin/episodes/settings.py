@@ -17,11 +17,12 @@ HANDOVER, TWO_ARMS = "handover", "two_pandas"
 class EpisodeSettings(Section):
     """The physics of an episode, and what counts as success (metres, seconds, newtons; angles in degrees).
 
-    ``closing_force_n``: without it the gripper's own. ``solver_iterations_held`` are those while something is held: 24 at 1/120
-    s do as well as 40 at 1/240 s, and 12 drop some (docs/measured.md). ``release_height_m`` is how far above its goal an object
-    is let go. What moved less than ``max_placed_m`` and tilted less than ``max_tilt_deg`` from its goal stands where it should,
-    if it moves by no more than ``max_rest_*`` in half a second; ``max_start_*`` is what a start may move until it rests,
-    ``max_disturbed_*`` what may happen to the other objects, ``max_partner_moved_m`` to the one that a goal is about.
+    ``closing_force_n``: without it the gripper's own. ``solver_iterations_held`` are those while something is held: 24 at
+    1/120 s do as well as 40 at 1/240 s, and 12 drop some (docs/measured/robot_data.md). ``release_height_m`` is how far above
+    its goal an object is let go. What moved less than ``max_placed_m`` and tilted less than ``max_tilt_deg`` from its goal
+    stands where it should, if it moves by no more than ``max_rest_*`` in half a second; ``max_start_*`` is what a start may
+    move until it rests, ``max_disturbed_*`` what may happen to the other objects, ``max_partner_moved_m`` to the one that a
+    goal is about.
     """
 
     timestep_s: float = Field(default=1 / 120, gt=0)

@@ -16,7 +16,7 @@ from manitwin.twin.record_values import Check
 from manitwin.twin.shares import wilson_interval
 
 UNCOVERED_LIMIT_M = 0.002
-"""Of the surface that no collision hull covers: more would let fingers sink in (measured on real meshes: docs/measured.md)."""
+"""Of the surface that no collision hull covers: more would let fingers sink in (docs/measured/meshes.md)."""
 
 CAVITY_LIMIT = 0.8
 """Of the open cavity that the hulls keep: less, and a container holds visibly less than it shows."""

@@ -19,7 +19,8 @@ from manitwin.formats.meshes.textures import linear_to_srgb, srgb_to_linear
 from manitwin.models.annotators.surface_color import lab_from_srgb
 from manitwin.render.scene_lighting import LUMINANCE
 
-# chosen on one half of the categories of benchmarks/photo_colors.py, the sheen also with real photos in sight (docs/measured.md)
+# chosen on one half of the categories of benchmarks/photo_colors.py, the sheen also with real photos in sight
+# (docs/measured/annotations.md)
 PALE_REFLECTANCE = 0.7  # of a pale ground: white paper has 0.85, a light grey table 0.5
 MOST_SHEEN = 0.02
 """What a surface reflects of its surroundings, of white: 4 % at normal incidence (Fresnel, refractive index 1.5) of what is half

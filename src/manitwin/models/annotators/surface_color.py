@@ -55,7 +55,7 @@ _TELLING = (
 )  # of the largest neutral colour's share: a colour of that much comes first, a red box with white letters is red
 _METALLIC = 0.5
 _GOLDEN_HUE_RAD, _GOLDEN_CHROMA = (np.deg2rad(75.0), np.deg2rad(97.0)), (29.0, 50.0)
-"""CIELAB hue and chroma of gold and brass in photos, however dark (docs/measured.md).
+"""CIELAB hue and chroma of gold and brass in photos, however dark (docs/measured/annotations.md).
 
 Brown paint has less hue, olive paint more, and yellow paint more chroma.
 """
