@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import ast
 import inspect
 import re
 import tomllib
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from graphlib import TopologicalSorter
 from pathlib import Path
 from typing import Any
 
+import grimp
 import pytest
 from typer.testing import CliRunner
 
@@ -72,32 +72,11 @@ def test_every_path_on_the_page_is_there() -> None:
     assert [name for name in said if not (PACKAGE / name).exists()] == []
 
 
-def modules_by_name() -> dict[str, Path]:
-    names = {}
-    for path in PACKAGE.rglob("*.py"):
-        dotted = ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)
-        names[dotted.removesuffix(".__init__")] = path
-    return names
-
-
-def imported_anywhere(source: str, modules: Mapping[str, Path]) -> set[str]:
-    """Return the modules that one imports: at its top, inside functions, and for types alone."""
-    found: set[str] = set()
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        if isinstance(node, ast.ImportFrom):
-            assert node.level == 0 and node.module is not None, "imports name the whole path"
-            members = {f"{node.module}.{alias.name}" for alias in node.names}
-            found |= {member if member in modules else node.module for member in members}
-    return found & modules.keys()
-
-
 def test_no_modules_import_each_other_not_even_in_functions_or_for_types() -> None:
-    modules = modules_by_name()
-    graph = {name: imported_anywhere(path.read_text(), modules) - {name} for name, path in modules.items()}
-    order = list(TopologicalSorter(graph).static_order())  # a circle raises CycleError, which names its modules
-    assert set(order) == set(modules) and sum(map(len, graph.values())) > len(modules)
+    graph = grimp.build_graph("manitwin", cache_dir=None)
+    imported = {name: graph.find_modules_directly_imported_by(name) for name in graph.modules}
+    order = list(TopologicalSorter(imported).static_order())  # a circle raises CycleError, which names its modules
+    assert set(order) == set(imported) and graph.count_imports() > len(imported)
 
 
 Stacks = dict[str, list[str]]

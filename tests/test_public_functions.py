@@ -107,6 +107,7 @@ def test_folder_without_twins_gets_no_index(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_statistics_are_written_beside_the_data_unless_said_otherwise(twins: Path, tmp_path: Path) -> None:
     manitwin.write_index(twins, jobs=1)
     written = manitwin.write_statistics(twins)

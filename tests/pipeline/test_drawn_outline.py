@@ -112,7 +112,7 @@ def mask_of_png_of_any_size(data: bytes) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(data)).convert("L")) > 127
 
 
-@pytest.mark.parametrize("box_px", [(), (100.0, 100.0, 500.0, 500.0)])
+@pytest.mark.parametrize("box_px", [pytest.param((), marks=pytest.mark.slow), (100.0, 100.0, 500.0, 500.0)])
 def test_photo_that_shows_nothing_is_cut_out_as_drawn(tmp_path: Path, box_px: tuple[float, ...]) -> None:
     grain = np.random.default_rng(0).integers(120, 136, (600, 600, 3), np.uint8)
     Image.fromarray(grain).save(tmp_path / "pale.png")

@@ -163,6 +163,7 @@ def test_masks_are_part_of_the_identity_and_kept_with_the_photos(tmp_path: Path)
     assert item.modified_at >= before
 
 
+@pytest.mark.slow
 def test_lenses_with_pixels_that_are_not_square_and_lenses_of_one_frame_are_those_of_their_photos(
     tmp_path: Path,
 ) -> None:

@@ -205,6 +205,7 @@ def test_views_of_a_nameless_thing_are_carved_at_their_stated_turns() -> None:
     assert made.unseen_share < 0.6
 
 
+@pytest.mark.slow
 def test_outlines_alone_do_not_tell_turns_but_a_round_thing_needs_none() -> None:
     for mesh, name in ((BOX, None), (CYLINDER, None), (BOX, "orange")):
         with pytest.raises(Rejected, match=r"0\.png, 90\.png: .*state the camera's turns with --turns"):

@@ -27,7 +27,10 @@ def _ellipse(across_px: int, high_px: int) -> np.ndarray:
     return rgba
 
 
-@pytest.mark.parametrize(("name", "half_axes_px"), [("glass", (120, 220)), ("jar", (170, 220)), ("bucket", (120, 220))])
+@pytest.mark.parametrize(
+    ("name", "half_axes_px"),
+    [("glass", (120, 220)), ("jar", (170, 220)), pytest.param("bucket", (120, 220), marks=pytest.mark.slow)],
+)
 def test_a_rim_seen_from_above_is_no_tall_thing(name: str, half_axes_px: tuple[int, int]) -> None:
     with pytest.raises(
         Rejected, match=f"hardly that of a {name}: how long it is does not show; take the photo from the side"
@@ -35,7 +38,7 @@ def test_a_rim_seen_from_above_is_no_tall_thing(name: str, half_axes_px: tuple[i
         from_photo(_ellipse(*half_axes_px), name)
 
 
-@pytest.mark.parametrize("name", ["bowl", "egg"])
+@pytest.mark.parametrize("name", [pytest.param("bowl", marks=pytest.mark.slow), "egg"])
 def test_what_has_an_ellipse_for_its_outline_is_made(name: str) -> None:
     assert from_photo(_ellipse(170, 220), name).notes["primitive"] == f"template:{name}"
 

@@ -36,7 +36,9 @@ def _far(category: str, outline: float) -> Fitted:
     return fitted(made, Placed(View(0.0, 0.3, 0.0, 0.2), True), left, evidence_of(PILE))
 
 
-@pytest.mark.parametrize("name", ["onion", "potato", "potatoes"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("onion", marks=pytest.mark.slow), pytest.param("potato", marks=pytest.mark.slow), "potatoes"]
+)
 def test_a_pile_is_no_onion_and_no_potato(name: str) -> None:
     with pytest.raises(Rejected, match="as several have that touch or hide one another") as caught:
         from_photo(PILE, name)

@@ -72,7 +72,7 @@ def test_a_nameless_slab_on_a_table_lies_and_is_as_thick_as_it_looks() -> None:
     assert job.notes["view"]["elevation_deg"] == pytest.approx(30, abs=5)
 
 
-@pytest.mark.parametrize(("elevation_deg", "yaw_rad"), [(30.0, 0.7), (55.0, 0.15)])
+@pytest.mark.parametrize(("elevation_deg", "yaw_rad"), [(30.0, 0.7), pytest.param(55.0, 0.15, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     "sides", [(0.22, 0.10, 0.06), (0.10, 0.07, 0.20), (0.12, 0.09, 0.05), (0.11, 0.11, 0.11)], ids=str
 )

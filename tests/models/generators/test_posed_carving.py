@@ -102,6 +102,7 @@ def test_the_unit_of_the_poses_is_that_of_the_size_and_without_one_there_is_none
     assert not without.metric and np.ptp(without.part.vertices, axis=0).max() == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_a_world_far_from_its_origin_makes_the_same() -> None:
     moved = [np.array(pose) for pose in POSES]
     for pose in moved:
@@ -169,7 +170,7 @@ def test_photos_from_one_direction_and_its_opposite_are_refused() -> None:
 
 
 @pytest.mark.usefixtures("coarser")
-@pytest.mark.parametrize("fisheye", [False, True])
+@pytest.mark.parametrize("fisheye", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_the_distortion_of_a_lens_is_undone(fisheye: bool) -> None:
     """The photos are bent as the lens does it; without its coefficients the outlines do not fill each other as far."""
     bent = (0.12, 0.05, 0.0, 0.0) if fisheye else (-0.35, 0.1, 0.002, -0.001, 0, 0, 0, 0)

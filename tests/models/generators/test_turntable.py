@@ -22,7 +22,7 @@ def _turned(count: int, elevation_deg: float) -> tuple[list[tuple[str, np.ndarra
     return [(f"{turn:.0f}.png", turned_photo(turn, elevation_deg)) for turn in turns], turns
 
 
-@pytest.mark.parametrize("elevation_deg", [0.0, 30.0])
+@pytest.mark.parametrize("elevation_deg", [pytest.param(0.0, marks=pytest.mark.slow), 30.0])
 def test_a_camera_that_stays_is_told_by_the_outlines(elevation_deg: float) -> None:
     turns = [60.0 * k for k in range(6)]
     camera = calibrated([turned_photo(turn, elevation_deg, aside_m=0.02) for turn in turns], turns)
@@ -84,6 +84,7 @@ def test_a_photo_at_a_wrong_turn_is_named() -> None:
         carve(photos, turns)
 
 
+@pytest.mark.slow
 def test_of_many_the_one_that_does_not_go_with_the_others_is_left_out_and_told() -> None:
     photos, turns = _turned(6, 25.0)
     photos[3] = ("wrong.png", turned_photo(turns[3] + 70, 25.0))

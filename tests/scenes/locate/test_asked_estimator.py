@@ -30,6 +30,7 @@ def asked(seen: BrickView, spec: str) -> AskedEstimator:
     return AskedEstimator(pose_estimator(spec, SERVICES), lambda twin_id: seen.twin, 7)
 
 
+@pytest.mark.slow
 def test_poor_guesses_of_a_program_are_aligned_and_the_one_that_explains_is_found(seen: BrickView) -> None:
     guess = asked(seen, PROGRAM)
     raw = guess(seen.view, seen.mask, seen.model)

@@ -33,7 +33,7 @@ def add(model: PoseModel, found: np.ndarray, true: np.ndarray) -> float:
     return float(np.linalg.norm(there, axis=1).mean() / model.diameter_m)
 
 
-@pytest.mark.parametrize("hidden", [0.0, 0.5])
+@pytest.mark.parametrize("hidden", [pytest.param(0.0, marks=pytest.mark.slow), 0.5])
 def test_a_body_without_symmetry_is_found_also_half_hidden(stool: PoseModel, hidden: float) -> None:
     seen = seen_from(stool, 0.6, hidden_right=hidden)
     found = locate_in_view(seen.view, seen.mask, stool)
@@ -76,7 +76,7 @@ def test_a_body_of_revolution_has_one_pose_and_any_turn_of_it_is_the_same() -> N
     "mesh",
     [
         trimesh.creation.box((0.06, 0.06, 0.06)),
-        trimesh.creation.cylinder(0.025, 0.14, sections=6),
+        pytest.param(trimesh.creation.cylinder(0.025, 0.14, sections=6), marks=pytest.mark.slow),
         trimesh.creation.icosphere(subdivisions=3, radius=0.035),
     ],
     ids=["cube", "hexagonal prism", "ball"],
