@@ -35,7 +35,7 @@ class GateStage:
     """
 
     name: ClassVar[str] = "gate"
-    version: ClassVar[str] = "5"
+    version: ClassVar[str] = "6"
     reads: ClassVar[tuple[str, ...]] = (
         "canonical.npz", "canonical.glb", "geometry", "views/", "cameras", "naming?", "photo.png?", "photos/?",
     )  # fmt: skip

@@ -79,12 +79,12 @@ def test_stripes_on_guessed_sides_are_minor_by_the_prompt() -> None:
     assert "stripes" in minor and "seen at once" in minor and "seen at once" not in severe
 
 
-def judged_beside_photo(folder: Path, **said: Any) -> tuple[ScriptedChat, QualityVerdict]:
+def judged_beside_photo(folder: Path, *, photos: int = 1, **said: Any) -> tuple[ScriptedChat, QualityVerdict]:
     rgba = np.zeros((40, 60, 4), np.uint8)
     rgba[10:30, 15:45] = (200, 30, 30, 255)
     Image.fromarray(rgba).save(folder / "photo.png")
     chat = ScriptedChat(changed(GOOD, photo_evidence="the back half is cut off", **said))
-    of = replace(subject(cup(), folder, "cup"), photos=(folder / "photo.png",))
+    of = replace(subject(cup(), folder, "cup"), photos=(folder / "photo.png",) * photos)
     return chat, annotator(chat).judge_quality(of)
 
 
@@ -95,6 +95,14 @@ def test_photo_is_shown_beside_the_views_and_a_half_of_it_is_rejected(tmp_path: 
     assert sum(isinstance(part, Picture) for part in question.parts) == 9
     assert verdict.visual_quality is False and "the back half is cut off" in verdict.detail
     assert judged_beside_photo(tmp_path, like_photo="yes")[1].visual_quality is True
+
+
+def test_of_many_photos_eight_are_shown_spread_over_all(tmp_path: Path) -> None:
+    chat, _ = judged_beside_photo(tmp_path, photos=36, like_photo="yes")
+    parts = chat.asked[0][0].parts
+    assert sum(isinstance(part, Picture) for part in parts) == 16
+    captions = [part for part in parts if isinstance(part, str) and part.startswith("Photo ")]
+    assert captions == [f"Photo {number} of 36 that it was made of:" for number in (1, 5, 10, 14, 19, 23, 28, 32)]
 
 
 def test_doubt_about_the_photo_is_asked_again_and_then_a_no(tmp_path: Path) -> None:

@@ -19,6 +19,8 @@ from manitwin.render.markers import draw_markers, font_px
 from manitwin.render.raycast import merged, silhouette
 from manitwin.render.scale_marks import best_camera, draw_dimension, draw_scale_bar
 
+MOST_PHOTOS = 8
+"""So many photos are shown at most: servers limit the pictures of a question, and eight views follow."""
 _FILLED = 0.9  # of a picture's side by the object cut out of a photo
 
 
@@ -61,11 +63,16 @@ def longest_extent_view(subject: Subject) -> list[str | Picture]:
 
 
 def photos_beside(subject: Subject, side_px: int) -> list[str | Picture]:
-    """Return the photos that the model was made of, cut out, each with a caption."""
+    """Return the cut-out photos that the model was made of, each after a caption; of more than ``MOST_PHOTOS`` an even selection.
+
+    Raises OSError for a photo that cannot be read.
+    """
+    count = len(subject.photos)
+    shown = np.unique(np.linspace(0, count, min(count, MOST_PHOTOS), endpoint=False).astype(int))
     parts: list[str | Picture] = []
-    for number, path in enumerate(subject.photos, 1):
-        which = "The photo" if len(subject.photos) == 1 else f"Photo {number} of {len(subject.photos)}"
-        with Image.open(path) as image:
+    for index in shown:
+        which = "The photo" if count == 1 else f"Photo {index + 1} of {count}"
+        with Image.open(subject.photos[index]) as image:
             parts += [f"{which} that it was made of:", cut_out_picture(np.asarray(image.convert("RGBA")), side_px)]
     return parts
 
