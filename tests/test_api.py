@@ -20,8 +20,8 @@ PANDA_FILE = Path(grippers.__file__).parent / "definitions" / "panda.toml"
     [
         ({"grippers": ["pandas"]}, "did you mean 'panda'"),
         ({"grippers": ["panda", "hook.toml"]}, "hook.toml is not there"),
-        ({"grippers": ["panda", str(PANDA_FILE)]}, "grippers panda, panda: each may be named once"),
-        ({"quick": True, "require_agreement": True}, "quick leaves the second engine out"),
+        ({"grippers": ["panda", str(PANDA_FILE)]}, "grippers panda, panda: .*names must be unique; name panda once"),
+        ({"quick": True, "require_agreement": True}, "--quick skips the second engine"),
         ({"grippers": ["panda", "suction"], "require_agreement": True}, "no second engine can try the gripper suction"),
         (
             {"config": BuildConfig(second_opinion=SecondOpinionConfig(enabled=False, require_agreement=True))},

@@ -155,7 +155,7 @@ def test_check_names_and_repairs(tmp_path: Path, manifest: Path) -> None:
     said = manitwin("check", "data", "--dry-run", folder=tmp_path)
     assert said.returncode == 4 and "no folder" in said.stderr
     repaired = manitwin("check", "data", folder=tmp_path)
-    assert repaired.returncode == 0 and "put right" in repaired.stdout
+    assert repaired.returncode == 0 and "repaired" in repaired.stdout
     manitwin("build", "-o", "data", folder=tmp_path)
     assert lost.is_file() and manitwin("check", "data", folder=tmp_path).returncode == 0
 
@@ -164,7 +164,8 @@ def test_the_old_name_says_so_in_one_line_and_builds(tmp_path: Path, manifest: P
     done = manitwin("run", manifest, "--dataset", "data", "--quick", "--executor", "inline", folder=tmp_path)
     assert done.returncode == 3 and "3 rejected" in done.stdout
     assert (
-        done.stderr.splitlines()[0] == "`manitwin run` is `manitwin build` now; the old name goes with the next version"
+        done.stderr.splitlines()[0]
+        == "`manitwin run` is deprecated and will be removed in the next version; use `manitwin build`"
     )
     assert "│ run " not in manitwin("--help", folder=tmp_path).stdout
 
@@ -214,7 +215,7 @@ def flat(tmp_path: Path) -> Path:
 
 @pytest.mark.slow
 def test_the_flat_layout_is_read_and_said_to_be_old(tmp_path: Path, flat: Path) -> None:
-    old = f"{flat.name}: in the flat layout of earlier versions, which is read and not added to"
+    old = f"{flat.name}: uses the flat layout of earlier versions, which can be read but not extended"
     for words, said in (
         (("check", "flat"), "2 twins: all their files are there"),
         (("index", "flat"), "2 accepted, 0 rejected"),

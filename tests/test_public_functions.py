@@ -35,7 +35,7 @@ def test_scenes_are_found_by_run_folder_and_file(scenes: Path) -> None:
 
 
 def test_place_without_a_scene_is_a_usage_error(tmp_path: Path) -> None:
-    with pytest.raises(manitwin.UsageError, match="no scene there; `manitwin layout DATASET"):
+    with pytest.raises(manitwin.UsageError, match="no scene found; create scenes with `manitwin layout DATASET"):
         manitwin.find_scenes(tmp_path)
 
 

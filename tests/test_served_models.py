@@ -186,7 +186,7 @@ def test_a_photo_and_a_text_become_twins_while_every_server_fails(tmp_path: Path
         status, said = finished(tmp_path, "build", *inputs, "-o", "data", *served.flags, "--jobs", "2")
         assert status == 0, said
         assert not any(key in said for key in KEYS.values())
-        assert "services charge about, for a twin" in said
+        assert "approximate charges of services per twin" in said
         made = [load(twin) for twin in twins(tmp_path)]
         assert {twin.record.source.kind for twin in made} == {"image", "text"}
         again, _ = finished(tmp_path, "build", "-o", "data", *served.flags)

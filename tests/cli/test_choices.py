@@ -84,7 +84,7 @@ def test_wrong_name_is_refused_with_the_nearest_and_a_file_is_left_to_its_reader
 
 
 def test_each_gripper_may_be_named_once() -> None:
-    with pytest.raises(UsageError, match="each may be named once"):
+    with pytest.raises(UsageError, match="name each only once"):
         choices.GRIPPERS.check(["panda", "panda"])
 
 

@@ -94,7 +94,7 @@ def test_a_backend_that_cannot_be_set_up_is_wrong_use_that_says_what_is_missing(
 
 @pytest.mark.parametrize(("what", "name"), [("vlm", "rules"), ("generator", "lift"), ("grasper", "antipodal")])
 def test_built_in_backends_have_nothing_to_ask(capsys: pytest.CaptureFixture[str], what: str, name: str) -> None:
-    assert said(capsys, what) == (f"ok      {name}: built in, nothing to ask", 0)
+    assert said(capsys, what) == (f"ok      {name}: built in, no service to test", 0)
 
 
 @pytest.mark.parametrize(

@@ -85,7 +85,7 @@ def test_every_fault_that_is_listed_can_be_asked_for_and_says_what_it_does(capsy
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({}, "no service is named; give one of openai"),
+        ({}, "no service given; give one of openai"),
         ({"name": "grasp"}, "unknown server 'grasp'"),
         ({"name": "graspgen", "fault": ["explodes"]}, "unknown fault 'explodes'"),
         ({"name": "graspgen", "fault": ["hangs=often"]}, "give a name, or name=times"),

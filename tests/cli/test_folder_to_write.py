@@ -37,7 +37,7 @@ def test_folder_that_cannot_be_written_is_refused_before_any_work(tmp_path: Path
 @pytest.mark.parametrize("more", [[], ["--dry-run"]])
 def test_run_without_inputs_of_a_data_set_that_is_not_there_makes_none(tmp_path: Path, more: list[str]) -> None:
     done = CliRunner().invoke(app, ["build", "-o", str(tmp_path / "ds9"), *more])
-    assert isinstance(done.exception, UsageError) and "no data set there to go on with" in str(done.exception)
+    assert isinstance(done.exception, UsageError) and "no data set to resume" in str(done.exception)
     assert not list(tmp_path.iterdir())
 
 

@@ -21,7 +21,9 @@ def said(capsys: pytest.CaptureFixture[str]) -> str:
 
 def test_jaws_are_told_by_their_numbers(capsys: pytest.CaptureFixture[str]) -> None:
     gripper("panda")
-    assert "holds things of up to 80 mm with 50 N, friction 1; its tips are 103 mm in front of its base" in said(capsys)
+    assert "holds objects of up to 80 mm with 50 N, friction 1; its tips are 103 mm in front of its base" in said(
+        capsys
+    )
 
 
 def test_hand_is_told_with_what_its_links_have(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -45,7 +47,7 @@ def test_hand_whose_fingers_oppose_aslant_is_noted_with_the_turn_that_mends_it(
     gripper(
         write_hand(tmp_path, TOML.replace(level, aslant).replace("depth_m = [0.06, 0.085]", "depth_m = [0.05, 0.06]"))
     )
-    assert "30 degrees off X, along which things are held; turn root_to_gripper by -0.52 rad about Y" in said(capsys)
+    assert "30 degrees off X, the closing direction; turn root_to_gripper by -0.52 rad about Y" in said(capsys)
 
 
 def test_picture_shows_thumb_left_and_fingers_right(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

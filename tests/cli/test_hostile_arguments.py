@@ -210,7 +210,7 @@ def test_ranges_of_objects_say_what_is_valid(
 def test_an_option_of_one_value_is_given_once(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["export", "TWIN", "--to", "mjcf", "--to", "urdf", "--out", str(tmp_path / "out")])
     assert isinstance(result.exception, UsageError)
-    assert str(result.exception) == "--to: given 2 times, and it takes one value; give it once"
+    assert str(result.exception) == "--to: given 2 times; this option takes one value, give it once"
     assert not (tmp_path / "out").exists()
 
 

@@ -56,7 +56,7 @@ def _group_lives(group: int) -> bool:
     return True
 
 
-AGAIN = "; run the same command again to go on where it stopped"
+AGAIN = "; rerun the same command to resume"
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

@@ -50,7 +50,7 @@ def test_upright_is_what_the_scenes_are_and_who_lies_is_said(bottles: Path, tmp_
     arguments.append("--sheet")
     done = CliRunner().invoke(app, arguments)
     assert done.exit_code == 0, done.output
-    assert "twins that have no upright placement and lie as they rest: 1" in done.output
+    assert "twins without an upright placement, placed in another resting pose: 1" in done.output
     assert "joints" not in done.output
     assert f"2 of 2 scenes in {tmp_path / 'out'}/contact_sheet.webp" in done.output
     with Image.open(tmp_path / "out" / "contact_sheet.webp") as sheet:

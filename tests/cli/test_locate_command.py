@@ -115,7 +115,7 @@ def test_grasps_at_the_pose_add_up_and_a_cloud_has_none(files: Files) -> None:
     assert code == 0 and grasps["verified"] == len(Twin(files.box).grasps())
     assert grasps["verified"] == len(grasps["free"]) + grasps["obstructed"] + grasps["uncertain"]
     done = CliRunner().invoke(app, ["locate", str(files.box), "--cloud", str(files.box / "grasps.parquet"), "--grasps"])
-    assert "does not show what is beside it" in str(done.exception)
+    assert "does not show its surroundings" in str(done.exception)
 
 
 def test_what_an_estimator_guesses_is_checked_and_says_who_guessed(files: Files) -> None:
@@ -158,9 +158,9 @@ def test_another_twin_is_refused_with_status_3(files: Files) -> None:
     [
         ((), "--depth, --camera: missing"),
         (("--depth", "depth.png"), "--camera: missing"),
-        (("--depth", "depth.png", "--cloud", "camera.json"), "a view by itself"),
+        (("--depth", "depth.png", "--cloud", "camera.json"), "cannot be combined with"),
         (("--cloud", "camera.json"), "is no cloud"),
-        (("--cloud", "camera.json", "--base", "camera.json"), "--base: a cloud of the thing alone"),
+        (("--cloud", "camera.json", "--base", "camera.json"), "--base: a point cloud of the object alone"),
         (("--depth", "depth.png", "--camera", "camera.json", "--base", "camera.json"), "says no pose of a camera"),
     ],
 )
@@ -187,4 +187,6 @@ def test_a_twin_of_another_size_is_found_at_the_things_size_and_gives_no_grasps(
 def test_a_size_is_looked_for_of_one_twin_by_the_own_search(files: Files) -> None:
     for words in ((files.box.parents[2],), (files.box, "--estimator", "command:true {request} {out}")):
         done = CliRunner().invoke(app, ["locate", *map(str, words), *files.view, "--fit-size"])
-        assert isinstance(done.exception, UsageError) and "name a twin, without --estimator" in str(done.exception)
+        assert isinstance(done.exception, UsageError) and "give a twin, and leave out --estimator" in str(
+            done.exception
+        )

@@ -59,9 +59,9 @@ def test_a_limit_of_file_sizes_is_one_line(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("error", "says", "status"),
     [
-        (MemoryError(), "no memory left", 4),
-        (OSError(errno.ENOSPC, "No space left on device", "/d/x"), "/d/x: No space left on device; make room", 4),
-        (OSError(errno.EDQUOT, "Disk quota exceeded"), "Disk quota exceeded; make room", 4),
+        (MemoryError(), "out of memory", 4),
+        (OSError(errno.ENOSPC, "No space left on device", "/d/x"), "/d/x: No space left on device; free disk space", 4),
+        (OSError(errno.EDQUOT, "Disk quota exceeded"), "Disk quota exceeded; free disk space", 4),
         (OSError(errno.EFBIG, "File too large", b"/d/\xff"), "ulimit -f", 4),
         (OSError(errno.EMFILE, "Too many open files"), "ulimit -n", 4),
         (BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable"), "ulimit -u", 4),

@@ -44,7 +44,7 @@ def test_added_weights_are_listed(folder: Path, capsys: pytest.CaptureFixture[st
 
 
 def test_list_takes_nothing_and_add_a_name() -> None:
-    with pytest.raises(UsageError, match="models list takes no more"):
+    with pytest.raises(UsageError, match="models list takes no further arguments"):
         models("list", "isnet")
     with pytest.raises(UsageError, match="manitwin models list"):
         models("add")

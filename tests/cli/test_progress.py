@@ -181,8 +181,8 @@ def test_what_waits_for_a_service_that_is_down_is_told_again_with_the_time_that_
             waits.stage(StageEnded(task(number), stage, "waiting", detail=down, given_up_in_s=1800.0 - at_s))
     lines = out.getvalue().splitlines()
     assert [line.partition(":")[0] for line in lines] == ["gate waits", "points waits", *["gate still waits"] * 14]
-    assert lines[0].startswith("gate waits: vlm at http://host does not answer; asked again for 30 min more")
-    assert lines[-1].count("asked again for 2 min more (run.patience_s)") == 1 and "Ctrl-C stops" in lines[-1]
+    assert lines[0].startswith("gate waits: vlm at http://host does not answer; retried for another 30 min")
+    assert lines[-1].count("retried for another 2 min (run.patience_s)") == 1 and "Ctrl-C stops" in lines[-1]
     assert "later" not in out.getvalue()
 
 

@@ -201,7 +201,7 @@ def test_log_is_no_part_of_a_data_set(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "manitwin", "check", "data"], cwd=tmp_path, capture_output=True, text=True
     )
-    assert "ledger and folders agree" in done.stdout and (tmp_path / "data" / "run.log").exists()
+    assert "the ledger and the folders agree" in done.stdout and (tmp_path / "data" / "run.log").exists()
 
 
 def test_addresses_are_printed_as_they_are(capfd: pytest.CaptureFixture[str]) -> None:

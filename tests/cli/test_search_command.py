@@ -34,7 +34,7 @@ def run(*arguments: object) -> str:
 def test_words_and_a_picture_find_twins(dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(twin_looks, "AROUND", 2)
     assert "knife" in run("search", dataset, "red knives", "--limit", 1)
-    assert "no twin is found by these words" in run("search", dataset, "xylophone")
+    assert "no twin matches these words" in run("search", dataset, "xylophone")
     misspelt = CliRunner().invoke(app, ["search", str(dataset), "red nife"])
     assert "no twin has the word 'nife'; spelt nearly so: knife" in misspelt.output
     catalog = tmp_path / "catalog"

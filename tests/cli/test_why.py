@@ -55,7 +55,7 @@ def test_trajectories_tell_the_most_frequent_cause_and_its_remedy(scenes: Path, 
     assert lines[0].startswith("why failed: ") and "twin.json: schema version None" in lines[0]
     assert "remedy: build the twin again" in lines[1]
     assert f"manitwin retry {out} and the same command again" in lines[1]
-    assert "run the same command again" not in done.output, "by itself it would try nothing again"
+    assert "rerun the same command" not in done.output, "by itself it would try nothing again"
     told = manitwin("status", out)
     assert "schema version None" in told.stdout and "--why" in told.stdout
 
@@ -73,7 +73,7 @@ def test_scenes_whose_twins_are_gone_are_refused_before_any_work(scenes: Path, t
     for twin_id in later:
         shutil.rmtree(tmp_path / "data" / twin_name(twin_id))
     done = manitwin("trajectories", place, "-o", out, "-n", 6)
-    assert done.exit_code != 0 and "name the data set where the twins are now (--twins)" in str(done.exception)
+    assert done.exit_code != 0 and "give the data set where the twins are now (--twins)" in str(done.exception)
     assert "(1 of 2 are missing)" in str(done.exception)
     assert not out.exists()
 
@@ -109,7 +109,7 @@ def test_layouts_tell_why_they_were_rejected(scenes: Path, tmp_path: Path) -> No
     done = manitwin("layout", scenes / "data", "-o", tmp_path / "scenes", "-n", 2, *crowded)
     assert done.exit_code == 3
     assert "why rejected: 2 of 2 no_room, such as item 1: no place was found" in done.stderr
-    assert "remedy: fewer --objects" in done.stderr
+    assert "remedy: use fewer --objects" in done.stderr
 
 
 def test_a_build_tells_the_most_frequent_reason_and_that_there_are_others(tmp_path: Path) -> None:
@@ -121,7 +121,9 @@ def test_a_build_tells_the_most_frequent_reason_and_that_there_are_others(tmp_pa
     )
     assert done.exit_code == 3, done.output
     assert "why rejected: 1 of 2 empty, item 1: a.png" in done.stderr and "1 duplicate" in done.stdout
-    assert "remedy: export or download it again" in done.stderr and "1 other cause: manitwin status" in done.stderr
+    assert (
+        "remedy: export or download the file again" in done.stderr and "1 other cause: manitwin status" in done.stderr
+    )
 
 
 def test_quiet_build_of_one_rejected_input_says_cause_and_remedy(tmp_path: Path) -> None:

@@ -132,7 +132,7 @@ def test_build_makes_damaged_files_again_by_itself(place: Path, damage: str) -> 
     DAMAGES[damage](twins(place)[0] / "grasps.parquet")
     shutil.rmtree(twins(place)[2])
     report = built(place)
-    assert "2 finished folders were gone or damaged: they are made again" in report.remarks
+    assert "2 finished folders were missing or damaged: they are built again" in report.remarks
     assert report.exit_code == 0 and content(place) == before and found(place) == []
     assert built(place).remarks == ["3 of 3 items were in the data set already"]
 
@@ -142,7 +142,7 @@ def test_altered_byte_is_seen_by_digests_alone(place: Path) -> None:
     path.write_bytes(path.read_bytes()[:-1] + b"\1")
     assert found(place) == []
     (said,) = found(place, digests=True)
-    assert "visual.glb is not what was written (its sha256 differs)" in said
+    assert "visual.glb differs from what was written (its sha256 differs)" in said
 
 
 def test_foreign_files_are_named_and_left(place: Path) -> None:
@@ -257,11 +257,11 @@ def test_damaged_ledger_is_said_put_aside_and_recovered_from_folders(place: Path
         reader.execute("SELECT count(*) FROM items").fetchall()
     (place / "config.json").write_text(canonical_json({}))
     dry = CliRunner().invoke(app, ["check", str(place), "--dry-run"])
-    assert dry.exit_code == 4 or "no ledger" in dry.output
+    assert dry.exit_code == 4 or "not a readable ledger" in dry.output
     assert os.path.lexists(ledger)
     done = CliRunner().invoke(app, ["check", str(place)])
     assert done.exit_code == 0 and not os.path.lexists(ledger), done.output
-    assert "put aside as ledger.sqlite.damaged" in done.output.replace("\n", " ")
+    assert "moved aside as ledger.sqlite.damaged" in done.output.replace("\n", " ")
     assert built(place).exit_code == 0 and content(place) == before and found(place) == []
 
 
@@ -279,7 +279,7 @@ def test_lock_and_log_that_are_links_are_not_written(place: Path, tmp_path: Path
 def test_folder_that_leads_out_is_not_written(place: Path, tmp_path: Path, name: str) -> None:
     shutil.move(place / name, tmp_path / "elsewhere")
     (place / name).symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(UsageError, match="a link out of"):
+    with pytest.raises(UsageError, match="a link to a place outside"):
         built(place)
 
 

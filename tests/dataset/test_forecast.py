@@ -103,8 +103,8 @@ def test_the_command_says_what_the_document_says(dataset: Path) -> None:
     runner = CliRunner()
     done = runner.invoke(app, ["plan", str(dataset), "--items", "1000", "--cores", "8"])
     assert done.exit_code == 0
-    assert "1,000 inputs on 8 cores, told from 8 inputs" in done.output
-    assert "dollars: not known; say the price of a core's hour with --core-hour-usd" in done.output
+    assert "1,000 inputs on 8 cores, estimated from 8 measured inputs" in done.output
+    assert "dollars: unknown; give the price of a core-hour with --core-hour-usd" in done.output
     done = runner.invoke(
         app, ["plan", str(dataset), "--items", "1000", "--cores", "8", "--core-hour-usd", "1", "--json"]
     )

@@ -166,7 +166,7 @@ def test_a_full_disk_stops_the_run_and_leaves_nothing_half_written(
     first = rehearse(root, texts, recipe=recipe, settings=settings(), processes=True, ledger_folder=folder)
     assert first.result.stopped is not None
     assert "full" in first.result.stopped or "No space left" in first.result.stopped
-    assert "make room" in first.result.stopped
+    assert "free disk space" in first.result.stopped
     assert "failed" not in first.states.values()
     assert [wrong for wrong in first.wrong if "half" in wrong or "without" in wrong] == []
     subprocess.run(["mount", "-o", "remount,size=60m", str(small_disk)], check=True)

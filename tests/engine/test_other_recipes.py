@@ -46,7 +46,7 @@ def test_what_failed_is_tried_again_by_a_recipe_that_replaces_nothing(tmp_path: 
     built(tmp_path / "data", "mug", "raise:b", recipe=EARLIER)
     report = built(tmp_path / "data", recipe=Keeps(plan=(("a", "cpu"), ("c", "cpu")), size=10))
     assert report.counts["accepted"] == 2 and report.counts.get("failed", 0) == 0, "there was nothing to be replaced"
-    assert [said[:22] for said in report.remarks] == ["1 that are there were "]
+    assert [said[:22] for said in report.remarks] == ["1 existing items were "]
 
 
 def test_without_inputs_all_are_made_again_and_the_run_says_why(place: Path) -> None:
@@ -60,12 +60,12 @@ def test_without_inputs_all_are_made_again_and_the_run_says_why(place: Path) -> 
 def test_of_those_that_are_not_given_it_is_said_that_they_stay(place: Path) -> None:
     (said,) = built(place, "vase").remarks
     assert said.startswith(
-        "2 that are not given were made by another version of manitwin or with other settings, and stay"
+        "2 items outside these inputs were made by another version of manitwin or with other settings, and stay"
     )
     assert made_by(place) == [EARLIER.sha256, EARLIER.sha256, NOW.sha256]
     remarks = built(place, "mug").remarks
     assert any(said.startswith("1 were made by another version") for said in remarks)
-    assert any(said.startswith("1 that are not given") for said in remarks)
+    assert any(said.startswith("1 items outside these inputs") for said in remarks)
     assert made_by(place) == [NOW.sha256, EARLIER.sha256, NOW.sha256]
 
 
@@ -74,6 +74,6 @@ def test_a_recipe_that_replaces_nothing_leaves_them_whatever_is_given(place: Pat
     recipe = Keeps(size=10, versions=NOW.versions)
     remarks = built(place, *texts, recipe=recipe).remarks
     (said,) = [each for each in remarks if "another version" in each]
-    assert said.startswith("2 that are there were made by another version of manitwin,") and "in a new folder" in said
+    assert said.startswith("2 existing items were made by another version of manitwin,") and "use a new folder" in said
     assert made_by(place)[:2] == [EARLIER.sha256] * 2
     assert len(made_by(place)) == (3 if "vase" in texts else 2)

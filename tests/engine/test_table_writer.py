@@ -66,5 +66,5 @@ def test_failures_in_a_row_stop_the_run_and_a_full_disk_does_at_once(ledger: Led
     tables = TableWriter(ledger, every=1, attempts=2)
     assert tables.due_at_the_end() is not None
     full = tables.written(Failure("no_space", "the disk is full"))
-    assert full == "the disk is full; make room, then run again to go on where it stopped"
+    assert full == "the disk is full; free disk space, then rerun the command to resume"
     assert len(ledger.not_indexed(10)) == 3, "what failed is not noted as written"

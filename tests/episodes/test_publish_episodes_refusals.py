@@ -36,7 +36,10 @@ def test_episodes_of_a_rehearsals_twin_stay_unless_they_are_asked_for(run: Path,
     done = CliRunner().invoke(app, [*arguments, ",".join(LICENCES.values())])
     assert done.exit_code == 0, done.output
     with_the_bowl = sum(BOWL in ids for ids in OBJECTS)
-    assert f"{6 - with_the_bowl} episodes of" in done.output and f"{with_the_bowl} rehearsals left out" in done.output
+    assert (
+        f"{6 - with_the_bowl} episodes of" in done.output
+        and f"{with_the_bowl} left out: made with a rehearsal server" in done.output
+    )
     assert BOWL not in "".join(path.read_text() for path in (tmp_path / "out").glob("*.md"))
     with pytest.raises(UsageError, match=r"no kept episode may go out: 3 are rehearsals.*--with-rehearsals"):
         publish_episodes(run, tmp_path / "none", twins=place, license_allow=["CC0-1.0", "CC-BY-4.0"])
@@ -106,10 +109,13 @@ def test_command_tells_episodes_from_twins(run: Path, twins: Path, tmp_path: Pat
     assert done.exit_code == 0, done.output
     assert "3 episodes of 2 twins" in done.output
     assert "3 left out by licence: CC-BY-NC-4.0 2, unknown 1" in done.output
-    for more, why in ((["--twins-per-shard", "2"], "no shards"), (["--shard-size-mb", "5"], "no shards")):
+    for more, why in (
+        (["--twins-per-shard", "2"], "not written as shards"),
+        (["--shard-size-mb", "5"], "not written as shards"),
+    ):
         with pytest.raises(UsageError, match=why):
             CliRunner().invoke(app, [*arguments, *more], catch_exceptions=False)
-    with pytest.raises(UsageError, match="holds no episodes"):
+    with pytest.raises(UsageError, match="contains no episodes"):
         CliRunner().invoke(app, [str(twins), "-o", str(tmp_path / "x"), "--twins", str(twins)], catch_exceptions=False)
 
 

@@ -58,4 +58,4 @@ def test_errors_of_the_disk_and_of_the_file_say_which_file(connection: sqlite3.C
 def test_a_database_with_more_than_its_tables_has_a_flaw(connection: sqlite3.Connection) -> None:
     assert flaw_in(connection, _made, tables_of="a list") is None
     connection.execute("CREATE VIEW other AS SELECT * FROM rows")
-    assert flaw_in(connection, _made, tables_of="a list") == "its tables are not those of a list"
+    assert flaw_in(connection, _made, tables_of="a list") == "its tables do not match those of a list"

@@ -94,10 +94,10 @@ class Changes(RulesAnnotator):
     ("change", "message"),
     [
         (lambda s: replace(s, grasp=s.grasp[:1]), "1 grasp points, not 2 to 3"),
-        (lambda s: replace(s, functional=s.functional[:1] * 2), "not different ones below 42"),
+        (lambda s: replace(s, functional=s.functional[:1] * 2), "they must differ and be below 42"),
         (
             lambda s: replace(s, grasp=(s.grasp[0], s.grasp[1].model_copy(update={"candidate": 42}))),
-            "not different ones below 42",
+            "they must differ and be below 42",
         ),
         (
             lambda s: replace(s, grasp=(s.grasp[0], s.grasp[1].model_copy(update={"position_m": [0, 0, 9]}))),

@@ -94,9 +94,7 @@ def test_the_reason_is_one_line_with_the_remedy(tmp_path: Path) -> None:
     recipe = TwinRecipe(BuildConfig())
     recipe.identify(item)
     file.unlink()
-    with pytest.raises(
-        InputChanged, match=r"^cup.obj: is not there any more; put it back, then run the same command again$"
-    ):
+    with pytest.raises(InputChanged, match=r"^cup.obj: was removed; put it back, then rerun the same command$"):
         recipe.identify(item)
 
 

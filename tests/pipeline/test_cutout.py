@@ -52,7 +52,9 @@ def test_only_the_picture_that_was_looked_at_is_confirmed() -> None:
     matte = confirmed_or_rejected(doubted, "a.jpg", {"cutout": {"sha256": sha256, "source": "human:ada"}})
     assert matte.confidence == 0.4
     assert matte.findings == ("doubtful by itself (0.40); human:ada confirmed the cut-out", "cut")
-    with pytest.raises(Rejected, match=r"a\.jpg: is cut out otherwise than as human:ada confirmed it; look") as caught:
+    with pytest.raises(
+        Rejected, match=r"a\.jpg: the cut-out differs from the one that human:ada confirmed; check"
+    ) as caught:
         confirmed_or_rejected(doubted, "a.jpg", {"cutout": {"sha256": "0" * 64, "source": "human:ada"}})
     assert (caught.value.reason, set(caught.value.files)) == ("low_confidence_matte", {CUTOUT})
     with pytest.raises(Rejected, match=r"^low_confidence_matte: a\.jpg: why$") as caught:
@@ -81,7 +83,7 @@ def test_what_was_confirmed_of_another_part_of_the_photo_or_cannot_be_read_is_lo
     whole[:700, :, 3] = 255
     otherwise = DoubtedCutOut("low_confidence_matte", "a.jpg: why", Matte(whole, "network", 0.4, (), {}))
     for doubted, kept in ((part, said), (otherwise, {**said, "alpha_png": damage})):
-        with pytest.raises(Rejected, match="otherwise than as human:ada confirmed it; look at it again"):
+        with pytest.raises(Rejected, match="differs from the one that human:ada confirmed; check it again"):
             confirmed_or_rejected(doubted, "a.jpg", {"cutout": kept})
 
 

@@ -59,7 +59,7 @@ def test_kept_outline_is_read_as_it_was_drawn() -> None:
     ],
 )
 def test_what_is_no_outline_is_refused_and_not_passed_over(said: Any) -> None:
-    with pytest.raises(Rejected, match=r"a\.jpg: the outline that was drawn of it cannot be read; remove its file"):
+    with pytest.raises(Rejected, match=r"a\.jpg: its drawn outline cannot be read; remove its file"):
         drawn_outline({DRAWN: said}, "a.jpg")
 
 
@@ -88,7 +88,7 @@ def test_outline_of_other_proportions_an_empty_one_and_a_full_one_are_refused() 
     for mask, why in (
         (ellipse(300, 300), "drew the outline on another picture"),
         (np.zeros((200, 300), bool), "is empty"),
-        (np.ones((200, 300), bool), "leaves nothing of the photo out"),
+        (np.ones((200, 300), bool), "covers the whole photo"),
     ):
         with pytest.raises(Rejected, match=why):
             as_drawn(given, DrawnOutline(mask, "human:ada"), "a.png")
@@ -133,7 +133,7 @@ def test_outlines_of_several_photos_are_kept_by_their_places() -> None:
     read = drawn_outline(said, "side.jpg", 11)
     assert read is not None and read.source == "human:ben" and drawn_outline(said, "back.jpg", 1) is None
     assert drawn_outline(said, "a.jpg") is None, "one of a photo by itself is another"
-    with pytest.raises(Rejected, match=r"a\.jpg: the outline that was drawn of it cannot be read"):
+    with pytest.raises(Rejected, match=r"a\.jpg: its drawn outline cannot be read"):
         drawn_outline({DRAWN_OF_SEVERAL: ["no object"]}, "a.jpg", 0)
 
 
@@ -151,7 +151,7 @@ def test_each_of_several_photos_is_cut_out_as_drawn_and_one_that_is_not_is_left_
     alpha = np.asarray(Image.open(tmp_path / "photos" / "01.png"))[..., 3] > 127
     assert (alpha == ellipse(600, 600)).mean() > 0.99
     assert "side.png: cut out as human:ada drew its outline" in field["findings"]
-    assert any(each.startswith("left out: back.png: the outline that was drawn") for each in field["findings"])
+    assert any(each.startswith("left out: back.png: its drawn outline") for each in field["findings"])
 
 
 def test_drawn_outlines_of_several_photos_take_the_places_of_their_masks(tmp_path: Path) -> None:

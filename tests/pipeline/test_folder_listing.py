@@ -135,9 +135,9 @@ def test_hidden_files_links_and_what_is_no_file_are_named(tmp_path: Path) -> Non
     ]
     assert said["again.jpg"] == "a link to cup.jpg"
     assert (
-        "leads nowhere" in said["gone.jpg"]
+        "a broken link" in said["gone.jpg"]
         and "link to a folder" in said["up"]
-        and said["pipe.jpg"] == "no regular file"
+        and said["pipe.jpg"] == "not a regular file"
     )
 
 
@@ -262,7 +262,7 @@ def test_a_listing_says_how_far_it_is(tmp_path: Path) -> None:
     said: list[str] = []
     list_folder(root, said.append)
     assert said[0] == "0 files found in scans" and "files found in scans" in said[3]
-    assert said[-1] == "3 of 3 meshes of scans looked at for the files that they name"
+    assert said[-1] == "3 of 3 meshes of scans searched for the files that they reference"
     notes = Notes()
     list(iterate_items([root], {}, notes))
     assert notes.under_way == said[-1]

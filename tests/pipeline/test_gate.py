@@ -127,7 +127,7 @@ def test_size_is_judged_only_where_it_is_known(tmp_path: Path, side_m: float) ->
         ("sofa", 2.4, "a sofa is that large, and no gripper here holds it"),
         ("sofa", 24.0, "give the right units (m, cm, mm), or the longest side in metres"),
         ("mug", 1.2, "give the right units (m, cm, mm), or the longest side in metres"),
-        ("flux capacitor", 1.2, "what truly is that large, no gripper here holds"),
+        ("flux capacitor", 1.2, "an object that really is this large fits none of the shipped grippers"),
     ],
 )
 def test_what_is_as_large_as_such_things_are_is_told_so(tmp_path: Path, name: str, side_m: float, said: str) -> None:
@@ -140,7 +140,7 @@ def test_what_is_as_large_as_such_things_are_is_told_so(tmp_path: Path, name: st
 def test_of_an_imported_asset_the_unit_of_its_file_is_to_blame(tmp_path: Path) -> None:
     draft = _draft(tmp_path, _box(side=0.001))
     draft.payload = Item(file=None, given="import.json")
-    said = "its file says so: mend the unit there and import it again, or give the longest side in metres"
+    said = "the file states this size: correct its unit and import it again, or give the longest side in metres"
     assert _rejection(draft, tmp_path).detail.endswith(said)
 
 

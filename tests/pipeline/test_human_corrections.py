@@ -107,7 +107,7 @@ def test_a_file_that_is_no_amendment_is_one_line(tmp_path: Path) -> None:
     write_amendments(root, "abcd", {"points": {"moves": {}}})
     assert read_amendments(root, "abcd") == {"points": {"moves": {}}}
     (tmp_path / amendments_name("abcd")).write_text('{"points": 3}')
-    with pytest.raises(UsageError, match="something else than an object by stage"):
+    with pytest.raises(UsageError, match="does not contain a JSON object keyed by stage"):
         read_amendments(root, "abcd")
 
 
@@ -172,7 +172,7 @@ def test_corrections_come_back_with_their_source_and_what_follows_is_made_again(
 
 def test_a_moved_point_that_is_gone_is_never_guessed() -> None:
     move = {"moves": {"f0": {"candidate": 1, "label": "spout", "source": "human:ada"}}}
-    with pytest.raises(BadReply, match=r"f0 \(spout\) was moved by human:ada, and is no point now"):
+    with pytest.raises(BadReply, match=r"f0 \(spout\) was moved by human:ada, but is no longer a point"):
         corrected_points(SelectedPoints((), ()), None, move)  # type: ignore[arg-type]
 
 
@@ -206,7 +206,9 @@ def test_a_candidate_is_the_one_that_was_seen_whatever_the_size_and_though_the_s
 def test_a_candidate_that_is_another_place_by_now_is_never_guessed(request_of_points: PointsRequest) -> None:
     place = place_in_box(request_of_points.positions_m, 5)
     numbered_anew = replace(request_of_points, positions_m=request_of_points.positions_m[::-1])
-    with pytest.raises(BadReply, match="candidate 5, which is another place of the object now; review the twin again"):
+    with pytest.raises(
+        BadReply, match="candidate 5, which is now at another place of the object; review the twin again"
+    ):
         moved_to_5(numbered_anew, place)
     assert moved_to_5(numbered_anew, None).candidate == 5, "a correction of an earlier version does not say its place"
 

@@ -55,7 +55,7 @@ def test_a_row_says_its_size_by_its_longest_side_or_by_its_unit(folder: Path) ->
     items, _ = collect_items([manifest], longest_side_m=0.5)
     assert [item.longest_side_m for item in items] == [0.12, None, 0.3, 0.5]
     for row, told in (
-        ("cup.glb,mm,0.1", r"list\.csv:2: longest_side_m: the unit mm says the size of a mesh already"),
+        ("cup.glb,mm,0.1", r"list\.csv:2: longest_side_m: the unit mm already determines the size of the mesh"),
         ("photo.jpg,,12 cm", r"list\.csv:2: longest_side_m is 12 cm; give metres, more than 0"),
         ("photo.jpg,,0", "longest_side_m is 0; give metres"),
         ("photo.jpg,,inf", "longest_side_m is inf; give metres"),
@@ -65,7 +65,7 @@ def test_a_row_says_its_size_by_its_longest_side_or_by_its_unit(folder: Path) ->
         with pytest.raises(UsageError, match=told):
             collect_items([manifest])
     manifest.write_text("text,longest_side_m\na mug,0.1\n")
-    with pytest.raises(UsageError, match="a text says its size in its words"):
+    with pytest.raises(UsageError, match="a text states the size in its words"):
         collect_items([manifest])
     manifest.write_text("file,height_m\nphoto.jpg,0.1\n")
     assert "'height_m' (did you mean 'longest_side_m'?)" in collect_items([manifest])[1].remarks[0]
@@ -119,7 +119,7 @@ def test_columns_that_nobody_knows_are_an_error_where_it_is_asked_for(folder: Pa
         ("file,name\ncup.glb,a,b\n", "more values than columns"),
         ("file;name\ncup.glb;cup\n", "list.csv:1: its columns are separated by semicolons"),
         ("file\tname\ncup.glb\tcup\n", "list.csv:1: its columns are separated by tabs"),
-        ("cup.glb,cup\nphoto.jpg,cup\n", "the first line names the columns, unknown: 'cup'"),
+        ("cup.glb,cup\nphoto.jpg,cup\n", "the first line must name the columns; unknown: 'cup'"),
         ("file\nhttps://example.org/cup.glb\n", "is a URL, and nothing is downloaded"),
     ],
 )
@@ -159,7 +159,11 @@ def test_path_that_is_not_there_is_a_usage_error(folder: Path) -> None:
 
 def test_folder_without_inputs_is_told_with_what_it_has(tmp_path: Path) -> None:
     (tmp_path / "photo.heic").write_bytes(b"x")
-    with pytest.raises(UsageError, match=r"no image or mesh in this folder; left alone: photo\.heic: HEIC is not read"):
+    with pytest.raises(
+        UsageError,
+        match=r"this folder contains no image or mesh; left alone: photo\.heic: HEIC is"
+        " not read",
+    ):
         collect_items([tmp_path])
     (tmp_path / "photo.heic").unlink()
     with pytest.raises(UsageError, match="no image or mesh"):

@@ -67,7 +67,7 @@ def test_photos_with_poses_are_thinned_out_by_where_their_cameras_look(tmp_path:
 
 def test_too_many_photos_are_refused_where_nobody_says_where_the_camera_was(tmp_path: Path) -> None:
     photos = _photos(tmp_path, 73)
-    with pytest.raises(UsageError, match=r"73 photos of one thing; give at most 72, .* or say where the camera was"):
+    with pytest.raises(UsageError, match=r"73 photos of one object; give at most 72, .* or say where the camera was"):
         list(iterate_items(photos, {}, Notes(), views=True))
     items = [Item(f"/nowhere/{number}.png") for number in range(MOST_GIVEN + 1)]
     with pytest.raises(UsageError, match="give at most 4096"):

@@ -96,7 +96,7 @@ def test_a_list_of_nothing_else_is_not_read_to_its_end(tmp_path: Path) -> None:
         return "none of these"
 
     texts = [f"thing {number}" for number in range(3 * MOST)]
-    with pytest.raises(UsageError, match=rf"{MOST - 1} more cannot be used: .*; what comes after them was not read$"):
+    with pytest.raises(UsageError, match=rf"{MOST - 1} more cannot be used: .*; the inputs after them were not read$"):
         list(iterate_items([], {}, Notes(), texts, refusal=refusal))
     assert len(read) == MOST
     manifest = tmp_path / "list.csv"

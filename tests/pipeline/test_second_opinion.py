@@ -155,7 +155,7 @@ def test_agreement_of_every_grasp_cannot_be_had_from_a_sample() -> None:
     flags = Flags(second_opinion="sample", require_agreement=True)
     with pytest.raises(UsageError, match="tries a sample"):
         check_names(with_flags(BuildConfig(), flags))
-    with pytest.raises(UsageError, match="quick leaves"):
+    with pytest.raises(UsageError, match="quick skips"):
         with_flags(BuildConfig(), Flags(second_opinion="sample", quick=True))
     assert with_flags(BuildConfig(), Flags(second_opinion="sample")).second_opinion.sample_of_held == SAMPLE_OF_HELD
     sampled = BuildConfig(second_opinion=SecondOpinionConfig(sample_of_held=20))

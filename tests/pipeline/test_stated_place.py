@@ -117,9 +117,7 @@ def test_a_box_chooses_one_of_two_things(tmp_path: Path) -> None:
 def test_a_box_around_other_things_is_told(tmp_path: Path) -> None:
     photo = _two_things(tmp_path)
     left, top, right, bottom = _around(*RED)
-    with pytest.raises(
-        Rejected, match=r"two\.png: what was cut out and the box that was stated of it have \d+ % in common"
-    ):
+    with pytest.raises(Rejected, match=r"two\.png: the cut-out and the stated box overlap by only \d+ %"):
         _cut(Item(str(photo), box_px=(left - 50, top - 40, right + 30, bottom + 30)), tmp_path / "cut")
 
 
@@ -217,13 +215,13 @@ def test_rows_say_masks_and_boxes(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("row", "said"),
     [
-        ({"file": "two.png", "mask": "gone.png"}, r"rows\.jsonl:1: mask: .*gone\.png is no file"),
-        ({"file": "cube.obj", "mask": "red.png"}, r"mask: says where in a photo the thing is, and this is a mesh"),
+        ({"file": "two.png", "mask": "gone.png"}, r"rows\.jsonl:1: mask: .*gone\.png is not a file"),
+        ({"file": "cube.obj", "mask": "red.png"}, r"mask: applies to photos, but this is a mesh"),
         (
             {"text": "a red mug", "box_px": "1,2,30,40"},
-            r"box_px: says where in a photo the thing is, and this is a text",
+            r"box_px: applies to photos, but this is a text",
         ),
-        ({"file": "two.png", "mask": "a\0b"}, r"mask: has a NUL character"),
+        ({"file": "two.png", "mask": "a\0b"}, r"mask: contains a NUL character"),
         ({"file": "two.png", "box_px": "1,2,3"}, r"rows\.jsonl:1: box_px is 1,2,3; give"),
     ],
 )
@@ -240,7 +238,7 @@ def test_what_holds_for_all_is_of_one_photo(tmp_path: Path, more: list[str]) -> 
     (tmp_path / "rows.csv").write_text("file\ntwo.png\n")
     inputs = [photo, *(tmp_path / name for name in more)] if more in (["two.png"], []) else [tmp_path / more[0]]
     texts = [] if more else ["a mug"]
-    with pytest.raises(UsageError, match="a mask or a box is of one photo; of several write a manifest"):
+    with pytest.raises(UsageError, match="a mask or a box applies to one photo; for several photos write a manifest"):
         list(iterate_items(inputs, {"box_px": "70,86,270,286"}, Notes(), texts))
     (item,) = iterate_items([photo], {"box_px": (70, 86, 270, 286), "mask": tmp_path / "red.png"}, Notes())
     assert item.box_px == (70, 86, 270, 286) and item.masks == (str(tmp_path / "red.png"),)
@@ -275,7 +273,7 @@ def test_photos_of_a_group_have_masks_of_their_own(tmp_path: Path) -> None:
 def test_a_box_in_a_group(tmp_path: Path) -> None:
     _two_things(tmp_path)
     Image.open(tmp_path / "two.png").rotate(180).save(tmp_path / "other.png")
-    with pytest.raises(UsageError, match=r"group 'g' \(rows 1, 2\): box_px is of a photo by itself"):
+    with pytest.raises(UsageError, match=r"group 'g' \(rows 1, 2\): box_px applies to a single photo"):
         _rows(
             tmp_path,
             {"file": "two.png", "group": "g", "box_px": "70,86,270,286"},

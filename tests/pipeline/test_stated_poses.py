@@ -86,14 +86,14 @@ def test_photos_that_do_not_go_with_the_file_are_named(photos: list[Path]) -> No
         _item([*photos, folder / "unposed.png"])
     Image.open(photos[1]).crop((10, 0, 310, 240)).save(photos[1])
     with pytest.raises(
-        UsageError, match=r"1\.png: 300 x 240 pixels, and its pose .* 320 x 240; give the photo uncropped"
+        UsageError, match=r"1\.png: 300 x 240 pixels, but its pose .* 320 x 240; give the photo uncropped"
     ):
         _item(photos)
     turned = Image.open(photos[0])
     exif = turned.getexif()
     exif[0x0112] = 3
     turned.save(photos[0], exif=exif)
-    with pytest.raises(UsageError, match=r"0\.png: its EXIF turns it"):
+    with pytest.raises(UsageError, match=r"0\.png: its EXIF orientation rotates it"):
         _item([photos[0], photos[2]])
 
 
@@ -161,7 +161,7 @@ def test_a_folder_of_views_is_in_natural_order_and_leaves_out_what_has_no_pose(t
     (item,) = iterate_items([folder], {}, notes, views=True, poses=tmp_path / "transforms.json")
     assert [Path(file).stem for file in item.files] == ["shot2", "shot10"]
     assert any("no pose of shot9.png, shot100.png: left out" in remark for remark in notes.remarks)
-    with pytest.raises(UsageError, match="poses are those of several photos of one thing; give --views too"):
+    with pytest.raises(UsageError, match="poses apply to several photos of one object; give --views too"):
         list(iterate_items([folder], {}, Notes(), poses=tmp_path / "transforms.json"))
 
 
@@ -181,7 +181,7 @@ def test_the_world_is_turned_upright_and_the_unit_is_told(photos: list[Path]) ->
     for stated in (of_json, of_colmap):
         heights = [-(c.world_to_camera[:, :3].T @ c.world_to_camera[:, 3])[2] for c in stated.cameras]
         assert heights == pytest.approx([pose[2, 3] for pose in POSES])
-    with pytest.raises(InputError, match="stand on their heads"):
+    with pytest.raises(InputError, match="upside down"):
         stated_poses(photos, folder, up="y")
 
 

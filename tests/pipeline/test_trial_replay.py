@@ -57,8 +57,8 @@ def test_what_the_first_engine_holds_and_the_confirming_one_refused_is_played_in
     ("gripper", "grasp", "said"),
     [
         ("panda", "panda-9999", "no grasp of this name"),
-        ("wsg50_110", "panda-0000", "no grasps of a gripper of this name"),
-        ("../panda.toml", "panda-0000", "no grasps of a gripper of this name"),
+        ("wsg50_110", "panda-0000", "no grasps for a gripper of this name"),
+        ("../panda.toml", "panda-0000", "no grasps for a gripper of this name"),
     ],
 )
 def test_what_is_not_there_is_said(folder: Path, gripper: str, grasp: str, said: str) -> None:
@@ -69,8 +69,8 @@ def test_what_is_not_there_is_said(folder: Path, gripper: str, grasp: str, said:
 @pytest.mark.parametrize(
     ("how", "said"),
     [
-        (lambda grasps: grasps.update(gripper_sha256="0" * 64), "another than that of the trial"),
-        (lambda grasps: grasps.update(gripper="mine"), "does not come with the package"),
+        (lambda grasps: grasps.update(gripper_sha256="0" * 64), "differs from the one of the trial"),
+        (lambda grasps: grasps.update(gripper="mine"), "is not shipped with the package"),
         (lambda grasps: grasps["trial"].update(engine="other"), "engine other"),
         (lambda grasps: grasps["trial"].update(timestep_s=-1.0), r"grasps\.trial\.timestep_s"),
     ],

@@ -54,7 +54,7 @@ def test_the_variations_of_neighbouring_seeds_are_not_the_same_things() -> None:
 
 
 def test_files_have_no_variations_and_a_count_has_limits(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"bottle\.jpg: count makes variations of texts"):
+    with pytest.raises(UsageError, match=r"bottle\.jpg: --count applies to texts"):
         list(iterate_items([SAMPLE], {}, Notes(), count=2))
     for count in (0, 100_001):
         with pytest.raises(UsageError, match=f"count is {count}; give 1 to 100000"):

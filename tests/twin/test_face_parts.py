@@ -40,7 +40,10 @@ def test_faces_of_a_twin_without_parts_have_none(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("labels", "message"),
-    [(LABELS[:-1], "11 faces, visual.glb has 12"), (np.full(12, 1, np.uint8), "names part 1, the record has 1")],
+    [
+        (LABELS[:-1], "11 faces, but visual.glb has 12"),
+        (np.full(12, 1, np.uint8), "refers to part 1, but the record has 1"),
+    ],
 )
 def test_parts_of_other_faces_are_refused(tmp_path: Path, labels: np.ndarray, message: str) -> None:
     twin = Twin(with_parts(tmp_path, [PART], labels))

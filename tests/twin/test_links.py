@@ -92,10 +92,10 @@ def test_faces_of_unknown_links_are_refused(tmp_path: Path) -> None:
     folder = write_articulated(tmp_path / "twin")
     faces = sum(link.faces for link in Twin(folder).record.links)
     (folder / FACE_LINKS).write_bytes(labels_to_npy(np.full(faces, 7, np.uint8)))
-    with pytest.raises(TwinError, match="names link 7, the record has 3"):
+    with pytest.raises(TwinError, match="refers to link 7, but the record has 3"):
         Twin(folder).face_links()
     (folder / FACE_LINKS).write_bytes(labels_to_npy(np.zeros(3, np.uint8)))
-    with pytest.raises(TwinError, match="tells the links of 3 faces"):
+    with pytest.raises(TwinError, match="has links for 3 faces"):
         Twin(folder).face_links()
 
 

@@ -85,7 +85,7 @@ def test_fill_states_out_of_order_are_refused(order: tuple[float, ...]) -> None:
 
 
 def test_a_place_that_is_not_there_says_so(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="no such folder"):
+    with pytest.raises(UsageError, match="this folder does not exist"):
         TwinSource(tmp_path / "nowhere")
 
 
@@ -99,7 +99,7 @@ def test_missing_twins_are_counted_before_any_is_read(tmp_path: Path) -> None:
 
 def test_a_data_set_that_is_given_as_a_twin_is_called_one(tmp_path: Path) -> None:
     write_set(tmp_path, accepted=1, rejected=0)
-    with pytest.raises(TwinError, match=r"it is a data set: `manitwin view` and manitwin\.Dataset show it"):
+    with pytest.raises(TwinError, match=r"this is a data set: open it with `manitwin view` or manitwin\.Dataset"):
         Twin(tmp_path)
 
 

@@ -124,7 +124,7 @@ def test_empty_outlines_full_ones_and_those_of_two_things_are_not_kept(
     two = box_in(size_px, 0.1, 0.4) | box_in(size_px, 0.6, 0.9)
     for mask, why in (
         (np.zeros(size_px[::-1], bool), "is empty"),
-        (np.ones(size_px[::-1], bool), "leaves nothing of the photo out"),
+        (np.ones(size_px[::-1], bool), "covers the whole photo"),
         (two, "separate objects"),
     ):
         status, told = kept_by(outlining, first, png(mask), name="jar")

@@ -82,7 +82,7 @@ def test_name_and_size_are_kept_at_once_shown_again_and_taken_back(
     ("name", "longest_side_cm", "why"),
     [
         ("mug\0", None, "the name: 'mug\\\\x00' has control characters"),
-        ("mug\nX", None, "has control characters; give plain words"),
+        ("mug\nX", None, "contains control characters; use printable characters only"),
         ("\u202egum", None, "has control characters"),
         ("m" * 201, None, "the name: 201 characters; give at most 200"),
         (7, None, "a name is a text"),

@@ -96,7 +96,7 @@ def test_an_altered_twin_is_said_and_ends_no_process(viewed: Viewed, tmp_path: P
     (folder / "collision" / "hull_00.obj").rename(tmp_path / "hull.obj")
     (folder / "collision" / "hull_00.obj").write_text("v nonsense\n")
     with TrialPlayer() as player:
-        with pytest.raises(TwinError, match="no hull that can be read"):
+        with pytest.raises(TwinError, match="not a readable hull"):
             player.play(Twin(folder), "panda", "panda-0000")
         (tmp_path / "hull.obj").replace(folder / "collision" / "hull_00.obj")
         table = pq.read_table(folder / "grasps.parquet")

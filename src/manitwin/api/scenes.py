@@ -46,7 +46,7 @@ def find_scenes(place: str | Path) -> list[Path]:
 
     found = scene_files(Path(place))
     if not found:
-        raise UsageError(f"{place}: no scene there; `manitwin layout DATASET -o {place}` makes some")
+        raise UsageError(f"{place}: no scene found; create scenes with `manitwin layout DATASET -o {place}`")
     return found
 
 

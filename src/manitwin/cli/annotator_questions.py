@@ -48,7 +48,7 @@ class SilentModel:
 
     def ask(self, question: Question, turns: tuple[Turn, ...] = ()) -> Reply:
         """Raise UsageError: nothing is sent from here."""
-        raise UsageError(f"{self.model} is not asked here; build the twin with it to have its answers")
+        raise UsageError(f"{self.model} cannot be asked by this command; build the twin with it to get its answers")
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,7 @@ def write_questions(asked: AskedQuestions, out: Path) -> None:
     Raises UsageError where ``out`` holds something already.
     """
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise UsageError(f"{out} is there already and not empty; give a new folder")
+        raise UsageError(f"{out} already exists and is not empty; give a new folder")
     out.mkdir(parents=True, exist_ok=True)
     for one in asked.questions:
         _write_question(one, out / one.folder)
@@ -225,11 +225,11 @@ def _write_question(asked: AskedQuestion, folder: Path) -> None:
 def _readme(asked: AskedQuestions) -> str:
     price = asked.price
     lines = [
-        f"# What {asked.model} is asked about twin {asked.twin_id}",
+        f"# Prompts of {asked.model} for twin {asked.twin_id}",
         "",
-        "Each folder is one question: `instructions.txt` (the system's turn), `question.txt` (the user's turn, with pictures"
-        " where their names stand), `schema.json` (the form of the answer). What contradicts geometry or priors is asked for"
-        " once more with what is wrong, which costs about as much again.",
+        "Each folder is one prompt: `instructions.txt` (system message), `question.txt` (user message; file names mark the places"
+        " of pictures), `schema.json` (JSON Schema of the answer). If an answer contradicts geometry or priors, the model is"
+        " asked once more and told what is wrong; that costs about as much again.",
         "",
         asked.remark,
         "",
@@ -251,7 +251,10 @@ def _readme(asked: AskedQuestions) -> str:
     lines.append(f"| all | | | {read_all} | {written_all} | {_usd(total, price)} |")
     if price is None:
         lines += ["", "USD: set `services.usd_per_million_tokens = [read, written]` in the configuration."]
-    lines += ["", "Tokens are estimates: 4 characters, or 28 x 28 pixels, a token; models count in their own ways."]
+    lines += [
+        "",
+        "Token counts are estimates: one token per 4 characters, or per 28 x 28 pixels; models count differently.",
+    ]
     return "\n".join(lines) + "\n"
 
 

@@ -68,7 +68,7 @@ def check_given_once(order: Iterable[Any]) -> None:
     times = Counter(each for each in order if each.param_type_name == "option" and not (each.multiple or each.is_flag))
     for option, count in times.items():
         if count > 1:
-            raise UsageError(f"{_called(option)}: given {count} times, and it takes one value; give it once")
+            raise UsageError(f"{_called(option)}: given {count} times; this option takes one value, give it once")
 
 
 class CheckedCommand(TyperCommand):
@@ -111,9 +111,9 @@ class CommandWords(TyperGroup):
 def check_text(called: str, value: str, *, place: bool) -> None:
     """Raise UsageError, naming the parameter, for a value that no command takes; ``place``: it names a file or folder."""
     if "\0" in value:
-        raise UsageError(f"{called}: has a NUL character in it; give it without that")
+        raise UsageError(f"{called}: contains a NUL character; remove it")
     if len(value) > LONGEST_TEXT:
-        raise UsageError(f"{called}: {len(value)} characters; give at most {LONGEST_TEXT}")
+        raise UsageError(f"{called}: {len(value)} characters are too many; give at most {LONGEST_TEXT}")
     if not place:
         return
     if not value.strip():
@@ -121,7 +121,7 @@ def check_text(called: str, value: str, *, place: bool) -> None:
     try:
         length = len(os.fsencode(value))
     except UnicodeEncodeError as error:
-        raise UsageError(f"{called}: {value!r} is no name that a file can have; check the path") from error
+        raise UsageError(f"{called}: {value!r} is not a valid file name; check the path") from error
     if length > LONGEST_PLACE:
         raise UsageError(f"{called}: {value[:40]!r}... has {length} bytes; a path has at most {LONGEST_PLACE}")
 
@@ -138,12 +138,14 @@ def degrees_of(value: str, photos: int) -> list[float]:
     except ValueError:
         told = value if len(value) <= 60 else f"{value[:60]}..."
         raise UsageError(
-            f"--turns {told!r}: no list of degrees; give one a photo, such as 0,90,180, or 0,10,... where all steps are equal"
+            f"--turns {told!r}: not a list of degrees; give one angle per photo, such as 0,90,180, or 0,10,... for equal steps"
         ) from None
     if not goes_on:
         return turns
     if len(turns) < 2 or len(turns) > photos:
-        raise UsageError(f"--turns {value!r}: for {photos} photos; give at least the first two turns before the dots")
+        raise UsageError(
+            f"--turns {value!r}: does not fit {photos} photos; give two or more angles before the dots, at most one per photo"
+        )
     step = turns[-1] - turns[-2]
     return turns + [turns[-1] + step * number for number in range(1, photos - len(turns) + 1)]
 

@@ -150,7 +150,7 @@ class _Planner:
         identity, by_header = found
         twin_id, kind = identity.item_id, identity.kind
         if twin_id in self.seen:
-            return PlannedItem(item, twin_id, kind, "duplicate", "the same input as another one")
+            return PlannedItem(item, twin_id, kind, "duplicate", "the same input as an earlier one")
         self.seen.add(twin_id)
         record = self._record_of(twin_id)
         ending = None if record is None else self._ending_of(record, twin_id)
@@ -174,8 +174,8 @@ class _Planner:
         try:
             otherwise = made_otherwise(parse_record(record), self._config)
         except TwinError:
-            return "what is there cannot be read"
-        return f"what is there was made {otherwise or 'before people put something right'}"
+            return "the existing twin cannot be read"
+        return f"the existing twin was made {otherwise or 'before its corrections by reviewers'}"
 
     def _amended(self, twin_id: str) -> str | None:
         return amendments_sha256(read_amendments(self._root, twin_id))

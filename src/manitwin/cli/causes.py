@@ -14,58 +14,58 @@ if TYPE_CHECKING:
     from manitwin.engine.ledger.progress import Unaccepted, UnacceptedState
 
 REMEDIES = {
-    "unreadable": "open it in what made it and save it again: a photo as PNG or JPEG, a mesh as GLB",
-    "empty": "export or download it again",
-    "wrong_type": "give a photo or a mesh; `manitwin import` takes what other simulators use",
+    "unreadable": "open the file in the program that made it and save it again: a photo as PNG or JPEG, a mesh as GLB",
+    "empty": "export or download the file again",
+    "wrong_type": "give a photo or a mesh; `manitwin import` reads assets of other simulators",
     "too_small": "give a larger photo",
-    "too_large": "simplify the mesh, scale its pictures down, or raise the limits in the configuration (mesh, run)",
-    "animated": "save one of its pictures as PNG, or choose one by matting.frame in the configuration",
-    "no_faces": "export it with faces: points and curves have no surface",
-    "not_finite": "export it again: some of its numbers are none",
+    "too_large": "simplify the mesh, reduce the size of its textures, or raise the limits in the configuration (mesh, run)",
+    "animated": "save one frame as PNG, or choose a frame with matting.frame in the configuration",
+    "no_faces": "export the mesh with faces: points and curves have no surface",
+    "not_finite": "export the mesh again: some of its coordinates are not finite numbers",
     "no_object": "photograph the object whole and larger, on a plain surface of another colour",
-    "several_objects": "one object an input: say where one is in the photo (--box, or a column box_px), or give each object in a"
+    "several_objects": "give one object per input: mark it in the photo (--box, or a column box_px), or give each object in a"
     " file of its own",
-    "low_confidence_matte": "photograph it whole on a plain surface of another colour, or give a mask of it (--mask, or a column"
-    " mask) or an image with an alpha channel;"
-    " where a cutout.webp lies beside a photo's twin.json and is right, `manitwin review cutouts DATASET --accept ID` builds it,"
-    " and with --draw its outline is drawn in the browser",
-    "generator_failed": "another photo, another generator (--generator, see docs/generators.md), or a mesh",
+    "low_confidence_matte": "photograph the whole object on a plain surface of another colour, or give a mask of it (--mask, or a"
+    " column mask) or an image with an alpha channel;"
+    " if the cutout.webp beside the twin.json is right, build it with `manitwin review cutouts DATASET --accept ID`;"
+    " with --draw you redraw the outline in the browser",
+    "generator_failed": "give another photo or a mesh, or use another generator (--generator, see docs/generators.md)",
     "not_watertight": "close the holes of the mesh in a modeller",
     "degenerate": "give a mesh that encloses a volume, with walls and no holes",
-    "absurd_size": "say the unit of a mesh (--units m, cm or mm, or a column units), or how long it is (--longest-side 0.12,"
+    "absurd_size": "give the unit of a mesh (--units m, cm or mm, or a column units), or its length (--longest-side 0.12,"
     " metres, or a column longest_side_m)",
-    "poor_quality": "another photo, or another generator (--generator, see docs/generators.md)",
+    "poor_quality": "give another photo, or use another generator (--generator, see docs/generators.md)",
     "implausible_mass": "check --units, --longest-side and --name, or the columns units, longest_side_m and name",
-    "implausible_size": "check --units, --longest-side and --name, or the columns of these; --units none where no unit is right,"
-    " as of game assets: it is then made as large as is usual of what it is called",
-    "too_wide": "a gripper that opens wider (--gripper, see docs/grippers.md)",
-    "too_thin": "a gripper for thin things, such as a suction cup (--gripper, see docs/grippers.md)",
-    "no_proposal": "another gripper (--gripper, see docs/grippers.md); hands may not reach such a thing at all",
-    "none_held": "another gripper (--gripper, see docs/grippers.md); it may be too heavy or too smooth for this one",
-    "no_stable_pose": "nothing, where it is round: it rolls; else check that the mesh is the whole object",
-    "unstable": "fewer --stacked or --contained, or larger layout.repairs in the configuration",
-    "no_room": "fewer --objects, or a sparser --clutter",
-    "nothing_fits": "fewer --stacked or --contained, or twins that others stand on or fit into",
-    "crashed": "open it again once more; where it dies again, leave this input out and report it with its file",
-    "timeout": "a larger run.stage_timeout_s in the configuration",
+    "implausible_size": "check --units, --longest-side and --name, or the columns of these; if no unit is right, as with game"
+    " assets, give --units none: the mesh is then scaled to the usual size of an object of its name",
+    "too_wide": "use a gripper that opens wider (--gripper, see docs/grippers.md)",
+    "too_thin": "use a gripper for thin objects, such as a suction cup (--gripper, see docs/grippers.md)",
+    "no_proposal": "use another gripper (--gripper, see docs/grippers.md); it is possible that no gripper can reach this object",
+    "none_held": "use another gripper (--gripper, see docs/grippers.md); the object may be too heavy or too smooth for this one",
+    "no_stable_pose": "none for a round object, which rolls; otherwise check that the mesh is the whole object",
+    "unstable": "use fewer --stacked or --contained objects, or a larger layout.repairs in the configuration",
+    "no_room": "use fewer --objects, or a sparser --clutter",
+    "nothing_fits": "use fewer --stacked or --contained objects, or twins that others can stand on or fit into",
+    "crashed": "retry the item; if the worker crashes again, leave this input out and report the crash with its file",
+    "timeout": "set a larger run.stage_timeout_s in the configuration",
 }
 """What a person can do about a reason: those of twins (``REJECTION_REASONS``), of layouts, and of what failed."""
 
 NAME_IT = (
-    "say what it is (--name mug, or a column name), and how long (--longest-side 0.12, metres, or a column longest_side_m);"
-    " of a mesh its unit does too (--units m, cm or mm, or a column units)"
+    "name the object (--name mug, or a column name), and give its length (--longest-side 0.12, metres, or a column"
+    " longest_side_m); for a mesh its unit is enough (--units m, cm or mm, or a column units)"
 )
 """The remedy where only the usual size of anything made it too wide or too thin."""
-SCALE_IT = "say the unit (--units m, cm or mm, or a column units), or scale the file"
+SCALE_IT = "give the unit (--units m, cm or mm, or a column units), or scale the mesh in the file"
 MEASURE_IT = (
-    "measure it (--longest-side 0.12, metres, or a column longest_side_m), or give a mesh of its true size (--units m, cm or mm,"
-    " or a column units), or say more closely what it is (--name)"
+    "measure the object (--longest-side 0.12, metres, or a column longest_side_m), give a mesh of its true size"
+    " (--units m, cm or mm, or a column units), or give a more specific name (--name)"
 )
 """The remedy where the usual size of what it is called did: another gripper comes after that."""
 
 AS_SCENERY = (
-    "none: it is no thing for these hands; as scenery simulators take its own file, and `manitwin import` writes its shape in"
-    " metres (asset.glb)"
+    "none: the object is too large for these grippers; to use it as scenery, load its own file in the simulator, or the shape"
+    " in metres that `manitwin import` writes (asset.glb)"
 )
 """Of what has the size of such things and is too large to be held."""
 

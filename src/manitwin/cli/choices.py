@@ -47,7 +47,7 @@ class Choices:
             for name in each.lower().split(",") if self.listed else [each]:
                 self._check_one(name.strip())
         if len(set(given)) < len(given):
-            raise UsageError(f"{self.kind}s {', '.join(given)}: each may be named once")
+            raise UsageError(f"{self.kind}s {', '.join(given)}: name each only once")
         return value
 
     def complete(self, incomplete: str) -> list[str]:
@@ -194,7 +194,7 @@ def _number(value: int) -> str:
 def settings_file(value: Path | None) -> Path | None:
     """Return the path of a TOML file that is there; a callback."""
     if value is not None and not os.path.exists(value):
-        raise UsageError(f"{value}: not there; give a TOML file of settings")
+        raise UsageError(f"{value}: not found; give a TOML file of settings")
     if value is not None and os.path.isdir(value):
         raise UsageError(f"{value}: is a folder; give a TOML file of settings")
     return value

@@ -118,13 +118,13 @@ def print_estimate(usd_by_kind: dict[str, float]) -> None:
     """Say about what services will charge for a twin, where they charge anything."""
     if any(usd_by_kind.values()):
         each = ", ".join(f"{usd:.4f} USD of {kind}" for kind, usd in usd_by_kind.items())
-        err_console.print(f"services charge about, for a twin: {each}")
+        err_console.print(f"approximate charges of services per twin: {each}")
 
 
 def note_old_layout(root: DatasetRoot) -> None:
     """Say so where a data set is of the layout of earlier versions."""
     if root.flat:
-        err_console.print(f"{root.url}: in the flat layout of earlier versions, which is read and not added to")
+        err_console.print(f"{root.url}: uses the flat layout of earlier versions, which can be read but not extended")
 
 
 def print_error(message: str) -> None:

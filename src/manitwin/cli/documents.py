@@ -46,7 +46,7 @@ def _keep_stdout(wanted: bool) -> bool:
 Json = Annotated[
     bool,
     typer.Option(
-        FLAG, callback=_keep_stdout, help="Print one JSON document on stdout; all that is for a person goes to stderr."
+        FLAG, callback=_keep_stdout, help="Print one JSON document on stdout; messages for people go to stderr."
     ),
 ]
 

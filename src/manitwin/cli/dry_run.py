@@ -17,7 +17,7 @@ WORDS = {
     "rejected": "rejected already",
     "failed": "failed already",
     "would_be_rejected": "would be rejected",
-    "duplicate": "the same again",
+    "duplicate": "duplicate",
 }
 
 
@@ -31,12 +31,12 @@ def print_plan(plan: Plan, place: str, *, as_json: bool) -> None:
     for planned in plan.items[:MOST_LINES]:
         out_console.print(_line_of(planned))
     if len(plan.items) > MOST_LINES:
-        out_console.print(f"... and {len(plan.items) - MOST_LINES} more (--json tells them all)")
+        out_console.print(f"... and {len(plan.items) - MOST_LINES} more (--json lists all)")
     counts: Counter[str] = Counter(planned.state for planned in plan.items)
     told = ", ".join(f"{counts[state]} {words}" for state, words in WORDS.items() if counts[state])
     out_console.print(f"dry run, nothing is written: {told or 'nothing to do'}")
     if counts["failed"]:
-        out_console.print(f"what failed is not tried again by itself: manitwin retry {place}")
+        out_console.print(f"failed items are not retried automatically; run manitwin retry {place}")
     each = "; ".join(
         f"{number} {kind} of {plan.rates[kind].cpu_s:.1f} CPU-s ({plan.rates[kind].source})"
         for kind, number in plan.to_build.items()

@@ -90,7 +90,7 @@ def gripper_lines(gripper: Gripper) -> list[str]:
     thickest = "any width" if gripper.kind == "suction" else f"up to {1000 * gripper.opening_m:.0f} mm"
     return [
         f"{gripper.name}: {gripper.kind}, {gripper.source}",
-        f"holds things of {thickest} with {gripper.force_n:.3g} N, friction {gripper.finger_friction:g}; its tips are"
+        f"holds objects of {thickest} with {gripper.force_n:.3g} N, friction {gripper.finger_friction:g}; its tips are"
         f" {1000 * gripper.tip_depth_m:.0f} mm in front of its base",
     ]
 
@@ -122,8 +122,8 @@ def tilt_note(posture: PostureFacts) -> str | None:
     if abs(tilt_deg) <= NOTED_TILT_DEG:
         return None
     return (
-        f"half open, the line from the thumb to the fingers is {abs(tilt_deg):.0f} degrees off X, along which"
-        f" things are held; turn root_to_gripper by {posture.tilt_rad:.2f} rad about Y, or choose other positions"
+        f"half open, the line from the thumb to the fingers is {abs(tilt_deg):.0f} degrees off X, the closing"
+        f" direction; turn root_to_gripper by {posture.tilt_rad:.2f} rad about Y, or choose other positions"
     )
 
 

@@ -162,7 +162,7 @@ class Interrupts:
     @property
     def message(self) -> str:
         """The message of an interrupted command."""
-        again = "; run the same command again to go on where it stopped" if self.command in RESUMABLE else ""
+        again = "; rerun the same command to resume" if self.command in RESUMABLE else ""
         return f"{f'manitwin {self.command}'.rstrip()}: interrupted{again}"
 
     def listen(self) -> None:

@@ -71,9 +71,9 @@ def find_twins(
 def scene_of(place: LocatedView, found: Found, dataset: str | None, *, of_cloud: bool) -> LocatedScene | NoLayout:
     """Return what was found as a scene of twins of a data set, or why there is none."""
     if of_cloud:
-        return NoLayout("a cloud of the thing alone shows no table")
+        return NoLayout("a point cloud of the object alone shows no table")
     if not found.has_own_size:
         return NoLayout(OTHER_SIZE)
     if dataset is None:
-        return NoLayout("the twin lies in no data set; give one where manitwin build left it")
+        return NoLayout("the twin is not in a data set; give a twin in the data set that manitwin build wrote")
     return place.scene

@@ -22,7 +22,7 @@ def print_thing(thing: Thing, name: str, is_one_of_many: bool) -> None:
     for pose in location.poses:
         x, y, z = pose.object_to_camera[:3, 3]
         out_console.print(
-            f"  score {pose.score:.3f}, {pose.visible_share:.0%} of it seen, at {x:.4f} {y:.4f} {z:.4f} m in the camera's frame"
+            f"  score {pose.score:.3f}, {pose.visible_share:.0%} of it visible, at {x:.4f} {y:.4f} {z:.4f} m in the camera frame"
         )
 
 
@@ -32,10 +32,10 @@ def print_size(told: dict[str, Any] | None, grasps: bool) -> None:
 
     if told is None:
         return
-    off = (
-        "" if told["shape_off_m"] is None else f"; its shape is off by {1e3 * told['shape_off_m']:.1f} mm in the median"
+    off = "" if told["shape_off_m"] is None else f"; median shape error {1e3 * told['shape_off_m']:.1f} mm"
+    out_console.print(
+        f"  {told['factor']:.3g} times the size of the twin ({told['low']:.3g} to {told['high']:.3g}){off}"
     )
-    out_console.print(f"  {told['factor']:.3g} times the twin's size ({told['low']:.3g} to {told['high']:.3g}){off}")
     if grasps and abs(told["factor"] - 1) > SAME_SIZE:
         out_console.print(f"  no grasps: {OTHER_SIZE}")
 
@@ -44,7 +44,7 @@ def print_grasps(told: dict[str, Any] | None) -> None:
     """Say how many grasps are free, how many of them the robot reaches, and which is the best."""
     if told is None:
         return
-    left = f"{told['obstructed']} are obstructed, {told['uncertain']} not in every pose"
+    left = f"{told['obstructed']} are obstructed, {told['uncertain']} are not free in every candidate pose"
     out_console.print(
         f"  {len(told['free'])} of {told['verified']} verified grasps of {told['gripper']} are free; {left}"
     )
@@ -53,7 +53,7 @@ def print_grasps(told: dict[str, Any] | None) -> None:
     for grasp in told["free"][:1]:
         x, y, z = grasp["position_m"]
         out_console.print(
-            f"  the best, {grasp['grasp_id']}: at {x:.4f} {y:.4f} {z:.4f} m, {grasp['width_m'] * 1e3:.0f} mm wide"
+            f"  best grasp {grasp['grasp_id']}: at {x:.4f} {y:.4f} {z:.4f} m, {grasp['width_m'] * 1e3:.0f} mm wide"
         )
 
 
@@ -66,8 +66,8 @@ def print_frames(functional: list[dict[str, Any]], placements: list[dict[str, An
         sure = "" if each["certain"] else ", elsewhere in another pose"
         out_console.print(f"  {each['label']}: at {x:.4f} {y:.4f} {z:.4f} m{sure}", markup=False)
     free, stands = [each for each in placements if each["free"]], [each for each in placements if each["stands"]]
-    now = f"; it is in number {stands[0]['placement']}" if stands else ""
-    out_console.print(f"  {len(free)} of {len(placements)} resting poses are free where it is{now}")
+    now = f"; the object is now in pose {stands[0]['placement']}" if stands else ""
+    out_console.print(f"  {len(free)} of {len(placements)} resting poses are collision-free at its position{now}")
 
 
 def print_layout(told: dict[str, Any] | None, out: Path | None) -> None:
@@ -76,18 +76,18 @@ def print_layout(told: dict[str, Any] | None, out: Path | None) -> None:
         return
     for each in told["objects"]:
         if each["as_boxes"] is not None:
-            out_console.print(f"{each['name']} is boxes in the layout: it {each['as_boxes']}")
+            out_console.print(f"{each['name']} is represented by boxes in the layout: it {each['as_boxes']}")
     if told["scene"] is None:
         out_console.print(f"no layout: {told['reason']}")
         return
     rested = [each["moved_m"] for each in told["objects"] if each["moved_m"] is not None]
     most_mm = 1000 * max(rested)
     where = (
-        "the robot's base is the origin"
+        "the origin is the robot base"
         if told["base"] == "given"
-        else "where the robot's base is is assumed (--base says it)"
+        else "the position of the robot base is assumed (give it with --base)"
     )
     out_console.print(
-        f"layout of {len(rested)} objects and {told['obstacles']} boxes of what else is seen in {out}; they rest at most"
-        f" {most_mm:.1f} mm from where they were found; {where}"
+        f"layout of {len(rested)} objects and {told['obstacles']} boxes of other visible surfaces, in {out}; the objects rest at"
+        f" most {most_mm:.1f} mm from where they were found; {where}"
     )

@@ -16,17 +16,17 @@ WORKERS_NEED = 4 * GIB
 WITH_WORKERS = frozenset({"build", "run", "layout", "trajectories", "render"})
 WITHOUT_LIBRARIES = frozenset({"status", "doctor", "completion", "schema"})
 RESUMABLE_STATUS, USAGE_STATUS = 4, 2
-_MAKE_ROOM = "make room, then run the same command again"
+_MAKE_ROOM = "free disk space, then rerun the same command"
 _REMEDIES = {
     errno.ENOSPC: _MAKE_ROOM,
     errno.EDQUOT: _MAKE_ROOM,
-    errno.EFBIG: "files may not be as large as that (ulimit -f); raise the limit",
+    errno.EFBIG: "the file size limit is exceeded (ulimit -f); raise it",
     errno.EMFILE: "raise the limit of open files (ulimit -n)",
-    errno.ENFILE: "end other programs",
-    errno.EAGAIN: "raise the limit of processes (ulimit -u), or end other programs",
-    errno.ENOMEM: "end other programs, or run fewer --jobs",
-    errno.EIO: "look at the disk, then run the same command again",
-    errno.ESTALE: "mount the disk again, then run the same command again",
+    errno.ENFILE: "close other programs",
+    errno.EAGAIN: "raise the limit of processes (ulimit -u), or close other programs",
+    errno.ENOMEM: "close other programs, or use fewer --jobs",
+    errno.EIO: "check the disk, then rerun the same command",
+    errno.ESTALE: "mount the file system again, then rerun the same command",
 }
 _WRONG_PATHS = frozenset({
     errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG,
@@ -43,9 +43,13 @@ def too_little_memory(arguments: list[str]) -> str | None:
     allowed, _ = resource.getrlimit(resource.RLIMIT_AS)
     if allowed == resource.RLIM_INFINITY or allowed >= needed:
         return None
-    instead = "; run.memory_gb in the configuration bounds what each worker fills" if command in WITH_WORKERS else ""
+    instead = (
+        "; run.memory_gb in the configuration bounds the memory that each worker uses"
+        if command in WITH_WORKERS
+        else ""
+    )
     return (
-        f"manitwin {command}: memory is limited to {allowed / GIB:.1f} GiB of addresses (ulimit -v), and {needed // GIB} GiB"
+        f"manitwin {command}: memory is limited to {allowed / GIB:.1f} GiB of address space (ulimit -v), and {needed // GIB} GiB"
         f" are needed; raise that limit (ulimit -v unlimited){instead}"
     )
 
@@ -53,7 +57,7 @@ def too_little_memory(arguments: list[str]) -> str | None:
 def of_machine(error: Exception) -> tuple[str, int] | None:
     """Return the line and the exit status for what a disk, a limit or a path has to do with; None for anything else."""
     if isinstance(error, MemoryError):
-        return f"there is no memory left; {_REMEDIES[errno.ENOMEM]}", RESUMABLE_STATUS
+        return f"out of memory; {_REMEDIES[errno.ENOMEM]}", RESUMABLE_STATUS
     if isinstance(error, RuntimeError) and "start new thread" in str(error):
         return f"no thread can be started; {_REMEDIES[errno.EAGAIN]}", RESUMABLE_STATUS
     if type(error).__module__ == "sqlite3" and type(error).__name__ == "OperationalError":
@@ -68,5 +72,5 @@ def of_machine(error: Exception) -> tuple[str, int] | None:
     if error.errno in _REMEDIES:
         return f"{where}{error.strerror}; {_REMEDIES[error.errno]}", RESUMABLE_STATUS
     if error.errno in _WRONG_PATHS:
-        return f"{where}{error.strerror}; check the path, and who may read and write there", USAGE_STATUS
+        return f"{where}{error.strerror}; check the path and its permissions", USAGE_STATUS
     return None

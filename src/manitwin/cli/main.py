@@ -99,7 +99,7 @@ def _print_version(wanted: bool) -> None:
 def _manitwin(
     context: typer.Context,
     version: Annotated[
-        bool, typer.Option("--version", help="Print the version, and end.", callback=_print_version, is_eager=True)
+        bool, typer.Option("--version", help="Print the version and exit.", callback=_print_version, is_eager=True)
     ] = False,
     verbose: Verbose = False,
     quiet: Quiet = False,
@@ -162,7 +162,7 @@ def show(
 def completion(
     shell: Annotated[str, SHELLS.argument(help="bash, zsh or fish.", metavar="SHELL")],
 ) -> None:
-    """Print the script with which a shell completes commands, options and names."""
+    """Print the script for shell completion of commands, options and names."""
     script = get_completion_script(prog_name=PROGRAM, complete_var=COMPLETION_VARIABLE, shell=shell)
     write_text(f"{script.strip()}\n")
 
@@ -197,7 +197,7 @@ def _shown(message: str) -> str:
 def _of_system(error: OSError) -> str:
     """Return one line of what the system refused, which nothing below this border has told in words of its own."""
     named = os.fsdecode(error.filename) if isinstance(error.filename, str | bytes) else "a file"
-    remedy = "make room, and run the same command again" if error.errno in LASTING_CAUSES else "check the path"
+    remedy = "free disk space, and rerun the same command" if error.errno in LASTING_CAUSES else "check the path"
     return f"{named}: {error.strerror or error}; {remedy}"
 
 

@@ -20,17 +20,18 @@ LARGEST_SEED = 2**63 - 1
 """As in ``config``, which takes a while to import; a test keeps them the same."""
 
 Text = Annotated[
-    list[str] | None, typer.Option("--text", help="A thing to make from words alone; may be repeated.", metavar="WORDS")
+    list[str] | None,
+    typer.Option("--text", help="An object to make from a description alone; may be repeated.", metavar="WORDS"),
 ]
 Units = Annotated[
-    str, choices.UNITS.option(help="Units of meshes, or of --poses: m, cm, mm, none (no lengths) or auto.")
+    str, choices.UNITS.option(help="Units of meshes, or of --poses: m, cm, mm, none (unknown scale) or auto.")
 ]
 Up = Annotated[str, choices.UP.option(help="Up axis of meshes, or of --poses: y, z or auto.")]
 LongestSide = Annotated[
     float | None,
     typer.Option(
         "--longest-side",
-        help="The longest of length, width and height as it stands: metres. A photo's size is else what is usual.",
+        help="Longest of length, width and height of the object as it stands, in metres. Default for photos: the usual size.",
         metavar="METRES",
         callback=choices.amount_of("--longest-side", choices.LARGEST_SIDE_M),
     ),
@@ -39,7 +40,7 @@ Mask = Annotated[
     Path | None,
     typer.Option(
         "--mask",
-        help="A picture of the thing's outline in the photo, as large as it: white where the thing is.",
+        help="Mask of the object, as large as the photo: white on the object, black elsewhere.",
         metavar="FILE",
     ),
 ]
@@ -47,63 +48,71 @@ Box = Annotated[
     str | None,
     typer.Option(
         "--box",
-        help="Where in the photo the thing is: left,top,right,bottom in pixels of the upright photo.",
+        help="Box around the object: left,top,right,bottom in pixels of the upright photo.",
         metavar="120,80,410,395",
     ),
 ]
-License = Annotated[str | None, typer.Option(help="Licence of the inputs (SPDX).")]
+License = Annotated[str | None, typer.Option(help="Licence of the inputs (SPDX identifier).")]
 Attribution = Annotated[str | None, typer.Option(help="Whom to credit for the inputs.")]
-Strict = Annotated[bool, typer.Option("--strict", help="A manifest column that nobody knows is an error.")]
+Strict = Annotated[bool, typer.Option("--strict", help="Treat an unknown manifest column as an error.")]
 Jobs = Annotated[
     int | None,
     typer.Option(
         "--jobs",
         "-j",
-        help="Processes; default: one a core, as memory allows.",
+        help="Number of processes; default: one per core, as memory allows.",
         callback=choices.count_of("jobs", MOST_JOBS),
     ),
 ]
 Seed = Annotated[
     int | None,
-    typer.Option(help="Seed of everything random; default: the configuration's.", min=0, max=LARGEST_SEED),
+    typer.Option(help="Random seed; default: the one in the configuration.", min=0, max=LARGEST_SEED),
 ]
 Executor = Annotated[
-    str, choices.EXECUTORS.option(help="local, ray for a cluster, or inline: this process, for a debugger.")
+    str,
+    choices.EXECUTORS.option(
+        help="Where to run: local (processes), ray (a cluster) or inline (this process, for a debugger)."
+    ),
 ]
-Address = Annotated[str | None, typer.Option(help="Ray's address ('auto'); none: a cluster of this machine.")]
+Address = Annotated[
+    str | None, typer.Option(help="Address of the Ray cluster ('auto'); default: start one on this machine.")
+]
 Config = Annotated[Path | None, typer.Option(help="A TOML file of settings.", callback=choices.settings_file)]
 Grippers = Annotated[
     list[str] | None,
-    choices.GRIPPERS.option("--gripper", help="A gripper to verify for; may be repeated, the first is the twin's own."),
+    choices.GRIPPERS.option(
+        "--gripper", help="Gripper to verify grasps for; may be repeated. The first is the main gripper of the twin."
+    ),
 ]
 OwnGrippers = Annotated[
     list[str] | None,
     choices.GRIPPERS.option(
-        "--gripper", help="The file of a gripper of your own that twins were built with; may be repeated."
+        "--gripper", help="File of a custom gripper that the twins were built with; may be repeated."
     ),
 ]
 Vlm = Annotated[
     str | None,
     choices.ANNOTATORS.option(
-        help="Who looks: openai:MODEL@URL, anthropic:MODEL, replay:FILE, or rules.", metavar="SPEC"
+        help="Annotator: openai:MODEL@URL, anthropic:MODEL, replay:FILE, or rules (built in).", metavar="SPEC"
     ),
 ]
 Generator = Annotated[
     str | None,
     choices.GENERATORS.option(
-        help="Who makes meshes: rodin, tripo, meshy, hunyuan3d@URL, fal:ENDPOINT, 'command:...', lift.", metavar="SPEC"
+        help="Mesh generator: rodin, tripo, meshy, hunyuan3d@URL, fal:ENDPOINT, 'command:...', or lift (built in).",
+        metavar="SPEC",
     ),
 ]
 Grasper = Annotated[
     str | None,
     choices.GRASPERS.option(
-        help="Who proposes grasps: graspgen@tcp://HOST:PORT, graspgenx@..., antipodal.", metavar="SPEC"
+        help="Grasp proposer: graspgen@tcp://HOST:PORT, graspgenx@..., or antipodal (built in).", metavar="SPEC"
     ),
 ]
 Matting = Annotated[
     str | None,
     choices.MATTING.option(
-        help="Learned opinions on photos' cut-outs: isnet, u2net (manitwin models add), a .onnx file, two by a comma; or none.",
+        help="Matting networks: isnet, u2net (manitwin models add), a .onnx file, two separated by a comma; or none.",
         metavar="NETWORKS",
     ),
 ]
@@ -111,64 +120,67 @@ MaxCost = Annotated[
     float | None,
     typer.Option(
         "--max-cost",
-        help="USD that services may charge in all; then stop, resumable.",
+        help="Limit on the total charges of services in USD; the run then stops and can be resumed.",
         callback=choices.amount_of("--max-cost", choices.LARGEST_COST_USD),
     ),
 ]
 RequireAgreement = Annotated[
-    bool, typer.Option("--require-agreement", help="Verify only grasps that both engines hold.")
+    bool, typer.Option("--require-agreement", help="Verify only grasps that hold in both physics engines.")
 ]
 SecondOpinion = Annotated[
     str | None,
     choices.SECOND_OPINIONS.option(
-        "--second-opinion", help="The second engine tries all grasps that held, or a sample of 20 of them."
+        "--second-opinion", help="Grasps that the second engine tries: all that held, or a sample of 20."
     ),
 ]
-Quick = Annotated[bool, typer.Option("--quick", help="One trial a grasp: no second opinion, no robustness.")]
+Quick = Annotated[bool, typer.Option("--quick", help="One trial per grasp: no second opinion, no robustness trials.")]
 Link = Annotated[
     str | None,
     typer.Option(
-        "--link", help="Of things with joints: verify grasps of this link alone, the joints locked.", metavar="NAME"
+        "--link", help="Articulated objects: verify grasps on this link only, with the joints locked.", metavar="NAME"
     ),
 ]
 Twins = Annotated[
     str | None,
-    typer.Option(help="Where the twins are now, if no longer where they were.", metavar="DATASET"),
+    typer.Option(help="Where the twins are now, if they were moved.", metavar="DATASET"),
 ]
 Record = Annotated[
-    Path | None, typer.Option(help="Add every answer of the model to this file, for --vlm replay:FILE.", metavar="FILE")
+    Path | None,
+    typer.Option(help="Append every answer of the model to this file, for --vlm replay:FILE.", metavar="FILE"),
 ]
 Count = Annotated[
     int,
     typer.Option(
         min=1,
         max=100_000,
-        help="Make so many variations of each text: measures, colours and materials that it leaves open.",
+        help="Variations of each text to make: of the measures, colours and materials that it leaves open.",
     ),
 ]
 Views = Annotated[
     bool,
-    typer.Option("--views", help="The inputs are photos of one thing, or their folder: make one twin of them all."),
+    typer.Option(
+        "--views", help="The inputs are photos of one object, or their folder: build one twin from all of them."
+    ),
 ]
 Turns = Annotated[
     str | None,
     typer.Option(
-        help="The camera's turn about the vertical in each photo of --views: degrees, counter-clockwise from above; 0,10,... goes"
-        " on by equal steps.",
+        help="Azimuth of the camera in each photo of --views, in degrees, counter-clockwise from above; 0,10,... continues in"
+        " equal steps.",
         metavar="0,90,180",
     ),
 ]
 Poses = Annotated[
     Path | None,
     typer.Option(
-        help="Where the cameras of several photos of a thing were: a transforms.json (NeRF, instant-ngp), or a COLMAP model's"
-        " folder.",
+        help="Camera poses of several photos of one object: a transforms.json (NeRF, instant-ngp) or the folder of a COLMAP"
+        " model.",
         metavar="FILE",
     ),
 ]
-Name = Annotated[str | None, typer.Option(help="What the object is ('mug'): the key to the priors.")]
+Name = Annotated[str | None, typer.Option(help="Name of the object ('mug'); it selects the priors.")]
 DryRun = Annotated[
-    bool, typer.Option("--dry-run", help="Say what would be done, and about what it would cost; write nothing.")
+    bool, typer.Option("--dry-run", help="Print what would be done and the estimated cost; write nothing.")
 ]
 
 OF_INPUTS: dict[str, tuple[Any, Any]] = {

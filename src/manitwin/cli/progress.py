@@ -171,8 +171,8 @@ class ShownWaits:
         said = f"{event.stage} {'still waits' if told else 'waits'}: {event.detail}"
         if event.given_up_in_s:
             said = (
-                f"{said.removesuffix(RUN_LATER)}; asked again for {duration(event.given_up_in_s)} more (run.patience_s), "
-                "then left to the next run. Ctrl-C stops at once; the same command goes on where it stopped"
+                f"{said.removesuffix(RUN_LATER)}; retried for another {duration(event.given_up_in_s)} (run.patience_s), "
+                "then left to the next run. Ctrl-C stops at once; rerun the same command to resume"
             )
         self._err.print(said, markup=False)
 

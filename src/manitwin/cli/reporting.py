@@ -18,12 +18,12 @@ from manitwin.errors import UsageError
 from manitwin.formats.installation import installed_version
 
 Verbose = Annotated[
-    bool, typer.Option("--verbose", "-v", help="Say more: stages and their seconds, what was chosen and why.")
+    bool, typer.Option("--verbose", "-v", help="Print more: the stages and their seconds, and what was chosen and why.")
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only errors.")]
 LogFile = Annotated[
     Path | None,
-    typer.Option("--log", help="Append what is said, with times, to this file.", metavar="FILE", dir_okay=False),
+    typer.Option("--log", help="Append all messages to this file, with timestamps.", metavar="FILE", dir_okay=False),
 ]
 OPTIONS = {"verbose": (Verbose, False), "quiet": (Quiet, False), "log": (LogFile, None)}
 LOG = logging.getLogger("manitwin.command")

@@ -40,11 +40,11 @@ def template_questions(
         view = read_picture(subject.views[0])
         alpha = np.where(shown_object(view), 255, 0).astype(np.uint8)
         shown = Shown(np.dstack([view, alpha]), None, subject.name)
-        remarks.append("This twin was made of no photo: a view of it stands in the photo's place.")
+        remarks.append("This twin was not made from a photo: one of its views takes the place of the photo.")
     asked = [choice_question(shown, prompts["template"], settings.picture_px)]
     template = template_for(subject.name) or template_for(subject.known_as)
     if template is None:
-        remarks.append("No template is called what it is: measures and likeness are not asked.")
+        remarks.append("No template has the name of this object: measures and likeness are not asked.")
         return asked, " ".join(remarks)
     remarks.append("The model in the last one is the twin itself; its measures are the template's usual ones.")
     measures = {name: measure.typical for name, measure in template.measures.items()}

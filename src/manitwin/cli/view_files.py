@@ -30,7 +30,7 @@ class ViewFiles:
         from manitwin.scenes.locate.captured import capture_files
 
         if self.cloud is not None:
-            raise UsageError("--cloud: is a view by itself; leave out --view")
+            raise UsageError("--cloud: cannot be combined with --view; leave out --view")
         there = capture_files(folder)
         return replace(
             self,
@@ -46,7 +46,7 @@ class ViewFiles:
             self._check_alone(grasps)
         if robot is not None and self.base is None:
             raise UsageError(
-                "--robot: what its arm reaches depends on where it stands; give --base, the camera's calibration"
+                "--robot: its reach depends on the pose of its base; give the camera calibration with --base"
             )
         needed = {"--depth": self.depth, "--camera": self.camera}
         if self.cloud is None and (missing := [name for name, file in needed.items() if file is None]):
@@ -54,10 +54,10 @@ class ViewFiles:
 
     def _check_alone(self, grasps: bool) -> None:
         if any(file is not None for file in (self.depth, self.camera, self.mask, self.rgb)):
-            raise UsageError("--cloud: is a view by itself; leave out --depth, --camera, --mask and --rgb")
+            raise UsageError("--cloud: cannot be combined with images; leave out --depth, --camera, --mask and --rgb")
         if grasps or self.base is not None:
             raise UsageError(
-                f"{'--grasps' if grasps else '--base'}: a cloud of the thing alone does not show what is beside it; give"
+                f"{'--grasps' if grasps else '--base'}: a point cloud of the object alone does not show its surroundings; give"
                 " --depth and --camera"
             )
 
@@ -79,5 +79,5 @@ class ViewFiles:
         if told is None:
             return view, proposals(view, table_plane(view, np.random.default_rng(seed)))
         if not told.any():
-            raise UsageError(f"{self.mask}: is empty: it shows no pixel of a thing; give a mask of the thing to locate")
+            raise UsageError(f"{self.mask}: the mask is empty; give a mask of the object to locate")
         return view, [told]

@@ -35,7 +35,7 @@ def load_config(path: str | Path, kind: Any = BuildConfig) -> Any:
 def read_toml(path: Path) -> dict[str, Any]:
     """Return the content of a TOML file of settings; raises ConfigError."""
     if not os.path.exists(path):
-        raise ConfigError(f"{path}: not there; give a TOML file of settings")
+        raise ConfigError(f"{path}: not found; give a TOML file of settings")
     return toml_file.read_toml(path, ConfigError, name=str(path))
 
 

@@ -13,7 +13,7 @@ from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import canonical_json, sha256_of_json
 
 AMENDMENTS = "amendments"
-_REMEDY = "mend it, or remove it"
+_REMEDY = "repair it, or remove it"
 Amendments = dict[str, dict[str, Any]]
 """Values that a stage takes in place of its own, by the stage's name."""
 
@@ -31,7 +31,7 @@ def read_amendments(root: DatasetRoot, item_id: str) -> Amendments:
     except FileNotFoundError:
         return {}
     if not all(isinstance(each, dict) for each in said.values()):
-        raise UsageError(f"{name}: holds something else than an object by stage; {_REMEDY}")
+        raise UsageError(f"{name}: does not contain a JSON object keyed by stage; {_REMEDY}")
     return said
 
 

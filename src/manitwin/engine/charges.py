@@ -85,5 +85,5 @@ class Budget:
         """Say why a job may not begin."""
         return (
             f"the next question costs about {expected_usd:.4f} USD, and {self.spent_usd:.4f} of at most"
-            f" {self.max_usd:g} USD are spent; raise max_cost_usd, then run again to go on where it stopped"
+            f" {self.max_usd:g} USD are spent; raise max_cost_usd, then rerun the command to resume"
         )

@@ -151,9 +151,12 @@ def _of_others(ledger: Ledger, recipe: Recipe, given: list[int]) -> list[str]:
     others = len(ledger.ended_under_others(recipe.sha256))
     if not recipe.replaces:
         stay = others - len(ledger.ended_under_others(recipe.sha256, replaces=False))
-        made = "made by another version of manitwin, or of a file that the settings name"
+        made = "made by another version of manitwin, or with another version of a file that the settings name"
         return (
-            [f"{stay} that are there were {made}, and stay as they are; in a new folder all are made alike"]
+            [
+                f"{stay} existing items were {made}, and stay unchanged; use a new folder to make all of them the same"
+                f" way"
+            ]
             if stay
             else []
         )
@@ -162,7 +165,8 @@ def _of_others(ledger: Ledger, recipe: Recipe, given: list[int]) -> list[str]:
     remarks = [f"{again} were {made}: {recipe.made_again}"] if again else []
     if others > again:
         remarks.append(
-            f"{others - again} that are not given were {made}, and stay as they are; a build without inputs looks at all of them"
+            f"{others - again} items outside these inputs were {made}, and stay unchanged; a build without"
+            f" inputs updates them too"
         )
     return remarks
 

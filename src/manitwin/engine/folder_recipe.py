@@ -78,7 +78,7 @@ class FolderRecipe(ABC, Generic[RecordT]):
     ) -> Ending:
         """Write the finished folder at ``fresh``; raises ManiTwinError for a rejection where there can be none."""
         if rejected is not None and not self.can_reject:
-            raise ManiTwinError(f"{kind} {draft.item_id}: {rejected}; it cannot be rejected as a whole")
+            raise ManiTwinError(f"{kind} {draft.item_id}: {rejected}; this item cannot be rejected as a whole")
         shutil.rmtree(fresh, ignore_errors=True)
         fresh.mkdir(parents=True)
         return self.ending(self.write(draft, kind, costs, rejected, stage, fresh))

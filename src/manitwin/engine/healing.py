@@ -25,7 +25,8 @@ def refuse_links(root: DatasetRoot) -> None:
     for place in (root.local / WORK, root.local / TWINS, root.local / "index", *prefixes):
         if os.path.islink(place) and not Path(os.path.realpath(place)).is_relative_to(inside):
             raise UsageError(
-                f"{place}: a link out of {root.url}, where nothing is written; put the folder itself there"
+                f"{place}: a link to a place outside {root.url}, where nothing is written; replace the link by the"
+                f" folder"
             )
 
 
@@ -47,8 +48,8 @@ def heal(ledger: Ledger, root: DatasetRoot, recipe: Recipe, given: Collection[in
             damaged.append(number)
     if damaged:
         ledger.reopen(damaged)
-        remarks.append(f"{len(damaged)} finished folders were gone or damaged: they are made again")
+        remarks.append(f"{len(damaged)} finished folders were missing or damaged: they are built again")
     if recipe.tables is not None and ledger.any_indexed() and recipe.tables.heal(root):
         ledger.forget_indexed()
-        remarks.append("the index was gone, damaged or of another version: it is written again")
+        remarks.append("the index was missing, damaged or of another version: it is rebuilt")
     return remarks

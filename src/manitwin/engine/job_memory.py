@@ -26,7 +26,7 @@ class JobMemory(Protocol):
         ...
 
 
-_REMEDY = "ask the service for the job and note its id there, or remove the file: the job is then paid again"
+_REMEDY = "find the job id in your account at the service and enter it, or remove the file and pay for the job again"
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from manitwin.errors import Rejected, encodable
 FailureKind = Literal[
     "unavailable", "rate_limited", "denied", "unsupported", "no_space", "changed", "error", "died", "timeout"
 ]
-MAKE_ROOM = "make room, then run again to go on where it stopped"
+MAKE_ROOM = "free disk space, then rerun the command to resume"
 """The remedy where a disk is full, behind what says so."""
 
 

@@ -36,6 +36,9 @@ def lost_usd(stage_folder: Path) -> float:
     if not lost.is_file():
         return 0.0
     said = parse_json(
-        read_bytes(lost, MAX_LOST_BYTES, TwinError), str(lost), TwinError, remedy="remove it: it is a sum of USD"
+        read_bytes(lost, MAX_LOST_BYTES, TwinError),
+        str(lost),
+        TwinError,
+        remedy="remove it; it only holds a sum in USD",
     )
     return json_number(said, str(lost))

@@ -29,7 +29,7 @@ from manitwin.twin.store import WORK, canonical_json, sha256_of_artifact, sha256
 
 RUN = logging.getLogger("manitwin.run")
 RESULT = "result.json"
-_ANEW = "remove its folder, and the stage runs again"
+_ANEW = "remove its folder to run the stage again"
 JOBS = "jobs"
 """The folder of a twin's work that remembers jobs of services, beside those of the stages."""
 
@@ -114,7 +114,7 @@ def take_up(place: Path, names: Iterable[str], draft: Draft) -> StageCost:
         digests = {name: result["digests"][name] for name in names}
         cost = StageCost(**result["cost"])
     except (KeyError, TypeError) as error:
-        raise TwinError(f"{place / RESULT}: no result of a stage ({error}); {_ANEW}") from error
+        raise TwinError(f"{place / RESULT}: not a valid stage result ({error}); {_ANEW}") from error
     draft.fields.update(fields)
     draft.digests.update(digests)
     draft.paths.update({name: place / name for name in digests if name not in fields})

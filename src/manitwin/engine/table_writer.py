@@ -48,7 +48,7 @@ class TableWriter:
             if reply.kind == "no_space":
                 return f"{reply.message}; {MAKE_ROOM}"
             if self._failures >= self._attempts:
-                return f"the index cannot be written: {reply.message}; `manitwin check` says what is wrong"
+                return f"the index cannot be written: {reply.message}; `manitwin check` reports what is wrong"
         elif job is not None and job.item_ids:
             self._ledger.indexed(job.item_ids)
             self._removed -= set(job.item_ids)

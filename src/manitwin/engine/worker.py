@@ -87,9 +87,7 @@ class Worker:
             kind = "no_space" if error.errno in NO_SPACE else "error"
             return Failure(kind, _line(error))  # type: ignore[arg-type]
         except MemoryError:
-            return Failure(
-                "error", f"it {too_much_memory(self.setup.memory_gb)}; raise the limit, or run fewer at a time"
-            )
+            return Failure("error", f"it {too_much_memory(self.setup.memory_gb)}; raise the limit, or use fewer --jobs")
         except Exception as error:
             where = traceback.extract_tb(error.__traceback__)[-1]
             said = f"{_line(error)} ({where.filename.rsplit('/', 1)[-1]}:{where.lineno})"
@@ -191,7 +189,7 @@ class Worker:
     def _require_same(self, task: Task) -> None:
         """Raise InputChanged where the input is not any more what the item's id stands for."""
         if self.setup.recipe.identify(task.payload).item_id != task.item_id:
-            raise InputChanged(f"{task.payload.title}: was changed while it was worked on; run the same command again")
+            raise InputChanged(f"{task.payload.title}: was changed while it was processed; rerun the same command")
 
     def _write_tables(self, job: WriteTables) -> None:
         tables = self.setup.recipe.tables
@@ -225,14 +223,14 @@ def too_much_memory(memory_gb: float) -> str:
     return (
         f"needs more than run.memory_gb = {memory_gb:g} GB of memory"
         if memory_gb
-        else "needs more memory than there is"
+        else "needs more memory than is available"
     )
 
 
 def too_large(job: RunStage, memory_gb: float) -> Rejected:
     """Return the rejection of an item for which a stage needs more memory than a worker may take."""
     said = f"{job.task.payload.title}: stage {job.stage} {too_much_memory(memory_gb)}"
-    return Rejected(TOO_LARGE, f"{said}; simplify the mesh or scale its pictures down, or raise run.memory_gb")
+    return Rejected(TOO_LARGE, f"{said}; simplify the mesh, reduce the size of its textures, or raise run.memory_gb")
 
 
 class InlineExecutor:

@@ -55,6 +55,6 @@ def flaw_in(
 ) -> str | None:
     """Return what is wrong with a database that should be as ``make`` gives an empty one; None where nothing is."""
     if not has_schema(connection, make):
-        return f"its tables are not those of {tables_of}"
+        return f"its tables do not match those of {tables_of}"
     (said,) = connection.execute("PRAGMA quick_check(1)").fetchone()
     return None if said == "ok" else str(said)

@@ -64,8 +64,8 @@ def _check_center(center: np.ndarray, solid: trimesh.Trimesh, source: str) -> No
     if beyond_m > OUTSIDE_SHARE * longest_m:
         raise Rejected(
             "implausible_mass",
-            f"the centre of mass of {source} lies {1000 * beyond_m:.3g} mm outside of the object, as of no body; give it in the"
-            " object frame, or leave it out of import.json",
+            f"the centre of mass of {source} lies {1000 * beyond_m:.3g} mm outside of the object, which is"
+            f" impossible; give it in the object frame, or leave it out of import.json",
         )
 
 
@@ -78,6 +78,6 @@ def _check_inertia(inertia: np.ndarray, source: str) -> None:
     listed = ", ".join(f"{moment:.3g}" for moment in moments)
     raise Rejected(
         "implausible_mass",
-        f"the inertia of {source} is that of no body (principal moments {listed} kg m2): each is positive, and at most the sum of"
-        " the two others; mend it, or leave it out of import.json",
+        f"the inertia of {source} is physically impossible (principal moments {listed} kg m2): each must be"
+        f" positive, and at most the sum of the other two; correct it, or leave it out of import.json",
     )

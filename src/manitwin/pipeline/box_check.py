@@ -19,7 +19,7 @@ def require_in_box(matte: Matte, box_px: PixelBox, file: str) -> None:
     if common < LEAST_IN_COMMON:
         raise DoubtedCutOut(
             "low_confidence_matte",
-            f"{file}: what was cut out and the box that was stated of it have {100 * common:.0f} % in common; correct the box, or"
-            " give a mask of the thing",
+            f"{file}: the cut-out and the stated box overlap by only {100 * common:.0f} %; correct the box, or give"
+            f" a mask of the object",
             replace(matte, confidence=min(matte.confidence, ELSEWHERE)),
         )

@@ -98,8 +98,8 @@ def choose_candidates(
     if len(shown) < count:
         raise Rejected(
             "degenerate",
-            f"only {len(shown)} of {samples} points of the repaired solid lie on the surface that the views show;"
-            " close the holes of the mesh",
+            f"only {len(shown)} of {samples} points on the repaired solid lie on the visible surface; close the"
+            f" holes of the mesh",
             stage="gate",
         )
     chosen = shown[sample_candidates(points[shown], normals[shown], count, find_opening(solid))]

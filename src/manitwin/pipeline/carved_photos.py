@@ -78,8 +78,8 @@ def carve_photos(
     if not are_crossing(turns):
         raise Rejected(
             "generator_failed",
-            f"{'; '.join([*cut.findings, ''])}the photos that are left are from one direction or its opposite; add one from the"
-            " side",
+            f"{'; '.join([*cut.findings, ''])}the remaining photos are all from one direction or its opposite; add"
+            f" one from the side",
             "generate",
         )
     lenses = set(cut.focals_mm)
@@ -90,20 +90,22 @@ def carve_photos(
 
 def _check(paths: Sequence[Path], turns_deg: Sequence[float] | None, poses: Path | None) -> None:
     if (turns_deg is None) == (poses is None):
-        raise UsageError(f"say where the camera was: {EXAMPLE}, or --poses transforms.json; one of them")
+        raise UsageError(
+            f"give the camera directions, {EXAMPLE}, or the camera poses, --poses transforms.json, but not both"
+        )
     turns = len(paths) if turns_deg is None else len(turns_deg)
     if not 2 <= len(paths) <= MOST_GIVEN or turns != len(paths):
         raise UsageError(
-            f"photos: {len(paths)}, turns: {turns}; give 2 to {MOST_GIVEN} photos and a turn of each, {EXAMPLE}"
+            f"photos: {len(paths)}, turns: {turns}; give 2 to {MOST_GIVEN} photos and one turn for each, {EXAMPLE}"
         )
     twice = given_twice([str(path.resolve()) for path in paths])
     if twice is not None:
         raise UsageError(f"{Path(twice).name} is given twice; give each photo once")
     if turns_deg is not None and not np.isfinite(turns_deg).all():
-        raise UsageError(f"a turn is no number; give degrees, {EXAMPLE}")
+        raise UsageError(f"a turn is not a number; give degrees, {EXAMPLE}")
     if turns_deg is not None and not are_crossing(turns_deg):
         raise UsageError(
-            "all photos are from one direction or its opposite: give one from the side, such as 90 degrees"
+            "all photos are from one direction or its opposite; give one from the side, such as 90 degrees"
         )
 
 
@@ -162,7 +164,7 @@ def _posed(
     carved, longest = carve_posed(photos, [stated.cameras[number] for number in numbers], turns)
     part = carved_part(carved)
     size = (
-        "their unit is not stated, and the mesh has none"
+        "their unit is not stated, so the mesh has no scale"
         if stated.unit_m is None
         else f"their unit is {stated.unit_said}"
     )
@@ -173,4 +175,4 @@ def _posed(
 
 
 def _left_out(carved: Carved) -> list[str]:
-    return [f"{left}: left out, its outline does not go with those of the other photos" for left in carved.left_out]
+    return [f"{left}: left out, its outline does not match those of the other photos" for left in carved.left_out]

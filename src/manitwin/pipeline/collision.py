@@ -57,7 +57,7 @@ class CollisionStage:
                 links = {"links": table}
         except QhullError as flat:
             raise Rejected(
-                "degenerate", "the mesh is flat, no convex hull has volume; give one with walls", "gate"
+                "degenerate", "the mesh is flat, so no convex hull has a volume; give a mesh with walls", "gate"
             ) from flat
         error = hull_error(solid, found.hulls, opening, np.random.default_rng(draft.seed), settings.error_samples)
         keeps_opening, notes = None, list(found.notes)

@@ -48,7 +48,7 @@ def confirmation(picture: bytes, source: str) -> dict[str, str]:
         with Image.open(io.BytesIO(picture), formats=("WEBP",)) as shown:
             alpha = shown.convert("RGBA").getchannel("A")
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-        raise UsageError(f"{CUTOUT}: no picture that can be read; run manitwin check --digests") from error
+        raise UsageError(f"{CUTOUT}: not a readable picture; run manitwin check --digests") from error
     encoded = io.BytesIO()
     alpha.save(encoded, "PNG", optimize=True)
     return {
@@ -84,7 +84,7 @@ def confirmed_or_rejected(doubted: DoubtedCutOut, name: str, amendment: Mapping[
     if hashlib.sha256(picture).hexdigest() != said["sha256"]:
         rgba = _as_confirmed(doubted.matte.rgba, said)
         if rgba is None:
-            detail = f"{name}: is cut out otherwise than as {said['source']} confirmed it; look at it again"
+            detail = f"{name}: the cut-out differs from the one that {said['source']} confirmed; check it again"
             raise Rejected(doubted.reason, detail, doubted.stage, {CUTOUT: picture})
         return replace(doubted.matte, rgba=rgba, findings=(f"cut out as {said['source']} confirmed it",))
     findings = (f"doubtful by itself ({doubted.matte.confidence:.2f}); {said['source']} confirmed the cut-out",)

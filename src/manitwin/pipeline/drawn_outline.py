@@ -23,7 +23,7 @@ DRAWN = "outline"
 """Key of the photo stage's amendment: ``{png, source}``, the outline as a PNG file in base64, and who drew it."""
 DRAWN_OF_SEVERAL = "outlines"
 """Its key for several photos of one thing: such an object by the photo's place among them, '0' the first."""
-_REMEDY = "remove its file below DATASET/amendments, build again and draw it anew"
+_REMEDY = "remove its file below DATASET/amendments, build again and redraw the outline"
 _BOUND = 0.02
 """By which the proportions of an outline and of its photo may differ, relative: both are of whole pixels."""
 
@@ -63,7 +63,7 @@ def drawn_outline(amendment: Mapping[str, Any], name: str, place: int | None = N
             return None
         return DrawnOutline(mask_of_png(base64.b64decode(said["png"], validate=True)), str(said["source"]))
     except (AttributeError, KeyError, TypeError, ValueError, binascii.Error) as error:
-        raise _refused(f"{name}: the outline that was drawn of it cannot be read; {_REMEDY}") from error
+        raise _refused(f"{name}: its drawn outline cannot be read; {_REMEDY}") from error
 
 
 def with_outline(amendment: Mapping[str, Any], drawn: DrawnOutline, place: int | None = None) -> dict[str, Any]:
@@ -88,7 +88,7 @@ def why_no_outline(mask: np.ndarray) -> str | None:
     """Return why a mask ``(H, W) bool`` is no outline of a thing, as the end of a sentence; None where it may be one."""
     if not mask.any():
         return "is empty"
-    return "leaves nothing of the photo out" if (~mask).mean() <= TRANSPARENT_SHARE else None
+    return "covers the whole photo" if (~mask).mean() <= TRANSPARENT_SHARE else None
 
 
 def as_drawn(given: Given, drawn: DrawnOutline, name: str) -> Given:

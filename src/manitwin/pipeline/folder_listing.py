@@ -32,7 +32,7 @@ _MAP_WORDS = frozenset({
 _NO_WORDS = frozenset({"k", "px"})  # of 4k, 1024px
 
 NOT_NAMED_HERE = "a mesh names a file of this name, but not where it lies, so it is not read"
-TEXTURE_BY_NAME = "named like a texture map, and no mesh beside it names it; give it by its own path if it is a photo"
+TEXTURE_BY_NAME = "named like a texture map, but no mesh in its folder uses it; if it is a photo, give its own path"
 
 
 @dataclass(frozen=True)
@@ -203,10 +203,10 @@ def _no_file(entry: os.DirEntry[str]) -> str | None:
     try:
         mode = entry.stat().st_mode
     except OSError as error:
-        return f"a link that leads nowhere ({error.strerror or error})"
+        return f"a broken link ({error.strerror or error})"
     if S_ISDIR(mode):
-        return "a link to a folder, not followed; give that folder by its own path"
-    return None if S_ISREG(mode) else "no regular file"
+        return "a link to a folder, which is not followed; give the path of that folder"
+    return None if S_ISREG(mode) else "not a regular file"
 
 
 def _named_parts(
@@ -223,7 +223,7 @@ def _named_parts(
     unknown: dict[str, str] = {}
     answers = zip(meshes, names_of(folder / mesh for mesh in meshes), strict=True)
     for number, (mesh, names) in enumerate(answers, 1):
-        told(f"{number:,} of {len(meshes):,} meshes of {folder.name} looked at for the files that they name")
+        told(f"{number:,} of {len(meshes):,} meshes of {folder.name} searched for the files that they reference")
         if isinstance(names, NotInspected):
             unknown[mesh] = str(names)
             continue

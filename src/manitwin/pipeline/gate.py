@@ -90,7 +90,7 @@ def check_watertight(watertight: bool, repairs: list[str]) -> Check:
     if not watertight:
         done = "; ".join(repairs) or "nothing could be done"
         raise Rejected(
-            "not_watertight", f"no closed surface after repair ({done}); close the mesh in a modeller", "gate"
+            "not_watertight", f"the surface is not closed after repair ({done}); close the mesh in a modeller", "gate"
         )
     return Check(name="watertight", passed=True)
 
@@ -115,8 +115,8 @@ def check_positive_volume(solid: trimesh.Trimesh, min_thickness_share: float) ->
     moments = np.linalg.eigvalsh(np.trace(inertia) / 2 * np.eye(3) - inertia) if known else np.full(3, np.nan)
     if not moments[0] >= -_ROUNDING * moments[-1]:
         detail = (
-            "parts of the solid are inside out: in one direction its second moment is below zero, as no body's is;"
-            " give a mesh that is closed, all of its faces looking outward"
+            "parts of the solid are inside out: its second moment is negative in one direction; give a closed mesh"
+            " with all faces oriented outward"
         )
         raise Rejected("degenerate", detail, "gate")
     return Check(name="positive_volume", passed=True, value=thickness_m, limit=limit_m, message="mean thickness, m")
@@ -144,12 +144,14 @@ def check_plausible_size(
     if not smallest_m <= side_m <= largest_m:
         remedy = "give the right units (m, cm, mm), or the longest side in metres"
         if imported:
-            remedy = "its file says so: mend the unit there and import it again, or give the longest side in metres"
+            remedy = (
+                "the file states this size: correct its unit and import it again, or give the longest side in metres"
+            )
         if side_m > largest_m and prior is None:
-            remedy += "; what truly is that large, no gripper here holds"
+            remedy += "; an object that really is this large fits none of the shipped grippers"
         elif prior is not None and largest_m < side_m <= _LITTLE_LARGER * prior.longest_axis_m.high:
             remedy = f"{article(prior.category)} {prior.category} {TRULY_LARGE}"
-        detail = f"the longest side is {side_m:.4g} m, valid is {smallest_m:g} to {largest_m:g} m; {remedy}"
+        detail = f"the longest side is {side_m:.4g} m, valid are {smallest_m:g} to {largest_m:g} m; {remedy}"
         raise Rejected("absurd_size", detail, "gate")
     limit_m = smallest_m if side_m < np.sqrt(smallest_m * largest_m) else largest_m
     return Check(
@@ -173,7 +175,7 @@ def check_single_object(
 def seen_checks(verdict: QualityVerdict) -> list[Check]:
     """Turn what was seen into checks; raises Rejected where the annotator said no."""
     if verdict.single_object is False:
-        raise Rejected("several_objects", f"not one coherent object by its pictures: {verdict.detail}", "gate")
+        raise Rejected("several_objects", f"not one coherent object in its pictures: {verdict.detail}", "gate")
     if verdict.visual_quality is False:
         raise Rejected("poor_quality", f"severe artifacts in its pictures: {verdict.detail}", "gate")
     return [

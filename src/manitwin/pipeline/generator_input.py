@@ -50,8 +50,8 @@ def refusal(config: BuildConfig) -> Callable[[Item], str | None]:
             return _without_template(config, item.text) if item.text else None
         able = ", ".join(_generators_asked_with(asked))
         return (
-            f"the generator {config.generator!r} makes no meshes of {called}; choose one that does with --generator"
-            f" ({able}), or give {other} or a mesh"
+            f"the generator {config.generator!r} cannot make a mesh from {called}; choose one that can with"
+            f" --generator ({able}), or give {other} or a mesh"
         )
 
     return why
@@ -67,7 +67,7 @@ def _two_things(item: Item) -> str | None:
     if by_text.category in (by_name.category, by_name.kin_of) or by_name.category == by_text.kin_of:
         return None
     said = f"the text says {by_text.category!r} ({item.text!r}) and the name {by_name.category!r}"
-    return f"{said}; leave out the name, or say the same"
+    return f"{said}; leave out the name, or make both the same"
 
 
 def _without_template(config: BuildConfig, text: str) -> str | None:
@@ -77,7 +77,7 @@ def _without_template(config: BuildConfig, text: str) -> str | None:
     if reason is None:
         return None
     able = [name for name in _generators_asked_with("text") if name != generator.name]
-    return f"{reason}; --generator {', '.join(able)} make other things of a text"
+    return f"{reason}; --generator {', '.join(able)} can make other objects from a text"
 
 
 def _asked_with(generator: Any) -> frozenset[Asked]:

@@ -112,11 +112,11 @@ def is_rectangular(name: str | None) -> bool | None:
 def doubted_rectangle(matte: Matte, file: str, name: str | None) -> DoubtedCutOut:
     """Return the doubt of a cut-out that is an upright rectangle, where nothing is known of what a person calls ``name``."""
     remedy = (
-        "say what it is with --name" if name is None else f"the priors know no {name!r}: give it a name that they know"
+        "name the object with --name" if name is None else f"the priors have no {name!r}; give a name that they have"
     )
     return DoubtedCutOut(
         "low_confidence_matte",
-        f"{file}: its alpha channel cuts an upright rectangle out, which may be the thing (a book, a box) or a picture with"
-        f" transparent bars; {remedy}, or crop the bars off",
+        f"{file}: its alpha channel is an upright rectangle: either the object (a book, a box) or a picture with"
+        f" transparent bars; {remedy}, or crop off the bars",
         replace(matte, confidence=DOUBTFUL),
     )

@@ -31,7 +31,7 @@ def why_none_held(
     reasons = []
     if needed_n > carried_n:
         reasons.append(
-            f"slippery for its weight: friction carries {carried_n:.1f} N, lift and slides need {needed_n:.1f} N"
+            f"too slippery for its weight: friction carries {carried_n:.1f} N, lift and slides need {needed_n:.1f} N"
         )
     if len(results):
         lever_m = nearest_lever_m(gripper_to_object, depth_m, body.center_of_mass_m)

@@ -131,8 +131,8 @@ def _place_of(points: list[FunctionalPoint] | list[GraspPoint], point_id: str, m
     own = [place for place in alike if there[place][0] == point_id]
     if not own and len(alike) != 1:
         raise BadReply(
-            f"{point_id} ({move['label']}) was moved by {move['source']}, and is no point now; review the twin again, or remove"
-            " its amendment"
+            f"{point_id} ({move['label']}) was moved by {move['source']}, but is no longer a point; review the twin"
+            f" again, or remove the amendment"
         )
     return (own or alike)[0]
 
@@ -144,8 +144,8 @@ def _moved(point: Any, request: PointsRequest, move: Mapping[str, Any]) -> Any:
     place = move.get("place")  # corrections of earlier versions do not say it
     if place is not None and not is_at(request.positions_m, candidate, np.asarray(place, float)):
         raise BadReply(
-            f"{point.id} was moved by {move['source']} to candidate {candidate}, which is another place of the object now; review"
-            " the twin again, or remove its amendment"
+            f"{point.id} was moved by {move['source']} to candidate {candidate}, which is now at another place of"
+            f" the object; review the twin again, or remove the amendment"
         )
     said = f"moved from candidate {point.candidate}"
     return point.model_copy(update={**request.place(candidate), "source": move["source"], "rationale": said})

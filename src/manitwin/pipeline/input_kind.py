@@ -25,7 +25,7 @@ def kind_of(item: Item) -> Kind:
         return "text"
     for file, kind in zip(item.files, kinds, strict=True):
         if item.views and kind != "image":
-            raise InputError("wrong_type", f"{Path(file).name}: no image; several views of one thing are all photos")
+            raise InputError("wrong_type", f"{Path(file).name}: not an image; all views of one object must be photos")
     return "photos" if item.views else kinds[0]
 
 

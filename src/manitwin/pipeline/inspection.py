@@ -28,7 +28,7 @@ MAX_RECORD_BYTES = 64 << 20
 _THIS = __name__
 _BY_SUFFIX = {
     **NOT_READ,
-    **dict.fromkeys((".csv", ".jsonl"), "a manifest is read only where it is given by its own path"),
+    **dict.fromkeys((".csv", ".jsonl"), "a manifest is read only if its own path is given"),
     ".mtl": "a material library that no mesh names",
     ".bin": "a buffer that no mesh names",
 }
@@ -104,7 +104,7 @@ def _found(answer: tuple[bool, Any], limits: Limits = LIMITS) -> Any:
     if returned:
         return value
     if isinstance(value, ProcessCrashed):
-        seconds = f"it takes longer than {limits.seconds:g} s, or ends the process that does"
+        seconds = f"it takes longer than {limits.seconds:g} s, or crashes the process"
         return NotInspected(f"could not be inspected ({seconds}); export it again, or leave it out")
     if isinstance(value, MemoryError):
         memory = f"it takes more than {limits.memory_bytes >> 30} GiB of memory"
@@ -146,7 +146,7 @@ def read_whether_image(file: Path) -> str | None:
             raise NotInspected(f"cannot be read ({error.strerror or error})") from error
     if found == "heif":
         return HEIC_NOT_READ
-    return None if found is not None else "no image or mesh"
+    return None if found is not None else "not an image or a mesh"
 
 
 def read_whether_twin(record: Path) -> bool:

@@ -176,7 +176,9 @@ def require_readable_size(path: Path) -> None:
     size = path.stat().st_size
     if size > MAX_KEPT_BYTES:
         said = f"{size} bytes are more than the limit of {MAX_KEPT_BYTES}"
-        raise InputError("too_large", f"{printable_line(path.name)}: {said}; simplify it, or scale its pictures down")
+        raise InputError(
+            "too_large", f"{printable_line(path.name)}: {said}; simplify it, or reduce the size of its textures"
+        )
 
 
 def file_sha256(path: Path) -> str:

@@ -47,8 +47,8 @@ class LinkScreen:
             return self.screen.why_none(counts)
         return Rejected(
             "no_proposal",
-            f"none of {before[-1]} grasps that fit touches the link {self.link!r} with both fingertips; choose another link,"
-            " or none",
+            f"none of {before[-1]} grasps that fit touches the link {self.link!r} with both fingertips; choose"
+            f" another link, or leave out --link",
         )
 
 

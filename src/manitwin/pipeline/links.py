@@ -53,7 +53,7 @@ def face_links(draft: Draft[Item], articulation: Articulation, mesh: trimesh.Tri
     if len(parts) != len(articulation.link_of_mesh):
         raise InputError(
             "unreadable",
-            f"{Path(draft.payload.file).name}: has {len(parts)} meshes, its import.json tells the links of"
+            f"{Path(draft.payload.file).name}: has {len(parts)} meshes, its import.json lists the links of"
             f" {len(articulation.link_of_mesh)}; import the asset again",
         )
     vertices, faces = trimesh.util.append_faces([part.vertices for part in parts], [part.faces for part in parts])

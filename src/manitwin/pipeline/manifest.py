@@ -59,12 +59,12 @@ def require_inputs(root: DatasetRoot, inputs: Sequence[str | Path], texts: Seque
     """Raise UsageError where a build has no inputs and no data set to go on with, and where it cannot be made or written."""
     if root.flat:
         raise UsageError(
-            f"{root.url}: holds twins in the flat layout of earlier versions, which is read and no longer written; give a new"
-            " folder"
+            f"{root.url}: contains twins in the flat layout of earlier versions, which can be read but not"
+            f" extended; give a new folder"
         )
     if not inputs and not texts and not root.exists(CONFIG) and not root.exists(LEDGER):
         raise UsageError(
-            f"{root.url}: no inputs, and no data set there to go on with; give images, meshes, folders, manifests or texts"
+            f"{root.url}: no inputs given, and no data set to resume; give images, meshes, folders, manifests or texts"
         )
     if root.local is not None:
         require_writable_folder(root.local, "twins")
@@ -94,15 +94,17 @@ def iterate_items(
         require_one_photo(inputs, texts, views=views)
     if views:
         if texts := list(texts):
-            raise UsageError("--views: a text; name the photos of one thing, such as --views front.jpg side.jpg")
+            raise UsageError("--views: a text; give the photos of one object, such as --views front.jpg side.jpg")
         yield from _one_of_views(list(inputs), defaults, notes, turns_deg, poses, refusal)
         return
     if turns_deg is not None or poses is not None:
         what = "turns" if poses is None else "poses"
-        raise UsageError(f"{what} are those of several photos of one thing; give --views too")
+        raise UsageError(f"{what} apply to several photos of one object; give --views too")
     for item in _given_items(inputs, defaults, notes, texts, strict, refusal):
         if item.file is not None and count > 1:
-            raise UsageError(f"{item.title}: count makes variations of texts, and this is a file; build it by itself")
+            raise UsageError(
+                f"{item.title}: --count applies to texts, but this is a file; build the file in a separate command"
+            )
         yield item
         yield from (replace(item, variation=number) for number in range(1, count))
 
@@ -119,7 +121,7 @@ def _one_of_views(
     if not inputs or listed is not None:
         told = "no photo" if listed is None else shortened(str(listed))
         raise UsageError(
-            f"--views: {told}; name the photos of one thing, or their folder, such as --views front.jpg side.jpg"
+            f"--views: {told}; give the photos of one object, or their folder, such as --views front.jpg side.jpg"
         )
     items: list[Item] = []
     for path in inputs:
@@ -164,7 +166,7 @@ def _given_items(
         if not os.path.exists(path):
             raise UsageError(
                 f"{shortened(str(given))}: {not_there(str(given))}; give an image, a mesh, a folder, or a .csv or .jsonl"
-                " manifest; words to make a thing of are a text (texts)"
+                " manifest; put the description of an object behind --text"
             )
         if path.is_dir():
             for item in _folder_items(path, str(given), defaults, notes):
@@ -176,7 +178,7 @@ def _given_items(
             yield from _allowed(item, str(given), refusal, refused)
     for text in texts:
         if not text.strip():
-            raise UsageError("an empty text; say what to make, such as 'a red mug'")
+            raise UsageError("the text is empty; describe an object, such as 'a red mug'")
         yield from _allowed(item_of({"text": text}, Path.cwd(), defaults, text), "--text", refusal, refused)
     refused.tell()
 
@@ -194,7 +196,7 @@ def _folder_items(folder: Path, given: str, defaults: dict[str, Any], notes: Not
     if not listing.inputs:
         left = "".join(f"; {line.removeprefix(f'{folder}: ')}" for line in listing.remarks()[1:])
         known = ", ".join(sorted(MESH_SUFFIXES | IMAGE_SUFFIXES))
-        raise UsageError(f"{given}: no image or mesh in this folder{left}; known: {known}")
+        raise UsageError(f"{given}: this folder contains no image or mesh{left}; known: {known}")
     masks = {str(photo): str(mask) for photo, mask in listing.masks.items()}
     for path in map(str, listing.inputs):
         row = {"file": path, "mask": masks[path]} if path in masks else {"file": path}
@@ -231,7 +233,8 @@ def _manifest_items(
             yield from _allowed(item, where, refusal, refused)
     if line is None:
         raise UsageError(
-            f"{path}: no rows; a manifest has a column 'file' or 'text', and optionally {', '.join(COLUMNS[2:])}"
+            f"{path}: the manifest has no rows; it needs a column 'file' or 'text', and optionally"
+            f" {', '.join(COLUMNS[2:])}"
         )
     if unknown:
         notes.remarks.append(f"{path}: columns not used: {listed_columns(unknown)}")

@@ -56,8 +56,8 @@ def item_of(
             raise UsageError(f"{where}: {key}: {why}")
     file, text = values.get("file"), values.get("text")
     if (file is None) == (text is None):
-        columns = f"; the first line names the columns, unknown: {listed_columns(unknown)}" if unknown else ""
-        raise UsageError(f"{where}: a row has either 'file' or 'text'{columns}")
+        columns = f"; the first line must name the columns; unknown: {listed_columns(unknown)}" if unknown else ""
+        raise UsageError(f"{where}: give either 'file' or 'text' in a row{columns}")
     if file is not None:
         path = os.path.join(folder, file.rstrip("/") or file)
         if not os.path.isfile(path):
@@ -120,9 +120,11 @@ def unusable(key: str, value: str) -> str | None:
     if len(value) > most:
         return f"{len(value)} characters; give at most {most}"
     if key in ("file", "poses", "mask"):
-        return "has a NUL character in it; check the path" if "\0" in value else None
+        return "contains a NUL character; check the path" if "\0" in value else None
     if _CONTROLS.search(value) or (key in ("name", "license") and _LINES.search(value)):
-        return f"{printable_line(value, max_characters=60)!r} has control characters; give plain words"
+        return (
+            f"{printable_line(value, max_characters=60)!r} contains control characters; use printable characters only"
+        )
     return None
 
 

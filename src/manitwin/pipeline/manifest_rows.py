@@ -26,7 +26,7 @@ def _jsonl_rows(path: Path, columns: tuple[str, ...]) -> Iterator[tuple[int, dic
         row = parse_json(line, f"{path}:{number}", UsageError, file_names=True)
         if not isinstance(row, dict):
             raise UsageError(
-                f"{path}:{number}: a line is one JSON object with 'file' or 'text', not {type(row).__name__}"
+                f"{path}:{number}: each line must be a JSON object with 'file' or 'text', not {type(row).__name__}"
             )
         for column in columns:
             value = row.get(column)

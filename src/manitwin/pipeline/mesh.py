@@ -79,7 +79,7 @@ class MeshStage:
                 by_convention = prior is not None and not generated and _up_is_convention(draft)
                 result, chosen, to_object = self._solid(soup, file, said, prior, by_convention)
         except (QhullError, np.linalg.LinAlgError) as error:
-            cause = f"its surface has no depth or precision to make a solid of ({type(error).__name__})"
+            cause = f"its surface is too flat or too imprecise to make a solid from it ({type(error).__name__})"
             raise _degenerate(path, cause) from error
         vertices = trimesh.transform_points(result.mesh.vertices, to_object)
         larger, is_stated = _to_stated_size(
@@ -146,7 +146,7 @@ def _check_extent(soup: trimesh.Trimesh, path: Path) -> None:
     scaled = (triangles - low) / longest  # areas of small lengths would be rounded to zero
     cross = np.cross(scaled[:, 1] - scaled[:, 0], scaled[:, 2] - scaled[:, 0])
     if not float(np.linalg.norm(cross, axis=1).sum()) > _LEAST_AREA:
-        raise _degenerate(path, "its faces have no area")
+        raise _degenerate(path, "all of its faces have zero area")
 
 
 def _degenerate(path: Path, cause: str) -> Rejected:
@@ -159,7 +159,7 @@ def _input_path(draft: Draft[Item], generated: bool) -> Path:
     if generated:
         return draft.path(_GENERATED)
     if draft.payload.file is None:
-        raise InputError("empty", "no mesh file and nothing generated; give a file")
+        raise InputError("empty", "no mesh was given or generated; give a file")
     return Path(draft.payload.file)
 
 

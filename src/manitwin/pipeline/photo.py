@@ -50,7 +50,7 @@ class PhotoStage:
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Read and matte; raises InputError, or Rejected where no single object can be told from the background."""
         if draft.payload.file is None:
-            raise InputError("empty", "no image file; give one")
+            raise InputError("empty", "no image was given; give an image file")
         amendment = draft.amendments.get(self.name, {})
         path = Path(draft.payload.file)
         rgba, field = self.cut_out(

@@ -114,7 +114,7 @@ def _require_own(photo: Path, camera: PosedCamera | None, found: CameraPoses) ->
         own = printable_line(camera.file, max_characters=120)
         raise InputError(
             "unreadable",
-            f"{shown}: the pose of this name in {called(found)} is that of another picture, {own}; give the poses of"
+            f"{shown}: the pose of this name in {called(found)} belongs to another picture, {own}; give the poses of"
             " these photos",
         )
 
@@ -141,14 +141,16 @@ def _of_upright(photo: Path, camera: PosedCamera, found: CameraPoses) -> PosedCa
     if stated is not None and not _same_shape((width, height), stated):
         raise InputError(
             "unreadable",
-            f"{name}: {width} x {height} pixels, and its pose in {file} is of a picture of {stated[0]:.0f} x {stated[1]:.0f};"
+            f"{name}: {width} x {height} pixels, but its pose in {file} is for a picture of {stated[0]:.0f} x"
+            f" {stated[1]:.0f};"
             " give the photo uncropped, as it was when the poses were estimated",
         )
     told = stated is not None and stated[0] != stated[1] and orientation in _TURNED
     if orientation != _UPRIGHT and not told:
         raise InputError(
             "unreadable",
-            f"{name}: its EXIF turns it, and its pose in {file} may be that of the picture as it is stored; save it upright,"
+            f"{name}: its EXIF orientation rotates it, and its pose in {file} may be that of the picture as it is"
+            f" stored; save it upright,"
             " without EXIF orientation, and estimate the poses of that",
         )
     return whole

@@ -39,8 +39,8 @@ def one_of_photos(
     """
     meshes = [item.title for item in items if item.file is not None and _is_mesh(item)]
     if meshes or any(item.file is None for item in items):
-        told = f"{meshes[0]} is a mesh" if meshes else "a text is no photo"
-        raise UsageError(f"{where}: {told}; the views of one thing are all photos: give a mesh or a text by itself")
+        told = f"{meshes[0]} is a mesh" if meshes else "a text is not a photo"
+        raise UsageError(f"{where}: {told}; all views of one object must be photos; give a mesh or a text separately")
     files = [str(item.file) for item in items]
     twice = given_twice(files)
     if twice is not None:
@@ -50,16 +50,16 @@ def one_of_photos(
         told = ", or say where the camera was, to have them thinned out" if unsaid else ""
         most = MOST_PHOTOS if unsaid else MOST_GIVEN
         raise UsageError(
-            f"{where}: {len(items)} photos of one thing; give at most {most}, spread over the directions{told}"
+            f"{where}: {len(items)} photos of one object; give at most {most}, spread over the directions{told}"
         )
     turns = [] if turns_deg is None else list(turns_deg)
     if turns and (len(turns) != len(items) or not all(map(isfinite, turns))):
         raise UsageError(
-            f"{where}: {len(items)} photos and the turns {', '.join(f'{turn:g}' for turn in turns)}: give one a photo, in"
-            " degrees, counter-clockwise seen from above, such as 0,90,180"
+            f"{where}: {len(items)} photos and the turns {', '.join(f'{turn:g}' for turn in turns)}: give one turn"
+            f" per photo, in degrees, counter-clockwise seen from above, such as 0,90,180"
         )
     if turns and poses is not None:
-        raise UsageError(f"{where}: turns and poses both say where the camera was; give one of them")
+        raise UsageError(f"{where}: turns and poses both describe the camera; give only one of them")
     try:
         kept = kept_photos([Path(file) for file in files], turns, None if poses is None else Path(poses))
     except InputError as error:
@@ -67,7 +67,7 @@ def one_of_photos(
     given = None if len(kept) == len(items) else len(items)
     items, turns = [items[number] for number in kept], [turns[number] for number in kept] if turns else []
     if any(item.box_px for item in items) and len(items) > 1:
-        raise UsageError(f"{where}: {BOX} is of a photo by itself; of several photos of one thing give masks")
+        raise UsageError(f"{where}: {BOX} applies to a single photo; for several photos of one object give masks")
     masks = tuple(item.masks[0] if item.masks else "" for item in items)
     masks = masks if any(masks) else ()
     if poses is not None:
@@ -81,7 +81,7 @@ def one_of_photos(
 
 def _posed(items: Sequence[Item], masks: tuple[str, ...], poses: str, where: str) -> Item:
     if len(items) == 1:
-        raise UsageError(f"{where}: poses are those of several photos of one thing, and this is one; give more photos")
+        raise UsageError(f"{where}: poses need several photos of one object, but there is only one; give more photos")
     views = tuple(str(each.file) for each in items[1:])
     item = replace(items[0], views=views, poses=os.path.realpath(poses), masks=masks)
     try:
@@ -134,11 +134,11 @@ class PhotoGroups:
         group = _said(row, "group")
         if not group and _said(row, "turn_deg"):
             raise UsageError(
-                f"{self.manifest}:{line}: turn_deg is the camera's turn in a photo of several; give the row a group too"
+                f"{self.manifest}:{line}: turn_deg needs several photos of one object; give the row a group too"
             )
         if not group and _said(row, "poses"):
             raise UsageError(
-                f"{self.manifest}:{line}: poses are the cameras of several photos of one thing; give their rows a group too"
+                f"{self.manifest}:{line}: poses need several photos of one object; give their rows a group too"
             )
         if group:
             self.rows[group].append((line, row))
@@ -176,7 +176,9 @@ def _agreed(where: str, column: str, rows: Iterable[tuple[int, Row]]) -> str:
         told = " and ".join(
             f"{printable_line(value, max_characters=40)!r} (row {line})" for value, line in values.items()
         )
-        raise UsageError(f"{where}: one thing has one {column}, and its rows say {told}; correct one of them")
+        raise UsageError(
+            f"{where}: all rows of an object must have the same {column}, but they have {told}; correct them"
+        )
     return next(iter(values), "")
 
 

@@ -166,7 +166,8 @@ class PhysicalStage:
         if not self.settings.min_density_kg_m3 <= density <= self.settings.max_density_kg_m3:
             raise Rejected(
                 "implausible_mass",
-                f"{mass.value:.4g} kg in {volume_m3 * 1e6:.4g} ml is {density:.4g} kg/m3, as no object has; {to_check}",
+                f"{mass.value:.4g} kg in {volume_m3 * 1e6:.4g} ml is {density:.4g} kg/m3, which is impossible;"
+                f" {to_check}",
             )
 
 

@@ -98,7 +98,7 @@ def find_rests(body: RigidBody, settings: PlacementConfig) -> list[_Rest]:
     if not rests or not rests[0].settled:
         raise Rejected(
             "no_stable_pose",
-            f"it rolled or tipped over from each of the {len(guesses)} likeliest poses it was set down in",
+            f"the object rolled or tipped over from each of the {len(guesses)} most likely resting poses",
         )
     upright = [rest for rest in rests[settings.max_placements :] if rest.settled and _is_upright(rest)][:1]
     return rests[: settings.max_placements - len(upright)] + upright

@@ -156,7 +156,9 @@ def _check_kind(
         raise BadReply(f"{len(points)} {kind} points, not {limits[0]} to {limits[1]}; ask the annotator again")
     numbers = [point.candidate for point in points]
     if len(set(numbers)) != len(numbers) or not all(0 <= i < len(positions_m) for i in numbers):
-        raise BadReply(f"{kind} points at candidates {numbers}, not different ones below {len(positions_m)}; ask again")
+        raise BadReply(
+            f"{kind} points at candidates {numbers}; they must differ and be below {len(positions_m)}; ask again"
+        )
     for point in points:
         if not np.allclose(point.position_m, positions_m[point.candidate], atol=1e-6):
             raise BadReply(f"{kind} point {point.id} is not at its candidate {point.candidate}; ask again")

@@ -127,7 +127,7 @@ def _grippers(config: BuildConfig) -> list[tuple[Gripper, str]]:
     if len(set(names)) < len(names):
         twice = sorted({name for name in names if names.count(name) > 1})
         raise UsageError(
-            f"grippers {', '.join(names)}: each may be named once, as grasps are told apart by the name; name"
+            f"grippers {', '.join(names)}: grasps are identified by the gripper name, so names must be unique; name"
             f" {', '.join(twice)} once, or give one of two files another name"
         )
     return [(gripper, f"-{gripper.name}" if number else "") for number, gripper in enumerate(grippers)]
@@ -271,9 +271,7 @@ class TwinRecipe(FolderRecipe[TwinRecord]):
         except (OSError, Rejected) as answer:
             gone = next((Path(file) for file in payload.files if not Path(file).exists()), None)
             if gone is not None:
-                raise InputChanged(
-                    f"{gone.name}: is not there any more; put it back, then run the same command again"
-                ) from answer
+                raise InputChanged(f"{gone.name}: was removed; put it back, then rerun the same command") from answer
             if identity is None or not isinstance(answer, Rejected):
                 raise
             return Identity(identity, claimed_kind(payload), answer)

@@ -45,7 +45,7 @@ class RefusedInputs:
         told = [printable_line(line.split("; ")[0], max_characters=_CHARACTERS) for line in others[:TOLD]]
         if rest := others[TOLD:]:
             told.append(f"and {len(rest):,} more{_rows(rest)}")
-        unread = "; what comes after them was not read" if len(self.lines) >= MOST else ""
+        unread = "; the inputs after them were not read" if len(self.lines) >= MOST else ""
         raise UsageError(f"{first}. {len(others):,} more cannot be used: {'; '.join(told)}{unread}")
 
 

@@ -58,7 +58,7 @@ def with_flags(settings: BuildConfig, flags: Flags) -> BuildConfig:
     """Return the settings with the flags on top; raises UsageError where two of them contradict each other."""
     quick, agree = flags.get("quick", False), flags.get("require_agreement", False)
     if quick and agree:
-        raise UsageError("quick leaves the second engine out, and require-agreement asks for it; give one of them")
+        raise UsageError("--quick skips the second engine, but --require-agreement needs it; give only one of them")
     max_cost_usd, record, grippers = flags.get("max_cost_usd"), flags.get("record"), flags.get("grippers")
     if max_cost_usd is not None and not 0 < max_cost_usd < inf:
         raise UsageError(f"max_cost_usd is {max_cost_usd:g}; give more than 0")
@@ -81,7 +81,7 @@ def with_flags(settings: BuildConfig, flags: Flags) -> BuildConfig:
         )
     asked = flags.get("second_opinion")
     if asked is not None and quick:
-        raise UsageError("quick leaves the second engine out, and second-opinion asks for it; give one of them")
+        raise UsageError("--quick skips the second engine, but --second-opinion needs it; give only one of them")
     if asked is not None:
         sample = None if asked == "all" else SAMPLE_OF_HELD
         base = update.get("second_opinion", settings.second_opinion)
@@ -109,7 +109,7 @@ def stored_config(root: DatasetRoot) -> BuildConfig:
     said = root.read_json(CONFIG, UsageError, remedy="give --config")
     if "kind" in said:
         kind = printable_line(str(said["kind"])[:40])
-        raise NotTwins(f"{root.url}: holds {kind}, not twins; give the data set that they are of")
+        raise NotTwins(f"{root.url}: contains {kind}, not twins; give the data set of their twins")
     try:
         return validated(BuildConfig, {name: value for name, value in said.items() if name not in RETIRED}, place)
     except ConfigError as error:

@@ -46,7 +46,8 @@ def stated_box_px(said: object, where: str) -> PixelBox | None:
     left, top, right, bottom = numbers
     if left >= right or top >= bottom:
         raise UsageError(
-            f"{where}: {BOX} is {shown}: its right and bottom edges are not beyond its left and top ones; give {_EXAMPLE} (not a"
+            f"{where}: {BOX} is {shown}: the right and bottom edges must lie beyond the left and top edges; give"
+            f" {_EXAMPLE} (not a"
             " width and a height)"
         )
     return left, top, right, bottom
@@ -59,7 +60,7 @@ def stated_mask(said: object, folder: Path, where: str) -> str | None:
     path = os.path.realpath(os.path.join(folder, str(said)))
     if not os.path.isfile(path):
         shown = printable_line(path, max_characters=200)
-        raise UsageError(f"{where}: {MASK}: {shown} is no file; paths are absolute or relative to the manifest")
+        raise UsageError(f"{where}: {MASK}: {shown} is not a file; paths are absolute or relative to the manifest")
     return path
 
 
@@ -68,7 +69,7 @@ def require_of_photo(values: Mapping[str, Any], file: str | None, where: str) ->
     said = [column for column in (MASK, BOX) if values.get(column) not in (None, "", ())]
     if said and (file is None or Path(file).suffix.lower() in MESH_SUFFIXES):
         what = "a text" if file is None else "a mesh"
-        raise UsageError(f"{where}: {said[0]}: says where in a photo the thing is, and this is {what}; leave it out")
+        raise UsageError(f"{where}: {said[0]}: applies to photos, but this is {what}; leave it out")
 
 
 def require_one_photo(inputs: Sequence[str | Path], texts: Sequence[str], *, views: bool) -> None:
@@ -76,7 +77,8 @@ def require_one_photo(inputs: Sequence[str | Path], texts: Sequence[str], *, vie
     one = len(inputs) == 1 and not texts and not views
     if not one or os.path.isdir(inputs[0]) or Path(inputs[0]).suffix.lower() in (".csv", ".jsonl"):
         raise UsageError(
-            f"a mask or a box is of one photo; of several write a manifest with the columns {MASK} and {BOX}"
+            f"a mask or a box applies to one photo; for several photos write a manifest with the columns {MASK} and"
+            f" {BOX}"
         )
 
 

@@ -79,12 +79,14 @@ def stated_poses(photos: Sequence[Path], poses: Path, up: str = "auto", units: s
     if told is None and up != "auto":
         raise InputError(
             "unreadable",
-            f"{file}: with {up} up most photos would stand on their heads; leave the up axis out to have it told by the cameras",
+            f"{file}: with {up} up most photos would be upside down; leave out the up axis to derive it from the"
+            f" cameras",
         )
     if told is None:
         raise InputError(
             "unreadable",
-            f"{file}: which way is up is not told: the cameras are rolled by more than {MOST_ROLL_DEG:.0f} degrees; state it"
+            f"{file}: the up direction is unknown: the cameras are rolled by more than {MOST_ROLL_DEG:.0f} degrees;"
+            f" state it"
             " with --up y or z, or turn the poses",
         )
     upright = rotation_between(told.axis, np.array([0.0, 0.0, 1.0]))

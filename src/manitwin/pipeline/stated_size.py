@@ -47,10 +47,12 @@ def stated_size_m(values: Mapping[str, Any], where: str) -> float | None:
         raise UsageError(f"{where}: {COLUMN} is {shown}; give metres, more than 0, such as 0.12")
     if values.get("text") is not None:
         raise UsageError(
-            f"{where}: {COLUMN}: a text says its size in its words, such as 'a mug, 9 cm tall'; put it there"
+            f"{where}: {COLUMN}: a text states the size in its words, such as 'a mug, 9 cm tall'; move the size"
+            f" into the text"
         )
     if values["units"] not in _NO_UNIT:
         raise UsageError(
-            f"{where}: {COLUMN}: the unit {values['units']} says the size of a mesh already; give one of them"
+            f"{where}: {COLUMN}: the unit {values['units']} already determines the size of the mesh; give only one"
+            f" of them"
         )
     return length_m

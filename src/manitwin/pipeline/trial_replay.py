@@ -83,7 +83,7 @@ def summary_of(twin: Twin, gripper_name: str) -> GraspSummary:
     other = first.other_grippers.get(gripper_name) if first is not None else None
     if other is None or other.summary is None:
         raise UsageError(
-            f"{twin.record.twin_id}: has no grasps of a gripper of this name; its record names those that it has"
+            f"{twin.record.twin_id}: has no grasps for a gripper of this name; its record lists its grippers"
         )
     return other.summary
 
@@ -92,11 +92,11 @@ def known_gripper(twin: Twin, gripper_name: str) -> Gripper:
     """Return a gripper that comes with the package and is the one of the twin's record; raises UsageError for another."""
     if gripper_name not in shipped_grippers():
         raise UsageError(
-            "the gripper does not come with the package, and a twin has only its name: no trial can be played"
+            "this gripper is not shipped with the package, and a twin stores only its name; no trial can be replayed"
         )
     gripper = load_gripper(gripper_name)
     if gripper.sha256 != summary_of(twin, gripper_name).gripper_sha256:
-        raise UsageError(f"the {gripper_name} of this package is another than that of the trial; build the twin again")
+        raise UsageError(f"the {gripper_name} of this package differs from the one of the trial; build the twin again")
     return gripper
 
 
@@ -109,8 +109,7 @@ def settings_of_trial(twin: Twin, trial: Trial, gripper: Gripper) -> TrialSettin
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
         raise UsageError(
-            f"{twin.folder}: its grasps were tried in no way that can be repeated (grasps.trial.{where}: {first['msg']});"
-            " build it again"
+            f"{twin.folder}: its grasp trials cannot be repeated (grasps.trial.{where}: {first['msg']}); build it again"
         ) from error
     return trial_settings(asked, gripper)
 
@@ -127,11 +126,11 @@ def _grasp(twin: Twin, gripper_name: str, grasp_id: str) -> tuple[np.ndarray, np
     names = zip(table["gripper"].to_pylist(), table["grasp_id"].to_pylist(), strict=True)
     row = next((place for place, name in enumerate(names) if name == (gripper_name, grasp_id)), None)
     if row is None:
-        raise UsageError(f"{twin.record.twin_id}: has no grasp of this name; grasps.parquet lists them")
+        raise UsageError(f"{twin.record.twin_id}: has no grasp of this name; grasps.parquet lists its grasps")
     found = table.slice(row, 1).to_pylist()[0]
     rotation = rotation_from_quaternion_wxyz(np.array([found["quaternion_wxyz"]], float))[0]
     pose = transform(rotation, np.array(found["position_m"], float))
     if not np.isfinite(pose).all():
-        raise UsageError(f"{twin.record.twin_id}: the grasp's pose is no finite numbers; build the twin again")
+        raise UsageError(f"{twin.record.twin_id}: the pose of the grasp is not finite; build the twin again")
     joints = [found[name] for name in JOINTS]
     return pose, None if any(not each for each in joints) else np.array(joints, float), found["outcome"]

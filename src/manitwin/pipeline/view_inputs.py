@@ -55,6 +55,6 @@ def listed_views(paths: Sequence[Path], poses: Path | None) -> list[Path]:
             continue
         inputs = list_folder(path).inputs
         if not inputs:
-            raise UsageError(f"{path}: no photo in this folder; give photos, or a folder of them")
+            raise UsageError(f"{path}: this folder contains no photo; give photos, or a folder of them")
         found += in_order(inputs, poses)[0]
     return found

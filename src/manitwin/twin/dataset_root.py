@@ -50,7 +50,7 @@ class DatasetRoot:
 
     def __init__(self, url: str | Path):
         if _PASSWORD.search(str(url)):  # first of all: what comes after shows the URL, and writes it
-            raise UsageError("the URL of a data set holds a password or a key; those come from the environment only")
+            raise UsageError("the URL of a data set contains a password or a key; pass these in the environment only")
         try:
             self.fs, self.path = url_to_fs(str(url), use_listings_cache=False)  # others write there as well
         except (ValueError, ImportError) as error:
@@ -87,7 +87,7 @@ class DatasetRoot:
     def full(self, name: str) -> str:
         """Return the name as the file system knows it. Raises UsageError for one that leaves the root."""
         if name.startswith("/") or ".." in PurePosixPath(name).parts:
-            raise UsageError(f"{name}: leaves the data set {self.url}; give a name below it")
+            raise UsageError(f"{name}: lies outside the data set {self.url}; give a path below it")
         return f"{self.path.rstrip('/')}/{name}"
 
     def exists(self, name: str) -> bool:

@@ -41,7 +41,7 @@ class Filling(Record):
                 raise ValueError("filling.states are not ordered from empty to full")
         for state in self.states:
             if not all(abs(place) <= LARGEST_M for place in state.center_of_mass_m):
-                raise ValueError(f"filling: center_of_mass_m is {state.center_of_mass_m}, which no object has")
+                raise ValueError(f"filling: center_of_mass_m is {state.center_of_mass_m}, which is impossible")
             if not all(abs(moment) <= LARGEST_KG * LARGEST_M for row in state.inertia_kg_m2 for moment in row):
                 raise ValueError("filling: inertia_kg_m2 is larger than that of any object")
         return self

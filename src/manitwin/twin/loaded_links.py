@@ -30,9 +30,9 @@ def read_face_links(folder: Path, record: TwinRecord, faces: int) -> np.ndarray:
     content = read_bytes(path, MAX_LABEL_BYTES, TwinError, inside=folder, name=str(path))
     labels = parse_labels(content, str(path), TwinError, remedy=REMEDY)
     if len(labels) != faces:
-        raise TwinError(f"{path}: tells the links of {len(labels)} faces, visual.glb has {faces}; {REMEDY}")
+        raise TwinError(f"{path}: has links for {len(labels)} faces, but visual.glb has {faces}; {REMEDY}")
     if len(labels) and labels.max() >= len(record.links):
-        raise TwinError(f"{path}: names link {labels.max()}, the record has {len(record.links)}; {REMEDY}")
+        raise TwinError(f"{path}: refers to link {labels.max()}, but the record has {len(record.links)}; {REMEDY}")
     return labels
 
 
@@ -51,7 +51,7 @@ def articulated_body(record: TwinRecord, whole: RigidBody) -> ArticulatedBody:
         return ArticulatedBody((whole,), ())
     missing = {number for link in record.links for number in link.hulls} - set(range(len(whole.hulls)))
     if missing:
-        raise TwinError(f"{record.twin_id}: its links name hull_{min(missing):02d}, which is not there; {REMEDY}")
+        raise TwinError(f"{record.twin_id}: its links refer to hull_{min(missing):02d}, which is not there; {REMEDY}")
     links = tuple(
         RigidBody(
             hulls=tuple(whole.hulls[number] for number in link.hulls),
@@ -90,7 +90,9 @@ def posed_parts(
     names = [joint.name for joint in joints]
     for name, position in positions.items():
         if name not in names:
-            raise UsageError(choose_from("joint", name, names) if names else "it has no joints: it is one rigid body")
+            raise UsageError(
+                choose_from("joint", name, names) if names else "the twin has no joints: it is one rigid body"
+            )
         joint = joints[names.index(name)]
         if joint.within(position) != position:
             unit = "m" if joint.kind == "prismatic" else "rad"

@@ -93,11 +93,11 @@ class Twin:
         content = read_bytes(path, MAX_LABEL_BYTES, TwinError, inside=self.folder, name=str(path))
         labels = parse_labels(content, str(path), TwinError, remedy=REMEDY)
         if len(labels) != faces:
-            raise TwinError(f"{path}: tells the parts of {len(labels)} faces, visual.glb has {faces}; {REMEDY}")
+            raise TwinError(f"{path}: has parts for {len(labels)} faces, but visual.glb has {faces}; {REMEDY}")
         unknown = (labels != NO_PART) & (labels >= parts)
         if unknown.any():
             raise TwinError(
-                f"{path}: names part {labels[unknown][0]}, the record has {parts}, counted from 0; {REMEDY}"
+                f"{path}: refers to part {labels[unknown][0]}, but the record has {parts}, counted from 0; {REMEDY}"
             )
         return labels
 
@@ -145,7 +145,7 @@ class Twin:
     def _filled(self, share: float) -> FillState:
         filling = self.physical.filling
         if filling is None:
-            raise UsageError(f"{self.folder}: has no fill states; they are told of bottles, cans and jars alone")
+            raise UsageError(f"{self.folder}: has no fill states; only bottles, cans and jars have them")
         state = filling.at(share)
         if state is None:
             valid = [f"{each.share:g}" for each in filling.states]
@@ -194,7 +194,7 @@ class Twin:
         if name is None:
             return tried[0] if tried else ""
         if not tried:
-            raise UsageError(f"{self.folder}: has no grasps of any gripper; build it again with one")
+            raise UsageError(f"{self.folder}: has no grasps for any gripper; build it again with a gripper")
         if name not in tried:
             raise UsageError(f"{self.folder}: {choose_from('gripper', name, tried)}")
         return name
@@ -217,7 +217,7 @@ class Twin:
         )
 
 
-MOVED = "put it back, or name the data set where the twins are now (--twins)"
+MOVED = "put it back, or give the data set where the twins are now (--twins)"
 """What helps where scenes or episodes name a twin that is not there."""
 
 
@@ -237,7 +237,8 @@ class TwinSource:
             )
         if self.root.local is not None and not self.root.local.is_dir():
             raise UsageError(
-                f"{place}: no such folder; give a data set, or the folder that `manitwin build` made (for the twins of"
+                f"{place}: this folder does not exist; give a data set, or the folder that `manitwin build` made"
+                f" (for the twins of"
                 " scenes or episodes: --twins)"
             )
 

@@ -31,7 +31,7 @@ def read_visual(path: Path) -> list[trimesh.Trimesh]:
     except InputError as error:
         raise TwinError(f"{path}: cannot be read ({error.detail}); {REMEDY}") from error
     if not all(np.isfinite(part.vertices).all() for part in parts):
-        raise TwinError(f"{path}: has vertices that are no finite numbers; {REMEDY}")
+        raise TwinError(f"{path}: has vertices that are not finite; {REMEDY}")
     return parts
 
 
@@ -52,7 +52,7 @@ def _hull(path: Path, folder: Path) -> trimesh.Trimesh:
         corners = [[word.partition(b"/")[0] for word in row[1:]] for row in rows if row[0] == b"f"]
         faces = np.array(corners, np.int64).reshape(-1, 3) - 1
     except (ValueError, OverflowError) as error:
-        raise TwinError(f"{path}: no hull that can be read ({str(error)[:120]}); {REMEDY}") from error
+        raise TwinError(f"{path}: not a readable hull ({str(error)[:120]}); {REMEDY}") from error
     if not len(faces) or not (np.abs(vertices) <= MAX_NUMBER).all() or faces.min() < 0 or faces.max() >= len(vertices):
-        raise TwinError(f"{path}: no hull of finite vertices and their triangles; {REMEDY}")
+        raise TwinError(f"{path}: not a hull with finite vertices and triangles; {REMEDY}")
     return trimesh.Trimesh(vertices, faces, process=False)

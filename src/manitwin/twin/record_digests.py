@@ -30,7 +30,7 @@ def state_of(record: Mapping[str, Any], name: str) -> TwinState:
     try:
         return TwinState(record["revision"], body_sha256(record), gripper_digests(record))
     except (KeyError, TypeError, AttributeError) as error:
-        raise TwinError(f"{name}: no record of a twin ({type(error).__name__}: {error}); {REMEDY}") from error
+        raise TwinError(f"{name}: not a record of a twin ({type(error).__name__}: {error}); {REMEDY}") from error
 
 
 def body_sha256(record: Mapping[str, Any]) -> str:

@@ -56,7 +56,7 @@ def sha256_of_untrusted(path: Path, inside: Path) -> str:
         size = os.fstat(stream.fileno()).st_size
         if size > MAX_TWIN_FILE_BYTES:
             raise TwinError(
-                f"{path}: {size} bytes are more than a twin's file may have ({MAX_TWIN_FILE_BYTES}); {REMEDY}"
+                f"{path}: {size} bytes exceed the size limit of a twin's file ({MAX_TWIN_FILE_BYTES}); {REMEDY}"
             )
         while block := stream.read(_BLOCK_BYTES):
             digest.update(block)
@@ -87,7 +87,7 @@ def file_beside(place: Path) -> Iterator[Path]:
     Raises UsageError where a folder is in its place.
     """
     if place.is_dir():
-        raise UsageError(f"{place}: is a folder, where a file is to be written; move it away")
+        raise UsageError(f"{place}: is a folder, but a file must be written there; move the folder away")
     place.parent.mkdir(parents=True, exist_ok=True)
     beside = place.with_name(f".{place.name}.{os.getpid()}")
     try:
@@ -155,7 +155,7 @@ def _plain(value: Any) -> Any:
 
 
 def _with_controls(value: Any) -> str | None:
-    """Return the beginning of a text in a JSON value that holds control characters, None where none does."""
+    """Return the beginning of a text in a JSON value that contains control characters, None where none does."""
     left = [value]
     while left:
         each = left.pop()
@@ -200,8 +200,10 @@ def read_record(folder: Path, verify: bool = False) -> TwinRecord:
     if not os.path.lexists(path):
         remedy = "give a folder that `manitwin build` made"
         if (folder / "twins").is_dir():
-            remedy = "it is a data set: `manitwin view` and manitwin.Dataset show it, and its twins are the folders below twins/"
-        raise TwinError(f"{folder}: no {RECORD}, so this is no finished twin; {remedy}")
+            remedy = (
+                "this is a data set: open it with `manitwin view` or manitwin.Dataset, or give a folder below twins/"
+            )
+        raise TwinError(f"{folder}: no {RECORD}, so this is not a finished twin; {remedy}")
     require_plain(folder)
     content = read_bytes(path, MAX_JSON_BYTES, TwinError, inside=folder, name=str(path))
     record = parse_record(content, path)
@@ -218,7 +220,7 @@ def parse_record(content: bytes, path: str | Path = RECORD, *, sealed: bool = Fa
     said = parse_json_object(content, str(path), TwinError, remedy=REMEDY)
     data = in_present_version(said, path)
     if (found := _with_controls(data)) is not None:
-        raise TwinError(f"{path}: {printable_line(found)!r} holds control characters; {REMEDY}")
+        raise TwinError(f"{path}: {printable_line(found)!r} contains control characters; {REMEDY}")
     if sealed and revision_of(said) != said.get("revision"):
         raise TwinError(f"{path}: altered since it was written (its revision does not match); {REMEDY}")
     try:

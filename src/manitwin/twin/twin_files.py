@@ -16,7 +16,8 @@ _MOST_ENTRIES = 100_000
 
 
 def require_plain(folder: Path) -> None:
-    """Raise TwinError where anything in a twin's folder is no regular file, no folder, or a link that leads out of it."""
+    """Raise TwinError where anything in a twin's folder is not a regular file, no folder, or a link that leads out"
+    " of it."""
     left, entries = [folder], 0
     while left:
         place = left.pop()
@@ -29,23 +30,23 @@ def require_plain(folder: Path) -> None:
                     elif entry.is_dir(follow_symlinks=False):
                         left.append(Path(entry.path))
                     elif not entry.is_file(follow_symlinks=False):
-                        raise TwinError(_refusal(entry.path, "is no regular file"))
+                        raise TwinError(_refusal(entry.path, "is not a regular file"))
         except OSError as error:
             raise TwinError(f"{place}: cannot be read ({error.strerror or error}); check its permissions") from error
         if entries > _MOST_ENTRIES:
-            raise TwinError(f"{folder}: holds more than {_MOST_ENTRIES} files; build the twin again")
+            raise TwinError(f"{folder}: contains more than {_MOST_ENTRIES} files; build the twin again")
 
 
 def _require_inside(folder: Path, path: Path) -> None:
     try:
         target = path.resolve(strict=True)
     except (OSError, RuntimeError, ValueError) as error:  # leads nowhere, or in a circle (RuntimeError until 3.12)
-        raise TwinError(_refusal(path, "is a link that leads nowhere")) from error
+        raise TwinError(_refusal(path, "is a broken link")) from error
     if not target.is_relative_to(folder.resolve()):
-        raise TwinError(_refusal(path, "leads out of the twin's folder, and is not read"))
+        raise TwinError(_refusal(path, "leads outside the folder of the twin, and is not read"))
     if not target.is_file() and not target.is_dir():
-        raise TwinError(_refusal(path, "is no regular file"))
+        raise TwinError(_refusal(path, "is not a regular file"))
 
 
 def _refusal(path: str | Path, what: str) -> str:
-    return f"{printable_line(str(path))}: {what}; build the twin again, or fetch it again"
+    return f"{printable_line(str(path))}: {what}; build or download the twin again"

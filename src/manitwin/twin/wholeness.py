@@ -43,7 +43,7 @@ def noted_sizes(root: DatasetRoot, folder: str) -> dict[str, int] | None:
     if said is None:
         return None
     if not isinstance(said, dict) or not all(type(size) is int and size >= 0 for size in said.values()):
-        raise TwinError(f"{root.full(folder)}/{RUN}: {BYTES} are no sizes of files; {REMEDY}")
+        raise TwinError(f"{root.full(folder)}/{RUN}: {BYTES} are not file sizes; {REMEDY}")
     return dict(said)
 
 
@@ -87,9 +87,9 @@ def _differences(found: Mapping[str, int | None], sizes: Mapping[str, int]) -> s
         return f"its folder lacks {missing}"
     for name, size in sorted(sizes.items()):
         if found[name] is None:
-            return f"{printable_line(name)} is no regular file"
+            return f"{printable_line(name)} is not a regular file"
         if found[name] != size:
-            return f"{printable_line(name)} has {found[name]} bytes, {size} were written"
+            return f"{printable_line(name)} has {found[name]} bytes, but {size} were written"
     return None
 
 
@@ -97,7 +97,7 @@ def _cut(root: DatasetRoot, name: str, size: int | None) -> str | None:
     """Tell of a file that its own first or last bytes show to be cut off; of a URL none is looked into."""
     called = printable_line(name.rpartition("/")[2])
     if not size:
-        return f"{called} is no regular file" if size is None else f"{called} is empty"
+        return f"{called} is not a regular file" if size is None else f"{called} is empty"
     if root.local is None:
         return None
     path = Path(root.full(name))
@@ -112,7 +112,7 @@ def _cut(root: DatasetRoot, name: str, size: int | None) -> str | None:
         ".png": tail == _PNG_END,
         ".npy": head.startswith(b"\x93NUMPY"),
     }
-    return None if whole.get(path.suffix, True) else f"{called} is cut off or no {path.suffix[1:]} file"
+    return None if whole.get(path.suffix, True) else f"{called} is truncated or not a {path.suffix[1:]} file"
 
 
 def _altered(root: DatasetRoot, folder: str, record: TwinRecord) -> Iterator[str]:
@@ -123,7 +123,7 @@ def _altered(root: DatasetRoot, folder: str, record: TwinRecord) -> Iterator[str
             yield str(error)
             continue
         if sha256(content).hexdigest() != digest:
-            yield f"{printable_line(name)} is not what was written (its sha256 differs)"
+            yield f"{printable_line(name)} differs from what was written (its sha256 differs)"
 
 
 def _named(names: set[str]) -> str | None:

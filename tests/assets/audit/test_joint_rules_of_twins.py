@@ -50,7 +50,7 @@ def test_labels_that_are_not_the_meshs_are_found(tmp_path: Path) -> None:
     folder = write_articulated(tmp_path / "twin")
     (folder / FACE_LINKS).write_bytes(labels_to_npy(np.zeros(5, np.uint8)))
     (found,) = findings(folder, "TWN006")
-    assert "tells the links of 5 faces" in found.message
+    assert "has links for 5 faces" in found.message
 
 
 def test_the_rules_of_joints_hold_for_twins_too(tmp_path: Path) -> None:

@@ -169,12 +169,12 @@ def test_command_prints_one_line_an_asset(tmp_path: Path) -> None:
     assert "dropped 1 collision shape: a build makes and checks its own" in said
     assert "1 imported, 0 not" in said
     again = CliRunner().invoke(app, [str(path), "-o", str(tmp_path / "out")])
-    assert again.exit_code == 0 and "mug: imported before, left as it is" in again.output
-    assert "0 imported, 1 imported before, 0 not" in " ".join(again.output.split())
+    assert again.exit_code == 0 and "mug: already imported, left unchanged" in again.output
+    assert "0 imported, 1 already imported, 0 not" in " ".join(again.output.split())
     shutil.copytree(tmp_path / "in", tmp_path / "twice" / "copy")
     shutil.copytree(tmp_path / "in", tmp_path / "twice" / "own")
     twice = " ".join(CliRunner().invoke(app, [str(tmp_path / "twice"), "-o", str(tmp_path / "new")]).output.split())
-    assert "is the same again as" in twice and "1 imported, 1 the same again, 0 not" in twice
+    assert "is a duplicate of" in twice and "1 imported, 1 duplicate, 0 not" in twice
     broken = CliRunner().invoke(app, [str(path), "-o", str(tmp_path / "out"), "--from", "urd"])
     assert isinstance(broken.exception, UsageError) and "did you mean 'urdf'" in str(broken.exception)
 

@@ -365,7 +365,7 @@ def test_each_object_of_an_mjcf_scene_is_an_asset_with_its_own_name_and_mass(tmp
     (alone,) = import_assets([mug_urdf(tmp_path / "urdf")], tmp_path / "each", each_object=True)
     assert alone.record is not None and alone.record.mass_kg == 0.32, "another format is read as ever"
     said = CliRunner().invoke(app, ["import", str(tmp_path / "scene.xml"), "-o", str(tmp_path / "said")])
-    assert "--each-object takes them all" in said.output
+    assert "--each-object imports all of them" in said.output
     with pytest.raises(AssetError, match="3 of its objects are free to move; there is no number 3"):
         read_asset(tmp_path / "scene.xml", number=3)
 

@@ -170,7 +170,7 @@ def test_a_catalogue_with_a_schema_of_its_own_is_refused_before_it_is_asked(
     add(path, photos, MINE)
     with closing(sqlite3.connect(path)) as changed:
         changed.executescript(own.replace("$NAME", "refused"))
-    with pytest.raises(UsageError, match="not those of a catalogue"):
+    with pytest.raises(UsageError, match="do not match those of a catalogue"):
         catalogue_status(path)
 
 

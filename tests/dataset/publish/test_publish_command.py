@@ -21,9 +21,9 @@ def test_command_says_what_went_out_and_what_did_not(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     assert "6 twins in 2 shards; 13 files" in done.output
     assert "1 left out by licence: unknown 1" in done.output
-    assert "1 rejected ones are not published" in done.output
+    assert "1 rejected twins are not published" in done.output
     again = CliRunner().invoke(app, [*arguments, "--license-allow", "CC-BY-4.0,unknown", "--name", "Mugs"])
-    assert "6 twins in 3 shards, 1 of them there already" in again.output
+    assert "6 twins in 3 shards, 1 of them unchanged" in again.output
     assert "1 left out by licence: CC0-1.0 1" in again.output
     assert "# Mugs" in (tmp_path / "out" / "README.md").read_text()
 
@@ -32,7 +32,7 @@ def test_missing_attribution_is_said(tmp_path: Path) -> None:
     make_twin(tmp_path / "set", "a0", attribution=None)
     index(tmp_path / "set")
     done = CliRunner().invoke(app, [str(tmp_path / "set"), "-o", str(tmp_path / "out")])
-    assert "1 are under a licence that asks for attribution, and have none" in done.output
+    assert "1 have a licence that requires attribution, but no attribution" in done.output
 
 
 def test_rehearsals_are_left_out_with_their_count_unless_asked_for(tmp_path: Path) -> None:
@@ -41,7 +41,7 @@ def test_rehearsals_are_left_out_with_their_count_unless_asked_for(tmp_path: Pat
     index(tmp_path / "set")
     arguments = [str(tmp_path / "set"), "-o", str(tmp_path / "out")]
     done = CliRunner().invoke(app, arguments)
-    assert "1 twins in 1 shards" in done.output and "1 rehearsals left out" in done.output
+    assert "1 twins in 1 shards" in done.output and "1 left out: made with a rehearsal server" in done.output
     asked = CliRunner().invoke(app, [*arguments, "--with-rehearsals"])
     assert "2 twins in" in asked.output and "left out" not in asked.output
 

@@ -73,7 +73,7 @@ def test_verdicts_on_twins_as_they_were_before_are_told_as_they_come_in(place: P
     ids = accepted(place)
     rows = [said(ids[0], revision="0" * 64), *(said(each, revision="") for each in ids)]
     told = run("review import", place, verdicts(tmp_path, *rows)).output
-    assert "7 reviews taken up" in told and "1 of the reviews of " in told and "do not count" in told
+    assert "7 reviews imported" in told and "1 of the reviews of " in told and "do not count" in told
     assert "do not count" not in run("review import", place, verdicts(tmp_path, *rows[1:])).output
 
 
@@ -86,8 +86,8 @@ def test_verdicts_of_files_are_added_up(place: Path, tmp_path: Path, suffix: str
     rows += [said(ids[4], dimension="physical", answer="no", mass_kg=0.2, mass_low_kg=0.1, mass_high_kg=0.3)]
     rows += [said(ids[4], dimension="functional", answer="no", points="f0=1")]
     path = verdicts(tmp_path, *rows, name=f"v{suffix}")
-    assert "8 reviews taken up" in run("review import", place, path).output
-    assert "0 reviews taken up, 8 were there already" in run("review import", place, path).output
+    assert "8 reviews imported" in run("review import", place, path).output
+    assert "0 reviews imported, 8 were already there" in run("review import", place, path).output
     report = review_report(str(place))
     category, physical = report.accuracies[0], report.accuracies[3]
     assert (category.right, category.wrong, category.undecided, category.unsure_answers) == (3, 1, 2, 1)
@@ -115,10 +115,10 @@ def test_verdicts_of_files_are_added_up(place: Path, tmp_path: Path, suffix: str
 def test_a_sample_of_more_than_there_is_says_that_it_is_all(place: Path) -> None:
     count = len(accepted(place))
     assert (
-        f"all that were accepted; the sample may have {count + 1}"
+        f"all accepted twins; the sample may have {count + 1}"
         in run("review", "sample", place, "--sample", count + 1).output
     )
-    assert "all that were accepted" not in run("review", "sample", place, "--sample", count).output
+    assert "all accepted twins" not in run("review", "sample", place, "--sample", count).output
 
 
 def test_export_has_a_row_an_answer_in_three_formats_and_csv_comes_back_as_it_was(
@@ -174,7 +174,7 @@ def test_a_form_is_filled_in_and_read(place: Path, tmp_path: Path) -> None:
     assert {row["dimension"] for row in rows} == set(DIMENSIONS) and "A red" in rows[1]["said"]
     for row in rows[:7]:
         row["answer"] = "yes"
-    assert "1 reviews taken up" in run("review import", place, verdicts(tmp_path, *rows)).output
+    assert "1 reviews imported" in run("review import", place, verdicts(tmp_path, *rows)).output
     report = review_report(str(place))
     assert (report.sample, report.reviewed) == (4, 1)
 

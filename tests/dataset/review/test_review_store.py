@@ -145,7 +145,7 @@ def test_what_is_no_store_is_one_line(tmp_path: Path) -> None:
 def test_a_store_with_a_schema_of_its_own_is_refused_before_it_is_asked(own: str, store: ReviewStore) -> None:
     with closing(sqlite3.connect(store.path)) as changed:
         changed.executescript(own.replace("$NAME", "drafts"))
-    with pytest.raises(UsageError, match="not those of a store of reviews"):
+    with pytest.raises(UsageError, match="do not match those of a store of reviews"):
         ReviewStore(store.path)
 
 

@@ -39,7 +39,7 @@ def test_words_that_an_input_was_given_with_are_no_amendment() -> None:
 
 def test_length_where_a_unit_was_stated_is_refused_as_in_a_manifest() -> None:
     item = Item("/photos/a.jpg", name="mug", units="cm", views=("/photos/b.jpg",), poses="/photos/transforms.json")
-    with pytest.raises(UsageError, match="the unit cm says the size"):
+    with pytest.raises(UsageError, match="the unit cm already determines the size"):
         with_words({}, item, Words("mug", "12"), "human:ada")
     assert words_of(item, with_words({}, item, Words("cup", ""), "human:ada")).name == "cup"
 

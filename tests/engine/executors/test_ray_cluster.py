@@ -103,7 +103,7 @@ def test_workers_of_another_version_are_refused(
     monkeypatch.setattr("manitwin.engine.executors.ray_pool.FAILED_STARTS", 2)
     with executor_for(tmp_path, recipe, connected) as executor:
         executor.submit(0, stage_job(0, "good", recipe))
-        with pytest.raises(Unavailable, match=r"this node has manitwin .* and the driver 9\.9"):
+        with pytest.raises(Unavailable, match=r"this node has manitwin .*, but the driver has 9\.9"):
             list(replies(executor, 1))
 
 

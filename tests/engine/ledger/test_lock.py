@@ -16,7 +16,7 @@ def test_one_holds_the_lock_at_a_time(tmp_path: Path) -> None:
     assert not is_written(path)
     with hold_lock(path):
         assert is_written(path)
-        with pytest.raises(UsageError, match="another run is writing it now"):
+        with pytest.raises(UsageError, match="another run is writing to it"):
             hold_lock(path)
     assert not is_written(path)
 

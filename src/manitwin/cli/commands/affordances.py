@@ -20,15 +20,17 @@ def affordances(
     ],
     out: Annotated[Path, options.output_folder("The folder to write; it must be new or empty.")],
     points: Annotated[
-        int, typer.Option(help="Points of a twin's surface.", callback=choices.count_of("--points", 100_000))
+        int,
+        typer.Option(help="Number of points on the surface of a twin.", callback=choices.count_of("--points", 100_000)),
     ] = 2048,
     trials: Annotated[
-        int, typer.Option(help="Grasps to try for the map of grasping.", callback=choices.count_of("--trials", 10_000))
+        int,
+        typer.Option(help="Number of grasps to try for the grasp map.", callback=choices.count_of("--trials", 10_000)),
     ] = 200,
-    seed: Annotated[int, typer.Option(help="The seed of everything random.", min=0, max=2**63 - 1)] = 0,
+    seed: Annotated[int, typer.Option(help="Random seed.", min=0, max=2**63 - 1)] = 0,
     gripper: options.OwnGrippers = None,
 ) -> None:
-    """Write where twins can be held, are held for a use, and are used, on points of their surfaces."""
+    """Write affordance maps on the surfaces of twins: where to grasp them, where to grasp them for use, and where they act."""
     from manitwin.dataset.affordances.write import write_affordances
     from manitwin.robots.grippers.gripper import load_gripper
 
@@ -36,9 +38,7 @@ def affordances(
     done = write_affordances(dataset, out, points=points, trials=trials, seed=seed, grippers=grippers, on_twin=_say)
     for identity, reason in done.left_out.items():
         out_console.print(f"left out: {reason if identity in reason else f'{identity}: {reason}'}")
-    line = (
-        f"{done.twins:,} twins in {out}: {done.with_grasp_map:,} with a map of grasping, {done.with_parts:,} with parts"
-    )
+    line = f"{done.twins:,} twins in {out}: {done.with_grasp_map:,} with a grasp map, {done.with_parts:,} with parts"
     if done.median_similarity is not None and done.median_area_under_curve is not None:
         agreement = f"SIM {done.median_similarity:.2f}, AUC {done.median_area_under_curve:.2f}"
         line += f"; two halves of the contacts agree, in the median, with {agreement}"

@@ -23,36 +23,42 @@ def audit(
         list[Path] | None, options.existing("Assets, or folders of assets.", "PATH...", "an asset, or a folder of them")
     ] = None,
     select: Annotated[
-        str | None, typer.Option(help="Only these rules: codes or their beginnings.", metavar="A,B")
+        str | None, typer.Option(help="Check only these rules: codes or prefixes of codes.", metavar="A,B")
     ] = None,
-    ignore: Annotated[str | None, typer.Option(help="All but these rules.", metavar="A,B")] = None,
+    ignore: Annotated[str | None, typer.Option(help="Skip these rules.", metavar="A,B")] = None,
     format: Annotated[
-        str, choices.AUDIT_FORMATS.option("--format", "-f", help="text, json or sarif.", metavar="FORMAT")
+        str,
+        choices.AUDIT_FORMATS.option("--format", "-f", help="Output format: text, json or sarif.", metavar="FORMAT"),
     ] = "text",
     engines: Annotated[
         str | None,
-        choices.AUDIT_ENGINES.option(help="Also drop each asset in these: mujoco, sapien, pybullet.", metavar="A,B"),
+        choices.AUDIT_ENGINES.option(
+            help="Also drop each asset in these engines: mujoco, sapien, pybullet.", metavar="A,B"
+        ),
     ] = None,
     engine: Annotated[
         str | None,
         choices.AUDIT_ENGINE.option(
-            help="Judge collision as mujoco, pybullet, sapien, physx or gazebo takes it.", metavar="ENGINE"
+            help="Judge collision geometry as this engine loads it: mujoco, pybullet, sapien, physx or gazebo.",
+            metavar="ENGINE",
         ),
     ] = None,
-    fix: Annotated[bool, typer.Option("--fix", help="Mend what is safe; old files stay beside as .orig.")] = False,
-    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, max=options.MOST_JOBS, help="Processes.")] = 1,
+    fix: Annotated[bool, typer.Option("--fix", help="Apply safe fixes; the original files are kept as .orig.")] = False,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, max=options.MOST_JOBS, help="Number of processes.")] = 1,
     baseline: Annotated[
-        Path | None, typer.Option(help="Known findings, which are not said and fail nothing.", metavar="FILE")
+        Path | None,
+        typer.Option(help="Baseline of known findings, which are not reported and cause no error.", metavar="FILE"),
     ] = None,
     write_baseline: Annotated[
-        Path | None, typer.Option(help="Write all that is found as a baseline, and exit with 0.", metavar="FILE")
+        Path | None, typer.Option(help="Write all findings as a baseline, and exit with status 0.", metavar="FILE")
     ] = None,
     html: Annotated[
-        Path | None, typer.Option(help="Also write a page of all findings, with the worst in pictures.", metavar="FILE")
+        Path | None,
+        typer.Option(help="Also write an HTML page of all findings, with pictures of the worst.", metavar="FILE"),
     ] = None,
-    explain: Annotated[str | None, typer.Option(help="Say what a rule is about, and stop.", metavar="CODE")] = None,
+    explain: Annotated[str | None, typer.Option(help="Explain a rule and exit.", metavar="CODE")] = None,
 ) -> None:
-    """Find what is wrong with assets of any tool: mass, inertia, collision, scale, frames, grasps. Exit 1 on errors."""
+    """Find errors in assets of any tool: mass, inertia, collision, scale, frames, grasps. Exit status 1 on errors."""
     if explain is not None:
         _explain(explain)
         return
@@ -65,13 +71,13 @@ def audit(
     known = None if baseline is None else read_baseline(baseline)
     rules = rules_selected((select or "").split(","), (ignore or "").split(","))
     if not rules:
-        raise UsageError("--select and --ignore leave no rule; leave one of them out")
+        raise UsageError("--select and --ignore exclude all rules; leave one of them out")
     run_in = check_engines((engines or "").split(",") if engines else ())
     fragments: list[Path] = []
     templates: list[Path] = []
     assets = find_all(paths, fragments, templates)
     if not assets:
-        raise UsageError(f"{', '.join(map(str, paths))}: holds no asset of a known format; {VALID_ASSETS}")
+        raise UsageError(f"{', '.join(map(str, paths))}: no asset of a known format found; {VALID_ASSETS}")
     audited = []
     for each in audit_all(assets, rules, jobs=jobs, fix=fix, named=paths, engines=run_in, engine=engine):
         each = each if known is None else known.without_known(each)
@@ -119,7 +125,7 @@ def _write_baseline(audited: Sequence[Audited], file: Path) -> None:
     from manitwin.assets.audit.baseline import baseline_text
 
     write_output(file, baseline_text(audited, file))
-    err_console.print(f"{file}: a baseline of what was found; --baseline takes it")
+    err_console.print(f"{file}: baseline of the findings; pass it with --baseline")
 
 
 def _write_page(audited: Sequence[Audited], rules: Sequence[RuleText], file: Path, named: Sequence[Path]) -> None:
@@ -133,7 +139,7 @@ def _write_page(audited: Sequence[Audited], rules: Sequence[RuleText], file: Pat
         if picture is not None:
             pictures[each.asset] = picture
     write_output(file, audit_page(audited, rules, pictures))
-    err_console.print(f"{file}: a page of all findings")
+    err_console.print(f"{file}: page of all findings")
 
 
 def _write_end(audited: Sequence[Audited], rules: Sequence[RuleText], format: str) -> None:

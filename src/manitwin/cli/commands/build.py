@@ -32,7 +32,7 @@ MOST_RECORDS = 1000
 """The grasps of so many twins are added up at the end: each record is read for it; `manitwin stats` does it for any number."""
 OF_WORKERS = ("manitwin.dataset.build", "manitwin.engine.executors.local_worker")
 """The modules that import what a worker needs."""
-RUN_RENAMED = "`manitwin run` is `manitwin build` now; the old name goes with the next version"
+RUN_RENAMED = "`manitwin run` is deprecated and will be removed in the next version; use `manitwin build`"
 
 
 @options.with_options({**options.OF_INPUTS, **options.FLAGS}, before="strict")
@@ -40,9 +40,9 @@ def build(
     inputs: Annotated[
         list[Path] | None,
         options.existing(
-            "Images, meshes, folders, or .csv/.jsonl manifests; none: go on with what is there.",
+            "Images, meshes, folders, or .csv/.jsonl manifests; without any, resume the data set.",
             "INPUT",
-            "an image, a mesh, a folder, or a .csv or .jsonl manifest; words to make a thing of go behind --text",
+            "an image, a mesh, a folder, or a .csv or .jsonl manifest; put the description of an object behind --text",
         ),
     ] = None,
     out: Annotated[str, options.output_folder("The data set: a folder, or a URL (s3://, gs://).")] = "",
@@ -56,16 +56,16 @@ def build(
     executor: options.Executor = "local",
     address: options.Address = None,
     jobs: options.Jobs = None,
-    lines: Annotated[bool, typer.Option("--lines/--no-lines", help="Print a line for every input that ends.")] = True,
+    lines: Annotated[bool, typer.Option("--lines/--no-lines", help="Print a line for every finished input.")] = True,
     json: Json = False,
     dry_run: options.DryRun = False,
     **said: Any,
 ) -> None:
-    """Build a verified twin of every input; run it again to go on where it stopped."""
+    """Build a verified twin of every input; rerun the command to resume."""
     from manitwin.errors import UsageError
 
     if not out:
-        raise UsageError("no data set to write twins into; give a folder or URL with -o")
+        raise UsageError("no data set given; give the folder or URL to write twins into with -o")
     arguments: dict[str, Any] = {
         "texts": text or [], "count": count, "strict": strict, "jobs": jobs, "config": config, "views": views,
         "turns_deg": None if turns is None else _turns(turns, inputs or [], views), "poses": poses,
@@ -97,7 +97,7 @@ Dataset = Annotated[str, typer.Option("--dataset", "--out", "-o", callback=choic
 @options.with_options({"out": (Dataset, "")})
 @wraps(build)
 def run(**given: Any) -> None:
-    """Do as ``build``, whose name for many inputs this was."""
+    """Run ``build``: the deprecated name of that command for many inputs."""
     err_console.print(RUN_RENAMED)
     build(**given)
 
@@ -201,13 +201,13 @@ def _print_report(report: BuildReport, lines: bool, told: int) -> None:
     if report.run.left:
         # a build that was stopped says by itself what for: no money left, a key that is refused
         why = "" if report.run.stopped else " for a service that does not answer"
-        err_console.print(f"{report.run.left} inputs wait{why}")
+        err_console.print(f"{report.run.left} inputs are waiting{why}")
     if report.run.stopped:
         print_error(f"stopped: {report.run.stopped}")
     told = len(report.run.given) == 1 and lines and not out_console.quiet
     print_causes(report.dataset, report.run.given, told=told)
     if report.open:
-        err_console.print(f"manitwin status {report.dataset} says more; run the same command again to go on")
+        err_console.print(f"manitwin status {report.dataset} shows details; rerun the same command to resume")
 
 
 def _print_others(report: BuildReport) -> None:
@@ -217,7 +217,7 @@ def _print_others(report: BuildReport) -> None:
         _print_result(result)
     more = sum(1 for _ in others)
     if more:
-        out_console.print(f"... and {more} more that were there already (--json tells them all)")
+        out_console.print(f"... and {more} more from earlier runs (--json lists all)")
 
 
 def _print_result(result: ItemResult) -> None:

@@ -16,24 +16,28 @@ def capture(
     scene: Annotated[
         Path | None,
         typer.Option(
-            help="Instead of a camera: a drawn scene's folder; depths get a depth camera's noise.",
+            help="Folder of a drawn scene to use instead of a camera; sensor noise is added to its depth.",
             metavar="SCENE",
             callback=choices.must_exist("a scene's folder"),
         ),
     ] = None,
-    camera: Annotated[str, typer.Option(help="Of a scene: which of its cameras.")] = "oblique",
-    seed: Annotated[int, typer.Option(help="Of a scene: the seed of the noise.", min=0, max=options.LARGEST_SEED)] = 0,
+    camera: Annotated[str, typer.Option(help="With --scene: which camera of the scene.")] = "oblique",
+    seed: Annotated[
+        int, typer.Option(help="With --scene: the random seed of the noise.", min=0, max=options.LARGEST_SEED)
+    ] = 0,
     bag: Annotated[
         Path | None,
         typer.Option(
-            help="Instead of a camera: a file that a RealSense recorded.",
+            help="Recording of a RealSense camera (.bag) to use instead of a camera.",
             metavar="FILE",
             callback=choices.must_exist("a recorded .bag"),
         ),
     ] = None,
-    serial: Annotated[str | None, typer.Option(help="The serial number of one of several RealSense cameras.")] = None,
+    serial: Annotated[
+        str | None, typer.Option(help="Serial number of the RealSense camera, if several are connected.")
+    ] = None,
 ) -> None:
-    """Save what a RealSense camera sees, for manitwin locate --view; or rehearse it with a drawn layout."""
+    """Save a frame of a RealSense camera for manitwin locate --view, or simulate one from a drawn scene."""
     from manitwin.errors import UsageError
     from manitwin.scenes.locate.captured import write_capture
     from manitwin.scenes.locate.realsense import record, sdk
@@ -41,7 +45,7 @@ def capture(
 
     given = [name for name, each in (("--scene", scene), ("--bag", bag), ("--serial", serial)) if each is not None]
     if len(given) > 1:
-        raise UsageError(f"{' and '.join(given)} name different sources; give one of them")
+        raise UsageError(f"{' and '.join(given)} name different sources; give only one")
     seen = record(sdk(), bag=bag, serial=serial) if scene is None else capture_of_scene(scene, camera, seed)
     write_capture(out, seen)
     height, width = seen.depth_m.shape

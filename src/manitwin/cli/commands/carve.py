@@ -17,7 +17,7 @@ def carve(
     paths: Annotated[
         list[Path],
         options.existing(
-            "Photos of one object, or their folder: it is turned before the camera, or seen from its own height.",
+            "Photos of one object, or their folder: of a turntable, or taken from the height of the object.",
             "PHOTO...",
             "two photos or more of one object, or their folder",
         ),
@@ -26,17 +26,20 @@ def carve(
     turns: Annotated[
         str | None,
         typer.Option(
-            help="The camera's turn about the vertical in each photo: degrees, counter-clockwise from above, the first 0;"
-            " 0,10,... goes on by equal steps.",
+            help="Azimuth of the camera in each photo, in degrees, counter-clockwise from above, the first 0;"
+            " 0,10,... continues in equal steps.",
             metavar="0,90,180",
         ),
     ] = None,
     poses: options.Poses = None,
     units: options.Units = "auto",
     up: options.Up = "auto",
-    name: Annotated[str | None, typer.Option(help="What it is: round and boxy things differ.", metavar="NAME")] = None,
+    name: Annotated[
+        str | None,
+        typer.Option(help="Name of the object; round and boxy objects are reconstructed differently.", metavar="NAME"),
+    ] = None,
 ) -> None:
-    """Carve a textured mesh out of several photos of one object, for `manitwin build`."""
+    """Reconstruct a textured mesh from several photos of one object by space carving, for `manitwin build`."""
     from manitwin.errors import UsageError
     from manitwin.formats.glb import write_glb
     from manitwin.pipeline.carved_photos import carve_photos
@@ -45,9 +48,9 @@ def carve(
     from manitwin.twin.store import write_bytes_atomically
 
     if out.suffix.lower() != ".glb":
-        raise UsageError(f"{out}: the mesh is a GLB file; give a name that ends in .glb")
+        raise UsageError(f"{out}: the mesh is written as GLB; give a name that ends in .glb")
     if not out.parent.is_dir():
-        raise UsageError(f"{out.parent}: no folder there; make it, or give another place with -o")
+        raise UsageError(f"{out.parent}: this folder does not exist; create it, or give another path with -o")
     why = None if name is None else unusable("name", name)
     if why is not None:
         raise UsageError(f"--name: {why}")
@@ -62,4 +65,4 @@ def carve(
     said = f" --name {quote(name)}" if name else ""
     unit = " --units m" if made.metric else ""
     out_console.print(f"{out}: {len(carved.surface.faces)} faces; of each outline it fills {filled}")
-    out_console.print(f"manitwin build {quote(str(out))} --up y{unit}{said} -o TWINS makes a twin of it")
+    out_console.print(f"manitwin build {quote(str(out))} --up y{unit}{said} -o TWINS builds a twin of it")

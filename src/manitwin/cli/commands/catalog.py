@@ -14,10 +14,12 @@ from manitwin.cli.console import out_console
 def catalog(
     dataset: Annotated[str, options.existing("A data set with an index.", "DATASET", "the folder of a data set")],
     out: Annotated[Path, options.output_folder("The folder to write; it must be new or empty.")],
-    size_px: Annotated[int, typer.Option("--size", help="Pixels of a picture's side.", min=32, max=2048)] = 224,
-    seed: Annotated[int, typer.Option(help="The seed of the points.", min=0, max=2**63 - 1)] = 0,
+    size_px: Annotated[
+        int, typer.Option("--size", help="Width and height of the pictures, in pixels.", min=32, max=2048)
+    ] = 224,
+    seed: Annotated[int, typer.Option(help="Random seed of the points.", min=0, max=2**63 - 1)] = 0,
 ) -> None:
-    """Write pictures from around, point clouds, captions and categories of twins, split by shape and source."""
+    """Write multi-view pictures, point clouds, captions and categories of twins, split by shape and source."""
     from manitwin.dataset.catalog.write import write_catalog
 
     done = write_catalog(dataset, out, size_px=size_px, seed=seed)

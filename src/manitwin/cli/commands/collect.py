@@ -16,7 +16,7 @@ _CAUSES_SHOWN = 20
 
 def collect_add(
     catalogue: Annotated[
-        Path, typer.Argument(help="The catalogue, an SQLite file; made where there is none.", metavar="CATALOGUE")
+        Path, typer.Argument(help="The catalogue, an SQLite file; created if missing.", metavar="CATALOGUE")
     ],
     inputs: Annotated[
         list[Path],
@@ -26,24 +26,29 @@ def collect_add(
             "a folder, or a .csv or .jsonl list",
         ),
     ],
-    source: Annotated[str | None, typer.Option(help="Where the inputs come from.", metavar="NAME")] = None,
-    licence: Annotated[
-        str | None, typer.Option("--licence", "--license", help="Their licence (SPDX), where a list says none.")
+    source: Annotated[
+        str | None, typer.Option(help="Source of the inputs, such as the name of their data set.", metavar="NAME")
     ] = None,
-    attribution: Annotated[str | None, typer.Option(help="Whom to credit, where a list says nobody.")] = None,
-    category: Annotated[str | None, typer.Option(help="What the things are, where a list does not say.")] = None,
+    licence: Annotated[
+        str | None,
+        typer.Option("--licence", "--license", help="Licence (SPDX identifier) of inputs without one in their list."),
+    ] = None,
+    attribution: Annotated[str | None, typer.Option(help="Credit for inputs without one in their list.")] = None,
+    category: Annotated[str | None, typer.Option(help="Name of objects without one in their list.")] = None,
     root: Annotated[
         Path | None,
-        typer.Option(help="The folder that files of a list lie in; default: the list's own.", metavar="FOLDER"),
+        typer.Option(
+            help="Folder that the paths in a list are relative to; default: the folder of the list.", metavar="FOLDER"
+        ),
     ] = None,
     alike: Annotated[
         bool,
         typer.Option(
-            "--alike", help="Then look at all files, and mark those that look like an earlier one as its duplicates."
+            "--alike", help="Also compare the appearance of all files, and mark near-duplicates of earlier files."
         ),
     ] = False,
 ) -> None:
-    """Add photos, meshes and URLs to a catalogue, each once; what cannot be read is told with its cause and count."""
+    """Add photos, meshes and URLs to a catalogue, each once; report unreadable files by cause and count."""
     from manitwin.dataset.collect.places import require_place
 
     for place in inputs:
@@ -53,8 +58,8 @@ def collect_add(
     given = Given(source=source, licence=licence, attribution=attribution, name=category)
     for place in inputs:
         done = add(catalogue, place, given, root)
-        told = f"{place}: {done.entries:,} entries: {done.new:,} new, {done.changed:,} changed, {done.unchanged:,} as before"
-        told += f", {done.repeated:,} named twice" if done.repeated else ""
+        told = f"{place}: {done.entries:,} entries: {done.new:,} new, {done.changed:,} changed, {done.unchanged:,} unchanged"
+        told += f", {done.repeated:,} listed twice" if done.repeated else ""
         told += f"; {done.parts:,} files are parts of meshes" if done.parts else ""
         out_console.print(told, markup=False, soft_wrap=True)
         lines = [f"{count:,} cannot be read: {cause}" for cause, count in sorted(done.unreadable.items())]
@@ -77,7 +82,7 @@ def collect_status(
     catalogue: Annotated[Path, options.existing("A catalogue.", "CATALOGUE", "a catalogue that collect add made")],
     json_: Json = False,
 ) -> None:
-    """Say what a catalogue has: rows by group, status, licence, source and size, and what could not be read."""
+    """Summarise a catalogue: rows by group, status, licence, source and size, and unreadable files."""
     from manitwin.dataset.collect.status import catalogue_status
 
     status = catalogue_status(catalogue)
@@ -92,16 +97,19 @@ def collect_plan(
     catalogue: Annotated[Path, options.existing("A catalogue.", "CATALOGUE", "a catalogue that collect add made")],
     out: Annotated[Path, options.output_folder("The folder to write the plan into.")],
     items: Annotated[
-        int, typer.Option(help="Twins to build.", callback=choices.count_of("--items", 10_000_000), metavar="N")
+        int,
+        typer.Option(help="Number of twins to build.", callback=choices.count_of("--items", 10_000_000), metavar="N"),
     ] = 1000,
-    seed: Annotated[int, typer.Option(help="The seed of the choice.", min=0, max=options.LARGEST_SEED)] = 1,
+    seed: Annotated[int, typer.Option(help="Random seed of the choice.", min=0, max=options.LARGEST_SEED)] = 1,
     license: Annotated[
         list[str] | None,
-        typer.Option("--licence", "--license", help="Only inputs of this licence; may be repeated.", metavar="SPDX"),
+        typer.Option(
+            "--licence", "--license", help="Choose only inputs with this licence; may be repeated.", metavar="SPDX"
+        ),
     ] = None,
     json_: Json = False,
 ) -> None:
-    """Choose inputs evenly over groups, sizes and categories, as manifests for build; prompts for what is short."""
+    """Choose inputs evenly over groups, sizes and categories, as manifests for build, with prompts to fill shortages."""
     from manitwin.dataset.collect.store import Catalogue
 
     with Catalogue(catalogue) as opened:
@@ -139,7 +147,7 @@ def collect_draw(
         str,
         typer.Option(
             "--images",
-            help="Who draws: command:PROGRAM {text} {out}, fal:ENDPOINT or openai:MODEL@URL.",
+            help="Text-to-image model: command:PROGRAM {text} {out}, fal:ENDPOINT or openai:MODEL@URL.",
             metavar="SPEC",
         ),
     ],
@@ -148,7 +156,7 @@ def collect_draw(
     max_cost_usd: options.MaxCost = None,
     json_: Json = False,
 ) -> None:
-    """Have a text-to-image model draw the prompts of a plan, each once; run again to go on."""
+    """Generate a picture for each prompt of a plan with a text-to-image model; rerun the command to resume."""
     from manitwin.config import BuildConfig, load_config
     from manitwin.dataset.collect.drawing import ANSWERS, MANIFEST, draw_pictures, read_prompts
 

@@ -54,28 +54,32 @@ def doctor(
     what: Annotated[
         str | None,
         choices.SERVED_KINDS.argument(
-            help="vlm, generator or grasper: send it one small request; none: look at this machine."
+            help="vlm, generator or grasper: send one small request to this service; default: check this machine."
         ),
     ] = None,
     vlm: Annotated[
-        str | None, choices.ANNOTATORS.option(help="A VLM (openai:MODEL@URL); default: the configuration's.")
+        str | None,
+        choices.ANNOTATORS.option(help="VLM to test (openai:MODEL@URL); default: the one in the configuration."),
     ] = None,
     generator: Annotated[
-        str | None, choices.GENERATORS.option(help="A generator (rodin); default: the configuration's.")
+        str | None, choices.GENERATORS.option(help="Generator to test (rodin); default: the one in the configuration.")
     ] = None,
     grasper: Annotated[
-        str | None, choices.GRASPERS.option(help="A grasper (graspgen@tcp://HOST:5556); default: the configuration's.")
+        str | None,
+        choices.GRASPERS.option(
+            help="Grasper to test (graspgen@tcp://HOST:5556); default: the one in the configuration."
+        ),
     ] = None,
     config: options.Config = None,
 ) -> None:
-    """Say what is there and what is missing on this machine, or whether a served model answers."""
+    """Check this machine for missing dependencies, or test whether a served model answers."""
     specs = {"vlm": vlm, "generator": generator, "grasper": grasper}
     if what is None:
         given = [f"--{name}" for name, spec in specs.items() if spec is not None]
         if given or config is not None:
             raise UsageError(
-                f"doctor without {', '.join(KINDS)} looks at this machine and takes no options; name one of them before"
-                " the options"
+                f"doctor without an argument checks this machine and takes no options; to test a service, give one of"
+                f" {', '.join(KINDS)} before the options"
             )
         findings, wrong = examine(), "missing"
     else:
@@ -106,7 +110,7 @@ def asked(kind: str, spec: str, settings: BuildConfig) -> Examined:
         try:
             backend = create(kind, spec, settings)
             if not hasattr(backend, "probe"):
-                return Examined(spec, True, "built in, nothing to ask")
+                return Examined(spec, True, "built in, no service to test")
             works, ok = backend.probe(), True
         except UsageError:
             raise
@@ -165,11 +169,11 @@ def _shared_libraries() -> str:
     if missing:
         packages = " ".join(sorted({package_by_policy(library) for library in missing}))
         raise ImportError(
-            f"{', '.join(missing)} not found by the loader; on Debian and Ubuntu run: sudo apt-get update &&"
-            f" sudo apt-get install -y --no-install-recommends {packages} (of a name that is not known there, apt-file"
-            " search finds the right one)"
+            f"{', '.join(missing)} not found by the dynamic loader; on Debian and Ubuntu run: sudo apt-get update &&"
+            f" sudo apt-get install -y --no-install-recommends {packages} (if a package name is unknown there, find it"
+            " with apt-file search)"
         )
-    return "the loader finds all that the installed packages want"
+    return "the dynamic loader finds all libraries of the installed packages"
 
 
 def _physics() -> str:
@@ -207,8 +211,8 @@ def _ray_casting() -> str:
 
     hit = RayMeshIntersector(trimesh.creation.box()).intersects_any([[0, 0, 2]], [[0, 0, -1]])
     if not hit.all():
-        raise RuntimeError("embree misses a box that is there; reinstall embreex")
-    return "embree hits what it should"
+        raise RuntimeError("embree returned a wrong hit in a ray casting test; reinstall embreex")
+    return "embree passes a ray casting test"
 
 
 def _renderer() -> str:
@@ -226,5 +230,5 @@ def _backends() -> str:
 def _disk() -> str:
     free = shutil.disk_usage(Path.cwd()).free / 1e9
     if free < MIN_FREE_GB:
-        raise OSError(f"{free:.1f} GB free here; a thousand twins want about 10 GB")
+        raise OSError(f"{free:.1f} GB free here; a thousand twins need about 10 GB")
     return f"{free:.0f} GB free here"

@@ -25,7 +25,9 @@ def _model(help: str) -> Any:
 
 
 def evaluate(
-    what: Annotated[str, choices.EVALUATIONS.argument(help="annotations, generation or grasps.", metavar="WHAT")],
+    what: Annotated[
+        str, choices.EVALUATIONS.argument(help="What to evaluate: annotations, generation or grasps.", metavar="WHAT")
+    ],
     dataset: Annotated[
         str, options.existing("A data set, or a folder of twins.", "DATASET", "a data set, or a folder of twins")
     ],
@@ -33,7 +35,7 @@ def evaluate(
         Path | None,
         typer.Option(
             "--labels",
-            help="annotations: truth labels, a row an object (docs/evaluation.md).",
+            help="annotations: ground-truth labels, one row per object (docs/evaluation.md).",
             metavar="LABELS.csv",
             callback=choices.must_exist("a CSV file of labels"),
         ),
@@ -41,17 +43,17 @@ def evaluate(
     clip: Annotated[
         str | None,
         typer.Option(
-            help="generation: a CLIP, for CLIP(N-I/T) and CLIP(I-I/T): a folder of ONNX files, or MODEL@http://HOST:PORT.",
+            help="generation: CLIP model for CLIP(N-I/T) and CLIP(I-I/T): a folder of ONNX files, or MODEL@http://HOST:PORT.",
             metavar="FOLDER|SERVER",
             callback=choices.must_exist("a model's folder of ONNX files, or MODEL@http://HOST:PORT"),
         ),
     ] = None,
-    ulip: Annotated[Path | None, _model("generation: a ULIP, with a network of points, for ULIP-I/T.")] = None,
-    out: Annotated[Path | None, options.new_folder("A new folder for tables (CSV, Parquet) and a page.")] = None,
-    seed: Annotated[int, typer.Option(help="The seed of shuffled pairs.", min=0, max=options.LARGEST_SEED)] = 0,
+    ulip: Annotated[Path | None, _model("generation: ULIP model with a point cloud encoder, for ULIP-I/T.")] = None,
+    out: Annotated[Path | None, options.new_folder("New folder for tables (CSV, Parquet) and a page.")] = None,
+    seed: Annotated[int, typer.Option(help="Random seed of the shuffled pairs.", min=0, max=options.LARGEST_SEED)] = 0,
     json: Json = False,
 ) -> None:
-    """Print the paper's tables beside a data set's, or score its annotations against labels, with intervals."""
+    """Print the paper's tables beside those of a data set, or score its annotations against labels, with intervals."""
     from manitwin.errors import UsageError
 
     given = {"--labels": labels, "--clip": clip, "--ulip": ulip, "--out": out}

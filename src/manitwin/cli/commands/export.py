@@ -29,21 +29,26 @@ def export(
     ],
     out: Annotated[Path, options.output_folder("The folder to write OUT/<twin>/<format>/ into.")],
     to: Annotated[
-        str, choices.EXPORT_FORMATS.option(help="Formats by commas (mjcf,urdf,sdf,usd,...), or all.")
+        str, choices.EXPORT_FORMATS.option(help="Formats separated by commas (mjcf,urdf,sdf,usd,...), or all.")
     ] = "all",
     license_allow: Annotated[
         str | None,
-        typer.Option(help="Licences that may go out, by commas (CC-BY-4.0,CC0-1.0); default: any, also 'unknown'."),
+        typer.Option(
+            help="Licences to export, separated by commas (CC-BY-4.0,CC0-1.0); default: any, including 'unknown'."
+        ),
     ] = None,
 ) -> None:
-    """Write twins as MJCF, URDF, SDF, USD, GLB, and for RoboTwin, ManiSkill, Isaac Lab and graspers; scenes as MJCF, SDF, USD."""
+    """Export twins as MJCF, URDF, SDF, USD, GLB or for RoboTwin, ManiSkill, Isaac Lab, graspers; scenes as MJCF,"
+    " SDF, USD."""
     from manitwin.assets.writers.licenses import allowed_licenses
     from manitwin.assets.writers.registry import chosen_formats
     from manitwin.errors import UsageError
 
     if scenes := scenes_among(twins):
         if license_allow is not None:
-            raise UsageError("--license-allow is for twins; export those of a scene by themselves to have them judged")
+            raise UsageError(
+                "--license-allow applies to twins, not scenes; to filter by licence, export the twins of the scene"
+            )
         export_scenes(scenes, out, to)
         return
     formats = chosen_formats(to.split(","))
@@ -65,7 +70,9 @@ def scenes_among(given: list[str]) -> list[Path]:
     found = [file for files in by_place.values() for file in files]
     others = [each for each, files in by_place.items() if not files]
     if found and others:
-        raise UsageError(f"{others[0]}: no scene, and {given[0]} is one; export twins and scenes apart")
+        raise UsageError(
+            f"{others[0]}: not a scene, but {given[0]} is one; export twins and scenes in separate commands"
+        )
     return found
 
 
@@ -79,7 +86,7 @@ def export_scenes(files: list[Path], out: Path, to: str) -> None:
         out_console.print(f"{file.parent.name}: {', '.join(written)}")
         if scene.stale is not None:
             err_console.print(
-                f"{file}: {scene.stale}: they may fall or overlap; sample the layouts again into a new folder"
+                f"{file}: {scene.stale}: objects may fall or overlap; sample the layouts again into a new folder"
             )
     out_console.print(f"{counted(len(files), 'scenes')} exported to {out}")
 
@@ -129,7 +136,7 @@ def _export(
     try:
         content = _content(folder, allowed)
         if ids.setdefault(content.name, content.record.twin_id) != content.record.twin_id:
-            raise ExportError(f"{folder}: another twin has the name {content.name} too; export it to another folder")
+            raise ExportError(f"{folder}: another twin has the same name {content.name}; export it to another folder")
     except (ExportError, TwinError) as error:
         print_error(str(error))
         return False
@@ -144,7 +151,7 @@ def _export(
     out_console.print(f"{content.name}: {', '.join(written) or 'nothing'}")
     if locked:
         out_console.print(
-            f"  without its joints, as one rigid body, in {', '.join(locked)}; mjcf, urdf, sdf and usd have them"
+            f"  exported without joints, as one rigid body, to {', '.join(locked)}; mjcf, urdf, sdf and usd keep the joints"
         )
     return len(written) == len(formats)
 

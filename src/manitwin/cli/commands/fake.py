@@ -14,19 +14,23 @@ from manitwin.cli.interrupt import until_interrupted
 
 
 def fake(
-    name: Annotated[str | None, choices.REHEARSALS.argument(help="Which service: openai, rodin, graspgen ...")] = None,
-    port: Annotated[int, typer.Option(help="The port; 0: any that is free.", min=0, max=65535)] = 0,
+    name: Annotated[
+        str | None, choices.REHEARSALS.argument(help="Service to stand in for: openai, rodin, graspgen ...")
+    ] = None,
+    port: Annotated[int, typer.Option(help="Port; 0: any free port.", min=0, max=65535)] = 0,
     fault: Annotated[
         list[str] | None,
-        typer.Option(help="What is to go wrong: NAME always, NAME=2 twice; may be repeated.", metavar="FAULT"),
+        typer.Option(help="Fault to inject: NAME in every request, NAME=2 in two; may be repeated.", metavar="FAULT"),
     ] = None,
-    key: Annotated[str | None, typer.Option(help="The key that it accepts; default: one made for it.")] = None,
+    key: Annotated[str | None, typer.Option(help="API key that the server accepts; default: a generated key.")] = None,
     polls: Annotated[
-        int | None, typer.Option(help="How often a job is looked at before it is done.", min=0, max=LARGEST_COUNT)
+        int | None, typer.Option(help="Number of polls before a job is done.", min=0, max=LARGEST_COUNT)
     ] = None,
-    list_faults: Annotated[bool, typer.Option("--list-faults", help="List what can go wrong, and end.")] = False,
+    list_faults: Annotated[
+        bool, typer.Option("--list-faults", help="List the faults that can be injected, and exit.")
+    ] = False,
 ) -> None:
-    """Serve a rehearsal of a service on this machine until interrupted."""
+    """Run a rehearsal server: a local stand-in for an external service, until interrupted."""
     from manitwin.errors import UsageError
     from manitwin.models.fakes.catalog import REHEARSALS, serving
     from manitwin.models.fakes.faults import FAULTS, Faults
@@ -36,7 +40,7 @@ def fake(
             out_console.print(f"{word:<15} {meaning}")
         return
     if name is None:
-        raise UsageError(f"no service is named; give one of {', '.join(REHEARSALS)}")
+        raise UsageError(f"no service given; give one of {', '.join(REHEARSALS)}")
     given = Faults.parse(fault or [])
     # an interrupt that was raised inside of a line's printing would print that line again
     with until_interrupted((signal.SIGINT,)) as wait:

@@ -17,21 +17,27 @@ if TYPE_CHECKING:
 
 
 def gripper(
-    name: Annotated[str, choices.GRIPPERS.argument(help="A shipped name, or a .toml file.", metavar="GRIPPER")],
+    name: Annotated[
+        str, choices.GRIPPERS.argument(help="Name of a shipped gripper, or a .toml file.", metavar="GRIPPER")
+    ],
     draw: Annotated[
         Path | None,
-        typer.Option("--draw", help="Draw it open, closed and from an oblique view.", metavar="FILE.png"),
+        typer.Option(
+            "--draw",
+            help="PNG file to draw the gripper into: open, closed and from an oblique view.",
+            metavar="FILE.png",
+        ),
     ] = None,
     json: Json = False,
 ) -> None:
-    """Check a gripper's file against itself and its URDF, say what it makes of it, and draw it."""
+    """Check a gripper file for consistency with its URDF, print the gripper that it defines, and draw it."""
     from manitwin.cli.gripper_facts import gripper_document, gripper_lines, hand_lines, posture_facts
     from manitwin.errors import UsageError
     from manitwin.robots.grippers.gripper import load_gripper
     from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 
     if draw is not None and draw.suffix.lower() != ".png":
-        raise UsageError(f"--draw {draw}: a picture is written as PNG; give a name that ends in .png")
+        raise UsageError(f"--draw {draw}: the picture is written as PNG; give a name that ends in .png")
     try:
         loaded = load_gripper(name)
     except UsageError:

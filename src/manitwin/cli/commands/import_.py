@@ -29,7 +29,7 @@ def import_(
         str,
         choices.IMPORT_FORMATS.option(
             "--from",
-            help="auto, robotwin, manitwin100k, embodiedgen, urdf, mjcf, sdf, usd, gso or twin.",
+            help="Format: auto, robotwin, manitwin100k, embodiedgen, urdf, mjcf, sdf, usd, gso or twin.",
             metavar="FORMAT",
         ),
     ] = "auto",
@@ -37,29 +37,30 @@ def import_(
         bool,
         typer.Option(
             "--lock-joints",
-            help="Take what moves by joints (URDF, MJCF, SDF, USD) as one rigid body, as the file stands.",
+            help="Import an articulated asset (URDF, MJCF, SDF, USD) as one rigid body in its default pose.",
         ),
     ] = False,
     each_object: Annotated[
         bool,
-        typer.Option(
-            "--each-object", help="Take every object of a scene (MJCF) that is free to move, not its first alone."
-        ),
+        typer.Option("--each-object", help="Import every free body of a scene (MJCF), not only the first."),
     ] = False,
     root: Annotated[
         Path | None,
         typer.Option(
-            help="The folder above which nothing is read; else an asset's repository, package or own folder.",
+            help="Read no files above this folder; default: the repository, package or folder of the asset.",
             metavar="FOLDER",
             callback=choices.must_exist("a folder that the assets lie in"),
         ),
     ] = None,
     report: Annotated[
         Path | None,
-        typer.Option(help="Also write as JSON what was kept and dropped of each asset, and why.", metavar="FILE"),
+        typer.Option(
+            help="Also write a JSON report of report of what was kept and dropped of each asset, and why.",
+            metavar="FILE",
+        ),
     ] = None,
 ) -> None:
-    """Take assets of other tools over, keep what is annotated, and say what is missing."""
+    """Import assets of other tools, keep their annotations, and report what is missing."""
 
     from manitwin.assets.importers.importer import import_assets, kept_words
 
@@ -78,13 +79,13 @@ def import_(
         if imported.there_already and imported.folder.name in first:
             same += 1
             out_console.print(
-                f"{imported.folder.name}: {imported.path} is the same again as {first[imported.folder.name]}"
+                f"{imported.folder.name}: {imported.path} is a duplicate of {first[imported.folder.name]}"
             )
             continue
         first[imported.folder.name] = imported.path
         if imported.there_already:
             there += 1
-            out_console.print(f"{imported.folder.name}: imported before, left as it is")
+            out_console.print(f"{imported.folder.name}: already imported, left unchanged")
             continue
         done += 1
         record = imported.record
@@ -97,11 +98,11 @@ def import_(
             out_console.print(f"  {remark}")
     if report is not None:
         _write_report(every, report)
-    before = (f", {there} imported before" if there else "") + (f", {same} the same again" if same else "")
-    then = f"; manitwin build {out} -o TWINS fills in what is missing" if done or there else ""
+    before = (f", {there} already imported" if there else "") + (f", {same} duplicate" if same else "")
+    then = f"; manitwin build {out} -o TWINS adds what is missing" if done or there else ""
     out_console.print(f"{done} imported{before}, {failed} not{then}")
     if any("moves by itself" in remark for each in every if each.record is not None for remark in each.record.remarks):
-        out_console.print("a scene has more objects that move: --each-object takes them all")
+        out_console.print("a scene has further free bodies: --each-object imports all of them")
     raise typer.Exit(3 if failed else 0)
 
 
@@ -109,4 +110,4 @@ def _write_report(every: Sequence[Imported], file: Path) -> None:
     from manitwin.assets.importers.report import report_of
 
     write_output(file, report_of(every))
-    err_console.print(f"{file}: what was kept and dropped of each asset")
+    err_console.print(f"{file}: report of what was kept and dropped of each asset")

@@ -25,29 +25,41 @@ def layout(
         ),
     ],
     out: Annotated[str, options.output_folder("The folder to write scenes into.")],
-    count: Annotated[int, typer.Option("-n", help="How many layouts.", callback=choices.count_of("-n"))] = 100,
-    objects: Annotated[str | None, typer.Option(help="How many objects: LOW..HIGH.", metavar="LOW..HIGH")] = None,
-    surface: Annotated[str | None, choices.SURFACES.option(help="table, shelf or tray.")] = None,
+    count: Annotated[int, typer.Option("-n", help="Number of layouts.", callback=choices.count_of("-n"))] = 100,
+    objects: Annotated[
+        str | None, typer.Option(help="Number of objects per layout: LOW..HIGH.", metavar="LOW..HIGH")
+    ] = None,
+    surface: Annotated[str | None, choices.SURFACES.option(help="Surface: table, shelf or tray.")] = None,
     clutter: Annotated[
-        str | None, choices.CLUTTER.option(help="How close they stand: sparse, medium or dense.")
+        str | None, choices.CLUTTER.option(help="Density of the objects: sparse, medium or dense.")
     ] = None,
     include: Annotated[
-        list[str] | None, typer.Option(help="A category that must be there; may be repeated.", metavar="CATEGORY")
+        list[str] | None,
+        typer.Option(help="Category that every layout must contain; may be repeated.", metavar="CATEGORY"),
     ] = None,
-    stacked: Annotated[int | None, typer.Option(help="How many stand on another object.", min=0, max=200)] = None,
-    contained: Annotated[int | None, typer.Option(help="How many lie in a vessel.", min=0, max=200)] = None,
+    stacked: Annotated[
+        int | None, typer.Option(help="Number of objects that stand on another object.", min=0, max=200)
+    ] = None,
+    contained: Annotated[
+        int | None, typer.Option(help="Number of objects that lie in a container.", min=0, max=200)
+    ] = None,
     upright: Annotated[
-        bool, typer.Option("--upright", help="Put down upright what has an upright placement that stayed.")
+        bool, typer.Option("--upright", help="Place objects upright if they have a stable upright placement.")
     ] = False,
-    robot: Annotated[str | None, choices.ROBOTS.option(help="Stay in the workspace of this robot.")] = None,
+    robot: Annotated[
+        str | None, choices.ROBOTS.option(help="Place objects within the workspace of this robot.")
+    ] = None,
     pictures: Annotated[
-        bool, typer.Option("--pictures", help="Also draw each (colours, depth, normals, instance ids) and a sheet.")
+        bool,
+        typer.Option(
+            "--pictures", help="Also render each layout (colour, depth, normals, instance ids) and a contact sheet."
+        ),
     ] = False,
-    sheet: Annotated[bool, typer.Option("--sheet", help="Draw one picture of the first 48 scenes.")] = False,
+    sheet: Annotated[bool, typer.Option("--sheet", help="File for a contact sheet of the first 48 scenes.")] = False,
     json: Json = False,
     **run: Any,
 ) -> None:
-    """Sample scenes of twins at rest on a table, a shelf or a tray; run it again to go on where it stopped."""
+    """Sample scenes of twins at rest on a table, a shelf or a tray; rerun the command to resume."""
     given = {
         "objects": None if objects is None else _range(objects), "surface": surface, "clutter": clutter, "robot": robot,
         "include": tuple(include) if include else None, "stacked": stacked, "contained": contained,
@@ -74,7 +86,7 @@ def layout(
         err_console.print(remark)
     totals = layout_totals(out)
     if settings.layout.upright and (lying := without_upright(dataset)):
-        out_console.print(f"twins that have no upright placement and lie as they rest: {len(lying)}")
+        out_console.print(f"twins without an upright placement, placed in another resting pose: {len(lying)}")
     if said := pool_of(DatasetRoot(dataset).absolute()).about_joints:
         out_console.print(said)
     _print_totals(totals)

@@ -35,66 +35,80 @@ def locate(
         Path | None,
         typer.Option(
             "--view",
-            help="A folder of manitwin capture, for --depth, --camera, --rgb and --base.",
+            help="Folder written by manitwin capture, in place of --depth, --camera, --rgb and --base.",
             metavar="FOLDER",
             callback=choices.must_exist("a folder that manitwin capture wrote"),
         ),
     ] = None,
     depth: Annotated[
-        Path | None, _file("A depth picture: PNG of one channel; 0 is unknown.", "a depth picture")
+        Path | None, _file("Depth image: PNG with one channel; 0 means unknown.", "a depth picture")
     ] = None,
     camera: Annotated[
-        Path | None, _file("JSON of its camera: fx, fy, cx, cy, width, height, depth_unit_m.", "a camera's JSON")
+        Path | None, _file("Camera intrinsics, JSON: fx, fy, cx, cy, width, height, depth_unit_m.", "a camera's JSON")
     ] = None,
     mask: Annotated[
         Path | None,
         _file(
-            "Where the thing is: PNG of one channel, 0 where it is not; default: all on the table.", "a thing's mask"
+            "Mask of the object: PNG with one channel, 0 elsewhere; default: everything on the table.",
+            "a mask of the object",
         ),
     ] = None,
-    rgb: Annotated[Path | None, _file("The colours, aligned with the depths.", "a picture")] = None,
+    rgb: Annotated[Path | None, _file("Colour image, aligned with the depth image.", "a picture")] = None,
     cloud: Annotated[
         Path | None,
-        _file("Instead: the points of the thing in the camera's frame, .ply or .npz.", "a cloud of the thing's points"),
+        _file(
+            "Point cloud of the object in the camera frame (.ply or .npz), instead of images.",
+            "a point cloud of the object",
+        ),
     ] = None,
     tried: Annotated[
         int,
         typer.Option(
-            help="Twins of a data set to try of a thing, the most alike.", callback=choices.count_of("--tried")
+            help="With a data set: number of most similar twins to try for each object.",
+            callback=choices.count_of("--tried"),
         ),
     ] = 5,
     estimator: Annotated[
         str | None,
         typer.Option(
-            help="Who guesses poses in the place of the search: 'command:PROGRAM {request} {out}', or http://HOST:PORT.",
+            help="Pose estimator instead of the built-in search: 'command:PROGRAM {request} {out}', or http://HOST:PORT.",
             metavar="SPEC",
         ),
     ] = None,
     grasps: Annotated[
-        bool, typer.Option("--grasps", help="Also which verified grasps are free of all that is seen, the best first.")
+        bool,
+        typer.Option(
+            "--grasps", help="Also print the verified grasps that are collision-free in the view, best first."
+        ),
     ] = False,
     fit_size: Annotated[
         bool,
         typer.Option(
-            "--fit-size", help="Also find its size, up to twice or half the twin's: of one from a photo it was a guess."
+            "--fit-size",
+            help="Also estimate the size, from half to twice that of the twin; a twin from one photo has a guessed size.",
         ),
     ] = False,
     base: Annotated[
         Path | None,
-        _file("JSON of the camera's pose in the frame of a robot's base: camera_to_base.", "a calibration's JSON"),
+        _file(
+            "Calibration, JSON: the camera pose in the frame of the robot base, camera_to_base.",
+            "the JSON file of a calibration",
+        ),
     ] = None,
     robot: Annotated[
         str | None,
-        choices.ROBOTS.option(help="Also which free grasps this robot reaches; needs --base, and implies --grasps."),
+        choices.ROBOTS.option(
+            help="Also print the free grasps that this robot reaches; needs --base, implies --grasps."
+        ),
     ] = None,
     out: Annotated[
-        Path | None, options.new_folder("A new folder for location.json, overlays, and the scene as a layout.")
+        Path | None, options.new_folder("New folder for location.json, overlays, and the scene as a layout.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="The seed of what is sampled.", min=0, max=options.LARGEST_SEED)] = 0,
+    seed: Annotated[int, typer.Option(help="Random seed.", min=0, max=options.LARGEST_SEED)] = 0,
     gripper: options.OwnGrippers = None,
     json_: Json = False,
 ) -> None:
-    """Find where a twin is in a depth picture: its pose, several that look the same, or that it is not what is seen."""
+    """Estimate the pose of a twin in a depth image; report ambiguous poses, and objects that are not the twin."""
     files = ViewFiles(depth, camera, mask, rgb, cloud, base)
     if seen is not None:
         files = files.with_captured(seen)
@@ -119,7 +133,7 @@ def locate(
     dataset = DatasetRoot(source).absolute() if one is None else dataset_of_twin(source)
     if fit_size and (one is None or estimator is not None):
         raise UsageError(
-            "--fit-size: looks for the size of one twin by the built-in search; name a twin, without --estimator"
+            "--fit-size: works with one twin and the built-in search; give a twin, and leave out --estimator"
         )
     grippers = [load_gripper(name) for name in gripper or ()]
     view, masks = files.read(seed)
@@ -167,4 +181,4 @@ def _print_things(
 
 
 def _drawn(twin_id: str) -> None:
-    error_console.print(f"{twin_id}: drawn and embedded, which is kept", markup=False)
+    error_console.print(f"{twin_id}: rendered and embedded; the result is cached", markup=False)

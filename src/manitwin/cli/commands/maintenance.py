@@ -10,7 +10,7 @@ import typer
 from manitwin.cli import choices, options
 from manitwin.cli.console import err_console, note_old_layout, out_console, print_error
 
-_AGAIN = "the build command with its inputs finds what is finished again, and builds the rest"
+_AGAIN = "rerun the build command with its inputs: it finds the finished twins, and builds the rest"
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -20,12 +20,13 @@ if TYPE_CHECKING:
 
 def check(
     dataset: Annotated[str, typer.Argument(help="A data set: a folder or URL.", metavar="DATASET")],
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what is wrong, repair nothing.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only report what is wrong; repair nothing.")] = False,
     digests: Annotated[
-        bool, typer.Option("--digests", help="Compare every byte of finished twins, not sizes.")
+        bool,
+        typer.Option("--digests", help="Compare the digests of all files of finished twins, not only their sizes."),
     ] = False,
 ) -> None:
-    """Prove that ledger, folders and tables of a data set agree, and put right what does not."""
+    """Check that the ledger, folders and tables of a data set agree, and repair what does not."""
     from manitwin.dataset.check import disagreements
     from manitwin.engine.ledger.ledger import Ledger
     from manitwin.engine.ledger.location import local_ledger
@@ -44,7 +45,7 @@ def check(
     except NotTwins:  # by the folders of twins, all that is finished there would be opened again
         raise
     except UsageError as error:
-        err_console.print(f"{error}, or remove it: the next build writes it again")
+        err_console.print(f"{error}, or remove it: the next build writes a new one")
         left, keeps_work = 1, True
     ledger = Ledger(path)
     try:
@@ -55,13 +56,15 @@ def check(
             else:
                 found.repair()
                 repaired += 1
-                out_console.print(f"{found.what}: put right")
+                out_console.print(f"{found.what}: repaired")
         counts = ledger.counts()
     finally:
         ledger.close()
     states = ", ".join(f"{count} {state}" for state, count in counts.items())
-    verdict = "ledger and folders agree" if not left else f"{left} things are wrong"
-    again = f"; {repaired} put right, manitwin build -o {dataset} does what is open again" if repaired else ""
+    verdict = "the ledger and the folders agree" if not left else f"{left} problems are left"
+    again = (
+        f"; {repaired} repaired; manitwin build -o {dataset} builds the items that are open again" if repaired else ""
+    )
     out_console.print(f"{states}: {verdict}{again}")
     raise typer.Exit(4 if left else 0)
 
@@ -82,10 +85,10 @@ def _is_ledger(path: Path, root: DatasetRoot, dry_run: bool) -> bool:
     except LedgerDamaged as error:
         cause = str(error).partition("; ")[0]
         if dry_run:
-            err_console.print(f"{cause}; without --dry-run it is put aside, and then {_AGAIN}")
+            err_console.print(f"{cause}; without --dry-run it is moved aside; then {_AGAIN}")
             return False
         with hold_lock(path):
-            out_console.print(f"{cause}: put aside as {put_aside(path).name}; {_AGAIN}")
+            out_console.print(f"{cause}: moved aside as {put_aside(path).name}; {_AGAIN}")
         return False
 
 
@@ -100,7 +103,7 @@ def _check_folders(root: DatasetRoot, dry_run: bool, digests: bool) -> None:
         err_console.print(line)
     if index and not dry_run and not damaged:
         indexed_again(root)
-        out_console.print(f"{index}: put right")
+        out_console.print(f"{index}: repaired")
     verdict = f"{len(damaged)} are damaged" if damaged else "all their files are there"
     out_console.print(f"{len(list(root.twin_ids()))} twins: {verdict}")
     raise typer.Exit(4 if damaged or (index and dry_run) else 0)
@@ -108,11 +111,11 @@ def _check_folders(root: DatasetRoot, dry_run: bool, digests: bool) -> None:
 
 def retry(
     dataset: Annotated[str, typer.Argument(help="A data set: a folder or URL.", metavar="DATASET")],
-    state: Annotated[str, choices.ENDED_STATES.option(help="failed or rejected.")] = "failed",
-    stage: Annotated[str | None, typer.Option(help="Only items that ended in this stage.")] = None,
-    reason: Annotated[str | None, typer.Option(help="Only items that ended for this reason.")] = None,
+    state: Annotated[str, choices.ENDED_STATES.option(help="State of the items: failed or rejected.")] = "failed",
+    stage: Annotated[str | None, typer.Option(help="Retry only items that ended in this stage.")] = None,
+    reason: Annotated[str | None, typer.Option(help="Retry only items that ended for this reason.")] = None,
 ) -> None:
-    """Open failed or rejected items again, their attempts forgotten; the next run takes them up."""
+    """Reopen failed or rejected items and reset their attempts; the next run processes them again."""
     from manitwin.engine.ledger.ledger import Ledger
     from manitwin.engine.ledger.location import local_ledger
     from manitwin.engine.ledger.reading import read_ledger
@@ -138,7 +141,7 @@ def retry(
         count = ledger.reopen(number for number, _ in rows)
     finally:
         ledger.close()
-    out_console.print(f"{count} items are open again; manitwin build -o {dataset} takes them up")
+    out_console.print(f"{count} items are open again; manitwin build -o {dataset} builds them")
 
 
 def index(
@@ -148,7 +151,7 @@ def index(
     ],
     jobs: options.Jobs = None,
 ) -> None:
-    """Write the index of a data set again, from its twins alone; the old one serves until the new one is whole."""
+    """Rebuild the index of a data set from its twins; the old index stays in use until the new one is complete."""
     from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     from manitwin.api import write_index

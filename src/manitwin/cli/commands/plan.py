@@ -24,18 +24,20 @@ def plan(
     dataset: Annotated[
         str, options.existing("A data set with an index.", "DATASET", "the folder or URL of a data set")
     ],
-    items: Annotated[int, typer.Option(help="Inputs to build.", callback=choices.count_of("items"))] = 100_000,
-    cores: Annotated[int, typer.Option(help="Cores to build on.", callback=choices.count_of("cores", 10**6))] = 64,
+    items: Annotated[
+        int, typer.Option(help="Number of inputs to build.", callback=choices.count_of("items"))
+    ] = 100_000,
+    cores: Annotated[
+        int, typer.Option(help="Number of CPU cores to build on.", callback=choices.count_of("cores", 10**6))
+    ] = 64,
     core_hour_usd: Annotated[
         float | None,
-        typer.Option(
-            help="The price of a core's hour, in dollars.", callback=choices.amount_of("--core-hour-usd", 1e4)
-        ),
+        typer.Option(help="Price of one core-hour, in USD.", callback=choices.amount_of("--core-hour-usd", 1e4)),
     ] = None,
-    seed: Annotated[int, typer.Option(help="The seed of what is drawn.", min=0, max=options.LARGEST_SEED)] = 0,
+    seed: Annotated[int, typer.Option(help="Random seed.", min=0, max=options.LARGEST_SEED)] = 0,
     json_: Json = False,
 ) -> None:
-    """Say what so many inputs would take, in hours, dollars, disk and memory, from what those of a data set took."""
+    """Estimate hours, dollars, disk and memory for a number of inputs, from what the inputs of a data set took."""
     from manitwin.dataset.forecast import forecast
     from manitwin.twin.dataset_root import DatasetRoot
 
@@ -51,7 +53,7 @@ def _lines(told: Forecast) -> list[str]:
     first = list(told.stages.items())[:_STAGES_SHOWN]
     shares = ", ".join(f"{name} {share:.0%}" for name, share in first)
     lines = [
-        f"{told.items:,} inputs on {told.cores:,} cores, told from {told.measured:,} inputs (intervals: 95 %)",
+        f"{told.items:,} inputs on {told.cores:,} cores, estimated from {told.measured:,} measured inputs (intervals: 95 %)",
         f"accepted twins: {_range(told.accepted, 1, '')}",
         f"CPU time: {_measured(told.cpu_hours, _CORE_HOURS)}; of it {shares}",
         f"time: {_measured(told.hours, _HOURS)} with all cores always busy; the slowest input took"
@@ -59,16 +61,16 @@ def _lines(told: Forecast) -> list[str]:
         f"services: {_range(told.services_usd, 1, ' dollars')}, as recorded",
     ]
     if told.usd is None:
-        lines.append("dollars: not known; say the price of a core's hour with --core-hour-usd")
+        lines.append("dollars: unknown; give the price of a core-hour with --core-hour-usd")
     else:
-        lines.append(f"dollars: {_range(told.usd, 1, '')}, services among them")
+        lines.append(f"dollars: {_range(told.usd, 1, '')}, including services")
     disk = [f"twins {_measured(told.twins_bytes, _BYTES)}"]
     if told.work_bytes is not None:
         disk.append(f"results of stages {_measured(told.work_bytes, _BYTES)}, none with run.keep_work = false")
     disk.append(f"index {_rounded(told.index_bytes)}, ledger {_rounded(told.ledger_bytes)}")
     lines.append(f"disk: {'; '.join(disk)}")
     if told.memory_bytes is None:
-        lines.append("memory: not known; the data set has no run.memory_gb")
+        lines.append("memory: unknown; the data set has no run.memory_gb")
     else:
         lines.append(
             f"memory: {told.memory_bytes / 2**30:,.0f} GiB at most, the limit of all workers; use is not recorded"

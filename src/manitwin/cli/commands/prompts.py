@@ -16,11 +16,9 @@ def prompts(
     twin: Annotated[Path, options.existing("A twin folder.", "TWIN", "a folder that manitwin build made")],
     out: Annotated[Path, options.output_folder("The folder to write the questions into.")],
     config: options.Config = None,
-    vlm: Annotated[
-        str, choices.ANNOTATORS.option(help="The model, as for build; nothing is sent to it.")
-    ] = "openai:MODEL",
+    vlm: Annotated[str, choices.ANNOTATORS.option(help="Model, as for build; nothing is sent to it.")] = "openai:MODEL",
 ) -> None:
-    """Write the questions that a vision-language model would be asked about a twin: text, pictures, schema and cost."""
+    """Write the prompts that a vision-language model would receive for a twin: text, pictures, schema and cost."""
     from manitwin.cli.annotator_questions import questions_about, write_questions
     from manitwin.config import BuildConfig, load_config
 

@@ -27,25 +27,27 @@ def publish(
             "the folder or URL of a data set",
         ),
     ],
-    out: Annotated[str, options.output_folder("A new folder or URL, or an older publication.")],
+    out: Annotated[str, options.output_folder("New folder or URL, or an earlier publication to update.")],
     license_allow: Annotated[
         str | None,
-        typer.Option(help="Licences that may go out, by commas (CC-BY-4.0,CC0-1.0); default: all but 'unknown'."),
+        typer.Option(help="Licences to publish, separated by commas (CC-BY-4.0,CC0-1.0); default: all but 'unknown'."),
     ] = None,
     with_rehearsals: Annotated[
         bool,
-        typer.Option("--with-rehearsals", help="Also twins that a rehearsal server (manitwin fake) had a part in."),
+        typer.Option("--with-rehearsals", help="Also publish twins built with a rehearsal server (manitwin fake)."),
     ] = False,
     shard_size_mb: Annotated[
-        int, typer.Option(help="The most that a shard may have, in 10^6 bytes.", min=1, max=1_000_000)
+        int, typer.Option(help="Largest size of a shard, in MB (10^6 bytes).", min=1, max=1_000_000)
     ] = SHARD_SIZE_MB,
     twins_per_shard: Annotated[
-        int | None, typer.Option(help="The most twins of a shard; default: any number.", min=1, max=LARGEST_COUNT)
+        int | None, typer.Option(help="Largest number of twins per shard; default: no limit.", min=1, max=LARGEST_COUNT)
     ] = None,
     twins: options.Twins = None,
-    name: Annotated[str | None, typer.Option(help="What the card calls it; default: the name of OUT.")] = None,
+    name: Annotated[
+        str | None, typer.Option(help="Name of the data set on the card; default: the name of OUT.")
+    ] = None,
 ) -> None:
-    """Write a data set as WebDataset shards, Parquet tables and a card; or episodes as a LeRobot data set with a card."""
+    """Write a data set as WebDataset shards, Parquet tables and a data card; or episodes as a LeRobot data set with a card."""
     from manitwin.dataset.publish.publish import publish_dataset
     from manitwin.episodes.attempts import ATTEMPTS
     from manitwin.errors import UsageError
@@ -56,11 +58,13 @@ def publish(
     note_old_layout(root)
     if root.local is not None and root.exists(ATTEMPTS):
         if twins_per_shard is not None or shard_size_mb != SHARD_SIZE_MB:
-            raise UsageError(f"{dataset}: holds episodes, which have no shards; leave the options of shards out")
+            raise UsageError(
+                f"{dataset}: contains episodes, which are not written as shards; leave out the shard options"
+            )
         _publish_episodes(root.local, out, allowed, twins, name, with_rehearsals)
         return
     if twins is not None:
-        raise UsageError(f"{dataset}: holds no episodes, whose twins could be elsewhere; leave --twins out")
+        raise UsageError(f"{dataset}: contains no episodes; --twins applies to episodes only, leave it out")
     published = publish_dataset(
         dataset,
         out,
@@ -99,21 +103,21 @@ def _held_back_lines(published: Published | PublishedEpisodes) -> list[str]:
         by_licence = ", ".join(f"{name} {count:,}" for name, count in published.left_out.items())
         lines.append(f"{sum(published.left_out.values()):,} left out by licence: {by_licence}")
     if published.rehearsals:
-        lines.append(f"{published.rehearsals:,} rehearsals left out: manitwin fake, not a model, had a part in them")
+        lines.append(f"{published.rehearsals:,} left out: made with a rehearsal server (manitwin fake)")
     if published.without_attribution:
-        lines.append(f"{published.without_attribution:,} are under a licence that asks for attribution, and have none")
+        lines.append(f"{published.without_attribution:,} have a licence that requires attribution, but no attribution")
     return lines
 
 
 def outcome_lines(published: Published) -> list[str]:
     """Return what to say of a publication: what went out, and what did not and why."""
-    kept = f", {published.kept_shards:,} of them there already" if published.kept_shards else ""
+    kept = f", {published.kept_shards:,} of them unchanged" if published.kept_shards else ""
     lines = [
         f"{published.twins:,} twins in {published.shards:,} shards{kept}; "
         f"{published.files:,} files, {published.bytes / 1e6:,.1f} MB"
     ]
     if published.rejected:
-        lines.append(f"{published.rejected:,} rejected ones are not published")
+        lines.append(f"{published.rejected:,} rejected twins are not published")
     return lines + _held_back_lines(published)
 
 

@@ -39,34 +39,38 @@ NARROWEST = 16
 def query(
     dataset: Annotated[str, typer.Argument(help="A data set: a folder or URL.", metavar="DATASET")],
     where: Annotated[
-        str | None, typer.Argument(help="An SQL condition: \"category = 'mug' and mass_kg < 0.4\". None: all rows.")
+        str | None, typer.Argument(help="An SQL condition: \"category = 'mug' and mass_kg < 0.4\". Default: all rows.")
     ] = None,
     table: Annotated[
-        str, choices.TABLES.option(help="twins, points, grasps, placements, rejections or stages.", metavar="NAME")
+        str,
+        choices.TABLES.option(help="Table: twins, points, grasps, placements, rejections or stages.", metavar="NAME"),
     ] = "twins",
-    columns: Annotated[str | None, typer.Option(help="Columns to print, with commas between.", metavar="A,B")] = None,
+    columns: Annotated[str | None, typer.Option(help="Columns to print, separated by commas.", metavar="A,B")] = None,
     limit: Annotated[
-        int | None, typer.Option(help="Print at most so many rows.", metavar="N", min=0, max=choices.LARGEST_COUNT)
+        int | None, typer.Option(help="Maximum number of rows to print.", metavar="N", min=0, max=choices.LARGEST_COUNT)
     ] = None,
     format: Annotated[
-        str, choices.QUERY_FORMATS.option("--format", "-f", help="table, csv, json or ids.", metavar="FORMAT")
+        str,
+        choices.QUERY_FORMATS.option(
+            "--format", "-f", help="Output format: table, csv, json or ids.", metavar="FORMAT"
+        ),
     ] = "table",
     timeout: Annotated[
         float,
         typer.Option(
-            help="Give up after so many seconds.", metavar="SECONDS", callback=choices.amount_of("--timeout", 1e6)
+            help="Time limit of the query, in seconds.", metavar="SECONDS", callback=choices.amount_of("--timeout", 1e6)
         ),
     ] = 60.0,
     memory_gb: Annotated[
         float,
-        typer.Option(help="Use so much memory at most.", metavar="GB", callback=choices.amount_of("--memory-gb", 1e5)),
+        typer.Option(help="Memory limit of the query.", metavar="GB", callback=choices.amount_of("--memory-gb", 1e5)),
     ] = 4.0,
 ) -> None:
     """Print the rows of a data set's index that satisfy a condition, sorted by twin."""
     from manitwin.errors import UsageError
 
     if format == "ids" and columns is not None:
-        raise UsageError("format ids prints twins' ids alone; leave out --columns, or choose another format")
+        raise UsageError("--format ids prints only the ids of twins; leave out --columns, or choose another format")
     from manitwin.dataset.index.query import Index
 
     names = [name.strip() for name in columns.split(",")] if columns is not None else None

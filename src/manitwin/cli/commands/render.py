@@ -21,45 +21,49 @@ def render(
     episodes: Annotated[
         Path,
         options.existing(
-            "What `manitwin trajectories` wrote, or a twin.",
+            "A folder that `manitwin trajectories` wrote, or a twin.",
             "EPISODES|TWIN",
             "the folder that manitwin trajectories wrote, or a twin's",
         ),
     ],
-    cameras: Annotated[str | None, choices.CAMERAS.option(help="By commas: front, side, top, wrist.")] = None,
-    size: Annotated[int | None, typer.Option(help="Width and height of a picture in pixels.", min=64, max=2048)] = None,
+    cameras: Annotated[
+        str | None, choices.CAMERAS.option(help="Cameras, separated by commas: front, side, top, wrist.")
+    ] = None,
+    size: Annotated[
+        int | None, typer.Option(help="Width and height of a picture, in pixels.", min=64, max=2048)
+    ] = None,
     codec: Annotated[
         str | None,
         choices.CODECS.option(
-            help="av1 (plays in browsers), vp9 (in older ones too, slow to write), or mpeg4 (in none)."
+            help="Video codec: av1 (plays in browsers), vp9 (also in older ones; slow to write) or mpeg4 (in none)."
         ),
     ] = None,
     rate_hz: Annotated[
         str | None,
-        choices.RATES_HZ.option(
-            help="States, actions and pictures a second of the LeRobot set: 20, 10 or 5; fewer cost less."
-        ),
+        choices.RATES_HZ.option(help="Frame rate of the LeRobot data set in Hz: 20, 10 or 5; lower rates cost less."),
     ] = None,
     twins: options.Twins = None,
     joint: Annotated[
         list[str] | None,
         typer.Option(
             "--joint",
-            help="Of a twin: a joint's position, rad or m; may be repeated. None: each at its ends.",
+            help="Twin: position of a joint, in rad or m; may be repeated. Default: every joint at its limits.",
             metavar="NAME=VALUE",
         ),
     ] = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Of a twin: the picture.", metavar="FILE.png")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Twin: file for the picture.", metavar="FILE.png")
+    ] = None,
     **run: Any,
 ) -> None:
-    """Draw the kept episodes by showing their states again and add the films to the LeRobot data set; or draw a twin's joints."""
+    """Render kept episodes by replaying their states, and add the videos to the LeRobot data set; or draw a twin's joints."""
     if (episodes / "twin.json").is_file():
         _draw_twin(episodes, joint, out, size)
         return
     if joint is not None or out is not None:
         from manitwin.errors import UsageError
 
-        raise UsageError(f"{episodes}: no twin, and --joint and --out are for one; give a twin's folder")
+        raise UsageError(f"{episodes}: not a twin; --joint and --out apply to a twin, give its folder")
     from manitwin.episodes.settings import PicturesConfig
 
     names = None if cameras is None else tuple(name.strip() for name in cameras.split(","))
@@ -88,7 +92,7 @@ def render(
             print_error(f"stopped: {report.stopped}")
         print_causes(f"{episodes}/pictures")
         if report.open:
-            err_console.print(f"manitwin status {episodes}/pictures says more; run the same command again")
+            err_console.print(f"manitwin status {episodes}/pictures shows details; rerun the same command to resume")
         raise typer.Exit(4)
 
 
@@ -97,7 +101,7 @@ def _draw_twin(folder: Path, said: list[str] | None, out: Path | None, size: int
     from manitwin.errors import UsageError
 
     if out is None or out.suffix.lower() != ".png":
-        raise UsageError(f"{folder}: is a twin; say where its picture goes with --out FILE.png")
+        raise UsageError(f"{folder}: is a twin; give a file for its picture with --out FILE.png")
     positions = dict(_position(each) for each in said or ())
     from manitwin.render.device import require_renderer
     from manitwin.render.joint_states import PANEL_PX, draw_joint_states, telling_states
@@ -106,7 +110,7 @@ def _draw_twin(folder: Path, said: list[str] | None, out: Path | None, size: int
 
     twin = Twin(folder)
     if not twin.record.joints:
-        raise UsageError(f"{folder}: has no joints, it is one rigid body; its pictures are in {folder}/views")
+        raise UsageError(f"{folder}: has no joints: it is one rigid body; its pictures are in {folder}/views")
     require_renderer()
     states = [positions] if positions else telling_states(twin)
     write_bytes_atomically(out, draw_joint_states(twin, states, size or PANEL_PX))
@@ -124,6 +128,6 @@ def _position(said: str) -> tuple[str, float]:
         position = math.nan
     if not equals or not name or not math.isfinite(position):
         raise UsageError(
-            f"--joint {said[:60]!r}: no name of a joint and its position; give NAME=VALUE, such as hinge=0.8"
+            f"--joint {said[:60]!r}: not the name and position of a joint; give NAME=VALUE, such as hinge=0.8"
         )
     return name, position

@@ -23,23 +23,24 @@ Dataset = Annotated[
     str, options.existing("A data set: a folder with an index.", "DATASET", "a data set that manitwin build made")
 ]
 Sample = Annotated[
-    int, typer.Option("--sample", help="Twins to review.", callback=choices.count_of("--sample", 1_000_000))
+    int, typer.Option("--sample", help="Number of twins to review.", callback=choices.count_of("--sample", 1_000_000))
 ]
 Overlap = Annotated[
     float,
     typer.Option(
-        help="The share of the sample that two annotators judge independently, for their agreement.", min=0.0, max=1.0
+        help="Fraction of the sample that two annotators judge independently, to measure agreement.", min=0.0, max=1.0
     ),
 ]
-SampleSeed = Annotated[int, typer.Option("--seed", help="The seed of the sample.", min=0, max=options.LARGEST_SEED)]
+SampleSeed = Annotated[int, typer.Option("--seed", help="Random seed of the sample.", min=0, max=options.LARGEST_SEED)]
 
 
 Annotators = Annotated[
     list[str] | None,
-    typer.Option("--annotator", help="Who reviews; several share the sample.", metavar="NAME"),
+    typer.Option("--annotator", help="Name of the annotator; several annotators share the sample.", metavar="NAME"),
 ]
 Given = Annotated[
-    int | None, typer.Option("--sample", help="Twins to review.", callback=choices.count_of("--sample", 1_000_000))
+    int | None,
+    typer.Option("--sample", help="Number of twins to review.", callback=choices.count_of("--sample", 1_000_000)),
 ]
 
 
@@ -50,20 +51,18 @@ def review(
     overlap: Overlap = 0.2,
     annotator: Annotators = None,
     blind: Annotated[
-        bool, typer.Option("--blind", help="Show neither who gave what is judged, nor how sure they were, nor why.")
+        bool, typer.Option("--blind", help="Hide the source, confidence and evidence of the annotations.")
     ] = False,
-    revoke: Annotated[
-        bool, typer.Option("--revoke", help="Forget all links and browsers that were let in before.")
-    ] = False,
+    revoke: Annotated[bool, typer.Option("--revoke", help="Revoke all earlier links and browser sessions.")] = False,
     port: Annotated[
-        int, typer.Option(help="The port; 0: that of the last time, or any that is free.", min=0, max=65535)
+        int, typer.Option(help="Port; 0: the port of the last session, or any free port.", min=0, max=65535)
     ] = 0,
     host: Annotated[
-        str, typer.Option(help="The address to listen on; 0.0.0.0: all, for others to review.", metavar="ADDRESS")
+        str, typer.Option(help="Address to listen on; 0.0.0.0 lets other machines connect.", metavar="ADDRESS")
     ] = "127.0.0.1",
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
 ) -> None:
-    """Judge a sample of twins in the browser, by keyboard, until interrupted; without --sample the last one that was drawn."""
+    """Review a sample of twins in the browser by keyboard, until interrupted; without --sample, the last sample drawn."""
     import webbrowser
 
     from manitwin.cli.commands.view import has_screen, interruptible, tell_link, warn_if_open
@@ -101,7 +100,7 @@ def review(
                 tell_link(server.link(PATH, name), f"for {name} alone, {left} twins; until interrupted (Ctrl-C)")
 
         serve_review(dataset, session, host, port, ready, tell, tokens)
-        out_console.print(f"`manitwin review report {dataset}` says what the verdicts tell")
+        out_console.print(f"`manitwin review report {dataset}` summarises the verdicts")
         out_console.print("stopped")
 
 
@@ -112,24 +111,26 @@ def review_sample(
     overlap: Overlap = 0.2,
     form: Annotated[
         Path | None,
-        typer.Option(help="Write the rows to be filled in: an answer a dimension.", metavar="FILE.csv", dir_okay=False),
+        typer.Option(
+            help="Write a form to fill in: one row per answer and dimension.", metavar="FILE.csv", dir_okay=False
+        ),
     ] = None,
     annotator: Annotators = None,
 ) -> None:
-    """Draw a sample that is stratified by category, size and origin, and write a form for verdicts made elsewhere."""
+    """Draw a sample stratified by category, size and origin, and write a form for verdicts made outside the browser."""
     from manitwin.errors import UsageError
 
     if (form is None) != (not annotator):
-        raise UsageError("a form belongs to an annotator: give --form FILE.csv and --annotator NAME together")
+        raise UsageError("a form is for one annotator: give --form FILE.csv and --annotator NAME together")
     from manitwin.dataset.review.plan import draw_plan, write_forms
 
     plan, strata = draw_plan(dataset, sample, seed, overlap)
     twice = sum(plan.wanted(twin_id) > 1 for twin_id in plan.twins)
     out_console.print(f"{len(plan.twins)} twins of {len(strata)} categories, {twice} of them for two annotators")
     if len(plan.twins) < sample:
-        out_console.print(f"these are all that were accepted; the sample may have {sample}")
+        out_console.print(f"these are all accepted twins; the sample may have {sample}")
     for file, rows in write_forms(dataset, plan, form, annotator or []):
-        out_console.print(f"{file}: {rows} rows to fill in; `manitwin review import {dataset} {file}` reads them")
+        out_console.print(f"{file}: {rows} rows to fill in; `manitwin review import {dataset} {file}` imports it")
 
 
 def review_import(
@@ -137,11 +138,11 @@ def review_import(
     verdicts: Annotated[
         Path,
         options.existing(
-            "Verdicts, a row an answer (docs/review.md).", "FILE.csv|FILE.jsonl", "a CSV or JSONL file of verdicts"
+            "Verdicts, one row per answer (docs/review.md).", "FILE.csv|FILE.jsonl", "a CSV or JSONL file of verdicts"
         ),
     ],
 ) -> None:
-    """Take up verdicts that were made elsewhere: all of a file or none, and those that are there already once."""
+    """Import verdicts made elsewhere: a whole file or nothing; verdicts that are there already are skipped."""
     from manitwin.dataset.review.store import ReviewStore, reviews_path
     from manitwin.dataset.review.twins_seen import read_twin
     from manitwin.dataset.review.verdict_files import read_verdicts
@@ -152,8 +153,8 @@ def review_import(
     with ReviewStore(path) as store:
         added = store.add((review for review, _ in read), (request for _, request in read))
         followed = store.followed()
-    there = f", {len(read) - added} were there already" if added < len(read) else ""
-    out_console.print(f"{added} reviews taken up{there}; `manitwin review report {dataset}` says what they tell")
+    there = f", {len(read) - added} were already there" if added < len(read) else ""
+    out_console.print(f"{added} reviews imported{there}; `manitwin review report {dataset}` summarises them")
     now = {twin_id: read_twin(root, twin_id).revision for twin_id in {review.twin_id for review, _ in read}}
     if outdated := sum(followed(each.twin_id, each.revision) != now[each.twin_id] for each, _ in read):
         error_console.print(
@@ -164,11 +165,11 @@ def review_import(
 def review_apply(
     dataset: Dataset,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Say what would be put right and what is disputed; write nothing.")
+        bool, typer.Option("--dry-run", help="Print what would be corrected and what is disputed; write nothing.")
     ] = False,
     jobs: options.Jobs = None,
 ) -> None:
-    """Write the corrections that nobody contradicts into the twins, and make again what follows from them."""
+    """Write uncontradicted corrections into the twins, and rebuild what depends on them."""
     from manitwin.cli.progress import WatchedRun
     from manitwin.dataset.review.apply import apply_reviews
     from manitwin.dataset.review.report import shown_correction
@@ -203,11 +204,13 @@ def review_report(
     dataset: Dataset,
     export: Annotated[
         Path | None,
-        typer.Option(help="Write all verdicts as .parquet, .csv or .jsonl, too.", metavar="FILE", dir_okay=False),
+        typer.Option(
+            help="Also write all verdicts to a .parquet, .csv or .jsonl file.", metavar="FILE", dir_okay=False
+        ),
     ] = None,
     json: Json = False,
 ) -> None:
-    """Print accuracy by dimension beside the paper's, agreement, progress, and what is disputed or wrong."""
+    """Print accuracy per dimension beside the paper's, agreement, progress, and disputed or wrong annotations."""
     from manitwin.dataset.review.report import export_verdicts, review_report
 
     report = review_report(dataset)
@@ -224,11 +227,15 @@ def review_tune(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", help="Write what is proposed as a configuration.", metavar="FILE.toml", dir_okay=False
+            "--out",
+            "-o",
+            help="Write the proposed thresholds as a configuration file.",
+            metavar="FILE.toml",
+            dir_okay=False,
         ),
     ] = None,
 ) -> None:
-    """Propose thresholds that would have agreed better with the verdicts, where that holds on twins they were not chosen on."""
+    """Propose thresholds that agree better with the verdicts, if they also do so on held-out twins."""
     from manitwin.dataset.review.tuning import toml_of, tune_dataset
     from manitwin.twin.store import write_bytes_atomically
 
@@ -237,7 +244,7 @@ def review_tune(
         out_console.print(each.line())
     proposed = toml_of(tuned)
     if not proposed:
-        out_console.print("nothing is proposed")
+        out_console.print("no threshold is proposed")
     elif out is not None:
         write_bytes_atomically(out, proposed.encode())
-        out_console.print(f"{out}: read it, then give it to `manitwin build --config {out}`")
+        out_console.print(f"{out}: check this file, then pass it to `manitwin build --config {out}`")

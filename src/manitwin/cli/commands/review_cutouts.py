@@ -24,13 +24,15 @@ def review_cutouts(
     sheet: Annotated[
         Path | None,
         typer.Option(
-            help="Draw them here, side by side; after 48 on a further sheet.", metavar="FILE.png", dir_okay=False
+            help="Draw the cut-outs side by side into this file; more than 48 go to further sheets.",
+            metavar="FILE.png",
+            dir_okay=False,
         ),
     ] = None,
     accept: Annotated[
         list[str] | None,
         typer.Option(
-            help="A photo whose cut-out you have looked at and found right: it is built; may be given again.",
+            help="Photo whose cut-out you have checked and found right: build it; may be repeated.",
             metavar="ID",
         ),
     ] = None,
@@ -38,32 +40,35 @@ def review_cutouts(
         bool,
         typer.Option(
             "--draw",
-            help="Draw outlines anew in the browser, and say what the things are, until interrupted; then they are built.",
+            help="Redraw outlines and name objects in the browser, until interrupted; then build the photos.",
         ),
     ] = False,
     redraw: Annotated[
         list[str] | None,
-        typer.Option(help="Show --draw this photo too, whose cut-out was believed; may be given again.", metavar="ID"),
+        typer.Option(
+            help="With --draw: also show this photo, whose cut-out was accepted; may be repeated.", metavar="ID"
+        ),
     ] = None,
-    annotator: Annotated[str, typer.Option(help="Who has looked at them.", metavar="NAME")] = "me",
-    port: Annotated[int, typer.Option(help="The port of --draw; 0: any that is free.", min=0, max=65535)] = 0,
+    annotator: Annotated[str, typer.Option(help="Name of the person who checked the cut-outs.", metavar="NAME")] = "me",
+    port: Annotated[int, typer.Option(help="With --draw: port; 0: any free port.", min=0, max=65535)] = 0,
     host: Annotated[
-        str, typer.Option(help="The address that --draw listens on; 0.0.0.0: all.", metavar="ADDRESS")
+        str,
+        typer.Option(help="With --draw: address to listen on; 0.0.0.0 lets other machines connect.", metavar="ADDRESS"),
     ] = "127.0.0.1",
     browser: Annotated[
-        bool, typer.Option("--browser/--no-browser", help="Open the page of --draw in the browser.")
+        bool, typer.Option("--browser/--no-browser", help="With --draw: open the page in the browser.")
     ] = True,
     jobs: options.Jobs = None,
 ) -> None:
-    """List rejected photos whose cut-out was doubted, draw them, or build those that you find right."""
+    """List photos rejected for a doubtful cut-out, draw the cut-outs, or build those that you accept."""
     from manitwin.errors import UsageError
 
     if sheet is not None and sheet.suffix.lower() not in PICTURES:
-        raise UsageError(f"--sheet {sheet}: no picture; end it in {', '.join(PICTURES)}")
+        raise UsageError(f"--sheet {sheet}: not a picture; use a name that ends in {', '.join(PICTURES)}")
     if redraw and not draw:
-        raise UsageError("--redraw says what --draw shows besides; give --draw too")
+        raise UsageError("--redraw adds a photo to --draw; give --draw too")
     if draw and (accept or sheet is not None):
-        raise UsageError("--draw goes by itself; accept cut-outs, or draw a sheet of them, before or after it")
+        raise UsageError("--draw cannot be combined with --accept or --sheet; run them as separate commands")
 
     from manitwin.cli.progress import WatchedRun
     from manitwin.dataset.review.cutouts import confirm, doubted_photos, write_sheets
@@ -100,8 +105,8 @@ def _draw(dataset: str, session: OutlineSession, host: str, port: int, browser: 
     from manitwin.web.serve import draw_outlines
 
     if not session.photos:
-        raise UsageError(f"{dataset}: has no photo that was rejected for its cut-out; --redraw ID shows another one")
-    remark = f"{len(session.photos)} photos; end it with Ctrl-C, and what was drawn is built"
+        raise UsageError(f"{dataset}: no photo was rejected for its cut-out; --redraw ID shows another photo")
+    remark = f"{len(session.photos)} photos; stop with Ctrl-C to build what was drawn"
     with interruptible() as ends_with:
 
         def ready(server: PageServer) -> None:

@@ -24,29 +24,31 @@ def search(
     image: Annotated[
         Path | None,
         typer.Option(
-            help="A photo or crop of one thing to find instead; transparency says what is background.",
+            help="Photo or crop of one object to search for instead; transparent pixels are background.",
             metavar="FILE",
-            callback=choices.must_exist("a picture of one thing"),
+            callback=choices.must_exist("a picture of one object"),
         ),
     ] = None,
     embedder: Annotated[
         str | None,
         typer.Option(
-            help="Rank words also by a model of embeddings: clip:FOLDER, openai:MODEL, or openai:MODEL@URL.",
+            help="Also rank by a text embedding model: clip:FOLDER, openai:MODEL, or openai:MODEL@URL.",
             metavar="SPEC",
         ),
     ] = None,
-    limit: Annotated[int, typer.Option(help="Print at most so many twins.", callback=choices.count_of("--limit"))] = 10,
+    limit: Annotated[
+        int, typer.Option(help="Maximum number of twins to print.", callback=choices.count_of("--limit"))
+    ] = 10,
     json_: Json = False,
 ) -> None:
-    """Print the twins that words describe, or that look like the thing in a picture, the best first."""
+    """Print the twins that match a description, or that look like the object in a picture, best match first."""
     from manitwin.errors import UsageError
     from manitwin.twin.dataset_root import DatasetRoot
 
     if (words is None) == (image is None):
-        raise UsageError('say what to look for: words such as "a blue mug", or --image FILE, one of them')
+        raise UsageError('give either a description such as "a blue mug" or --image FILE')
     if image is not None and embedder is not None:
-        raise UsageError("--embedder is for words; leave it out with --image")
+        raise UsageError("--embedder applies to words only; leave it out with --image")
     root = DatasetRoot(dataset)
     note_old_layout(root)
     background: str | None = None
@@ -71,15 +73,17 @@ def search(
         print_document({**asked, "background": background, "hits": [asdict(hit) for hit in hits]})
         return
     if background == "none":
-        error_console.print("the thing was not told from its background: the whole picture is compared", markup=False)
+        error_console.print(
+            "the object could not be separated from its background: the whole picture is compared", markup=False
+        )
     for hit in hits:
         out_console.print(f"{hit.score:8.3f}  {hit.twin_id}  {hit.category}: {_cut(hit.caption)}")
     if not hits:
-        out_console.print("no twin is found by these words")
+        out_console.print("no twin matches these words")
 
 
 def _drawn(twin_id: str) -> None:
-    error_console.print(f"{twin_id}: drawn and embedded, which is kept", markup=False)
+    error_console.print(f"{twin_id}: rendered and embedded; the result is cached", markup=False)
 
 
 def _cut(text: str) -> str:

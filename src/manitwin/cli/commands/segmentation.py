@@ -20,25 +20,29 @@ def segmentation(
     ],
     out: Annotated[Path, options.output_folder("The folder to write; it must be new or empty.")],
     form: Annotated[
-        str, choices.SEGMENTATION_FORMATS.option("--format", help="coco, coco-panoptic, cityscapes, bop, pointcloud.")
+        str,
+        choices.SEGMENTATION_FORMATS.option(
+            "--format", help="Format: coco, coco-panoptic, cityscapes, bop or pointcloud."
+        ),
     ],
     dataset: Annotated[
         Path | None,
         typer.Option(
             "--twins",
-            help="Where the scenes' twins are; default: where the scenes say.",
+            help="Data set of the twins; default: the one recorded in the scenes.",
             metavar="DATASET",
             callback=choices.must_exist("the data set that the scenes were sampled from"),
         ),
     ] = None,
     validation_share: Annotated[
-        float, typer.Option("--val", help="The share of scenes that go into the split val.", min=0, max=1)
+        float, typer.Option("--val", help="Fraction of scenes in the val split.", min=0, max=1)
     ] = 0.1,
     points: Annotated[
-        int, typer.Option(help="Points of a scene's cloud, at most.", callback=choices.count_of("--points"))
+        int,
+        typer.Option(help="Maximum number of points in the cloud of a scene.", callback=choices.count_of("--points")),
     ] = 100_000,
 ) -> None:
-    """Write instances, classes and parts of drawn scenes: masks, panoptic pictures, poses, point clouds."""
+    """Write instance, class and part segmentation of drawn scenes: masks, panoptic pictures, poses, point clouds."""
     from manitwin.scenes.perception.segmentation import write_segmentation
 
     done = write_segmentation(scenes, out, form, dataset=dataset, validation_share=validation_share, points=points)

@@ -20,7 +20,7 @@ def stats(
     ],
     out: Annotated[Path | None, options.output_folder("The folder to write into; default: DATASET/statistics.")] = None,
 ) -> None:
-    """Write the statistics of a data set, or of episodes: a page, its figures, and its numbers with the SQL of each."""
+    """Write the statistics of a data set or of episodes: a page, its figures, and every number with its SQL query."""
     from manitwin.api import write_statistics
     from manitwin.twin.dataset_root import DatasetRoot
 

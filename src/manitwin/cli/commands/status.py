@@ -25,18 +25,18 @@ MOST_CAUSES = 10
 
 def status(
     dataset: Annotated[str, typer.Argument(help="A data set: a folder or URL.", metavar="DATASET")],
-    watch: Annotated[bool, typer.Option("--watch", help="Show it anew every two seconds, until Ctrl-C.")] = False,
+    watch: Annotated[bool, typer.Option("--watch", help="Refresh every two seconds, until Ctrl-C.")] = False,
     why: Annotated[
         str | None,
-        typer.Option(help="Explain one item: its number, twin id, or a part of its file name.", metavar="ITEM"),
+        typer.Option(help="Explain one item, given its number, twin id or part of its file name.", metavar="ITEM"),
     ] = None,
     json: Json = False,
 ) -> None:
-    """Say how far a data set is: by stage, how fast, what is left, what it cost, what was rejected and why."""
+    """Show the progress of a data set: stages, speed, remaining work, cost, and rejections with their reasons."""
     from manitwin.errors import UsageError
 
     if json and watch:
-        raise UsageError("--json prints one document, and --watch goes on; give one of them")
+        raise UsageError("--json and --watch cannot be combined; give only one")
     from manitwin.cli.causes import group_causes
     from manitwin.cli.documents import status_document, story_document
     from manitwin.engine.ledger.location import local_ledger
@@ -97,9 +97,9 @@ def _print_causes(causes: list[Cause], dataset: str) -> None:
     if len(causes) > MOST_CAUSES:
         out_console.print(f"and {len(causes) - MOST_CAUSES} more causes")
     if any(cause.state == "failed" for cause in causes):
-        out_console.print(f"`manitwin retry {dataset}` opens what failed again")
+        out_console.print(f"`manitwin retry {dataset}` reopens the failed items")
     if causes:
-        out_console.print(f"`manitwin status {dataset} --why {causes[0].example}` tells all of one item")
+        out_console.print(f"`manitwin status {dataset} --why {causes[0].example}` shows all details of one item")
 
 
 def _view(progress: Progress) -> RenderableType:
@@ -126,7 +126,7 @@ def _view(progress: Progress) -> RenderableType:
     ]
     if progress.of_another_recipe:
         lines.append(
-            f"{progress.of_another_recipe} of these ended under another version of manitwin, or with other settings, than the"
+            f"{progress.of_another_recipe} of these ended with another version of manitwin, or with other settings, than the"
             " last run had"
         )
     if progress.items_per_hour:
@@ -144,7 +144,7 @@ def _print_story(story: ItemStory) -> None:
 
     lines = [
         f"item {story.number}: {told(story.item)}",
-        f"twin {story.twin_id or 'not known yet'}, {story.state}"
+        f"twin {story.twin_id or 'unknown yet'}, {story.state}"
         + (f" ({story.reason})" if story.reason else "")
         + (f": {story.detail}" if story.detail else ""),
     ]

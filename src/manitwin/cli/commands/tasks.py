@@ -24,22 +24,25 @@ def tasks(
         str, options.existing("Scenes of `manitwin layout`.", "SCENES", "a folder that manitwin layout wrote")
     ],
     out: Annotated[Path, options.output_folder("The folder to write tasks into.")],
-    per_scene: Annotated[int | None, typer.Option(help="How many tasks of a scene, at most.", min=1, max=1000)] = None,
+    per_scene: Annotated[int | None, typer.Option(help="Maximum number of tasks per scene.", min=1, max=1000)] = None,
     robot: Annotated[
-        str | None, choices.ROBOTS.option(help="Who is to do them: a robot by name, or a TOML file.")
+        str | None, choices.ROBOTS.option(help="Robot that executes the tasks: a name, or a TOML file.")
     ] = None,
     vlm: Annotated[
         str | None,
         choices.PROPOSERS.option(
-            help="Who proposes tasks besides: openai:MODEL@URL, anthropic:MODEL, replay:FILE, or none.", metavar="SPEC"
+            help="Model that proposes further tasks: openai:MODEL@URL, anthropic:MODEL, replay:FILE, or none.",
+            metavar="SPEC",
         ),
     ] = None,
-    bddl: Annotated[bool, typer.Option("--bddl", help="Also write what BDDL can say, to OUT/bddl.")] = False,
+    bddl: Annotated[
+        bool, typer.Option("--bddl", help="Also write the tasks that BDDL can express to OUT/bddl.")
+    ] = False,
     twins: options.Twins = None,
     json: Json = False,
     **run: Any,
 ) -> None:
-    """Find tasks in scenes, check each by planning, and write them with instructions; run it again to go on."""
+    """Find tasks in scenes, check each by planning, and write them with instructions; rerun the command to resume."""
     from manitwin.episodes.settings import TasksConfig
 
     settings = options.read_settings(TasksConfig, run, {"robot": robot, "per_scene": per_scene, "vlm": vlm})
@@ -82,5 +85,5 @@ def _print_totals(totals: TaskTotals, out: Path) -> None:
         most = list(totals.dropped.items())
         more = f", and {len(most) - SHOWN_REASONS} more reasons" if len(most) > SHOWN_REASONS else ""
         told = ", ".join(f"{count} {reason}" for reason, count in most[:SHOWN_REASONS])
-        out_console.print(f"dropped: {told}{more}; tasks_report.json has all")
-    out_console.print(f"manitwin trajectories {out} -o EPISODES carries them out")
+        out_console.print(f"dropped: {told}{more}; tasks_report.json lists all")
+    out_console.print(f"manitwin trajectories {out} -o EPISODES executes them")

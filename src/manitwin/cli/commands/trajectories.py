@@ -29,31 +29,32 @@ def trajectories(
     ],
     out: Annotated[Path, options.output_folder("The folder to write episodes into.")],
     count: Annotated[
-        int, typer.Option("-n", help="How many episodes to attempt.", callback=choices.count_of("-n"))
+        int, typer.Option("-n", help="Number of episodes to attempt.", callback=choices.count_of("-n"))
     ] = 100,
     robot: Annotated[
-        str | None, choices.ROBOTS.option(help="A robot by name, or a TOML file that describes one.")
+        str | None, choices.ROBOTS.option(help="Robot: a name, or a TOML file that describes one.")
     ] = None,
     skill: Annotated[
-        str | None, choices.SKILLS.option(help="What to do: pick_place, place_in, stack, left_of ... (docs/skills.md).")
+        str | None, choices.SKILLS.option(help="Skill: pick_place, place_in, stack, left_of ... (docs/skills.md).")
     ] = None,
     twins: options.Twins = None,
     others: Annotated[
-        int | None, typer.Option(help="So many other objects around, where twins are given.", min=0, max=20)
+        int | None, typer.Option(help="Number of clutter objects, if twins are given.", min=0, max=20)
     ] = None,
     retire: Annotated[
-        bool, typer.Option("--retire/--no-retire", help="Retire grasps that fail, in their twins' records.")
+        bool,
+        typer.Option("--retire/--no-retire", help="Mark grasps that fail as retired in the records of their twins."),
     ] = True,
     formats: Annotated[
         str,
         choices.EPISODE_FORMATS.option(
-            "--format", help="What to write beside the batches: lerobot, maniskill, or both by a comma."
+            "--format", help="Formats to write beside the batches: lerobot, maniskill, or both separated by a comma."
         ),
     ] = "lerobot,maniskill",
     json: Json = False,
     **run: Any,
 ) -> None:
-    """Plan and execute episodes of a skill, and keep what succeeded; run it again to go on where it stopped."""
+    """Plan and execute episodes of a skill, and keep those that succeed; rerun the command to resume."""
     from manitwin.episodes.settings import TrajectoriesConfig
 
     settings = options.read_settings(TrajectoriesConfig, run, {"robot": robot, "skill": skill, "others": others})
@@ -75,7 +76,7 @@ def trajectories(
             out_console.print(line)
         if retire:
             _print_retired(report.retired, report.newly_retired)
-        out_console.print(f"manitwin stats {out} says more")
+        out_console.print(f"manitwin stats {out} shows details")
     if json:
         print_document(trajectories_document(report, str(out), causes_of(str(out))))
     if report.totals is None:
@@ -87,11 +88,11 @@ def _print_unfinished(report: RunReport, out: Path) -> None:
         print_error(f"stopped: {report.stopped}")
     print_causes(str(out))
     if report.open:
-        err_console.print(f"manitwin status {out} says more; run the same command again to go on")
+        err_console.print(f"manitwin status {out} shows details; rerun the same command to resume")
 
 
 def _print_retired(found: list[Retirement], fresh: int) -> None:
-    out_console.print(f"{len(found)} grasps fail end to end, {fresh} of them retired now")
+    out_console.print(f"{len(found)} grasps fail end to end; {fresh} of them were retired now")
     for each in found:
         what = ", ".join(f"{n} {outcome}" for outcome, n in each.outcomes.items())
         out_console.print(f"  {each.twin_id} {each.grasp_id}: {each.failed} of {each.executed} ({what})")

@@ -30,15 +30,15 @@ def view(
             "a data set's, a twin's, scenes' or episodes' folder, or an HDF5 file of episodes",
         ),
     ],
-    port: Annotated[int, typer.Option(help="The port; 0: any that is free.", min=0, max=65535)] = 0,
+    port: Annotated[int, typer.Option(help="Port; 0: any free port.", min=0, max=65535)] = 0,
     host: Annotated[
-        str, typer.Option(help="The address to listen on; 0.0.0.0: all, for others to see.", metavar="ADDRESS")
+        str, typer.Option(help="Address to listen on; 0.0.0.0 lets other machines connect.", metavar="ADDRESS")
     ] = "127.0.0.1",
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
     static: Annotated[
         Path | None,
         typer.Option(
-            help="Write the pages as plain files into this new folder instead.",
+            help="Write the pages as static files into this new folder, and start no server.",
             metavar="OUT",
             callback=choices.folder_to_write,
         ),
@@ -46,28 +46,31 @@ def view(
     sample: Annotated[
         int | None,
         typer.Option(
-            help="Of --static: so many twins, scenes or episodes, drawn.", callback=choices.count_of("sample")
+            help="With --static: number of twins, scenes or episodes to draw at random.",
+            callback=choices.count_of("sample"),
         ),
     ] = None,
-    seed: Annotated[
-        int, typer.Option(help="Of --sample: the seed of what is drawn.", min=0, max=options.LARGEST_SEED)
-    ] = 0,
+    seed: Annotated[int, typer.Option(help="With --sample: random seed.", min=0, max=options.LARGEST_SEED)] = 0,
     where: Annotated[
-        str | None, typer.Option(help="Of --static: the twins of a condition, as of manitwin query.", metavar="SQL")
+        str | None,
+        typer.Option(
+            help="With --static: only twins that satisfy this condition, as in manitwin query.", metavar="SQL"
+        ),
     ] = None,
     trials: Annotated[
-        int, typer.Option(help="Of --static: so many grasps of each gripper can be played.", min=0, max=1000)
+        int,
+        typer.Option(help="With --static: number of grasps of each gripper to include as animations.", min=0, max=1000),
     ] = 0,
     twins: options.Twins = None,
 ) -> None:
-    """Show a gallery of a data set and a page of each twin, scenes, or episodes, in the browser; or write plain files."""
+    """Browse a data set, a twin, scenes or episodes in the browser, or write the pages as static files."""
     from manitwin.errors import UsageError
 
     if static is not None:
         _write(source, static, sample, seed, where or "", trials, twins)
         return
     if sample is not None or where is not None or trials:
-        raise UsageError("--sample, --where and --trials are of --static; the gallery has filters of its own")
+        raise UsageError("--sample, --where and --trials need --static; in the browser, use the filters of the gallery")
     from manitwin.web.serve import serve
 
     def ready(server: PageServer) -> None:
@@ -83,7 +86,7 @@ def view(
             host,
             port,
             ready,
-            lambda link: tell_link(link, "a new link, as one that was used came again"),
+            lambda link: tell_link(link, "new link, because the old one was used a second time"),
             twins,
         )
         out_console.print("stopped")
@@ -118,7 +121,9 @@ def _write(source: str, out: Path, sample: int | None, seed: int, where: str, tr
 def warn_if_open(server: PageServer) -> None:
     """Warn where a server can be reached from other machines."""
     if server.names.open:
-        error_console.print("it listens beyond this machine, and what it sends is not encrypted", style="yellow")
+        error_console.print(
+            "the server is reachable from other machines, and its traffic is not encrypted", style="yellow"
+        )
 
 
 def tell_link(link: str, remark: str) -> None:

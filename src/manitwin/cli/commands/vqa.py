@@ -20,22 +20,22 @@ def vqa(
     ],
     out: Annotated[Path, options.output_folder("The folder to write; it must be new or empty.")],
     form: Annotated[
-        str, choices.VQA_FORMATS.option("--format", help="llava (LLaVA and ShareGPT), parquet, webdataset.")
+        str, choices.VQA_FORMATS.option("--format", help="Format: llava (LLaVA and ShareGPT), parquet or webdataset.")
     ] = "llava",
     per_scene: Annotated[
-        int, typer.Option(help="Questions a scene, at most.", callback=choices.count_of("--per-scene"))
+        int, typer.Option(help="Maximum number of questions per scene.", callback=choices.count_of("--per-scene"))
     ] = 80,
     points: Annotated[
         str,
         choices.POINT_CONVENTIONS.option(
-            "--points", help="How places are written: unit, robopoint, roborefer, pixel or thousand."
+            "--points", help="Coordinate convention of points: unit, robopoint, roborefer, pixel or thousand."
         ),
     ] = "unit",
     dataset: Annotated[
         Path | None,
         typer.Option(
             "--twins",
-            help="Where the scenes' twins are; default: where the scenes say.",
+            help="Data set of the twins; default: the one recorded in the scenes.",
             metavar="DATASET",
             callback=choices.must_exist("the data set that the scenes were sampled from"),
         ),
@@ -43,19 +43,19 @@ def vqa(
     validation_share: Annotated[
         float,
         typer.Option(
-            "--val", help="The share of scenes in the split val, which has wordings of its own.", min=0, max=1
+            "--val", help="Fraction of scenes in the val split, whose questions are worded differently.", min=0, max=1
         ),
     ] = 0.1,
-    seed: Annotated[int, typer.Option(help="Seed of everything random.", min=0, max=options.LARGEST_SEED)] = 7,
+    seed: Annotated[int, typer.Option(help="Random seed.", min=0, max=options.LARGEST_SEED)] = 7,
     vlm: Annotated[
         str,
         choices.PROPOSERS.option(
-            help="Who words the questions in other ways too: openai:MODEL@URL, anthropic:MODEL, replay:FILE, or none.",
+            help="Model that paraphrases the questions: openai:MODEL@URL, anthropic:MODEL, replay:FILE, or none.",
             metavar="SPEC",
         ),
     ] = "none",
 ) -> None:
-    """Write questions about drawn scenes whose answers are computed, with the evidence beside them."""
+    """Write questions about drawn scenes with computed answers and the evidence for each."""
     from manitwin.scenes.vqa.write import write_vqa
 
     done = write_vqa(

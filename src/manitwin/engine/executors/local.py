@@ -145,8 +145,8 @@ class LocalExecutor:
                 self._failed_pools += 1
                 if self._failed_pools >= FAILED_POOLS:
                     raise Unavailable(
-                        "the worker processes cannot be started, or end before they get a job;"
-                        " `manitwin doctor` looks for the cause, and more memory or fewer --jobs may help"
+                        "the worker processes cannot be started, or end before they get a job; `manitwin doctor`"
+                        " may find the cause, and more memory or fewer --jobs may help"
                     ) from error
                 RUN.warning("all worker processes of a pool have died: new ones are started")
                 self._pools = {needs: other for needs, other in self._pools.items() if other is not pool}
@@ -189,7 +189,7 @@ class LocalExecutor:
             return self._died(given.job, error)
         except CancelledError:
             if not given.late:
-                return Failure("died", "cut off as the run was stopped")
+                return Failure("died", "interrupted because the run was stopped")
             limit = self._settings.stage_timeout_s
             return Failure("timeout", f"took longer than run.stage_timeout_s = {limit:g} s")
         except BrokenProcessPool:
@@ -206,9 +206,9 @@ class LocalExecutor:
         said = f": {words.said}" if words.said else ""
         at = f"; it was at {words.calls}" if words.calls else ""
         limit = self._setup.memory_gb
-        memory = f"; it may take no more than run.memory_gb = {limit:g} GB" if limit and words.no_memory else ""
+        memory = f"; its limit is run.memory_gb = {limit:g} GB" if limit and words.no_memory else ""
         if error.exitcode == -signal.SIGKILL:
-            memory = "; it was killed from outside: where memory is short the system does so, then lower --jobs or run.memory_gb"
+            memory = "; it was killed from outside, probably by the system because memory ran out; lower --jobs or run.memory_gb"
         return Failure("died", f"the worker process died ({how}{said}){memory}{at}")
 
 

@@ -178,7 +178,7 @@ class RayExecutor:
         """Return what a job's end says whose worker or node died; None where it is to be done again, alone."""
         job, cause = running.job, actor.cause
         if actor.death == "unreachable":
-            return Failure("unavailable", f"its worker did not answer any more: {cause}")
+            return Failure("unavailable", f"its worker stopped answering: {cause}")
         if actor.death == "node":
             what = (type(job), getattr(job, "number", None), getattr(job, "stage", None))
             self._nodes_lost[what] += 1
@@ -210,14 +210,18 @@ def reachable(address: str) -> str:
         noted = Path(os.environ.get("RAY_TMPDIR", "/tmp")) / CURRENT_CLUSTER
         address = os.environ.get("RAY_ADDRESS") or (noted.read_text().strip() if noted.is_file() else "")
         if not address:
-            raise Unavailable("no Ray cluster on this machine; start one with `ray start --head`, or give its address")
+            raise Unavailable(
+                "no Ray cluster runs on this machine; start one with `ray start --head`, or give its address"
+            )
     host, _, port = address.rpartition(":")
     if "://" in address or not host or not port.isdigit():
         raise UsageError(f"{address}: not the address of a Ray cluster; give host:port, or auto on one of its nodes")
     try:
         socket.create_connection((host, int(port)), timeout=CONNECT_S).close()
     except OSError as error:
-        raise Unavailable(f"no Ray cluster answers at {address} ({error}); is its head running?") from error
+        raise Unavailable(
+            f"no Ray cluster answers at {address} ({error}); check that its head node is running"
+        ) from error
     return address
 
 
@@ -246,7 +250,7 @@ class Head:
         if self.silent_s > SILENCE_S:
             raise Unavailable(
                 f"the head of the Ray cluster is lost ({self._error} since {self.silent_s:.0f} s); "
-                "start the cluster again, then the same command: the run goes on where it stopped"
+                "restart the cluster, then rerun the same command to resume"
             )
 
     def total(self, resource: str) -> int:

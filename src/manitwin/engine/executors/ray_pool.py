@@ -235,7 +235,7 @@ class RayPool:
             self._stalled_since = now
         elif now - self._stalled_since > START_PATIENCE_S:
             self._stalled_since = None
-            why = f"no worker could be started on the Ray cluster in {START_PATIENCE_S:g} s; `ray status` says what is free"
+            why = f"no worker could be started on the Ray cluster in {START_PATIENCE_S:g} s; `ray status` shows what is free"
             ended: Ended = [(ticket, Failure("unavailable", why)) for ticket, _ in self._backlog]
             self._backlog.clear()
             return ended

@@ -30,7 +30,10 @@ class RayWorker:
         """Raises UsageError where the node has another manitwin than the driver: its results would be others."""
         here = installed_version()
         if here != wanted_version:
-            raise UsageError(f"this node has manitwin {here} and the driver {wanted_version}; install the same on all")
+            raise UsageError(
+                f"this node has manitwin {here}, but the driver has {wanted_version}; install the same"
+                f" version on all nodes"
+            )
         one_thread_each()
         limit_memory(setup.memory_gb)
         map_large_blocks()

@@ -52,7 +52,7 @@ def local_log(root: DatasetRoot) -> Path:
     ledger = local_ledger(root)
     log = ledger.with_name(RUN_LOG) if root.local is not None else ledger.with_suffix(".log")
     if log.is_symlink() or (log.exists() and not log.is_file()):
-        raise UsageError(f"{log}: is a link or no regular file, and runs write their log there; remove it")
+        raise UsageError(f"{log}: is a link or not a regular file, but runs write their log to it; remove it")
     return log
 
 

@@ -24,10 +24,10 @@ def _opened(path: Path, flags: int) -> TextIO:
     except OSError as error:
         if isinstance(error, FileNotFoundError):
             raise
-        raise UsageError(f"{path}: cannot be opened ({error.strerror}); remove it where it is a link") from error
+        raise UsageError(f"{path}: cannot be opened ({error.strerror}); if it is a link, remove it") from error
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
-        raise UsageError(f"{path}: is no regular file, and a ledger's lock is one; remove it")
+        raise UsageError(f"{path}: the lock of a ledger must be a regular file; remove it")
     return os.fdopen(descriptor, "r" if flags == os.O_RDONLY else "r+")
 
 
@@ -40,7 +40,7 @@ def hold_lock(ledger: Path) -> TextIO:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             lock.close()
-            raise UsageError(f"{ledger}: another run is writing it now; wait for its end, or stop it") from error
+            raise UsageError(f"{ledger}: another run is writing to it; wait until that run ends, or stop it") from error
         with suppress(FileNotFoundError):
             if os.path.samestat(path.stat(), os.fstat(lock.fileno())):
                 return lock

@@ -163,14 +163,14 @@ def read_story(connection: sqlite3.Connection, which: str) -> ItemStory:
         rows = connection.execute(f"SELECT {columns} FROM items WHERE {condition} LIMIT 6", (value,)).fetchall()
         if len(rows) > 1:
             near = "; ".join(f"{row['number']} {row['twin_id'] or ''} {told(json.loads(row['item']))}" for row in rows)
-            raise UsageError(f"{which}: several items are meant: {near}; give one's number or id")
+            raise UsageError(f"{which}: matches several items: {near}; give the number or id of one")
         if rows:
             row = rows[0]
             return ItemStory(
                 row["number"], json.loads(row["item"]), row["twin_id"], row["state"], row["reason"], row["detail"],
                 bool(row["indexed"]), stage_rows(connection, row["number"]),
             )  # fmt: skip
-    raise UsageError(f"{which}: no such item; give its number, its twin's id, or a part of its file's name")
+    raise UsageError(f"{which}: no such item; give an item number, a twin id, or part of a file name")
 
 
 def told(payload: Mapping[str, Any]) -> str:

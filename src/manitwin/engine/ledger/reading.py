@@ -24,7 +24,7 @@ def read_ledger(path: Path) -> Iterator[sqlite3.Connection]:
     watches a ledger opens it anew each time: a run that begins meanwhile is not seen through such a connection.
     """
     if not os.path.lexists(path):
-        raise UsageError(f"{path}: no ledger; `manitwin build INPUT... -o DATASET` makes one")
+        raise UsageError(f"{path}: no ledger found; `manitwin build INPUT... -o DATASET` creates one")
     require_regular(path)
     log = path.with_name(f"{path.name}-wal")
     at_rest = not is_written(path) and (not log.is_file() or log.stat().st_size == 0)

@@ -19,7 +19,7 @@ _OF_THE_DISK = frozenset(
 )
 """SQLite's codes for what is no fault of the file."""
 
-REMEDY = "manitwin check DATASET puts it aside, and the same build with its inputs then finds all finished twins again"
+REMEDY = "run manitwin check DATASET, which moves it aside, then rerun the build with its inputs: it finds the finished twins"
 
 
 class LedgerDamaged(UsageError):
@@ -30,7 +30,7 @@ def damaged(path: Path, cause: object) -> LedgerDamaged:
     """Return the one line about a ledger that cannot be read."""
     said = printable_line(str(cause), max_characters=120)
     remedy = REMEDY.replace("DATASET", str(path.parent))
-    return LedgerDamaged(f"{path}: no ledger that can be read ({said}); {remedy}")
+    return LedgerDamaged(f"{path}: not a readable ledger ({said}); {remedy}")
 
 
 @contextmanager
@@ -41,7 +41,7 @@ def sound(path: Path) -> Iterator[None]:
     except sqlite3.DatabaseError as error:
         code = getattr(error, "sqlite_errorcode", None)
         if code is not None and code & 0xFF in _OF_THE_DISK:
-            raise UsageError(f"{path}: {error}; mend the disk or its permissions, and try again") from error
+            raise UsageError(f"{path}: {error}; check the disk and its permissions, and try again") from error
         raise damaged(path, error) from error
     except (UnicodeDecodeError, sqlite3.InterfaceError) as error:
         raise damaged(path, error) from error
@@ -77,7 +77,7 @@ def check_tables(connection: sqlite3.Connection, path: Path) -> None:
         migrate(ours, ":memory:")
         for what, of in (("tables", _objects), ("columns", _columns)):
             if of(connection) != of(ours):
-                raise damaged(path, f"its {what} are not those of a ledger")
+                raise damaged(path, f"its {what} do not match those of a ledger")
 
 
 def _objects(connection: sqlite3.Connection) -> set[tuple[str, str]]:
