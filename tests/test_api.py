@@ -19,7 +19,7 @@ PANDA_FILE = Path(grippers.__file__).parent / "definitions" / "panda.toml"
     ("arguments", "message"),
     [
         ({"grippers": ["pandas"]}, "did you mean 'panda'"),
-        ({"grippers": ["panda", "hook.toml"]}, "hook.toml is not there"),
+        ({"grippers": ["panda", "hook.toml"]}, "hook.toml does not exist"),
         ({"grippers": ["panda", str(PANDA_FILE)]}, "grippers panda, panda: .*names must be unique; name panda once"),
         ({"quick": True, "require_agreement": True}, "--quick skips the second engine"),
         ({"grippers": ["panda", "suction"], "require_agreement": True}, "no second engine can try the gripper suction"),

@@ -153,7 +153,7 @@ def test_check_names_and_repairs(tmp_path: Path, manifest: Path) -> None:
     ledger = Ledger(tmp_path / "data" / "ledger.sqlite")
     ledger.close()
     said = manitwin("check", "data", "--dry-run", folder=tmp_path)
-    assert said.returncode == 4 and "no folder" in said.stderr
+    assert said.returncode == 4 and "its folder is missing" in said.stderr
     repaired = manitwin("check", "data", folder=tmp_path)
     assert repaired.returncode == 0 and "repaired" in repaired.stdout
     manitwin("build", "-o", "data", folder=tmp_path)

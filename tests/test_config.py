@@ -59,5 +59,5 @@ def test_empty_section_of_earlier_settings_is_read_over(tmp_path: Path) -> None:
 
 
 def test_missing_file_is_a_config_error(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="not there"):
+    with pytest.raises(ConfigError, match="not found"):
         load_config(tmp_path / "none.toml")

@@ -92,7 +92,7 @@ def test_gripper_is_loaded_by_name_and_by_file(tmp_path: Path) -> None:
 def test_gripper_that_is_not_there_is_a_usage_error(tmp_path: Path) -> None:
     with pytest.raises(manitwin.UsageError, match=r"pandas.*panda"):
         manitwin.load_gripper("pandas")
-    with pytest.raises(manitwin.UsageError, match=r"none\.toml is not there"):
+    with pytest.raises(manitwin.UsageError, match=r"none\.toml does not exist"):
         manitwin.load_gripper(tmp_path / "none.toml")
 
 
@@ -102,7 +102,7 @@ def test_index_is_made_of_the_twins_folders(twins: Path) -> None:
 
 
 def test_folder_without_twins_gets_no_index(tmp_path: Path) -> None:
-    with pytest.raises(manitwin.UsageError, match="no data set"):
+    with pytest.raises(manitwin.UsageError, match="not a data set"):
         manitwin.write_index(tmp_path)
     assert not list(tmp_path.iterdir())
 

@@ -194,11 +194,14 @@ def test_variant_by_its_file_and_the_lowest_by_the_folder(tmp_path: Path) -> Non
     ("data", "complaint"),
     [
         ("{", "JSON is broken"),
-        ("[1]", "holds a JSON list, not an object"),
+        ("[1]", "contains a JSON list, not an object"),
         ({"scale": [1, 2]}, "scale is neither"),
         ({"scale": "big"}, "scale is not made of numbers"),
         ('{"scale": [1e300, 1, 1]}', "scale holds a number"),
-        ('{"contact_points_pose": [[[NaN, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]]}', "no finite number"),
+        (
+            '{"contact_points_pose": [[[NaN, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]]}',
+            "not a finite number",
+        ),
         ({"contact_points_pose": [[1, 2, 3]]}, "no list of 4x4 matrices"),
         ({"contact_points_pose": [[[1]], [[1, 2]]]}, "not made of numbers"),
         ({"contact_points_group": [3]}, "no list of lists"),

@@ -24,10 +24,10 @@ def one_line(text: str) -> str:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("build", "nothing_here.png", "-o", "OUT"), "nothing_here.png: not there"),
+        (("build", "nothing_here.png", "-o", "OUT"), "nothing_here.png: not found"),
         (
             ("build", "a red mug", "-o", "OUT"),
-            "a red mug: not there; give an image, a mesh, a folder, or a .csv or .jsonl",
+            "a red mug: not found; give an image, a mesh, a folder, or a .csv or .jsonl",
         ),
         (("build", "a red mug", "-o", "OUT"), "put the description of an object behind --text"),
         (("build", "FILE"), "give the folder or URL to write twins into with -o"),
@@ -38,9 +38,9 @@ def one_line(text: str) -> str:
         (("build", "FILE", "-o", "OUT", "--nonsense"), "--nonsense"),
         (("build", "FILE", "-o", "OUT", "--quick", "--require-agreement"), "--quick skips the second engine"),
         (("build", "FILE", "-o", "OUT", "--gripper", "panda", "--gripper", "panda"), "name each only once"),
-        (("show", "OUT"), "not there; give a folder that manitwin build made"),
-        (("build", "https://example.org/mug.png", "-o", "OUT"), "a URL, and nothing is downloaded: download it"),
-        (("layout", "OUT", "-o", "OUT"), "not there; give a data set"),
+        (("show", "OUT"), "not found; give a folder that manitwin build made"),
+        (("build", "https://example.org/mug.png", "-o", "OUT"), "a URL; URLs are not downloaded: download the file"),
+        (("layout", "OUT", "-o", "OUT"), "not found; give a data set"),
         (("layout", "FILE", "-o", "OUT", "--objects", "few"), "give LOW..HIGH"),
         (("trajectories", "FILE", "-o", "OUT", "-n", "0"), "-n is 0; give 1 or more"),
         (("build", "--text", "a hamer", "-o", "OUT"), "--text: no template makes 'a hamer'; did you mean hammer"),

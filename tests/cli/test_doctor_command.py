@@ -102,7 +102,7 @@ def test_built_in_backends_have_nothing_to_ask(capsys: pytest.CaptureFixture[str
     [
         ("grasper", {"grasper": "graspgun@tcp://h:1"}, "unknown grasper"),
         (None, {"vlm": "openai:x"}, "takes no options"),
-        ("vlm", {"config": Path("none.toml")}, "not there"),
+        ("vlm", {"config": Path("none.toml")}, "not found"),
     ],
 )
 def test_wrong_use_is_said(what: str | None, options: dict[str, Any], message: str) -> None:

@@ -228,4 +228,4 @@ def test_an_option_of_several_values_and_a_flag_may_be_given_again(tmp_path: Pat
         "wsg50_110",
     ]
     result = CliRunner().invoke(app, words)
-    assert "times" not in str(result.exception) and "not there" in str(result.exception)
+    assert "times" not in str(result.exception) and "not found" in str(result.exception)

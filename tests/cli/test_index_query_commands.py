@@ -92,7 +92,7 @@ def test_index_leaves_out_what_cannot_be_read_and_says_so(tmp_path: Path) -> Non
 
 def test_index_of_no_data_set_is_a_usage_error(tmp_path: Path) -> None:
     error = run("index", tmp_path).exception
-    assert isinstance(error, UsageError) and "no data set" in str(error)
+    assert isinstance(error, UsageError) and "not a data set" in str(error)
     assert not (tmp_path / "index").exists()
 
 

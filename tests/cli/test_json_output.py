@@ -142,7 +142,7 @@ def test_layout_and_trajectories_tell_numbers(data: Path, tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("arguments", "kind", "message"),
     [
-        (("build", "nothing_here.png", "-o", "out"), "UsageError", "nothing_here.png: not there"),
+        (("build", "nothing_here.png", "-o", "out"), "UsageError", "nothing_here.png: not found"),
         (("build", "--nonsense"), "NoSuchOption", "--nonsense"),
         (("build", "--text", "a mug", "-v", "--nonsense"), "NoSuchOption", "--nonsense"),
         (("show", "nowhere"), None, "nowhere"),

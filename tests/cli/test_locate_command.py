@@ -159,9 +159,9 @@ def test_another_twin_is_refused_with_status_3(files: Files) -> None:
         ((), "--depth, --camera: missing"),
         (("--depth", "depth.png"), "--camera: missing"),
         (("--depth", "depth.png", "--cloud", "camera.json"), "cannot be combined with"),
-        (("--cloud", "camera.json"), "is no cloud"),
+        (("--cloud", "camera.json"), "is not a point cloud"),
         (("--cloud", "camera.json", "--base", "camera.json"), "--base: a point cloud of the object alone"),
-        (("--depth", "depth.png", "--camera", "camera.json", "--base", "camera.json"), "says no pose of a camera"),
+        (("--depth", "depth.png", "--camera", "camera.json", "--base", "camera.json"), "contains no camera pose"),
     ],
 )
 def test_what_cannot_be_asked_is_refused(files: Files, given: tuple[str, ...], said: str) -> None:

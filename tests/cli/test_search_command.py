@@ -51,9 +51,9 @@ def test_words_and_a_picture_find_twins(dataset: Path, tmp_path: Path, monkeypat
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        ((), "one of them"),
-        (("mug", "--image", "IMAGE"), "one of them"),
-        (("--image", "IMAGE", "--embedder", "openai:x"), "for words"),
+        ((), "give either a description"),
+        (("mug", "--image", "IMAGE"), "give either a description"),
+        (("--image", "IMAGE", "--embedder", "openai:x"), "applies to words only"),
     ],
 )
 def test_what_cannot_be_asked_is_refused(dataset: Path, tmp_path: Path, more: tuple[str, ...], said: str) -> None:

@@ -111,7 +111,7 @@ def test_results_of_an_item_at_work_may_not_be_removed(place: Path) -> None:
         ledger.execute("UPDATE items SET state = 'waiting' WHERE number = ?", (number,))
     ledger.close()
     shutil.rmtree(place / ".work")
-    assert any(f"item {number}, stage " in each and "its result is not there" in each for each in found(place))
+    assert any(f"item {number}, stage " in each and "its result is missing" in each for each in found(place))
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
@@ -160,7 +160,7 @@ def test_twin_without_sizes_is_looked_at_by_its_files_own_ends(tmp_path: Path, f
     assert list(damaged_twins(root)) == []
     cut(tmp_path / root.twin_name(identity) / file)
     (said,) = damaged_twins(root)
-    assert f"{file} is cut off" in said
+    assert f"{file} is truncated" in said
 
 
 def test_amended_twin_is_whole(tmp_path: Path) -> None:

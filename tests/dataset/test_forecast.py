@@ -78,7 +78,7 @@ def test_what_is_not_known_is_none_and_too_few_inputs_are_refused(tmp_path: Path
     for number in range(4):
         write_accepted(root, number)
     rebuild(DatasetRoot(root), jobs=1)
-    with pytest.raises(UsageError, match="4 inputs were built, 5 at least"):
+    with pytest.raises(UsageError, match="4 inputs were built, but an estimate needs at least 5"):
         forecast(DatasetRoot(root), 10, 1)
     write_accepted(root, 4)
     rebuild(DatasetRoot(root), jobs=1)
@@ -95,7 +95,7 @@ def test_stages_of_a_twin_that_the_index_has_not_are_one_line(tmp_path: Path) ->
     table = pq.read_table(file)
     strangers = pa.array(["f" * 16] * len(table), table.schema.field("twin_id").type)
     pq.write_table(table.set_column(table.schema.get_field_index("twin_id"), "twin_id", strangers), file)
-    with pytest.raises(UsageError, match="no twin and no rejection"):
+    with pytest.raises(UsageError, match="neither a twin nor a rejection"):
         forecast(DatasetRoot(root), 10, 1)
 
 

@@ -206,7 +206,7 @@ def test_a_lost_folder_is_found_missing_and_made_again_from_its_stages(tmp_path:
     shutil.rmtree(tmp_path / "d" / twin_name(run.ended[0].task.item_id))
     ledger = Ledger(tmp_path / "d" / "ledger.sqlite")
     found = list(disagreements(ledger, run.root, True))
-    assert len(found) == 1 and "no folder" in found[0].what
+    assert len(found) == 1 and "its folder is missing" in found[0].what
     for each in found:
         assert each.repair is not None
         each.repair()
@@ -224,7 +224,7 @@ def test_a_result_that_is_not_there_is_done_again(tmp_path: Path, recipe: Rehear
     next((tmp_path / "d" / ".work" / run.ended[0].task.item_id / "b").glob("*/result.json")).write_text("{ half")
     ledger = Ledger(tmp_path / "d" / "ledger.sqlite")
     assert [f.what for f in disagreements(ledger, run.root, True)] == [
-        "item 1, stage b: done in the ledger, and its result is not there"
+        "item 1, stage b: done in the ledger, but its result is missing"
     ]
     ledger.close()
 

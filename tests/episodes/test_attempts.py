@@ -77,7 +77,7 @@ def test_end_of_a_run_tells_of_grasps_that_are_of_another_gripper(tmp_path: Path
         batch / ATTEMPTS, [attempt(1, outcome="dropped", transferred=True), attempt(2, outcome="dropped")]
     )
     told = collect(tmp_path, []).lines
-    said = "1 of 2 executed took grasps that were verified for other jaws, not for the robot's gripper"
+    said = "1 of 2 executed episodes used grasps that were verified for other jaws, not for the robot's gripper"
     assert said in told and "manitwin build --gripper" in told[told.index(said) + 1]
     table.write_attempts(batch / ATTEMPTS, [attempt(1, outcome="dropped"), attempt(2, outcome="dropped")])
     assert not any("other jaws" in line for line in collect(tmp_path, []).lines)

@@ -155,7 +155,7 @@ def test_film_that_ends_too_soon_is_refused_where_it_ends(tmp_path: Path) -> Non
     with pytest.raises(EpisodesError, match=r"a\.mp4: "), Film(path) as film:
         film.picture(0)
     path.write_bytes(content[: index + 50])
-    with pytest.raises(EpisodesError, match=r"a\.mp4: no video that can be read"):
+    with pytest.raises(EpisodesError, match=r"a\.mp4: not a readable video"):
         Film(path)
 
 

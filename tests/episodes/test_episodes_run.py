@@ -143,7 +143,7 @@ def test_what_became_of_twins_without_a_grasp_is_told_at_the_end(bricks: Path, t
     out = tmp_path / "episodes"
     make_episodes(scenes, out, 1, TrajectoriesConfig(seed=5, robot="ur5_suction"), executor="inline")
     told = "\n".join(collect(out, ["maniskill"]).lines)
-    assert "not kept: 1 no_grasp\nwhy no_grasp: no verified grasp for the robot's hand have " in told
+    assert "not kept: 1 no_grasp\nwhy no_grasp: there is no verified grasp for the robot's hand for " in told
     assert "manitwin build --gripper" in told
 
 
@@ -196,7 +196,7 @@ def test_episodes_made_in_steps_are_those_made_in_one_go(bricks: Path, episodes:
         report = make_episodes(bricks, tmp_path, count, CONFIG, executor="inline")
         totals.append(collect(tmp_path, ["lerobot"]).totals.attempted)
     assert totals == [2, 4, 6]
-    assert report.remarks == ["4 of 6 episodes were there already"]
+    assert report.remarks == ["4 of 6 episodes existed already"]
     in_steps, in_one_go = (
         {(each.seed, each.twin_id, each.grasp_id, each.length_s) for each in read_attempts(out / ATTEMPTS)}
         for out in (tmp_path, episodes)
@@ -210,7 +210,7 @@ def test_episodes_made_in_steps_are_those_made_in_one_go(bricks: Path, episodes:
         bricks, tmp_path, 3, CONFIG, executor="inline", on_start=lambda items, todo: opened.append(todo)
     )
     assert opened == [0]
-    assert fewer.remarks == ["6 episodes are there already, more than the 3 asked for; none was added"]
+    assert fewer.remarks == ["6 episodes exist already, more than the requested 3; none was added"]
     with pytest.raises(UsageError, match=r"made with other settings \(seed: 5 there, 6 now\).*another folder"):
         make_episodes(bricks, tmp_path, 6, CONFIG.model_copy(update={"seed": 6}), executor="inline")
 
@@ -239,7 +239,7 @@ def test_episodes_that_another_version_made_stay_and_the_run_says_so(
     after = {folder.name: (folder / "batch.json").read_bytes() for folder in batch_folders(tmp_path)}
     assert {name: after[name] for name in before} == before
     assert any("were made by another version" in said and "new folder" in said for said in report.remarks)
-    assert f"3 of {count} episodes were there already" in report.remarks
+    assert f"3 of {count} episodes existed already" in report.remarks
 
 
 def test_a_batch_of_a_newer_version_is_refused(episodes: Path, tmp_path: Path) -> None:

@@ -179,7 +179,7 @@ def test_two_robots_of_one_name_are_refused_and_the_old_file_stays(tmp_path: Pat
     write_episodes(tmp_path / "b.h5", [episode(1, of=replace(robot(), sha256="1" * 64))])
     merge_episodes([tmp_path / "a.h5"], tmp_path / "m")
     before = (tmp_path / "m" / TRAJECTORIES).read_bytes()
-    with pytest.raises(EpisodesError, match="'panda' is not the one"):
+    with pytest.raises(EpisodesError, match="'panda' differs from the robot of this name"):
         merge_episodes([tmp_path / "a.h5", tmp_path / "b.h5"], tmp_path / "m")
     assert (tmp_path / "m" / TRAJECTORIES).read_bytes() == before
     assert sorted(p.name for p in (tmp_path / "m").iterdir()) == [TRAJECTORIES, METADATA]
@@ -214,7 +214,7 @@ def test_recordings_that_do_not_fit_together_are_refused(tmp_path: Path, change:
 
 def test_files_of_others_are_told_apart(tmp_path: Path) -> None:
     (tmp_path / "text.h5").write_text("no HDF5")
-    with pytest.raises(EpisodesError, match="no HDF5 file that can be read"):
+    with pytest.raises(EpisodesError, match="not a readable HDF5 file"):
         EpisodeFile(tmp_path / "text.h5")
     with pytest.raises(EpisodesError, match=r"no HDF5 file|cannot be opened"):
         EpisodeFile(tmp_path / "missing.h5")
@@ -225,5 +225,8 @@ def test_files_of_others_are_told_apart(tmp_path: Path) -> None:
         EpisodeFile(tmp_path / "a.h5")
     with h5py.File(tmp_path / "b.h5", "w") as file:
         file.create_dataset("traj_0/actions", data=np.zeros((3, 8)))
-    with EpisodeFile(tmp_path / "b.h5") as foreign, pytest.raises(EpisodesError, match="this package did not write it"):
+    with (
+        EpisodeFile(tmp_path / "b.h5") as foreign,
+        pytest.raises(EpisodesError, match="it was not written by this package"),
+    ):
         foreign[0]

@@ -255,7 +255,7 @@ def test_a_set_needs_episodes_of_one_robot_with_instructions(tmp_path: Path) -> 
     mute = replace(mute, attempt=replace(mute.attempt, instructions=()))
     for given, said in (
         ([], "no episode"),
-        ([episode(0), episode(1, of=robot(6, "ur5"))], "one set a robot"),
+        ([episode(0), episode(1, of=robot(6, "ur5"))], "write one set per robot"),
         ([episode(0), mute], "no instruction"),
     ):
         with pytest.raises(EpisodesError, match=said):

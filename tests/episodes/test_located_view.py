@@ -40,7 +40,7 @@ def test_grasps_in_reach_come_first_and_of_a_far_thing_none_is_reached(seen: Bri
 
 
 def test_an_arm_that_has_no_jaws_is_refused(seen: BrickView) -> None:
-    with pytest.raises(UsageError, match="grasps that are carried over want a hand of two jaws"):
+    with pytest.raises(UsageError, match="grasps that are carried over need a two-jaw gripper"):
         place_of(seen, 0.5, robot="ur5_suction")
 
 

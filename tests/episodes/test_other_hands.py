@@ -140,12 +140,12 @@ def test_a_hand_that_closes_above_the_brick_or_not_at_all_lifts_nothing(off: dic
 def test_what_wants_jaws_is_refused_in_one_line() -> None:
     robot = load_robot("ur5_suction")
     for name in ("pour", "push"):
-        with pytest.raises(UsageError, match=rf"^skill {name} wants .*give one of panda, .* pick_place, place_on"):
+        with pytest.raises(UsageError, match=rf"^skill {name} needs .*give one of panda, .* pick_place, place_on"):
             check_hand(robot, load_skill(name))
     check_hand(robot, load_skill("place_in"))
     check_hand(robot, None)
     check_hand(load_robot("panda"), load_skill("pour"))
     with pytest.raises(
-        UsageError, match=r"^grasps that are carried over want a hand of two jaws, xarm7_allegro has allegro"
+        UsageError, match=r"^grasps that are carried over need a two-jaw gripper, but xarm7_allegro has allegro"
     ):
         check_jaws(load_robot("xarm7_allegro"), "grasps that are carried over")

@@ -81,7 +81,7 @@ def test_grasps_of_the_same_file_are_the_gripper_s_own(twins: tuple[Path, str], 
 def test_grasps_of_another_file_of_its_name_are_refused(twins: tuple[Path, str], tmp_path: Path) -> None:
     root, identity = twins
     changed = own_jaws(tmp_path / "arm", friction=0.6)
-    with pytest.raises(UsageError, match=f"twin {identity} has grasps of a gripper {NAME} whose file is another"):
+    with pytest.raises(UsageError, match=f"twin {identity} has grasps of a gripper {NAME} whose file differs"):
         usable_grasps(Twin(root / twin_name(identity)), changed)
 
 
@@ -91,9 +91,7 @@ def test_runs_refuse_them_before_they_begin(twins: tuple[Path, str], tmp_path: P
     assert make_layouts(root, tmp_path / "scenes", 1, layouts, executor="inline").counts["accepted"] == 1
     own_jaws(tmp_path / "arm", friction=0.6)
     robot = arm(tmp_path)
-    refused = (
-        f"twin {identity} has grasps of a gripper {NAME} whose file is another than that of the {NAME} of own; build"
-    )
+    refused = f"twin {identity} has grasps of a gripper {NAME} whose file differs from that of the {NAME} of own; build"
     for place in (root, tmp_path / "scenes"):
         with pytest.raises(UsageError, match=refused):
             make_episodes(place, tmp_path / "out", 1, TrajectoriesConfig(robot=robot), executor="inline")

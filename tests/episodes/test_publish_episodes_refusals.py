@@ -41,7 +41,9 @@ def test_episodes_of_a_rehearsals_twin_stay_unless_they_are_asked_for(run: Path,
         and f"{with_the_bowl} left out: made with a rehearsal server" in done.output
     )
     assert BOWL not in "".join(path.read_text() for path in (tmp_path / "out").glob("*.md"))
-    with pytest.raises(UsageError, match=r"no kept episode may go out: 3 are rehearsals.*--with-rehearsals"):
+    with pytest.raises(
+        UsageError, match=r"no kept episode can be published: 3 were made with a rehearsal server.*--with-rehearsals"
+    ):
         publish_episodes(run, tmp_path / "none", twins=place, license_allow=["CC0-1.0", "CC-BY-4.0"])
     asked = publish_episodes(
         run, tmp_path / "all", twins=place, license_allow=["CC0-1.0", "CC-BY-4.0"], with_rehearsals=True
@@ -51,7 +53,7 @@ def test_episodes_of_a_rehearsals_twin_stay_unless_they_are_asked_for(run: Path,
 
 def test_what_cannot_be_published_leaves_nothing(run: Path, twins: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    with pytest.raises(UsageError, match=r"no kept episode may go out; .*CC-BY-4.0 \+ CC-BY-NC-4.0 \(2\)"):
+    with pytest.raises(UsageError, match=r"no kept episode can be published; .*CC-BY-4.0 \+ CC-BY-NC-4.0 \(2\)"):
         publish_episodes(run, out, license_allow=["MIT"])
     with pytest.raises(UsageError, match=r"no such folder.*--twins"):
         publish_episodes(run, out, twins=tmp_path / "elsewhere")
@@ -74,7 +76,7 @@ def test_words_that_name_somebodys_folder_stop_it(twins: Path, tmp_path: Path) -
 
 def test_folder_with_anything_else_is_refused(run: Path, tmp_path: Path) -> None:
     (tmp_path / "thesis.txt").write_text("")
-    with pytest.raises(UsageError, match="no publication of episodes"):
+    with pytest.raises(UsageError, match="not a publication of episodes"):
         publish_episodes(run, tmp_path, license_allow=["CC0-1.0", "CC-BY-4.0"])
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
 
@@ -155,5 +157,5 @@ def test_record_of_pictures_with_frames_that_no_film_has_is_refused(
             list(said["first_frames"].items())[1:]
         )
         record.write_text(json.dumps(said))
-    with pytest.raises(EpisodesError, match="frames, which are not those recorded"):
+    with pytest.raises(EpisodesError, match="frames, but another number was recorded"):
         publish_episodes(place, tmp_path / "out", twins=twins, license_allow=["CC0-1.0"])

@@ -15,20 +15,20 @@ from manitwin.formats.bounded_file import open_regular, read_bytes, read_text
 def test_whole_file_is_read_up_to_the_limit_itself(tmp_path: Path) -> None:
     (tmp_path / "a").write_bytes(b"12345")
     assert read_bytes(tmp_path / "a", 5, AssetError) == b"12345"
-    with pytest.raises(AssetError, match=r"^a: 5 bytes are more than the limit of 4; give a smaller file$"):
+    with pytest.raises(AssetError, match=r"^a: 5 bytes exceed the limit of 4; give a smaller file$"):
         read_bytes(tmp_path / "a", 4, AssetError)
 
 
 def test_sparse_file_is_refused_by_its_size_before_it_is_read(tmp_path: Path) -> None:
     with (tmp_path / "a").open("wb") as stream:
         stream.truncate(1 << 42)
-    with pytest.raises(AssetError, match=f"a: {1 << 42} bytes are more than"):
+    with pytest.raises(AssetError, match=f"a: {1 << 42} bytes exceed"):
         read_bytes(tmp_path / "a", 1 << 20, AssetError)
 
 
 def test_file_that_says_it_is_empty_is_read_no_further_than_the_limit() -> None:
     assert read_bytes(Path("/proc/self/stat"), 1 << 16, AssetError)
-    with pytest.raises(AssetError, match=r"stat: 11 bytes are more than the limit of 10"):
+    with pytest.raises(AssetError, match=r"stat: 11 bytes exceed the limit of 10"):
         read_bytes(Path("/proc/self/stat"), 10, AssetError)
 
 
@@ -52,10 +52,10 @@ def make_link_to_pipe(path: Path) -> None:
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (make_pipe, "thing: is a named pipe, and only regular files are read; give a file"),
-        (make_link_to_pipe, "thing: is a named pipe, and only regular files are read; give a file"),
-        (make_folder, "thing: is a folder, and only regular files are read; give a file"),
-        (make_link_to_device, "thing: is a device, and only regular files are read; give a file"),
+        (make_pipe, "thing: is a named pipe, but only regular files are read; give a file"),
+        (make_link_to_pipe, "thing: is a named pipe, but only regular files are read; give a file"),
+        (make_folder, "thing: is a folder, but only regular files are read; give a file"),
+        (make_link_to_device, "thing: is a device, but only regular files are read; give a file"),
         (lambda path: path.symlink_to(path.name), "thing: cannot be opened (Too many levels of symbolic links); "),
         (lambda path: None, "thing: cannot be opened (No such file or directory); check the path"),
     ],
@@ -92,7 +92,7 @@ def test_link_is_followed_inside_its_folder_only(tmp_path: Path) -> None:
     inside = tmp_path / "in"
     assert read_text(inside / "deep" / "good", 100, AssetError, inside=inside) == "here"
     for way in ("deep/bad", "up/secret", "../secret", str(tmp_path / "secret")):
-        with pytest.raises(AssetError, match="leads out of its folder"):
+        with pytest.raises(AssetError, match="leads outside its folder"):
             read_text(inside / way, 100, AssetError, inside=inside)
 
 
@@ -136,5 +136,5 @@ def test_memory_is_asked_for_by_the_size_of_a_file_and_not_by_the_limit(tmp_path
 
 def test_a_file_that_says_it_is_empty_is_read_to_its_end_or_the_limit() -> None:
     assert len(read_bytes(Path("/proc/self/maps"), 1 << 24, UsageError)) > 0
-    with pytest.raises(UsageError, match="more than the limit of 10"):
+    with pytest.raises(UsageError, match="exceed the limit of 10"):
         read_bytes(Path("/proc/self/maps"), 10, UsageError)

@@ -77,7 +77,7 @@ def test_a_sparse_picture_is_refused_by_its_size(tmp_path: Path) -> None:
     (tmp_path / "a.png").write_bytes(png(64, 64))
     os.truncate(tmp_path / "a.png", 6 << 30)
     for read in (read_image, check_header):
-        with pytest.raises(InputError, match=r"^too_large: a\.png: 6442450944 bytes are more than the limit"):
+        with pytest.raises(InputError, match=r"^too_large: a\.png: 6442450944 bytes exceed the limit"):
             read(tmp_path / "a.png")
 
 
@@ -99,7 +99,7 @@ def test_what_passes_the_processs_memory_is_too_large_in_one_line(tmp_path: Path
     )
     said = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True)
     assert (said.returncode, said.stderr) == (0, "")
-    assert said.stdout == "too_large: a.png: it asks for more memory than there is; scale it down first\n"
+    assert said.stdout == "too_large: a.png: it needs more memory than is available; scale the picture down first\n"
 
 
 def test_pictures_of_a_file_are_counted_without_decoding_them(tmp_path: Path) -> None:

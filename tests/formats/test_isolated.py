@@ -39,7 +39,7 @@ def test_results_and_errors_come_back_from_another_process(tmp_path: Path) -> No
 
 def test_a_crash_ends_the_worker_and_not_this_process() -> None:
     before = run_isolated("os:getpid")
-    with pytest.raises(ProcessCrashed, match="os:abort has ended its process"):
+    with pytest.raises(ProcessCrashed, match="os:abort has crashed its process"):
         run_isolated("os:abort")
     assert run_isolated("os:getpid") != before
 
@@ -156,7 +156,7 @@ def test_where_no_process_can_be_started_it_is_one_line(monkeypatch: pytest.Monk
         raise BlockingIOError(11, "Resource temporarily unavailable")
 
     monkeypatch.setattr("manitwin.formats.isolated.subprocess.Popen", refused)
-    with pytest.raises(Unavailable, match=r"does not start .Resource temporarily unavailable.; look at the limits"):
+    with pytest.raises(Unavailable, match=r"does not start .Resource temporarily unavailable.; check the limits"):
         run_isolated("os:getpid")
 
 

@@ -18,7 +18,7 @@ def test_numbers_are_read_as_they_were_written(most: int) -> None:
 
 @pytest.mark.parametrize("content", [b"", b"no picture", b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff\xe0" + bytes(40)])
 def test_what_is_no_png_is_one_line_without_an_address(content: bytes) -> None:
-    with pytest.raises(UsageError, match=r"ids\.png: is no PNG that can be read") as caught:
+    with pytest.raises(UsageError, match=r"ids\.png: is not a readable PNG") as caught:
         parse_label_picture(content, "ids.png", UsageError, remedy="draw it again")
     assert "0x" not in str(caught.value) and "\n" not in str(caught.value)
 

@@ -90,7 +90,7 @@ def test_file_that_is_none_is_refused(tmp_path: Path) -> None:
     assert "device" in refused(tmp_path / "zero.parquet")
     (tmp_path / "inside").mkdir()
     (tmp_path / "inside/link.parquet").symlink_to(written(tmp_path / "outside.parquet"))
-    assert "leads out of its folder" in refused(tmp_path / "inside/link.parquet", inside=tmp_path / "inside")
+    assert "leads outside its folder" in refused(tmp_path / "inside/link.parquet", inside=tmp_path / "inside")
     refused(tmp_path / "not_there.parquet")
 
 
@@ -129,7 +129,7 @@ def test_list_that_repeats_is_measured_by_its_pages(tmp_path: Path) -> None:
 
 
 def test_more_rows_than_the_limit_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(TwinError, match="3 rows are more than the limit of 2"):
+    with pytest.raises(TwinError, match="3 rows exceed the limit of 2"):
         check_parquet(written(tmp_path / "a.parquet"), TwinError, remedy=REMEDY, max_rows=2)
 
 

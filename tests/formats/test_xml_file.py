@@ -67,7 +67,7 @@ def test_other_roots_broken_and_large_files_are_refused_as_the_reader_s_error(
     with pytest.raises(AssetError, match=r"its XML is <sdf>, not <robot>"):
         read_xml(path, "robot")
     monkeypatch.setattr(xml_file, "MAX_XML_BYTES", 3)
-    with pytest.raises(AssetError, match=r"thing\.urdf: 6 bytes are more than the limit of 3"):
+    with pytest.raises(AssetError, match=r"thing\.urdf: 6 bytes exceed the limit of 3"):
         read_xml(path, "sdf")
 
 

@@ -64,8 +64,8 @@ def test_avif_is_an_input_and_heic_is_named_with_the_remedy(tmp_path: Path) -> N
     assert names(tmp_path, listing.inputs) == ["photo.avif"]
     assert listing.left[tmp_path / "photo.heic"] == "HEIC is not read; convert it to PNG or JPEG"
     assert listing.left[tmp_path / "renamed_without_suffix"] == listing.left[tmp_path / "photo.heic"]
-    assert listing.left[tmp_path / "notes.txt"] == "no image or mesh"
-    assert f"{tmp_path}: left alone: notes.txt: no image or mesh" in listing.remarks()
+    assert listing.left[tmp_path / "notes.txt"] == "not an image or a mesh"
+    assert f"{tmp_path}: left alone: notes.txt: not an image or a mesh" in listing.remarks()
 
 
 def test_an_image_under_another_name_is_an_input_as_it_is_alone(tmp_path: Path) -> None:
@@ -219,8 +219,11 @@ def run_isolated_anew() -> None:
 @pytest.mark.parametrize(
     ("body", "why"),
     [
-        ("import os; path.name == 'bad.obj' and os.abort()", "longer than 1 s, or ends the process"),
-        ("import re; path.name == 'bad.obj' and re.match('(a+)+b', 'a' * 64)", "longer than 1 s, or ends the process"),
+        ("import os; path.name == 'bad.obj' and os.abort()", "longer than 1 s, or crashes the process"),
+        (
+            "import re; path.name == 'bad.obj' and re.match('(a+)+b', 'a' * 64)",
+            "longer than 1 s, or crashes the process",
+        ),
         ("path.name == 'bad.obj' and bytearray(1 << 40)", "more than 1 GiB of memory"),
         ("import time; path.name == 'bad.obj' and time.sleep(1e6)", "longer than 1 s"),
     ],
@@ -239,7 +242,7 @@ def test_long_lists_are_counted_by_reason_and_kept_whole(tmp_path: Path) -> None
     listing = listed(tmp_path)
     lines = listing.remarks()
     assert lines[0].endswith("202 files: 1 input (1 image), 201 left alone")
-    assert f"{tmp_path}: left alone: 200 files (000.txt, 001.txt, 002.txt, ...): no image or mesh" in lines
+    assert f"{tmp_path}: left alone: 200 files (000.txt, 001.txt, 002.txt, ...): not an image or a mesh" in lines
     assert any("scan.blend: this mesh format is not read; export it" in line for line in lines)
     assert len(lines) == 3 and len(listing.left) == 201
 

@@ -112,7 +112,7 @@ def test_columns_that_nobody_knows_are_an_error_where_it_is_asked_for(folder: Pa
     [
         ("fil,name\ncup.glb,cup\n", "did you mean 'file'"),
         ("file,units\ncup.glb,inch\n", "Valid: auto, cm, m, mm, none"),
-        ("file\nnot_there.glb\n", "not_there.glb is not there"),
+        ("file\nnot_there.glb\n", "not_there.glb is not found"),
         ("file,text\ncup.glb,a cup\n", "either 'file' or 'text'"),
         ("name\ncup\n", "either 'file' or 'text'"),
         ("file\n", "no rows"),
@@ -120,7 +120,7 @@ def test_columns_that_nobody_knows_are_an_error_where_it_is_asked_for(folder: Pa
         ("file;name\ncup.glb;cup\n", "list.csv:1: its columns are separated by semicolons"),
         ("file\tname\ncup.glb\tcup\n", "list.csv:1: its columns are separated by tabs"),
         ("cup.glb,cup\nphoto.jpg,cup\n", "the first line must name the columns; unknown: 'cup'"),
-        ("file\nhttps://example.org/cup.glb\n", "is a URL, and nothing is downloaded"),
+        ("file\nhttps://example.org/cup.glb\n", "is a URL; URLs are not downloaded"),
     ],
 )
 def test_bad_manifest_is_one_clear_error(folder: Path, content: str, message: str) -> None:
@@ -151,9 +151,9 @@ def test_manifest_that_is_no_text_is_told(folder: Path) -> None:
 
 
 def test_path_that_is_not_there_is_a_usage_error(folder: Path) -> None:
-    with pytest.raises(UsageError, match="not there"):
+    with pytest.raises(UsageError, match="not found"):
         collect_items([folder / "nothing.png"])
-    with pytest.raises(UsageError, match="a URL, and nothing is downloaded"):
+    with pytest.raises(UsageError, match="a URL; URLs are not downloaded"):
         collect_items([Path("https://example.org/mug.png")])
 
 

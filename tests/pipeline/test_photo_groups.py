@@ -96,8 +96,8 @@ def test_views_make_one_item_of_photos_and_of_nothing_else(photos: Path) -> None
     (item,) = iterate_items([front, side, back], {}, Notes(), views=True, turns_deg=[0, 90, 180])
     assert item.turns_deg == (0.0, 90.0, 180.0) and len(item.files) == 3
     for inputs, texts, turns, told in (
-        ([photos / "things.csv"], [], None, "name the photos"),
-        ([], [], None, "no photo; name the photos"),
+        ([photos / "things.csv"], [], None, "give the photos"),
+        ([], [], None, "no photo; give the photos"),
         ([front, side], ["a mug"], None, "a text"),
         ([front, side], [], [0.0], "2 photos and the turns 0"),
     ):

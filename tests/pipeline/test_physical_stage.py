@@ -322,9 +322,9 @@ def test_an_inertia_far_from_the_shape_is_a_finding(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("fields", "cause"),
     [
-        ({"inertia_kg_m2": np.diag([1e-4, 1e-4, 3e-4]).tolist()}, "that of no body"),
-        ({"inertia_kg_m2": np.diag([-1e-4, 1e-4, 1e-4]).tolist()}, "that of no body"),
-        ({"inertia_kg_m2": [[1e-4, 5e-5, 0], [0, 1e-4, 0], [0, 0, 1e-4]]}, "that of no body"),
+        ({"inertia_kg_m2": np.diag([1e-4, 1e-4, 3e-4]).tolist()}, "physically impossible"),
+        ({"inertia_kg_m2": np.diag([-1e-4, 1e-4, 1e-4]).tolist()}, "physically impossible"),
+        ({"inertia_kg_m2": [[1e-4, 5e-5, 0], [0, 1e-4, 0], [0, 0, 1e-4]]}, "physically impossible"),
         ({"center_of_mass_m": [0.0, 0.05, 0.05]}, "20 mm outside"),
     ],
 )

@@ -38,7 +38,7 @@ def test_every_row_that_cannot_be_used_is_named_with_its_reason(
     assert first == f"{manifest}:3: no unicorns; draw a horse"
     told = others.split("; ")
     assert [line.removeprefix(f"{manifest}:")[0] for line in told] == ["4", "5", "7", "8"]
-    assert "gone.glb is not there" in told[0] and "furlong" in told[1] and told[3].endswith("no unicorns")
+    assert "gone.glb is not found" in told[0] and "furlong" in told[1] and told[3].endswith("no unicorns")
 
 
 def test_one_that_is_wrong_is_told_as_ever(tmp_path: Path) -> None:
@@ -70,7 +70,7 @@ def test_a_group_that_contradicts_itself_is_told_with_the_rows(tmp_path: Path, m
     rows = ["file,name,group", "gone.glb,,", "front.jpg,mug,1", "side.jpg,spoon,1"]
     Path("list.csv").write_text("\n".join(rows) + "\n")
     with pytest.raises(
-        UsageError, match=r"^list.csv:2: .*gone.glb is not there.* 1 more cannot be used: list.csv: group '1'"
+        UsageError, match=r"^list.csv:2: .*gone.glb is not found.* 1 more cannot be used: list.csv: group '1'"
     ):
         list(iterate_items([Path("list.csv")], {}, Notes()))
 

@@ -50,7 +50,7 @@ def test_views_with_poses_are_one_item_whose_identity_has_the_cameras(photos: li
         json.dumps({**document, "aabb_scale": 4, "frames": [*document["frames"], document["frames"][0]]}, indent=1)
     )
     document["frames"][0]["file_path"] = "elsewhere/9.png"
-    with pytest.raises(InputError, match="may be any of"):
+    with pytest.raises(InputError, match="matches several entries of"):
         twin_id(item)
     document["frames"][0]["file_path"] = "other/0.png"
     file.write_text(json.dumps(document, indent=2))
@@ -69,9 +69,9 @@ def test_rows_of_a_group_may_have_poses(photos: list[Path]) -> None:
     assert item == _item(photos)
     for rows, told in (
         ("file,poses\n0.png,transforms.json\n", "give their rows a group"),
-        ("file,group,poses,turn_deg\n0.png,a,transforms.json,0\n1.png,a,,9\n", "give one of them"),
-        ("file,group,poses\n0.png,a,transforms.json\n", "this is one"),
-        ("file,group,poses\n0.png,a,nothing.json\n1.png,a,\n", r"group 'a' .*nothing\.json: not there"),
+        ("file,group,poses,turn_deg\n0.png,a,transforms.json,0\n1.png,a,,9\n", "give only one of them"),
+        ("file,group,poses\n0.png,a,transforms.json\n", "there is only one"),
+        ("file,group,poses\n0.png,a,nothing.json\n1.png,a,\n", r"group 'a' .*nothing\.json: not found"),
         ("file,group,poses\n0.png,a,a.json\n1.png,a,b.json\n", "one poses"),
     ):
         (folder / "things.csv").write_text(rows)

@@ -56,7 +56,7 @@ def test_an_srdf_is_taken_at_its_word(tmp_path: Path):
     )
     assert ("base", "fore") in _pairs(path)
     (tmp_path / "small.srdf").write_text('<robot name="small"/>')
-    with pytest.raises(UsageError, match="no pair of the robot's links"):
+    with pytest.raises(UsageError, match="it lists no pair of the robot's links"):
         load_robot(path)
 
 

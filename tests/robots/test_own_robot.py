@@ -78,13 +78,13 @@ def test_a_joint_of_neither_arm_nor_hand_is_fixed_where_the_file_says(tmp_path: 
         (('<robot name="small">', '<!DOCTYPE robot [<!ENTITY a "b">]><robot name="small">'), "declares a document type"),
         (('<parent link="fore"/>', '<parent link="four"/>'), "did you mean 'fore'"),
         (('<link name="flange"/>', '<link name="flange"/><link name="loose"/>'), "loose all have no parent"),
-        (('<child link="flange"/>', '<child link="fore"/>'), "link 'fore' hangs from two joints"),
+        (('<child link="flange"/>', '<child link="fore"/>'), "link 'fore' is the child of two joints"),
         (('name="lift" type="revolute"', 'name="lift" type="prismatic"'), "lift is prismatic; an arm's joints are revolute"),
         (('name="lift" type="revolute"', 'name="lift" type="planar"'), "'planar'; valid are revolute"),
         (('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0"/><mimic joint="turn"/>'), "lift mimics another"),
         (('<axis xyz="0 1 0"/>', '<axis xyz="0 0 0"/>'), "axis of joint 'lift' has no direction"),
-        (('<origin xyz="0 0 0.3"/>', '<origin xyz="0 0 nan"/>'), "wants 3 usable"),
-        (('<origin xyz="0 0 0.3"/>', '<origin xyz="0 0 1e30"/>'), "wants 3 usable"),
+        (('<origin xyz="0 0 0.3"/>', '<origin xyz="0 0 nan"/>'), "needs 3 usable"),
+        (('<origin xyz="0 0 0.3"/>', '<origin xyz="0 0 1e30"/>'), "needs 3 usable"),
         (('velocity="3"', 'velocity="0"'), "roll has no velocity limit"),
         (('lower="-3" upper="3"', 'lower="3" upper="-3"'), "roll has no range"),
         (('<box size="0.1 0.1 0.3"/>', "<box/>"), "lacks size"),
@@ -103,7 +103,7 @@ def test_spoilt_urdf_is_refused_in_one_line(tmp_path: Path, change: tuple[str, s
     [
         (('file = "small.urdf"', 'file = "smal.urdf"'), "is not there"),
         (('file = "small.urdf"', 'file = "../small.urdf"'), "put it below that folder"),
-        (('file = "small.urdf"', 'file = "small.urdf"\npackage_folder = "/"'), "package_folder leaves"),
+        (('file = "small.urdf"', 'file = "small.urdf"\npackage_folder = "/"'), "package_folder lies outside"),
         (('"turn", "lift"', '"turn", "lft"'), "unknown joint 'lft'; did you mean 'lift'. Valid: lift, "),
         (('"turn", "lift"', '"lift", "turn"'), "on the way to panda_palm are turn, lift, roll"),
         (('base_link = "base"', 'base_link = "bas"'), "unknown link 'bas'; did you mean 'base'"),
@@ -111,7 +111,7 @@ def test_spoilt_urdf_is_refused_in_one_line(tmp_path: Path, change: tuple[str, s
         (('gripper = "panda"', 'gripper = "allegro"'), "not a ParallelGripper"),
         (('gripper = "panda"', 'gripper = "../hand.toml"'), "is not below"),
         (("[0.0, 0.5, 0.0]", "[0.0, 2.5, 0.0]"), "home_rad of lift is 2.5; its limits are -2 to 2"),
-        (("[0.0, 0.5, 0.0]", "[0.0, 0.5]"), "home_rad wants 3 values"),
+        (("[0.0, 0.5, 0.0]", "[0.0, 0.5]"), "home_rad needs 3 values"),
         (("velocity_fraction = 0.5", "velocity_fraction = 0.5\nspeed = 1"), "speed: Extra inputs"),
         (("[1.0, 0.0, 0.0, 0.0]", "[0.0, 0.0, 0.0, 0.0]"), "length 1"),
         (("[workspace]", "[limits_rad]\nturn = [-3.0, 1.0]\n[workspace]"), "limits_rad of turn exceed the URDF's -2 to 2"),
@@ -151,7 +151,7 @@ def test_unknown_robots_are_answered_with_the_known_ones():
         match=r"did you mean 'panda'.* Valid: panda, two_pandas, ur5_panda, ur5_robotiq, ur5_suction, xarm7_a",
     ):
         load_robot("pandaa")
-    with pytest.raises(UsageError, match=r"mine\.toml is not there"):
+    with pytest.raises(UsageError, match=r"mine\.toml does not exist"):
         load_robot("mine.toml")
 
 
@@ -213,11 +213,11 @@ def test_own_hand_loses_its_mimicry_and_gets_the_grippers_range(tmp_path: Path):
 @pytest.mark.parametrize(
     "replaced, hand, message",
     [
-        (("", ""), ('"left", "right"', '"right", "left"'), "not along \\+X; mend gripper_to_tip or the order"),
+        (("", ""), ('"left", "right"', '"right", "left"'), "not along \\+X; correct gripper_to_tip or the order"),
         (("", ""), ("[0.0, 0.0, 0.0]", "[0.0, 0.0, -0.03]"), "its fingers end 0.1425 m along"),
         (('<mimic joint="left"/>', '<mimic joint="left" multiplier="2"/>'), ("", ""), "must follow left one to one"),
         (('<mimic joint="left"/>', '<mimic joint="lift"/>'), ("", ""), "must follow left one to one"),
-        (('upper="0.05"', 'upper="0.03"'), ("", ""), "runs from 0 to 0.03 m; the gripper wants 0 \\(closed\\) to 0.04 m"),
+        (('upper="0.05"', 'upper="0.03"'), ("", ""), "runs from 0 to 0.03 m; the gripper needs 0 \\(closed\\) to 0.04 m"),
         (('name="left" type="prismatic"', 'name="left" type="revolute"'), ("", ""), "a parallel hand's are prismatic"),
         (("", ""), ('"left", "right"', '"left", "rihgt"'), "did you mean 'right'"),
     ],

@@ -81,7 +81,7 @@ def test_the_same_file_has_the_same_digest_and_another_base_another(tmp_path: Pa
         (('name = "right"\nrobot = "panda"', 'name = "right"\nrobot = "two_pandas"'), "two_pandas has two arms itself"),
         (
             ('name = "right"\nrobot = "panda"', 'name = "right"\nrobot = "ur5_robotiq"'),
-            "want the same hand of two jaws",
+            "need the same two-jaw gripper",
         ),
         (('name = "right"\nrobot = "panda"', 'name = "right"\nrobot = "pandaa"'), "did you mean 'panda'"),
         (('name = "right"\nrobot = "panda"', 'name = "right"\nrobot = "mine.toml"'), "has two arms itself"),

@@ -116,7 +116,7 @@ def test_twin_that_stands_otherwise_is_named(twins: Path, scene: SceneRecord, ch
     assert done.exit_code == 0 and f"twin {first.twin_id}" in " ".join(done.stderr.split())
     settings = LayoutsConfig(seed=3, layout=LayoutSettings(objects=(2, 2)))
     report = make_layouts(twins, tmp_path / "scenes", 1, settings, executor="inline")
-    assert any(first.twin_id in remark and "stay as they are" in remark for remark in report.remarks)
+    assert any(first.twin_id in remark and "left unchanged" in remark for remark in report.remarks)
 
 
 def test_scene_of_an_earlier_version_is_read_and_stays_the_same_bytes(scene: SceneRecord, tmp_path: Path) -> None:
@@ -169,5 +169,5 @@ def test_states_are_those_of_the_records(twins: Path, scene: SceneRecord) -> Non
 
 
 def test_what_is_no_record_says_so() -> None:
-    with pytest.raises(TwinError, match=r"a/twin\.json: no record of a twin.*build the twin again"):
+    with pytest.raises(TwinError, match=r"a/twin\.json: not a record of a twin.*build the twin again"):
         state_of({"revision": "x", "placements": [1]}, "a/twin.json")

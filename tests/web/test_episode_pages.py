@@ -110,5 +110,5 @@ def test_what_holds_no_episode_is_told(tmp_path: Path) -> None:
         pages_of(str(tmp_path), tmp_path / "cache")
     assert not is_episodes("s3://bucket/episodes") and not is_episodes(str(tmp_path / "nothing"))
     (tmp_path / "text.h5").write_text("text")
-    with pytest.raises(EpisodesError, match="no HDF5 file"):
+    with pytest.raises(EpisodesError, match="not a readable HDF5 file"):
         pages_of(str(tmp_path / "text.h5"), tmp_path / "cache")

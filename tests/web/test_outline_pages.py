@@ -100,7 +100,7 @@ def test_outline_is_fitted_kept_and_shown_again(outlining: Starlette, outlines: 
     [
         (b"", "no PNG file"),
         (b"no picture", "no PNG file"),
-        (png(np.ones((8, 8), bool)), "is none of this photo; reload the page"),
+        (png(np.ones((8, 8), bool)), "does not fit this photo; reload the page"),
         (png(np.ones((8, 2000), bool)), "at most 1024 pixels a side"),
         (bytes(MOST_BODY_BYTES + 1), "no PNG file"),
     ],
@@ -174,5 +174,5 @@ def test_photo_that_is_gone_is_said_to_be(outlines: OutlineSession, tmp_path: Pa
     *_, bare = outlines.photos
     moved = replace(outlines.photos[bare], item=replace(outlines.photos[bare].item, file=str(tmp_path / "bare.png")))
     outlines.photos[bare] = moved
-    with pytest.raises(UsageError, match=r"bare\.png: cannot be looked at"):
+    with pytest.raises(UsageError, match=r"bare\.png: cannot be read"):
         outlines.picture(bare)

@@ -81,9 +81,9 @@ def test_name_and_size_are_kept_at_once_shown_again_and_taken_back(
 @pytest.mark.parametrize(
     ("name", "longest_side_cm", "why"),
     [
-        ("mug\0", None, "the name: 'mug\\\\x00' has control characters"),
+        ("mug\0", None, "the name: 'mug\\\\x00' contains control characters"),
         ("mug\nX", None, "contains control characters; use printable characters only"),
-        ("\u202egum", None, "has control characters"),
+        ("\u202egum", None, "contains control characters"),
         ("m" * 201, None, "the name: 201 characters; give at most 200"),
         (7, None, "a name is a text"),
         ("mug", ["9"], "a longest side is a text"),
@@ -109,7 +109,7 @@ def test_what_is_no_name_or_size_is_refused_and_nothing_is_kept(
     ("raw", "why"),
     [
         (b"", "its JSON is broken"),
-        (b"\xff\xfe", "what was sent"),
+        (b"\xff\xfe", "the data sent"),
         (b'{"png": null, "name": "\\ud800", "longest_side_cm": null}', "its JSON is broken"),
         (b'{"png": null, "name": null}', "has other names than png, name, longest_side_cm"),
         (b'{"png": "%%", "name": null, "longest_side_cm": null}', "no outline in base64"),
@@ -131,7 +131,7 @@ def test_unknown_name_is_kept_and_the_nearest_known_ones_are_told(
     first = next(iter(outlines.photos))
     for name, told in (
         ("botle", "did you mean"),
-        ("xyzzy", "say what kind of thing it is, in English"),
+        ("xyzzy", "name the kind of object, in English"),
         ("red mug", "known as: mug, "),
         ("", ""),
     ):

@@ -104,7 +104,7 @@ def test_corners_brush_undo_and_what_is_kept_is_built(tmp_path: Path, visitor: C
         page.keyboard.press("n")
         page.keyboard.press("Enter")
         page.wait_for_selector(".said.error")
-        assert page.inner_text("#said") == "not kept: the outline is empty; draw it around the thing"
+        assert page.inner_text("#said") == "not kept: the outline is empty; draw it around the object"
         assert page.errors == ["Failed to load resource: the server responded with a status of 400 (Bad Request)"]
         assert "1 outlines are drawn by me: 1 accepted" in ended()
     root = DatasetRoot(place)

@@ -271,7 +271,7 @@ def test_three_js_comes_out_of_nicegui_as_a_script_with_its_licence() -> None:
 
 
 def test_a_data_set_without_an_index_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="no data set"):
+    with pytest.raises(UsageError, match="not a data set"):
         Gallery(DatasetRoot(tmp_path))
 
 

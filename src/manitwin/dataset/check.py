@@ -50,7 +50,7 @@ def _interrupted(ledger: Ledger) -> Iterator[Disagreement]:
     (count,) = ledger.connection.execute("SELECT count(*) FROM stages WHERE state = 'running'").fetchone()
     if count:
         yield Disagreement(
-            f"{count} stages are marked as running, and no run is at work",
+            f"{count} stages are marked as running, but no run is active",
             partial(_execute, ledger, "UPDATE stages SET state = 'waiting' WHERE state = 'running'", [()]),
         )
 
@@ -62,12 +62,12 @@ def _ended_without_folder(ledger: Ledger, root: DatasetRoot, digests: bool) -> I
     for number, twin_id, state, revision in rows:
         called = f"item {number}, twin {printable_line(str(twin_id), max_characters=80)}"
         if not _FOLDER.fullmatch(str(twin_id)):
-            yield Disagreement(f"{called}: no name of a twin", partial(_reopen, ledger, number))
+            yield Disagreement(f"{called}: not the name of a twin", partial(_reopen, ledger, number))
             continue
         try:
             record = _read(root, twin_id)
         except FileNotFoundError:
-            wrong: str | None = f"{state} in the ledger, and there is no folder"
+            wrong: str | None = f"{state} in the ledger, but its folder is missing"
         except NewerVersion as error:
             yield Disagreement(f"{called}: {error}", None)
             continue
@@ -77,7 +77,9 @@ def _ended_without_folder(ledger: Ledger, root: DatasetRoot, digests: bool) -> I
             wrong = _what_is_wrong(root, record, state, revision, digests)
             foreign = foreign_files(root, root.twin_name(twin_id), record)
             if foreign and not wrong:
-                yield Disagreement(f"{called}: its folder holds {foreign}, which is not its own; remove it", None)
+                yield Disagreement(
+                    f"{called}: its folder contains {foreign}, which does not belong to it; remove it", None
+                )
         if wrong:
             yield Disagreement(f"{called}: {wrong}", partial(_redo, ledger, root, number, twin_id))
 
@@ -93,9 +95,9 @@ def _read(root: DatasetRoot, twin_id: str) -> TwinRecord:
 
 def _what_is_wrong(root: DatasetRoot, record: TwinRecord, state: str, revision: str, digests: bool) -> str | None:
     if record.status != state:
-        return f"{state} in the ledger, {record.status} in its folder"
+        return f"{state} in the ledger, but {record.status} in its folder"
     if record.revision != revision:
-        return "its folder is of another revision than the ledger's"
+        return "its folder has another revision than the ledger"
     return damage(root, root.twin_name(record.twin_id), record, digests=digests)
 
 
@@ -113,7 +115,7 @@ def damaged_twins(root: DatasetRoot, *, digests: bool = False) -> Iterator[str]:
         if wrong:
             yield f"twin {twin_id}: {wrong}; remove {folder} and build its input again"
         elif foreign:
-            yield f"twin {twin_id}: its folder holds {foreign}, which is not its own; remove it"
+            yield f"twin {twin_id}: its folder contains {foreign}, which does not belong to it; remove it"
 
 
 def _folders_nobody_ended(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagreement]:
@@ -126,7 +128,7 @@ def _folders_nobody_ended(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagre
             (unknown,) = ledger.connection.execute("SELECT count(*) FROM items WHERE twin_id IS NULL").fetchone()
             if not unknown:
                 yield Disagreement(
-                    f"twin {twin_id}: a folder, and no item of the ledger makes it; a build with its input takes it up",
+                    f"twin {twin_id}: a folder without an item in the ledger; a build with its input adopts it",
                     None,
                 )
 
@@ -138,7 +140,7 @@ def _half_folders(root: DatasetRoot) -> Iterator[Disagreement]:
     for pattern in ("*/*/.*", "*.finished", "*.replaced"):
         for path in sorted(work.glob(pattern)):
             name = path.relative_to(root.local).as_posix()
-            yield Disagreement(f"{name}: left half-made", partial(root.remove, name))
+            yield Disagreement(f"{name}: left incomplete", partial(root.remove, name))
     for path in sorted((root.local / "twins").glob("*/*")):
         if not (path / RECORD).is_file():
             name = path.relative_to(root.local).as_posix()
@@ -167,7 +169,7 @@ def _done_without_result(ledger: Ledger, root: DatasetRoot, digests: bool) -> It
         if all(_FOLDER.fullmatch(each) for each in (str(twin_id), stage, key)) and _is_result(root, name, digests):
             continue
         yield Disagreement(
-            f"item {number}, stage {stage}: done in the ledger, and its result is not there",
+            f"item {number}, stage {stage}: done in the ledger, but its result is missing",
             partial(_undo, ledger, root, number, stage, name),
         )
 
@@ -188,14 +190,15 @@ def _index(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagreement]:
     lost = sorted(twin_id for twin_id, revision in ended.items() if in_tables.get(twin_id) != revision)
     if lost:
         yield Disagreement(
-            f"{len(lost)} twins are marked as indexed, and no table has them as they are ({lost[0]} ...)",
+            f"{len(lost)} twins are marked as indexed, but no table has their current revision ({lost[0]} ...)",
             partial(_reindex, ledger, root),
         )
     finished = {twin_id for (twin_id,) in ledger.connection.execute("SELECT twin_id FROM items")}
     strangers = sorted(in_tables.keys() - finished)
     if strangers:
         yield Disagreement(
-            f"{len(strangers)} twins of the tables are of no item ({strangers[0]} ...); manitwin index makes the tables again",
+            f"{len(strangers)} twins of the tables belong to no item ({strangers[0]} ...); manitwin index rebuilds"
+            f" the tables",
             None,
         )
 

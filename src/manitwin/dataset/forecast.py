@@ -82,7 +82,8 @@ def forecast(
     ids = sorted({*status, *rejected})
     if len(ids) < LEAST_INPUTS:
         raise UsageError(
-            f"{root.path}: {len(ids)} inputs were built, {LEAST_INPUTS} at least tell what others cost; build more first"
+            f"{root.path}: {len(ids)} inputs were built, but an estimate needs at least {LEAST_INPUTS}; build more"
+            f" first"
         )
     place = {twin_id: number for number, twin_id in enumerate(ids)}
     rows = index.select("stages", columns=["twin_id", "stage", "cpu_seconds", "cost_usd"]).to_pydict()
@@ -90,15 +91,15 @@ def forecast(
     for twin_id, stage, seconds, cost in zip(*(rows[name] for name in rows), strict=True):
         if twin_id not in place:
             raise UsageError(
-                f"{root.path}: its index has stages of {printable_line(twin_id)}, of which it has no twin and no rejection;"
-                f" `manitwin index {root.path}` makes it again"
+                f"{root.path}: its index has stages of {printable_line(twin_id)}, but neither a twin nor a"
+                f" rejection; rebuild it with `manitwin index {root.path}`"
             )
         cpu_s[place[twin_id]] += seconds or 0.0
         usd[place[twin_id]] += cost or 0.0
         stages[stage] = stages.get(stage, 0.0) + (seconds or 0.0)
     if not cpu_s.any():
         raise UsageError(
-            f"{root.path}: no CPU time of its stages is recorded; `manitwin index {root.path}` and try again"
+            f"{root.path}: it has no recorded CPU time of stages; run `manitwin index {root.path}` and try again"
         )
     rng = np.random.default_rng(seed)
     busy = min(cores, items)  # an input is built on one core

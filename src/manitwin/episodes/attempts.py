@@ -119,7 +119,7 @@ def attempt_from(said: dict[str, Any]) -> Attempt:
     try:
         return Attempt(**{**said, "instructions": tuple(said["instructions"])})
     except (TypeError, KeyError) as error:
-        raise EpisodesError(f"an attempt with other fields than this version's ({error}); {REMEDY}") from error
+        raise EpisodesError(f"an attempt has other fields than in this version ({error}); {REMEDY}") from error
 
 
 def attempts_table(attempts: Iterable[Attempt]) -> pa.Table:

@@ -57,7 +57,7 @@ def batch_folders(out: Path) -> list[Path]:
     """
     folders = [path.parent for path in sorted((out / BATCHES).glob(f"*/*/{BATCH_RECORD}"))]
     if not folders:
-        raise UsageError(f"{out}: no episodes there; `manitwin trajectories` makes some")
+        raise UsageError(f"{out}: no episodes found; create some with `manitwin trajectories`")
     of, first = dict[str, Path](), dict[Path, str]()
     for folder in folders:
         read_batch(folder)
@@ -102,9 +102,9 @@ def _whose_grasps(success: Success) -> list[str]:
     if not success.transferred:
         return []
     return [
-        f"{success.transferred} of {success.total.executed} executed took grasps that were verified for other jaws, not for the"
-        " robot's gripper",
-        "  remedy: build the twins for it too: manitwin build --gripper, see docs/grippers.md",
+        f"{success.transferred} of {success.total.executed} executed episodes used grasps that were verified for"
+        f" other jaws, not for the robot's gripper",
+        "  remedy: build the twins for this gripper too: manitwin build --gripper, see docs/grippers.md",
     ]
 
 
@@ -118,8 +118,8 @@ def _why_never_executed(success: Success) -> list[str]:
     if lacking := success.without_grasp:
         named = ", ".join(f"{twin_id} {category}" for twin_id, category in lacking[:MOST_NAMED])
         more = f" and {len(lacking) - MOST_NAMED} more" if len(lacking) > MOST_NAMED else ""
-        lines.append(f"why no_grasp: no verified grasp for the robot's hand have {named}{more}")
-        lines.append("  remedy: build them for it too: manitwin build --gripper, see docs/grippers.md")
+        lines.append(f"why no_grasp: there is no verified grasp for the robot's hand for {named}{more}")
+        lines.append("  remedy: build the twins for this gripper too: manitwin build --gripper, see docs/grippers.md")
     return lines
 
 

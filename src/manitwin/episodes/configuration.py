@@ -46,5 +46,5 @@ def read_configuration(episodes: Path) -> dict[str, Any]:
     except ValidationError as error:
         first = error.errors()[0]
         where = printable_line(".".join(map(str, first["loc"])), max_characters=80)
-        raise EpisodesError(f"{path}: not of episodes ({where}: {first['msg']}); {_REMEDY}") from error
+        raise EpisodesError(f"{path}: not a configuration of episodes ({where}: {first['msg']}); {_REMEDY}") from error
     return said

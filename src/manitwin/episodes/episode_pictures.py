@@ -208,7 +208,7 @@ def read_pictures(folder: Path) -> PicturesRecord:
         return PicturesRecord(**read_json_object(path, EpisodesError, inside=folder, name=str(path), remedy=_DRAW))
     except ValidationError as error:
         said = printable_line(str(error).split("\n")[0], max_characters=120)
-        raise EpisodesError(f"{path}: no record of pictures ({said}); {_DRAW}") from error
+        raise EpisodesError(f"{path}: not a record of pictures ({said}); {_DRAW}") from error
 
 
 def draw_episodes(
@@ -254,5 +254,5 @@ def write_with_pictures(out: Path, cameras: tuple[str, ...], rate_hz: int) -> Le
 
 def _said(out: Path) -> dict[str, str]:
     if not os.path.lexists(out / CONFIG):
-        raise EpisodesError(f"{out}/{CONFIG}: no episodes there; `manitwin trajectories` makes some")
+        raise EpisodesError(f"{out}/{CONFIG}: no episodes found; create some with `manitwin trajectories`")
     return read_configuration(out)

@@ -113,12 +113,13 @@ def _check_asked(config: TrajectoriesConfig, source: EpisodesSource) -> None:
     """Raise UsageError for settings that the source has its own answer to: they would be left out without a word."""
     if source.tasks is not None and config.skill != TrajectoriesConfig.model_fields["skill"].default:
         raise UsageError(
-            f"skill is {config.skill}: tasks say themselves what is to be done; leave it out, or give their scenes,"
+            f"skill is {config.skill}: tasks define their own skill; leave skill out, or give the scenes,"
             f" {source.scenes}"
         )
     if source.scenes is not None and config.others:
         raise UsageError(
-            f"others is {config.others}: scenes have their own objects; leave it out, or give the data set, {source.dataset}"
+            f"others is {config.others}: scenes have their own objects; leave others out, or give the data set,"
+            f" {source.dataset}"
         )
 
 
@@ -203,9 +204,9 @@ def make_episodes(
     report.remarks.extend(source.remarks)
     before = sum(batch.count for batch in there)
     if before > count:
-        report.remarks.append(f"{before} episodes are there already, more than the {count} asked for; none was added")
+        report.remarks.append(f"{before} episodes exist already, more than the requested {count}; none was added")
     elif before:
-        report.remarks.append(f"{before} of {count} episodes were there already")
+        report.remarks.append(f"{before} of {count} episodes existed already")
     if source.scenes is None and (said := pool_of(source.dataset).about_joints):
         report.remarks.append(said)
     return report
@@ -228,7 +229,7 @@ def twins_for(skill: Skill | None, pool: Pool, begins: Begins) -> list[str]:
     found = [twin.twin_id for twin in pool.twins if suits(twin) and (not asks_for_grasps or begins(skill, twin))]
     if not found:
         raise UsageError(
-            f"none of {len(pool.twins)} twins can be used to {skill.name}; docs/skills.md says what it takes"
+            f"none of {len(pool.twins)} twins can be used to {skill.name}; docs/skills.md lists the requirements"
         )
     return found
 

@@ -45,12 +45,12 @@ class EpisodesSource:
             said = root.read_json(CONFIG, UsageError, remedy="make the layouts again")
             if not isinstance(said.get("dataset"), str):
                 raise UsageError(
-                    f"{place}/{CONFIG}: does not say whose twins these scenes are of; make the layouts again"
+                    f"{place}/{CONFIG}: does not name the data set of these scenes; make the layouts again"
                 )
             dataset = said["dataset"] if twins is None else DatasetRoot(twins).absolute()
             return cls(dataset, path, None, *_check_twins(dataset, Path(path)))
         if twins is not None:
-            raise UsageError(f"{place}: holds no scenes, whose twins could be elsewhere; leave --twins out")
+            raise UsageError(f"{place}: contains no scenes; --twins applies to scenes only, leave --twins out")
         return cls(path, None)
 
     @classmethod
@@ -59,7 +59,7 @@ class EpisodesSource:
         dataset = said.get("dataset") if twins is None else DatasetRoot(twins).absolute()
         scenes = said.get("scenes")
         if not isinstance(dataset, str) or not isinstance(scenes, str):
-            raise UsageError(f"{root.url}/{CONFIG}: does not say of which scenes its tasks are; make the tasks again")
+            raise UsageError(f"{root.url}/{CONFIG}: does not name the scenes of its tasks; make the tasks again")
         return cls(dataset, scenes, path, *_check_twins(dataset, Path(scenes)))
 
     def check_grippers(self, robot: Robot) -> None:

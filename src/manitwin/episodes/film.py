@@ -53,7 +53,7 @@ class Film:
             head = stream.read(8)
         capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG) if head[4:] == b"ftyp" else None
         if capture is None or not capture.isOpened():
-            raise EpisodesError(f"{path}: no video that can be read; {_REMEDY}")
+            raise EpisodesError(f"{path}: not a readable video; {_REMEDY}")
         self._capture, self._next = capture, 0
         self._sequence: Image.Image | None = None
         try:
@@ -134,7 +134,7 @@ def _sequence(path: Path, facts: VideoFacts) -> Image.Image:
     try:
         sequence = Image.open(io.BytesIO(as_avif_sequence(content)), formats=["AVIF"])
     except Exception as error:  # a decoder may raise anything on damaged bytes
-        raise EpisodesError(f"{path}: no AV1 film that can be read; {_REMEDY}") from error
+        raise EpisodesError(f"{path}: not a readable AV1 video; {_REMEDY}") from error
     if sequence.size != (facts.width_px, facts.height_px):
         raise EpisodesError(
             f"{path}: pictures of {sequence.size} pixels, its header says {facts.width_px} x {facts.height_px}; {_REMEDY}"

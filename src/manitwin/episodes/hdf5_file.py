@@ -155,7 +155,7 @@ def _said(content: bytes | None, where: str) -> dict[str, Any]:
     """Return the JSON of a trajectory's group, with its fields of the right types; raises EpisodesError."""
     if content is None:
         raise EpisodesError(
-            f"{where}: no attribute {EPISODE!r}, so this package did not write it; give a file of its own"
+            f"{where}: no attribute {EPISODE!r}, so it was not written by this package; give a file written by manitwin"
         )
     said = parse_json_object(content, where, EpisodesError, remedy=_REMEDY)
     try:
@@ -242,7 +242,7 @@ def _read(content: Hdf5, group: str, said: dict[str, Any], where: str) -> Stored
     # (T + 1, objects, 13): with no objects there would be no target, so there is always one
     each = [array(f"env_states/actors/{thing.name}", 13) for thing in objects]
     if len({len(states) for states in each}) != 1:
-        raise EpisodesError(f"{where}: the states of its objects are not equally many; {_REMEDY}")
+        raise EpisodesError(f"{where}: its objects have different numbers of states; {_REMEDY}")
     states = np.stack(each, axis=1)
     jaws, arms = robot.has_jaws, robot.arm_count
     if robot.arms and sum(each.joints for each in robot.arms) != arm:

@@ -74,8 +74,8 @@ def _note(robots: dict[str, Any], robot: dict[str, Any], path: Path) -> None:
     """Keep each robot once; raises EpisodesError for two different ones of one name."""
     if robots.setdefault(robot["name"], robot) != robot:
         raise EpisodesError(
-            f"{path}: its robot {robot['name']!r} is not the one that other files call so (its digest or limits differ);"
-            " run one of the two under another name"
+            f"{path}: its robot {robot['name']!r} differs from the robot of this name in other files (its digest or"
+            f" limits differ); give one of the two another name"
         )
 
 

@@ -41,7 +41,7 @@ def open_regular(path: Path, refuse: Refusal, *, inside: Path | None = None, nam
     called = printable_line(path.name if name is None else name, max_characters=_NAME_CHARACTERS)
     try:
         if inside is not None and not path.resolve().is_relative_to(inside.resolve()):
-            raise refuse(f"{called}: leads out of its folder, and is not read; put the file itself there")
+            raise refuse(f"{called}: leads outside its folder, and is not read; replace the link by the file")
         # without waiting for the other end of a pipe, and without making a terminal this process's own
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
     except (OSError, ValueError, RuntimeError) as error:  # a NUL in the name; a loop of links (RuntimeError until 3.12)
@@ -49,8 +49,8 @@ def open_regular(path: Path, refuse: Refusal, *, inside: Path | None = None, nam
     try:
         mode = os.fstat(descriptor).st_mode
         if not stat.S_ISREG(mode):
-            kind = _KINDS.get(stat.S_IFMT(mode), "no regular file")
-            raise refuse(f"{called}: is {kind}, and only regular files are read; give a file")
+            kind = _KINDS.get(stat.S_IFMT(mode), "not a regular file")
+            raise refuse(f"{called}: is {kind}, but only regular files are read; give a file")
         return os.fdopen(descriptor, "rb")
     except BaseException:
         os.close(descriptor)
@@ -80,7 +80,7 @@ def read_bytes(
     if size > limit_bytes or len(content) > limit_bytes:
         said = max(size, len(content))
         refuse_size = refuse_size or refuse
-        raise refuse_size(f"{called}: {said} bytes are more than the limit of {limit_bytes}; give a smaller file")
+        raise refuse_size(f"{called}: {said} bytes exceed the limit of {limit_bytes}; give a smaller file")
     return content
 
 

@@ -31,18 +31,19 @@ def read_csv(path: Path, refuse: Refusal, *, name: str | None = None) -> Iterato
         columns = len(header)
         for mark, told in _OTHER_MARKS.items() if columns == 1 else ():
             if mark in header[0]:
-                raise refuse(f"{called}:1: its columns are separated by {told}; save it with commas between them")
+                raise refuse(f"{called}:1: its columns are separated by {told}; save it with commas as separators")
         if columns > MAX_COLUMNS:
             raise refuse(
-                f"{called}:{reader.line_num}: {columns:,} columns; at most {MAX_COLUMNS} are read: remove what is not needed"
+                f"{called}:{reader.line_num}: {columns:,} columns; at most {MAX_COLUMNS} are read; remove columns"
+                f" that are not needed"
             )
         for row in reader:
             if None in row:
-                raise refuse(f"{called}:{reader.line_num}: more values than columns; quote values that hold a comma")
+                raise refuse(f"{called}:{reader.line_num}: more values than columns; quote values that contain a comma")
             yield reader.line_num, row
     except csv.Error as error:
         cause = printable_line(str(error), max_characters=120)
-        remedy = "close its quotes, and write a quote in a value twice"
+        remedy = "close the quotes, and double a quote within a value"
         raise refuse(f"{called}:{reader.line_num}: not CSV ({cause}); {remedy}") from error
 
 

@@ -52,9 +52,9 @@ class Hdf5:
         with self._failures(group):
             found = self._object(group)
             if not isinstance(found, h5py.Group):
-                raise self._wrong(group, "is no group")
+                raise self._wrong(group, "is not a group")
             if len(found) > MAX_OBJECTS:
-                raise self._wrong(group, f"{len(found)} objects are more than the limit of {MAX_OBJECTS}")
+                raise self._wrong(group, f"{len(found)} objects exceed the limit of {MAX_OBJECTS}")
             return list(found)
 
     def has(self, path: str) -> bool:
@@ -73,7 +73,7 @@ class Hdf5:
                 return None
             about = found.attrs.get_id(attribute)
             if about.dtype.kind != "S" or about.shape != () or about.dtype.itemsize > MAX_TEXT_BYTES:
-                raise self._wrong(path, f"the attribute {attribute} is no text of at most {MAX_TEXT_BYTES} bytes")
+                raise self._wrong(path, f"the attribute {attribute} is not a text of at most {MAX_TEXT_BYTES} bytes")
             return bytes(found.attrs[attribute])
 
     def array(self, path: str) -> np.ndarray:
@@ -103,7 +103,7 @@ class Hdf5:
 
     def _look_through(self, group: Any, path: str, seen: set[int], depth: int) -> None:
         if not isinstance(group, h5py.Group):
-            raise self._wrong(path, "is no group")
+            raise self._wrong(path, "is not a group")
         if depth > _DEPTH:
             raise self._wrong(path, "its groups are nested too deep")
         for name in self.names(path):
@@ -111,7 +111,7 @@ class Hdf5:
             found = self._object(inner)
             address = h5py.h5o.get_info(found.id).addr
             if address in seen or len(seen) > MAX_OBJECTS:
-                raise self._wrong(inner, "is there twice, or leads back to a group that it is in")
+                raise self._wrong(inner, "occurs twice, or links back to a group that contains it")
             seen.add(address)
             for attribute in found.attrs:
                 self.text(inner, attribute)
@@ -130,27 +130,27 @@ class Hdf5:
             if link is None:
                 raise KeyError(path)
             if not isinstance(link, h5py.HardLink):
-                raise self._wrong(path, "is a link, and only what lies in the file is read")
+                raise self._wrong(path, "is a link, but only data within the file is read")
             found = found[part]
         return found
 
     def _array(self, path: str) -> h5py.Dataset:
         found = self._object(path)
         if not isinstance(found, h5py.Dataset):
-            raise self._wrong(path, "is no array")
+            raise self._wrong(path, "is not an array")
         kind, shape, made = found.dtype, found.shape, found.id.get_create_plist()
         if kind.kind not in "biuf" or kind.hasobject or kind.subdtype is not None or shape is None:
             raise self._wrong(path, f"is of type {kind}, not of numbers")
         if made.get_layout() == h5py.h5d.VIRTUAL or made.get_external_count():
-            raise self._wrong(path, "is kept in other files, and only what lies in this one is read")
+            raise self._wrong(path, "is stored in other files, but only data within this file is read")
         filters = {made.get_filter(number)[0] for number in range(made.get_nfilters())}
         if filters - _FILTERS:
-            raise self._wrong(path, f"has the filter {min(filters - _FILTERS)}, and no plugin is loaded; use gzip")
+            raise self._wrong(path, f"has the filter {min(filters - _FILTERS)}, but plugins are not loaded; use gzip")
         size, chunk = math.prod(shape) * kind.itemsize, math.prod(found.chunks or ()) * kind.itemsize
         if max(size, chunk) > MAX_ARRAY_BYTES:
-            raise self._wrong(path, f"{max(size, chunk)} bytes are more than the limit of {MAX_ARRAY_BYTES}")
+            raise self._wrong(path, f"{max(size, chunk)} bytes exceed the limit of {MAX_ARRAY_BYTES}")
         if size > found.id.get_storage_size() * _DEFLATE_RATIO:
-            raise self._wrong(path, f"says {size} bytes, and {found.id.get_storage_size()} were written")
+            raise self._wrong(path, f"declares {size} bytes, but {found.id.get_storage_size()} were written")
         return found
 
     def _wrong(self, path: str, cause: str) -> Exception:
@@ -164,7 +164,7 @@ class Hdf5:
             said = printable_line(" ".join(str(error).split()), max_characters=160)
             where = f"{printable_line(path, max_characters=80)}: " if path else ""
             raise self._refuse(
-                f"{self._called}: {where}no HDF5 file that can be read ({type(error).__name__}: {said}); {self._remedy}"
+                f"{self._called}: {where}not a readable HDF5 file ({type(error).__name__}: {said}); {self._remedy}"
             ) from error
 
 

@@ -144,7 +144,7 @@ def _opened(path: Path) -> Iterator[Image.Image]:
     with open_regular(path, unreadable) as stream, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the limits are checked below
         if os.fstat(stream.fileno()).st_size > MAX_BYTES:
-            raise _too_large(path, f"{os.fstat(stream.fileno()).st_size} bytes are more than the limit of {MAX_BYTES}")
+            raise _too_large(path, f"{os.fstat(stream.fileno()).st_size} bytes exceed the limit of {MAX_BYTES}")
         if (count_pictures(stream, image_format(stream.read(64)) or "") or 0) > MAX_PICTURES:
             raise _too_large(path, f"more than {MAX_PICTURES} pictures in one file")
         stream.seek(0)
@@ -170,17 +170,17 @@ def _refused(path: Path, error: Exception) -> InputError:
     ):  # raised at twice Pillow's own limit, before this module can look
         return _too_large(path, _MEGAPIXELS)
     if isinstance(error, MemoryError):
-        return _too_large(path, "it asks for more memory than there is")
+        return _too_large(path, "it needs more memory than is available")
     cause = str(error).splitlines()[0] if str(error) else type(error).__name__
     if isinstance(error, Image.UnidentifiedImageError):
-        cause = "no decoder for it, or its header is damaged"
+        cause = "no decoder supports it, or its header is damaged"
     cause = printable_line(cause, max_characters=_CAUSE_CHARACTERS)
     detail = f"{_name(path)}: truncated or corrupt image ({cause}); export or download it again, as PNG or JPEG"
     return InputError("unreadable", detail)
 
 
 def _too_large(path: Path, cause: str) -> InputError:
-    return InputError("too_large", f"{_name(path)}: {cause}; scale it down first")
+    return InputError("too_large", f"{_name(path)}: {cause}; scale the picture down first")
 
 
 def _name(path: Path) -> str:
@@ -211,12 +211,13 @@ def _check_size(path: Path, image: Image.Image) -> None:
     if tiles and tiles[0][0] == _PNM_TEXT and image.width * image.height > MAX_TEXT_PIXELS:
         raise InputError(
             "too_large",
-            f"{_name(path)}: more than {MAX_TEXT_PIXELS // 1_000_000} megapixels written as text; save it as PNG, or binary PPM",
+            f"{_name(path)}: more than {MAX_TEXT_PIXELS // 1_000_000} megapixels in a text format; save it as PNG"
+            f" or binary PPM",
         )
     if min(image.size) < MIN_SIDE_PX:
         raise InputError(
             "too_small",
-            f"{_name(path)}: {image.width} x {image.height} pixels, the shorter side must have at least {MIN_SIDE_PX};"
+            f"{_name(path)}: {image.width} x {image.height} pixels; the shorter side must have at least {MIN_SIDE_PX};"
             " give a larger photo",
         )
 
@@ -228,7 +229,7 @@ def _choose_frame(path: Path, image: Image.Image, frame: int | None, findings: l
     if frame is None:
         raise InputError(
             "animated",
-            f"{_name(path)}: an animation or a file of {count} pictures; save one of them as PNG, or set frame in the"
+            f"{_name(path)}: an animation or a file with {count} pictures; save one of them as PNG, or set frame in the"
             f" configuration to 0..{count - 1}",
         )
     if not 0 <= frame < count:
@@ -264,12 +265,12 @@ def _to_srgb(path: Path, image: Image.Image, profile: bytes | None, findings: li
     if image.mode in _WIDE_GREY:
         values = np.asarray(image)
         if values.min() < 0 or values.max() > 65535:
-            raise InputError("unreadable", f"{_name(path)}: more than 16 bits a pixel; save it as 8-bit PNG")
+            raise InputError("unreadable", f"{_name(path)}: more than 16 bits per pixel; save it as 8-bit PNG")
         findings.append("scaled 16-bit grey to 8 bit")
         return Image.fromarray(((values.astype(np.uint32) + 128) // 257).astype(np.uint8)).convert("RGB")
     if image.mode == "F":
         raise InputError(
-            "unreadable", f"{_name(path)}: floating-point pixels have no known white; save it as 8-bit PNG"
+            "unreadable", f"{_name(path)}: the white level of floating-point pixels is unknown; save it as 8-bit PNG"
         )
     transparent = image.mode in ("RGBA", "LA", "La", "RGBa", "PA") or "transparency" in image.info
     if profile and image.mode in ("RGB", "CMYK", "L", "RGBA"):

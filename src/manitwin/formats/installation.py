@@ -57,7 +57,7 @@ def names_shared_library(error: ImportError) -> bool:
 
 def import_remedy(error: ImportError, otherwise: str) -> str:
     """Return the remedy of a failed import: the doctor where a shared library is missing, else what the caller knows."""
-    return "manitwin doctor says which of this system's packages have it" if names_shared_library(error) else otherwise
+    return "manitwin doctor names the system packages that contain it" if names_shared_library(error) else otherwise
 
 
 @dataclass(frozen=True)

@@ -33,8 +33,8 @@ _GRACE_SECONDS = 5
 """Between the limit that this process keeps, and the one that the kernel keeps where this process is gone."""
 _LENGTH = struct.Struct("<Q")
 _READY = "ready"
-_NOT_STARTED = "the process in which files of others are read does not start"
-_REMEDY = "look at the limits of memory, files and processes (ulimit -a)"
+_NOT_STARTED = "the process that reads untrusted files does not start"
+_REMEDY = "check the limits of memory, files and processes (ulimit -a)"
 _CHUNK = 256
 _TELL_EVERY_SECONDS = 0.05
 _READ_BYTES = 1 << 20
@@ -47,7 +47,7 @@ Answer = tuple[bool, Any]
 
 
 class ProcessCrashed(Exception):
-    """A call that has ended its process."""
+    """A call that has crashed its process."""
 
 
 class TookTooLong(ProcessCrashed):
@@ -137,7 +137,7 @@ def _working_folder() -> str | None:
 
 
 def _crashed(function: str) -> ProcessCrashed:
-    return ProcessCrashed(f"{function} has ended its process")
+    return ProcessCrashed(f"{function} has crashed its process")
 
 
 class _Worker:

@@ -47,7 +47,7 @@ def parse_json(
             json.dumps(value, ensure_ascii=False).encode()
         return value
     except RecursionError as error:
-        raise refuse(f"{called}: its JSON is nested too deep to be read; {remedy}") from error
+        raise refuse(f"{called}: its JSON is nested too deeply; {remedy}") from error
     except ValueError as error:
         cause = printable_line(str(error).split(";")[0], max_characters=_CAUSE_CHARACTERS)
         raise refuse(f"{called}: its JSON is broken ({cause}); {remedy}") from error
@@ -60,7 +60,7 @@ def parse_json_object(
     value = parse_json(content, name, refuse, remedy=remedy, file_names=file_names)
     if not isinstance(value, dict):
         called = printable_line(name, max_characters=_CAUSE_CHARACTERS)
-        raise refuse(f"{called}: holds a JSON {type(value).__name__}, not an object; {remedy}")
+        raise refuse(f"{called}: contains a JSON {type(value).__name__}, not an object; {remedy}")
     return value
 
 
@@ -82,16 +82,16 @@ def read_json_object(
 def _finite(text: str) -> float:
     value = float(text)
     if not math.isfinite(value):
-        raise ValueError(f"{text[:40]} is no finite number")
+        raise ValueError(f"{text[:40]} is not a finite number")
     return value
 
 
 def json_number(value: Any, what: str) -> float:
     """Return a finite number; raises AssetError saying ``what`` it is of."""
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise AssetError(f"{what}: {str(value)[:40]!r} is no number")
+        raise AssetError(f"{what}: {str(value)[:40]!r} is not a number")
     if abs(value) > MAX_NUMBER or not math.isfinite(value):  # an integer may be larger than any double
-        raise AssetError(f"{what}: {str(value)[:40]} is no number that an object can have")
+        raise AssetError(f"{what}: {str(value)[:40]} is out of range for an object")
     return float(value)
 
 
@@ -107,5 +107,5 @@ def json_object(value: Any, what: str) -> dict[str, Any]:
     if value is None:
         return {}
     if not isinstance(value, dict):
-        raise AssetError(f"{what}: {str(value)[:40]!r} is no JSON object")
+        raise AssetError(f"{what}: {str(value)[:40]!r} is not a JSON object")
     return value

@@ -28,7 +28,7 @@ def parse_label_picture(content: bytes, name: str, refuse: Refusal, *, remedy: s
     try:
         with Image.open(io.BytesIO(content), formats=("PNG",)) as picture:
             if picture.mode not in _MODES:
-                raise refuse(f"{called}: has {picture.mode} pixels, not one whole number each; {remedy}")
+                raise refuse(f"{called}: has {picture.mode} pixels, not single-channel integers; {remedy}")
             if max(picture.size) > MAX_PICTURE_PX:
                 raise refuse(f"{called}: {picture.size[0]} x {picture.size[1]} pixels; {remedy}")
             return np.asarray(picture, _MODES[picture.mode])
@@ -36,4 +36,4 @@ def parse_label_picture(content: bytes, name: str, refuse: Refusal, *, remedy: s
         cause = (
             "not a PNG" if isinstance(error, UnidentifiedImageError) else printable_line(str(error), max_characters=120)
         )
-        raise refuse(f"{called}: is no PNG that can be read ({cause}); {remedy}") from error
+        raise refuse(f"{called}: is not a readable PNG ({cause}); {remedy}") from error

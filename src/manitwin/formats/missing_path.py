@@ -10,5 +10,5 @@ _URL = re.compile(r"[a-z][a-z0-9+.-]+:/", re.IGNORECASE)  # what was read as a p
 def not_there(path: str) -> str:
     """Return why nothing is found at a path that a person gave: it is not there, or no path but a URL."""
     if _URL.match(path):
-        return "a URL, and nothing is downloaded: download it, and give its path"
-    return "not there"
+        return "a URL; URLs are not downloaded: download the file, and give its path"
+    return "not found"

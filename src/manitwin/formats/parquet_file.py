@@ -150,9 +150,9 @@ def check_parquet(path: Path, refuse: Refusal, *, schema: pa.Schema | None = Non
 
 def _check_footer(footer: Footer, columns: Sequence[str] | None, unreadable: _Unreadable, max_rows: int) -> None:
     if footer.rows > max_rows:
-        raise unreadable(f"{footer.rows} rows are more than the limit of {max_rows}")
+        raise unreadable(f"{footer.rows} rows exceed the limit of {max_rows}")
     if len(footer.leaves) > MAX_COLUMNS:
-        raise unreadable(f"{len(footer.leaves)} columns are more than the limit of {MAX_COLUMNS}")
+        raise unreadable(f"{len(footer.leaves)} columns exceed the limit of {MAX_COLUMNS}")
     there = {leaf.column for leaf in footer.leaves}
     missing = [name for name in columns or () if name not in there]
     if missing:

@@ -52,7 +52,7 @@ def factory(kind: str, spec: str) -> Any:
         return getattr(import_module(module), attribute)
     except ImportError as error:
         raise Unavailable(
-            f"{kind} {_parts(spec)[0]!r} cannot be loaded: {error}; install what it names, or choose another"
+            f"{kind} {_parts(spec)[0]!r} cannot be loaded: {error}; install what is missing, or choose another"
         ) from error
 
 
@@ -63,7 +63,7 @@ def create(kind: str, spec: str, config: BuildConfig) -> Any:
     if hasattr(made_by, "from_spec"):
         return made_by.from_spec(argument, config)
     if argument:
-        raise ConfigError(f"{kind} {spec!r}: {name} takes nothing after its name")
+        raise ConfigError(f"{kind} {spec!r}: {name} takes no arguments after its name")
     return made_by()
 
 

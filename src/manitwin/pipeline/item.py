@@ -175,7 +175,7 @@ def require_readable_size(path: Path) -> None:
     """Raise InputError ``too_large`` for a file that no reader takes."""
     size = path.stat().st_size
     if size > MAX_KEPT_BYTES:
-        said = f"{size} bytes are more than the limit of {MAX_KEPT_BYTES}"
+        said = f"{size} bytes exceed the limit of {MAX_KEPT_BYTES}"
         raise InputError(
             "too_large", f"{printable_line(path.name)}: {said}; simplify it, or reduce the size of its textures"
         )

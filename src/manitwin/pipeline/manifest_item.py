@@ -63,7 +63,7 @@ def item_of(
         if not os.path.isfile(path):
             if os.path.isdir(path) and is_imported(Path(path)):
                 return _imported_item(Path(path).resolve(), values, where)
-            what = "no file" if os.path.exists(path) else not_there(file)
+            what = "not a file" if os.path.exists(path) else not_there(file)
             raise UsageError(f"{where}: {shortened(path)} is {what}; paths are absolute or relative to the manifest")
         file = _resolved(path)
     for key, kind in (("units", StatedUnit), ("up", Up)):

@@ -160,7 +160,7 @@ def _settle_arm_joint(tree: UrdfTree, name: str, given: tuple[float, float] | No
     if kind not in ("revolute", "continuous"):
         raise ConfigError(f"{tree.name}: arm joint {name} is {kind}; an arm's joints are revolute")
     if joint.find("mimic") is not None:
-        raise ConfigError(f"{tree.name}: arm joint {name} mimics another; name joints that move on their own")
+        raise ConfigError(f"{tree.name}: arm joint {name} mimics another; name joints that move independently")
     if limit is None or float(limit.get("velocity", "0")) <= 0:
         raise ConfigError(f"{tree.name}: arm joint {name} has no velocity limit; give it <limit velocity>")
     if kind == "continuous":
@@ -209,7 +209,7 @@ def settle_finger_joints(tree: UrdfTree, names: tuple[str, str], half_opening_m:
         if lower > REACH_TOLERANCE_M or upper < half_opening_m - REACH_TOLERANCE_M:
             raise ConfigError(
                 f"{tree.name}: finger joint {name} runs from {lower:g} to {upper:g} m; "
-                f"the gripper wants 0 (closed) to {half_opening_m:g} m"
+                f"the gripper needs 0 (closed) to {half_opening_m:g} m"
             )
         limit.set("lower", "0")
         limit.set("upper", repr(half_opening_m))

@@ -145,7 +145,7 @@ def definition_path(name_or_path: str) -> Path:
         path = Path(name_or_path)
         if not path.is_file():
             raise UsageError(
-                f"robot file {name_or_path} is not there; give a .toml file or one of {', '.join(shipped)}"
+                f"robot file {name_or_path} does not exist; give a .toml file or one of {', '.join(shipped)}"
             )
         return path
     if name_or_path not in shipped:
@@ -164,9 +164,7 @@ def read_definition(path: Path) -> tuple[RobotDefinition, str]:
         where = ".".join(str(part) for part in first["loc"])
         raise ConfigError(f"robot file {path}: {where}: {first['msg']}") from error
     if len(definition.home_rad) != len(definition.arm_joints):
-        raise ConfigError(
-            f"robot file {path}: home_rad wants {len(definition.arm_joints)} values, one for each arm joint"
-        )
+        raise ConfigError(f"robot file {path}: home_rad needs {len(definition.arm_joints)} values, one per arm joint")
     return definition, hashlib.sha256(content).hexdigest()
 
 
@@ -212,7 +210,7 @@ def _distribution_folder(field: UrdfField, robot: str) -> Path:
     try:
         return Path(str(distribution(str(field.distribution)).locate_file("")))
     except PackageNotFoundError as error:
-        raise Unavailable(f"robot {robot} wants the files of {field.distribution}: {remedy}") from error
+        raise Unavailable(f"robot {robot} needs the files of {field.distribution}: {remedy}") from error
 
 
 def _inside(path: Path, boundary: Path, links_allowed: bool, what: str, directory: bool = False) -> Path:
@@ -224,13 +222,13 @@ def _inside(path: Path, boundary: Path, links_allowed: bool, what: str, director
         there = inside and (plain.is_dir() if directory else plain.is_file())
         too_large = there and plain.stat().st_size > MAX_FILE_BYTES
     except (OSError, ValueError, RuntimeError) as error:  # a name that no file system can hold, or links in a circle
-        raise ConfigError(f"{what} cannot be a file: {error}; mend the name") from error
+        raise ConfigError(f"{what} is not a valid file name: {error}; correct the name") from error
     if not inside:
-        raise ConfigError(f"{what} leaves {boundary}; put it below that folder")
+        raise ConfigError(f"{what} lies outside {boundary}; put it below that folder")
     if not there:
-        raise ConfigError(f"{what} is not there: looked for {plain}; put it there, or mend the name")
+        raise ConfigError(f"{what} is not there: looked for {plain}; put it there, or correct the name")
     if too_large:
         raise ConfigError(
-            f"{what} is larger than {MAX_FILE_BYTES >> 20} MiB, which no robot's file is; make it smaller"
+            f"{what} is larger than {MAX_FILE_BYTES >> 20} MiB, which is too large for a robot file; make it smaller"
         )
     return plain

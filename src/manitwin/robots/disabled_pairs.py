@@ -80,7 +80,7 @@ def _of_srdf(path: Path, tree: UrdfTree) -> set[tuple[str, str]]:
         if first in tree.links and second in tree.links:
             found.add(_pair(first, second))
     if not found:
-        raise ConfigError(f"{path}: no pair of the robot's links in it; leave srdf out, and the pairs are computed")
+        raise ConfigError(f"{path}: it lists no pair of the robot's links; leave srdf out to compute the pairs")
     return found
 
 
@@ -102,14 +102,14 @@ def _in_contact(tree: UrdfTree, definition: RobotDefinition) -> set[tuple[str, s
         import pinocchio as pin
     except ImportError as error:
         remedy = import_remedy(error, "pip install 'manitwin[robots]'")
-        raise Unavailable(f"robots without an SRDF want pin and coal ({error}): {remedy}") from error
+        raise Unavailable(f"robots without an SRDF need pin and coal ({error}): {remedy}") from error
     urdf = tree.text()
     try:
         model, geometry = pin.buildModelFromXML(urdf), pin.GeometryModel()
     except ValueError as error:
         said = printable_line(str(error), max_characters=120)
         raise ConfigError(
-            f"{definition.name}: Pinocchio cannot read its URDF ({said}); mend its numbers and joints"
+            f"{definition.name}: Pinocchio cannot read its URDF ({said}); correct its numbers and joints"
         ) from error
     owners: list[str] = []
     links_with_shapes = [(model.frames[model.getBodyId(link.name)], link) for link in links_of_urdf(urdf)]

@@ -157,7 +157,7 @@ def _hull(tree: UrdfTree, path: Path, where: str) -> np.ndarray:
     except Exception as error:  # mesh readers raise whatever they stumble over
         reason = " ".join(str(error).split())[:120]
         raise tree.refuse(
-            f"the mesh of {where}, {path},", f"has no convex hull ({reason})", "mend or replace it"
+            f"the mesh of {where}, {path},", f"has no convex hull ({reason})", "repair or replace it"
         ) from error
 
 

@@ -103,7 +103,7 @@ def _load(path: Path) -> Robot:
 
 def _load_one_arm(name_or_path: str, wanted_by: Path) -> Robot:
     if is_of_two_arms(definition_path(name_or_path)):
-        raise ConfigError(f"robot file {wanted_by}: {name_or_path} has two arms itself; name a robot of one")
+        raise ConfigError(f"robot file {wanted_by}: {name_or_path} has two arms itself; name a robot with one arm")
     return load_robot(name_or_path)
 
 
@@ -152,17 +152,17 @@ def _check_jaws(robot: Robot, gripper: ParallelGripper) -> None:
         if abs(sign * axis[0] - 1) > AXIS_TOLERANCE:
             raise ConfigError(
                 f"robot {robot.name}: {joint} opens along {axis.round(3).tolist()} of the grasp frame, not along "
-                f"{'+X' if sign > 0 else '-X'}; mend gripper_to_tip or the order of finger_joints"
+                f"{'+X' if sign > 0 else '-X'}; correct gripper_to_tip or the order of finger_joints"
             )
         for shape in link.shapes:
             box_to_link, half_m = shape.bounding_box()
             box = to_grasp @ poses[link.name] @ box_to_link
             furthest_m.append(float(box[2, 3] + np.abs(box[2, :3]) @ half_m))
     if not furthest_m:
-        raise ConfigError(f"robot {robot.name}: its fingers have no collision shapes; give them some")
+        raise ConfigError(f"robot {robot.name}: its fingers have no collision shapes; add some")
     wanted_m = gripper.tip_depth_m + gripper.pad_half_extents_m[1]
     if abs(max(furthest_m) - wanted_m) > TIP_TOLERANCE_M:
         raise ConfigError(
             f"robot {robot.name}: its fingers end {max(furthest_m):.4f} m along +Z of the grasp frame, the gripper's at "
-            f"{wanted_m:.4f}; mend gripper_to_tip or name another gripper"
+            f"{wanted_m:.4f}; correct gripper_to_tip or name another gripper"
         )

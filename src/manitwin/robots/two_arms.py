@@ -73,7 +73,7 @@ def load_two_arms(path: Path, load: Callable[[str], Robot]) -> Robot:
     for name, robot in zip(names, own, strict=True):
         if not robot.has_jaws or robot.gripper.sha256 != own[0].gripper.sha256:
             raise ConfigError(
-                f"robot file {path}: arm {name} has {robot.gripper.name}; both want the same hand of two jaws"
+                f"robot file {path}: arm {name} has {robot.gripper.name}; both arms need the same two-jaw gripper"
             )
     arms = [
         placed_arm(robot, each.name, each.base_to_world.matrix())

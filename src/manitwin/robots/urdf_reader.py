@@ -86,7 +86,7 @@ def read_urdf(
     tree = UrdfTree(name, root, rules.error)
     if rules.simulated and (macro := _first_macro(root)) is not None:
         raise tree.refuse(
-            f"<{macro}>", "is of xacro, which makes URDFs and is none", "run 'xacro FILE > FILE.urdf', give that"
+            f"<{macro}>", "is a xacro file, not a URDF", "run 'xacro FILE > FILE.urdf' and give the result"
         )
     _check_tree(tree, rules)
     for link_name, link in tree.links.items():
@@ -123,7 +123,7 @@ def _check_tree(tree: UrdfTree, rules: UrdfRules) -> None:
             if not name:
                 raise tree.refuse(f"a <{tag}>", "has no name", "give it one")
             if count > 1:
-                raise tree.refuse(f"{tag} {name!r}", f"is there {count} times", "give each its own name")
+                raise tree.refuse(f"{tag} {name!r}", f"occurs {count} times", "give each its own name")
     links, holders = tree.links, dict[str, str]()
     for name, joint in tree.joints.items():
         for end in ("parent", "child"):
@@ -138,13 +138,13 @@ def _check_tree(tree: UrdfTree, rules: UrdfRules) -> None:
             raise tree.refuse(f"joint {name!r}", f"is of the type {joint.get('type')!r}", f"valid are {kinds}")
         other = holders.setdefault(child_of(joint), name)
         if other != name:
-            two = f"hangs from two joints, {other!r} and {name!r}"
+            two = f"is the child of two joints, {other!r} and {name!r}"
             raise tree.refuse(f"link {child_of(joint)!r}", two, "the links must form a tree: remove one")
     roots = tree.roots()
     reached = set(tree.below(*roots))
     if circle := [name for name in links if name not in reached]:
         remedy = "the links must form a tree: remove one"
-        raise tree.refuse(f"the joints of {', '.join(circle)}", "go in a circle", remedy)
+        raise tree.refuse(f"the joints of {', '.join(circle)}", "form a loop", remedy)
     if rules.simulated and len(roots) > 1:
         remedy = "the links must form a tree with one root: join them"
         raise tree.refuse(f"the links {', '.join(roots)}", "all have no parent", remedy)
@@ -192,5 +192,5 @@ def _check_attributes(
                 values = []
             least = 0.0 if element.tag in _SIZES else -MAX_NUMBER
             if len(values) not in counts or not all(math.isfinite(v) and least <= v <= MAX_NUMBER for v in values):
-                wanted = f"wants {counts[0]} usable number{'s' if counts[0] > 1 else ''}"
+                wanted = f"needs {counts[0]} usable number{'s' if counts[0] > 1 else ''}"
                 raise tree.refuse(where, f"has <{element.tag} {key}={text[:40]!r}>, which {wanted}", "mend it")

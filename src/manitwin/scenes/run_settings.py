@@ -35,7 +35,9 @@ def load_settings(kind: type[Application], file: Path | None, given: dict[str, A
 def earlier_settings(root: DatasetRoot) -> dict[str, Any]:
     """Return the configuration of the last run at a root; empty where there was none."""
     return (
-        root.read_json(CONFIG, UsageError, remedy="remove it: the run writes it again") if root.exists(CONFIG) else {}
+        root.read_json(CONFIG, UsageError, remedy="remove it: the next run writes a new one")
+        if root.exists(CONFIG)
+        else {}
     )
 
 
@@ -47,7 +49,7 @@ def check_settings(root: DatasetRoot, now: Mapping[str, Any], *, free: frozenset
     """
     earlier = earlier_settings(root)
     if earlier and earlier.get("kind") != now["kind"]:
-        raise UsageError(f"{root.url}: holds {earlier.get('kind', 'twins')}, not {now['kind']}; give another folder")
+        raise UsageError(f"{root.url}: contains {earlier.get('kind', 'twins')}, not {now['kind']}; give another folder")
     before = dict(_flat(earlier))
     differ = [
         f"{name}: {json.dumps(before[name])} there, {json.dumps(value)} now"
@@ -61,7 +63,7 @@ def check_settings(root: DatasetRoot, now: Mapping[str, Any], *, free: frozenset
     if count:
         raise UsageError(
             f"{root.url}: {count} {made} in it were made with other settings ({'; '.join(differ)});"
-            " give the same ones to add to it, or another folder"
+            " give the same settings to add to it, or another folder"
         )
 
 

@@ -37,7 +37,7 @@ def read_scene(path: Path) -> SceneRecord:
     """Read a scene file, or that of a scene's folder. Raises UsageError naming the file, the cause and the remedy."""
     file = path / SCENE if path.is_dir() else path
     if not os.path.lexists(file):
-        raise UsageError(f"{path}: no {SCENE} there; give a scene that `manitwin layout` made")
+        raise UsageError(f"{path}: it contains no {SCENE}; give a scene that `manitwin layout` made")
     return parse_scene(read_bytes(file, MAX_JSON_BYTES, UsageError, inside=file.parent, name=str(file)), file)
 
 

@@ -170,7 +170,7 @@ def test_a_catalogue_is_the_same_again_and_never_over_another(dataset: Path, wri
     ]
     with pytest.raises(UsageError, match="not empty"):
         write_catalog(dataset, written)
-    with pytest.raises(UsageError, match="no data set"):
+    with pytest.raises(UsageError, match="not a data set"):
         write_catalog(tmp_path, tmp_path / "out")
 
 

@@ -125,7 +125,7 @@ def test_every_row_of_a_list_is_a_row_or_a_counted_cause(photos: Path, tmp_path:
         "cannot be opened (No such file or directory)",
         "is a named pipe",
         "is empty",
-        "leads out of its folder",
+        "leads outside its folder",
     }
     assert sum(causes(done).values()) == 11
     status = catalogue_status(tmp_path / "c.db")

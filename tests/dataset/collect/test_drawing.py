@@ -172,7 +172,7 @@ def test_a_program_draws_and_what_is_wrong_with_it_is_said(tmp_path: Path) -> No
     ("spec", "error", "says"),
     [
         ("midjourney:v9", UsageError, "command, fal, openai"),
-        ("command:draw {image} {out}", ConfigError, "leave {image} out"),
+        ("command:draw {image} {out}", ConfigError, "leave out {image}"),
         ("command:draw {text}", ConfigError, "needs {out}"),
         ("openai:", ConfigError, "name the model"),
         ("openai:gpt-image-1", ConfigError, "usd_per_job"),
@@ -189,7 +189,7 @@ def test_prompts_are_those_of_a_plan_and_wrong_ones_name_their_line(tmp_path: Pa
     (tmp_path / "prompts.csv").write_text("text,name\na mug,mug\na mug,mug\n")
     assert read_prompts(tmp_path) == [Prompt("a mug", "mug")]
     (tmp_path / "bad.csv").write_text("name\nmug\n")
-    with pytest.raises(UsageError, match=r"bad\.csv:2: no text"):
+    with pytest.raises(UsageError, match=r"bad\.csv:2: the text is missing"):
         read_prompts(tmp_path / "bad.csv")
 
 

@@ -89,10 +89,10 @@ def test_fuels_models_are_rows_and_one_without_a_name_is_a_counted_cause(tmp_pat
 @pytest.mark.parametrize(
     ("told", "said"),
     [
-        ({}, "no listing that is known"),
-        ([1], "no listing"),
-        ({"a": {"name": "x"}}, "no listing"),
-        ("mug", "no listing"),
+        ({}, "not a known listing"),
+        ([1], "not a known listing"),
+        ({"a": {"name": "x"}}, "not a known listing"),
+        ("mug", "not a known listing"),
     ],
 )
 def test_other_json_is_refused_as_a_whole(told: Any, said: str, tmp_path: Path) -> None:

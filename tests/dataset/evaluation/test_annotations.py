@@ -116,10 +116,10 @@ def test_labels_without_an_accepted_twin_are_named(place: Path, tmp_path: Path) 
     [
         ("", "no labels"),
         ("file,categry\na,b\n", "categry"),
-        ("category\nmug\n", "neither file nor twin_id"),
+        ("category\nmug\n", "file and twin_id are missing"),
         ("file,plausible_mass_low_kg,plausible_mass_high_kg\na,1,\n", "not two numbers"),
-        ("file,plausible_mass_low_kg,plausible_mass_high_kg\na,2,1\n", "no interval above 0"),
-        ("file,plausible_mass_low_kg,plausible_mass_high_kg\na,nan,1\n", "no interval above 0"),
+        ("file,plausible_mass_low_kg,plausible_mass_high_kg\na,2,1\n", "not an interval above 0"),
+        ("file,plausible_mass_low_kg,plausible_mass_high_kg\na,nan,1\n", "not an interval above 0"),
         ("file,typical_grasp_type\na,paralel jaw\n", "did you mean 'parallel_jaw'"),
     ],
 )

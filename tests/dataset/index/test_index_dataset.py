@@ -37,7 +37,7 @@ def dataset(place: Path) -> Dataset:
 
 def test_nothing_is_read_before_it_is_asked_for(tmp_path: Path) -> None:
     lazy = Dataset(tmp_path / "not there").filter("nonsense").split().train
-    with pytest.raises(UsageError, match="no data set"):
+    with pytest.raises(UsageError, match="not a data set"):
         len(lazy)
 
 
@@ -47,7 +47,7 @@ def test_filters_add_up(dataset: Dataset) -> None:
     assert mugs.filter("mass_kg < 0.3").ids() == [twin_id(0)]
     assert sorted(dataset.ids()) == dataset.ids()
     assert "category = 'mug'" in repr(mugs)
-    with pytest.raises(UsageError, match="not one condition"):
+    with pytest.raises(UsageError, match="not a single condition"):
         len(dataset.filter("true FROM twins"))
     with pytest.raises(UsageError, match="syntax error"):
         dataset.filter("true) OR (true").grasps()
@@ -162,7 +162,7 @@ def test_split_keeps_copies_together_and_stays_when_the_set_grows(tmp_path: Path
 
 @pytest.mark.parametrize("shares", [(0.8, 0.2, 0.1), (-0.1, 0.5, 0.5)])
 def test_split_refuses_shares_that_are_none(dataset: Dataset, shares: tuple[float, float, float]) -> None:
-    with pytest.raises(UsageError, match="add up to 1 or less"):
+    with pytest.raises(UsageError, match="add up to at most 1"):
         dataset.split(*shares)
 
 

@@ -53,7 +53,7 @@ def test_one_that_an_older_version_began_goes_on(dataset: Path, published: Path,
     with pytest.raises(KeyboardInterrupt):
         publish_dataset(dataset, out, twins_per_shard=2, on_shard=stop_after(1))
     (out / ".publish" / "started").write_bytes(b"")  # as it was when there were twins alone
-    with pytest.raises(UsageError, match="a publication of twins was begun there"):
+    with pytest.raises(UsageError, match="it contains an unfinished publication of twins"):
         Publication(DatasetRoot(out), EPISODES).begin()
     assert publish_dataset(dataset, out, twins_per_shard=2).kept_shards == 1
     assert files_below(out) == files_below(published)

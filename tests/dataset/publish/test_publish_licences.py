@@ -53,7 +53,7 @@ def test_rehearsals_stay_unless_they_are_asked_for_and_are_counted() -> None:
     assert "".join(sorted(selection.published)) == "abc" and selection.rehearsals == 1 and "e" in selection.kept_back
     asked = select(rows, None, with_rehearsals=True)
     assert "".join(sorted(asked.published)) == "abce" and asked.rehearsals == 0
-    with pytest.raises(UsageError, match=r"1 are rehearsals, made by manitwin fake .*--with-rehearsals"):
+    with pytest.raises(UsageError, match=r"1 were made with a rehearsal server .*--with-rehearsals"):
         select(rows[4:], None)
 
 

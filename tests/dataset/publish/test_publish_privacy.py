@@ -87,5 +87,5 @@ def test_source_with_a_folder_in_its_name_is_refused(tmp_path: Path) -> None:
     record = read_record(folder).model_dump(mode="json", exclude={"revision"})
     seal(folder, {**record, "source": {**record["source"], "file": "photos/source.zip"}})
     index(root)
-    with pytest.raises(TwinError, match="not a file's name"):
+    with pytest.raises(TwinError, match="not a file name"):
         publish_dataset(root, tmp_path / "out")

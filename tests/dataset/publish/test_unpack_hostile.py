@@ -111,7 +111,7 @@ def test_record_that_names_a_file_elsewhere_is_refused(tmp_path: Path, file: str
     record["revision"] = revision_of(record)
     parts[RECORD] = canonical_json(record).encode()
     tar = write_tar(tmp_path / "bad.tar", [member(f"{ID}.{part}", content) for part, content in parts.items()])
-    with pytest.raises(TwinError, match=r"no name for a file|is no file below the twin's folder"):
+    with pytest.raises(TwinError, match=r"not a valid file name|is no file below the twin's folder"):
         unpack_shard(tar, tmp_path / "out")
 
 

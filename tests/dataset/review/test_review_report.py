@@ -184,13 +184,13 @@ def test_a_form_is_filled_in_and_read(place: Path, tmp_path: Path) -> None:
     [
         ({"answer": "maybe"}, "'yes', 'no' or 'unsure'"),
         ({"dimension": "colour"}, "colour"),
-        ({"twin_id": "0" * 16}, "no twin of"),
+        ({"twin_id": "0" * 16}, "not a twin of"),
         ({"answer": ""}, "no answer"),
         ({"answer": "no", "dimension": "functional", "points": "f0=99"}, "there are 0 to"),
         ({"answer": "no", "dimension": "functional", "points": "f7=1"}, "unknown point 'f7'"),
-        ({"answer": "no", "dimension": "grasp", "points": "g0=1"}, "two points at one candidate"),
+        ({"answer": "no", "dimension": "grasp", "points": "g0=1"}, "two points at the same candidate"),
         ({"answer": "no", "dimension": "functional", "points": "f0"}, "give them as 'f0=12;g1=3'"),
-        ({"answer": "no", "dimension": "physical", "mass_kg": "heavy"}, "no number"),
+        ({"answer": "no", "dimension": "physical", "mass_kg": "heavy"}, "not a number"),
         ({"verdict": "yes"}, "unknown column 'verdict'"),
     ],
 )

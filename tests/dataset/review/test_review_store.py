@@ -134,10 +134,10 @@ def test_what_is_no_store_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no reviews yet"):
         ReviewStore(tmp_path / "none.sqlite", make=False)
     (tmp_path / "text.sqlite").write_text("no database at all" * 100)
-    with pytest.raises(UsageError, match="no reviews that can be read"):
+    with pytest.raises(UsageError, match="not a readable review store"):
         ReviewStore(tmp_path / "text.sqlite")
     (tmp_path / "link.sqlite").symlink_to("/etc/hostname")
-    with pytest.raises(UsageError, match="leads out of its folder"):
+    with pytest.raises(UsageError, match="leads outside its folder"):
         ReviewStore(tmp_path / "link.sqlite")
 
 
@@ -159,7 +159,7 @@ def test_a_store_with_a_schema_of_its_own_is_refused_before_it_is_asked(own: str
         ({"corrections": {"mass_kg": {"value": -1, "low": -1, "high": 1}}}, "greater than 0"),
         ({"corrections": {"mass_kg": {"value": 2, "low": 1, "high": 1.5}}}, "outside"),
         ({"corrections": {"points": {"x9": 1}}}, "ids are f0"),
-        ({"annotator": "a b"}, "no annotator's name"),
+        ({"annotator": "a b"}, "not a valid annotator name"),
         ({"note": "bell\x07"}, "control characters"),
         ({"seconds": float("nan")}, "finite"),
         ({"twin_id": "../t"}, "no name for a folder"),

@@ -70,7 +70,7 @@ def test_a_blind_annotator_is_told_a_mass_without_its_interval(made: tuple[Path,
 def test_what_is_wrong_is_refused_and_nothing_is_kept(made: tuple[Path, list[str]], session: ReviewSession) -> None:
     record = read_twin(DatasetRoot(made[0]), made[1][0])
     for change, why in (
-        ({"revision": "another"}, "built anew since it was shown"),
+        ({"revision": "another"}, "rebuilt since it was shown"),
         ({"answers": {"category": "perhaps"}}, "'yes', 'no' or 'unsure'"),
         ({"answers": {}}, "no dimension is answered"),
         ({"request": "x"}, "request"),
@@ -80,5 +80,5 @@ def test_what_is_wrong_is_refused_and_nothing_is_kept(made: tuple[Path, list[str
         with pytest.raises(UsageError, match=why):
             session.confirm("ada", record, {**said(record.revision), **change})
     assert session.store.standing() == []
-    with pytest.raises(UsageError, match="no annotator's name"):
+    with pytest.raises(UsageError, match="not a valid annotator name"):
         ReviewSession(session.store, Index(made[0]), session.plan, ["a b"])

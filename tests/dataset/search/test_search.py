@@ -129,7 +129,7 @@ def test_small_and_large_order_the_things_of_a_category() -> None:
 
 
 def test_a_question_of_nothing_but_what_is_unwanted_is_refused() -> None:
-    with pytest.raises(UsageError, match="only what is not looked for"):
+    with pytest.raises(UsageError, match="only excluded words"):
         on_the_shelf("not red")
 
 

@@ -64,10 +64,10 @@ def test_report_lists_near_duplicates_of_the_index(tmp_path: Path) -> None:
 
 
 def test_data_set_without_an_index_is_said_to_have_none(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"no data set \(twins/ is missing\)"):
+    with pytest.raises(UsageError, match=r"not a data set \(twins/ is missing\)"):
         write_dataset_report(DatasetRoot(tmp_path))
     (tmp_path / "ledger.sqlite").touch()
-    with pytest.raises(UsageError, match="none of its twins is finished; manitwin status"):
+    with pytest.raises(UsageError, match="no twin is finished yet; manitwin status"):
         write_dataset_report(DatasetRoot(tmp_path))
     (tmp_path / "twins").mkdir()
     with pytest.raises(UsageError, match="has no index; run manitwin index"):

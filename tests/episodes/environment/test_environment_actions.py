@@ -31,12 +31,12 @@ NAMES = ("shoulder", "elbow", "gripper_opening_m")
 @pytest.mark.parametrize(
     ("action", "said"),
     [
-        ([0.1, np.nan, 0.04], "action is not finite for elbow; look at what the policy returned"),
+        ([0.1, np.nan, 0.04], "action is not finite for elbow; check the output of the policy"),
         ([np.inf, 0.0, -np.inf], "action is not finite for shoulder, gripper_opening_m"),
         ([0.1, 0.2], r"action has shape \(2,\); give 3 numbers: shoulder, elbow, gripper_opening_m"),
         ([[0.1, 0.2, 0.04]], r"action has shape \(1, 3\)"),
         (0.1, r"action has shape \(\)"),
-        ("left", "action: no numbers"),
+        ("left", "action: not numbers"),
         (None, "action"),
     ],
 )

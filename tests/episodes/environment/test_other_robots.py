@@ -113,9 +113,9 @@ def test_two_arms_get_tasks_of_both_and_of_the_first_and_repeat_them(tmp_path: P
     info = replayed(env, by_skill["handover"], hand=0.08)
     assert info["failure"].endswith("not_taken")
     env.close()
-    with pytest.raises(UsageError, match="skill handover wants two arms, panda has one"):
+    with pytest.raises(UsageError, match="skill handover needs two arms, but panda has one"):
         make_episodes(tmp_path / "tasks", tmp_path / "one", 8, TrajectoriesConfig(robot="panda"), executor="inline")
-    with pytest.raises(UsageError, match="skill handover wants two arms, panda has one"):
+    with pytest.raises(UsageError, match="skill handover needs two arms, but panda has one"):
         manitwin.make_env(tmp_path / "tasks", by_skill["handover"].attempt.task_id, robot="panda")
     noise = manitwin.StartNoise(joints_rad=0.02)
     env = manitwin.make_env(tmp_path / "tasks", by_skill["handover"].attempt.task_id, max_steps=5, start_noise=noise)

@@ -23,7 +23,7 @@ def test_a_literal_reads_as_a_formula_and_takes_its_default_value() -> None:
         (("inn", "a", "b"), "'in'"),
         (("in", "a"), "needs a second argument, a object"),
         (("upright", "a", "b"), "takes one argument"),
-        (("on", "a", "a"), "two different things"),
+        (("on", "a", "a"), "two different objects"),
         (("on", "a", "b", 0.1), "takes no value"),
         (("near", "a", "b", -1.0), "give one from 0"),
         (("near", "a", "b", float("nan")), "give one from 0"),

@@ -289,11 +289,11 @@ def test_the_difference_of_the_taker_s_tip_leads_to_what_it_is_told() -> None:
 def test_a_handover_wants_two_arms_which_also_do_what_one_does() -> None:
     two, one = load_robot("two_pandas"), load_robot("panda")
     check_hand(two, load_skill("handover"))
-    with pytest.raises(UsageError, match="wants two arms, panda has one; give one of two_pandas"):
+    with pytest.raises(UsageError, match="needs two arms, but panda has one; give one of two_pandas"):
         check_hand(one, load_skill("handover"))
     for name in ("place_in", "pick_place", "pour"):
         check_hand(two, load_skill(name))
-    with pytest.raises(UsageError, match="grasps that are carried over want one arm"):
+    with pytest.raises(UsageError, match="grasps that are carried over need one arm"):
         check_jaws(two, "grasps that are carried over")
 
 

@@ -130,12 +130,12 @@ def test_files_of_tasks_are_read_as_they_were_written(tasks: list[TaskRecord], t
     path.write_bytes(tasks_bytes(tasks))
     assert read_tasks(path) == tasks
     path.write_bytes(tasks_bytes([tasks[0], tasks[0]]))
-    with pytest.raises(UsageError, match="come twice"):
+    with pytest.raises(UsageError, match="are repeated"):
         read_tasks(path)
     with pytest.raises(UsageError, match="no task 'nothing'"):
         path.write_bytes(tasks_bytes(tasks))
         one_task(tmp_path, "nothing")
-    with pytest.raises(UsageError, match="not there"):
+    with pytest.raises(UsageError, match="not found"):
         read_tasks(tmp_path / "elsewhere")
 
 
@@ -169,7 +169,7 @@ def test_tasks_are_carried_out_with_their_goals_and_words(
 
 
 def test_a_skill_is_not_asked_of_tasks_which_say_themselves_what_is_done(folder: Path, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="skill is lift: tasks say themselves what is to be done"):
+    with pytest.raises(UsageError, match="skill is lift: tasks define their own skill"):
         make_episodes(folder, tmp_path / "out", 1, TrajectoriesConfig(skill="lift"), executor="inline")
     assert not (tmp_path / "out").exists()
 

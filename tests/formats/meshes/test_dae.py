@@ -123,7 +123,7 @@ BROKEN_NUMBERS = ("0 0 0 1 0 0 1 1 0 0 1 0", "0,5 0 0 1 0 0 1 1 0 0 1 0")
 def test_a_document_of_broken_shapes_alone_says_what_is_broken(tmp_path: Path) -> None:
     (tmp_path / "a.dae").write_text(DOCUMENT.format(texture="", nodes="", extra="").replace(*BROKEN_NUMBERS))
     with pytest.raises(
-        InputError, match=r"no_faces: a\.dae: .*, as its COLLADA is broken \(Corrupted float array\); export"
+        InputError, match=r"no_faces: a\.dae: .* because its COLLADA is broken \(Corrupted float array\); export"
     ):
         read_mesh(tmp_path / "a.dae")
 

@@ -79,9 +79,9 @@ def test_it_is_told_by_what_it_holds_and_a_skeleton_is_told(tmp_path: Path) -> N
     ("content", "cause"),
     [
         (fbx_box().encode()[:900], "its FBX is broken"),
-        (fbx_box().replace("Geometry: 20", "Geometrie: 20").encode(), "its FBX is broken, or holds nothing but points"),
-        (fbx_box().replace("7.4.0", "6.1.0").encode(), "FBX 6.1 is not read, only 7.1 (2011) and later"),
-        (b"Kaydara FBX Binary  \x00\x1a\x00" + (6100).to_bytes(4, "little") + bytes(99), "FBX 6.1 is not read"),
+        (fbx_box().replace("Geometry: 20", "Geometrie: 20").encode(), "its FBX is broken, or contains only points"),
+        (fbx_box().replace("7.4.0", "6.1.0").encode(), "FBX 6.1 is not supported, only 7.1 (2011) and later"),
+        (b"Kaydara FBX Binary  \x00\x1a\x00" + (6100).to_bytes(4, "little") + bytes(99), "FBX 6.1 is not supported"),
         (b"Kaydara FBX Binary  \x00\x1a\x00" + (7400).to_bytes(4, "little") + b"\xff" * 99, "its FBX is broken"),
         (b"Kaydara FBX Binary  \x00", "its FBX is broken"),
     ],
@@ -95,12 +95,12 @@ def test_broken_and_old_files_are_one_clear_line(tmp_path: Path, content: bytes,
 
 
 def test_too_many_faces_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="12 faces are more than the limit of 10") as caught:
+    with pytest.raises(InputError, match="12 faces exceed the limit of 10") as caught:
         _read(tmp_path, fbx_box(), MeshLimits(max_faces=10))
     assert caught.value.reason == "too_large"
 
 
 def test_what_reads_fbx_is_named_where_it_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fbx, "find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r"what reads FBX is not installed; pip install 'manitwin\[fbx\]', or export"):
+    with pytest.raises(InputError, match=r"the FBX reader is not installed; pip install 'manitwin\[fbx\]', or export"):
         _read(tmp_path, fbx_box())

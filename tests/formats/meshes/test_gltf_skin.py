@@ -50,7 +50,7 @@ def test_shares_of_joints_are_blended(tmp_path: Path) -> None:
         (lambda tree: tree["nodes"][0].update(skin=4), "a node names skin 4, which is not there"),
         (lambda tree: tree["skins"][0].update(joints=[1, 9]), "a joint of its skeleton is not in the scene"),
         (lambda tree: tree["scenes"][0].update(nodes=[0]), "a joint of its skeleton is not in the scene"),
-        (lambda tree: tree["skins"][0].update(joints=[1]), "a vertex is bound to a joint that its skeleton has not"),
+        (lambda tree: tree["skins"][0].update(joints=[1]), "a vertex is bound to a joint that is not in its skeleton"),
         (lambda tree: tree["accessors"][-1].update(count=1), "fewer bind matrices than joints"),
         (
             lambda tree: tree["meshes"][0]["primitives"][0]["attributes"].pop("WEIGHTS_0"),

@@ -146,7 +146,7 @@ def written(folder: Path, name: str, content: bytes | str) -> Path:
 Case = tuple[str, Callable[[], bytes | str], str, str]
 REFUSED: list[Case] = [
     # sizes that the file does not have, or that pass a limit
-    ("count.glb", lambda: glb(accessors=[zeros(12_000_001), INDICES]), "too_large", "vertices are more than the limit"),
+    ("count.glb", lambda: glb(accessors=[zeros(12_000_001), INDICES]), "too_large", "vertices exceed the limit"),
     ("matrices.glb", lambda: glb(accessors=[zeros(12_000_001, "MAT4"), INDICES]), "too_large", "limit"),
     ("values.glb", lambda: glb(accessors=[*(zeros(11_000_000, "VEC4") for _ in range(9)), INDICES], meshes=[
         {"primitives": [{"attributes": {"POSITION": i}, "indices": 9} for i in range(9)]}]), "too_large", "numbers"),
@@ -160,21 +160,21 @@ REFUSED: list[Case] = [
     ("word.ply", lambda: ply("ascii", rows(3, 1), b"0" * 10_000_000), "unreadable", "rows do not match"),
     ("size.ply", lambda: ply("ascii", rows(3, 1), b"0 " * 9 + b"99999999999 0 1 2"), "unreadable", "rows do not match"),
     ("half.ply", lambda: ply("ascii", rows(3, 1), b"0 " * 9 + b"2.5 0 1 2"), "unreadable", "rows do not match"),
-    ("index.ply", lambda: ply("ascii", rows(3, 1), b"0 " * 9 + b"3 0 1 1e300"), "unreadable", "vertex that is not there"),
-    ("nan.ply", lambda: ply("ascii", rows(3, 1), b"0 " * 9 + b"3 0 1 nan"), "unreadable", "vertex that is not there"),
+    ("index.ply", lambda: ply("ascii", rows(3, 1), b"0 " * 9 + b"3 0 1 1e300"), "unreadable", "vertex that does not exist"),
+    ("nan.ply", lambda: ply("ascii", rows(3, 1), b"0 " * 9 + b"3 0 1 nan"), "unreadable", "vertex that does not exist"),
     ("count.ply", lambda: ply("binary_little_endian", rows(1, 1, "float"), bytes(12) + struct.pack("<f", np.nan)),
      "unreadable", "broken"),
     ("long.ply", lambda: ply("binary_big_endian", rows(1, 1, "uint"), bytes(12) + b"\xff" * 8), "unreadable", "end early"),
-    ("corners.obj", lambda: OBJ + "f " + "1 2 3 " * 140_000, "too_large", "faces are more than the limit"),
-    ("points.obj", lambda: OBJ + "f 1\n" * 400_000, "too_large", "faces are more than the limit"),
+    ("corners.obj", lambda: OBJ + "f " + "1 2 3 " * 140_000, "too_large", "faces exceed the limit"),
+    ("points.obj", lambda: OBJ + "f 1\n" * 400_000, "too_large", "faces exceed the limit"),
     ("numbers.obj", lambda: OBJ + "v " + "0 " * 5_000_000, "unreadable", "line 21 is too long"),
     ("line.obj", lambda: OBJ + "o " + "x" * (65 << 20), "too_large", "line of more than"),
     ("groups.obj", lambda: OBJ + "".join(f"usemtl {i}\nf 1 2 3\n" for i in range(20_001)), "too_large", "parts"),
-    ("index.obj", lambda: OBJ + "f 1 2 " + "9" * 10_000, "unreadable", "is no face"),
-    ("negative.obj", lambda: OBJ + "f -1 -2 -" + "9" * 30, "unreadable", "is no face"),
+    ("index.obj", lambda: OBJ + "f 1 2 " + "9" * 10_000, "unreadable", "is not a face"),
+    ("negative.obj", lambda: OBJ + "f -1 -2 -" + "9" * 30, "unreadable", "is not a face"),
     ("elements.dae", lambda: dae("<a/>" * 8_000_001), "too_large", "elements"),
     ("archive.dae", lambda: dae("<a>\u4b50\u0605</a>").replace("?>", ' encoding="utf-16"?>', 1).encode("utf-16"),
-     "unreadable", "hides a ZIP archive"),
+     "unreadable", "contains a ZIP archive"),
     ("members.usdz", lambda: usdz(("a.usda", "#usda 1.0\n"), *((f"{i}", "") for i in range(10_000))), "too_large", "members"),
     ("counts.usdz", lambda: usdz(("a.usda", usda_mesh("(0,0,0)", "-3, 6", "0,0,0"))), "unreadable", "do not match"),
     ("huge.usdz", lambda: usdz(("a.usda", usda_mesh("(0,0,0)", "2000000000", "0"))), "unreadable", "do not match"),
@@ -188,7 +188,7 @@ REFUSED: list[Case] = [
     ("plain.obj", lambda: "v 0 0 0\nv 1e200 0 0\nv 0 1 0\nf 1 2 3\n", "not_finite", "farther out"),
     ("far.stl", lambda: "solid x\n" + FACET.replace("1 0 0", "1e400 nan 0"), "not_finite", "NaN or infinite"),
     ("matrix.dae", lambda: dae(dae_box(matrix=f"<matrix>{'1e300 ' * 16}</matrix>")), "not_finite", "vertices"),
-    ("index.dae", lambda: dae(dae_box(indices="0 1 999999 " * 12)), "no_faces", "no faces"),
+    ("index.dae", lambda: dae(dae_box(indices="0 1 999999 " * 12)), "no_faces", "no readable faces"),
     ("negative.dae", lambda: dae(dae_box(indices="0 1 -9 " * 12)), "unreadable", "broken"),
     ("far.usdz", lambda: usdz(("a.usda", usda_mesh("(0,0,1e30),(1,0,0),(0,1,0)", "3", "0,1,2"))), "not_finite", "farther out"),
 ]  # fmt: skip
@@ -353,7 +353,9 @@ def test_what_passes_the_processs_memory_is_too_large_in_one_line(tmp_path: Path
     )
     lines = said.stdout.splitlines()
     assert (said.returncode, said.stderr, len(lines)) == (0, "", 2)
-    assert lines[0] == "too_large: textures.glb: it asks for more memory than there is; simplify it, or raise the limit"
+    assert (
+        lines[0] == "too_large: textures.glb: it needs more memory than is available; simplify it, or raise the limit"
+    )
     assert lines[1] == "accessor.glb 50" or lines[1].startswith("too_large: accessor.glb: ")
 
 

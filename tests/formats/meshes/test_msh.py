@@ -58,12 +58,12 @@ def test_mujoco_reads_the_same_solid(tmp_path: Path) -> None:
 def test_what_is_broken_or_too_large_is_refused(tmp_path: Path) -> None:
     ball = trimesh.creation.icosphere(subdivisions=1, radius=0.1)
     whole = write_msh(tmp_path / "ball.msh", ball).read_bytes()
-    with pytest.raises(InputError, match="faces are more than the limit"):
+    with pytest.raises(InputError, match="faces exceed the limit"):
         read_mesh(tmp_path / "ball.msh", limits=MeshLimits(max_faces=10))
     (tmp_path / "cut.msh").write_bytes(whole[:-4])
     with pytest.raises(InputError, match="unknown binary data"):
         read_mesh(tmp_path / "cut.msh")
     wrong = whole[:-4] + np.array([10_000], "<i4").tobytes()
     (tmp_path / "wrong.msh").write_bytes(wrong)
-    with pytest.raises(InputError, match="a face names a vertex that is not there"):
+    with pytest.raises(InputError, match="a face refers to a vertex that does not exist"):
         read_mesh(tmp_path / "wrong.msh")

@@ -129,9 +129,9 @@ def test_vertex_that_no_face_uses_may_be_nan(tmp_path: Path) -> None:
 
 def test_limits_on_faces_and_bytes_hold(tmp_path: Path) -> None:
     (tmp_path / "a.obj").write_text(CUBE + CUBE_FACES)
-    with pytest.raises(InputError, match="faces are more than the limit of 11"):
+    with pytest.raises(InputError, match="faces exceed the limit of 11"):
         read_mesh(tmp_path / "a.obj", limits=MeshLimits(max_faces=11))
-    with pytest.raises(InputError, match="bytes are more than the limit"):
+    with pytest.raises(InputError, match="bytes exceed the limit"):
         read_mesh(tmp_path / "a.obj", limits=MeshLimits(max_bytes=20))
 
 

@@ -62,7 +62,7 @@ def test_faces_that_count_back_stay_where_they_are_among_others() -> None:
 
 def test_a_broken_line_among_plain_ones_is_named() -> None:
     faces = faces_of(["1 2 3", "4 5 6", "7 8 x"])
-    with pytest.raises(InputError, match=r"line 3 is no face: 'f 7 8 x"):
+    with pytest.raises(InputError, match=r"line 3 is not a face: 'f 7 8 x"):
         faces.rows()
 
 

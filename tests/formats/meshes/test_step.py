@@ -44,5 +44,5 @@ def test_a_broken_or_empty_file_is_one_clear_line(tmp_path: Path, text: str) -> 
 def test_what_reads_cad_files_is_named_where_it_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "a.stp").write_text(step_box((1, 2, 3)))
     monkeypatch.setattr(step, "find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r"what reads STEP is not installed; pip install 'manitwin\[cad\]', or export"):
+    with pytest.raises(InputError, match=r"the STEP reader is not installed; pip install 'manitwin\[cad\]', or export"):
         read_mesh(tmp_path / "a.stp")

@@ -87,7 +87,7 @@ def test_its_files_are_told_apart_by_their_sha256(made: tuple[Path, Weights], tm
 def test_a_folder_without_one_of_its_files_is_refused(tmp_path: Path, gone: str) -> None:
     write_tiny_clip(tmp_path / "m")
     (tmp_path / "m" / gone).unlink()
-    with pytest.raises(UsageError, match=f"{Path(gone).name}: not there"):
+    with pytest.raises(UsageError, match=f"{Path(gone).name}: not found"):
         ClipFolder(tmp_path / "m")
 
 

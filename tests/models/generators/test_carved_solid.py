@@ -44,5 +44,5 @@ def test_the_level_set_of_a_ball_is_the_ball() -> None:
 
 
 def test_a_field_that_is_nowhere_positive_is_rejected() -> None:
-    with pytest.raises(Rejected, match="nothing in common"):
+    with pytest.raises(Rejected, match="do not intersect"):
         carved_of(np.full((5, 5, 5), -1.0), CELL, ORIGIN, [], [])

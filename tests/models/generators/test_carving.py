@@ -93,7 +93,7 @@ def test_turns_are_counter_clockwise_seen_from_above() -> None:
 def test_a_photo_of_another_thing_is_named() -> None:
     photos = [(f"{turn:.0f}.png", _photo(CYLINDER, turn)) for turn in (0.0, 60.0, 90.0, 120.0)]
     photos[1] = ("other.png", _photo(trimesh.creation.icosphere(3, 0.06), 60))
-    with pytest.raises(Rejected, match=r"other\.png: its outline does not go with"):
+    with pytest.raises(Rejected, match=r"other\.png: its outline does not match"):
         carve(photos, [0, 60, 90, 120])
 
 
@@ -138,9 +138,9 @@ def test_poses_stand_for_turns_and_give_the_size(tmp_path: Path, monkeypatch: py
     made = carve_photos(paths, None, poses=tmp_path / "transforms.json")
     assert made.metric and np.ptp(made.part.vertices[:, 2]) == pytest.approx(0.104, abs=0.004)
     assert any("their unit is m, as transforms.json states" in finding for finding in made.findings)
-    with pytest.raises(UsageError, match="one of them"):
+    with pytest.raises(UsageError, match="but not both"):
         carve_photos(paths, [0, 1, 2, 3, 4], poses=tmp_path / "transforms.json")
-    with pytest.raises(UsageError, match=r"--poses: nothing\.json: not there"):
+    with pytest.raises(UsageError, match=r"--poses: nothing\.json: not found"):
         carve_photos(paths, None, poses=tmp_path / "nothing.json")
 
 

@@ -166,7 +166,7 @@ def test_script_with_a_missing_interpreter_is_unavailable(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize(
     ("content", "words"),
-    [(None, "wrote nothing"), (b"", "no mesh"), (b"hello", "no mesh"), (b"v 0 0 0\n", "wrote obj")],
+    [(None, "wrote nothing"), (b"", "not a mesh"), (b"hello", "not a mesh"), (b"v 0 0 0\n", "wrote obj")],
 )
 def test_output_has_to_be_a_mesh(tmp_path: Path, content: bytes | None, words: str) -> None:
     text = "" if content is None else f"import sys; open(sys.argv[-1], 'wb').write({content!r})"

@@ -266,5 +266,5 @@ def test_spec_needs_a_key_and_a_price_that_is_listed_or_given(monkeypatch: pytes
     with pytest.raises(ConfigError, match=r"services\.usd_per_job"):
         FalGenerator.from_spec(f"{TRELLIS}@https://proxy.example", settings())
     assert FalGenerator.from_spec("@http://localhost:9000", settings()).usd_per_job == 0.0
-    with pytest.raises(ConfigError, match="no endpoint"):
+    with pytest.raises(ConfigError, match="not an endpoint"):
         FalGenerator.from_spec("trellis", settings())

@@ -70,7 +70,7 @@ def test_words_of_each_refusal(tmp_path: Path) -> None:
     assert "truncated" in str(_flaw(tmp_path, truncated(glb([whole]))))
     assert "zero bytes" in str(_flaw(tmp_path, b""))
     assert "watertight" in str(_flaw(tmp_path, glb([open_surface()])))
-    assert "one point" in str(_flaw(tmp_path, _with(whole.vertices * 0, whole.faces)))
+    assert "all of its vertices coincide" in str(_flaw(tmp_path, _with(whole.vertices * 0, whole.faces)))
     flat = str(_flaw(tmp_path, _with(whole.vertices * [1, 1, 0], whole.faces)))
     assert "watertight" in flat or "volume" in flat
     nan = whole.vertices.copy()

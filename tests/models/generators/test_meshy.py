@@ -269,7 +269,7 @@ def test_link_to_another_port_of_this_machine_is_not_followed(tmp_path: Path) ->
     with FakeServer(Elsewhere()) as elsewhere:
         hostile = Hostile({"status": "SUCCEEDED", "model_urls": {"glb": f"{elsewhere.url}/model.glb"}})
         with FakeServer(hostile) as server:
-            assert "no public address" in refused(BadReply, lambda: client(server).fetch("image:x", tmp_path))
+            assert "neither a public address" in refused(BadReply, lambda: client(server).fetch("image:x", tmp_path))
     assert not elsewhere.requests and not list(tmp_path.iterdir())
 
 

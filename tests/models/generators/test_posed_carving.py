@@ -138,7 +138,7 @@ def test_cameras_from_below_see_the_underside_and_nothing_is_cut_off() -> None:
 def test_a_photo_at_a_wrong_pose_is_left_out_of_many_and_named_of_few() -> None:
     cameras = _cameras([*POSES[:6], pose_at(20, 30, 0.25)])
     assert from_views(_views(PHOTOS, cameras), None).notes["left_out"] == ["6.png"]
-    with pytest.raises(Rejected, match=r"2\.png: its outline does not go with its pose"):
+    with pytest.raises(Rejected, match=r"2\.png: its outline does not match its pose"):
         from_views(_views(PHOTOS[:5], _cameras([*POSES[:2], pose_at(20, 30, 0.22), *POSES[3:5]])), None)
 
 

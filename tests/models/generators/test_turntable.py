@@ -80,7 +80,7 @@ def test_turns_that_run_the_other_way_round_are_told() -> None:
 def test_a_photo_at_a_wrong_turn_is_named() -> None:
     photos, turns = _turned(5, 25.0)
     photos[3] = ("wrong.png", turned_photo(turns[3] + 70, 25.0))
-    with pytest.raises(Rejected, match=r"wrong\.png: its outline does not go with those of the other photos"):
+    with pytest.raises(Rejected, match=r"wrong\.png: its outline does not match those of the other photos"):
         carve(photos, turns)
 
 
@@ -97,7 +97,7 @@ def test_of_many_the_one_that_does_not_go_with_the_others_is_left_out_and_told()
 @pytest.mark.slow
 def test_of_many_that_do_not_go_together_one_is_named() -> None:
     photos, turns = _turned(5, 25.0)
-    with pytest.raises(Rejected, match="these 5 outlines are not of one thing at these turns") as refused:
+    with pytest.raises(Rejected, match="these 5 outlines are not of one object at these turns") as refused:
         carve(photos, [turn / 2 for turn in turns])
     assert str(refused.value).count(".png") == 1
 

@@ -32,7 +32,7 @@ def test_download_is_asked_for_without_the_key(tmp_path: Path) -> None:
 
 def test_download_of_broken_files(tmp_path: Path) -> None:
     cut, empty = Response(200, b"x" * 999, cut_after=500), Response(200, b"")
-    for broken, words in ((cut, "cut short"), (empty, "is empty")):
+    for broken, words in ((cut, "truncated"), (empty, "is empty")):
         with FakeServer(Script(broken)) as server:
             assert words in str(error_of(lambda server=server: _download(server, tmp_path)))  # type: ignore[misc]
             assert len(server.requests) == 3

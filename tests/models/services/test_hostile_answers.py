@@ -74,7 +74,7 @@ def test_link_of_a_mesh_to_another_port_of_this_machine_is_not_followed(name: st
         moved = Response(302, b"", {"Location": address})
         with twisted(name, lambda place, answer: moved if place == "FILE" else answer) as (_, server):
             error = used(name, server.url, tmp_path)
-    assert type(error) is BadReply and "no public address" in str(error)
+    assert type(error) is BadReply and "neither a public address" in str(error)
     assert not internal.requests and not list(tmp_path.iterdir())
 
 

@@ -27,14 +27,14 @@ MALFORMED = [
     [("annotator", "openai:fake"), ("generator", "hunyuan3d"), ("generator", "rodin"), ("generator", "meshy")],
 )
 def test_malformed_address_is_refused_with_an_example(kind: str, name: str, url: str) -> None:
-    with pytest.raises(ConfigError, match=r"is no URL of a server.*; give one such as http://localhost:8000/v1"):
+    with pytest.raises(ConfigError, match=r"is not the URL of a server.*; give one such as http://localhost:8000/v1"):
         create(kind, f"{name}@{url}", BuildConfig())
 
 
 @pytest.mark.parametrize("url", ["tcp://127.0.0.1:40993,", "tcp://h:x"])
 @pytest.mark.parametrize("name", ["graspgen", "graspgenx"])
 def test_malformed_address_of_a_grasp_server_is_refused(name: str, url: str) -> None:
-    with pytest.raises(ConfigError, match=r"is no URL of a server.*tcp://localhost:5556"):
+    with pytest.raises(ConfigError, match=r"is not the URL of a server.*tcp://localhost:5556"):
         create("grasper", f"{name}@{url}", BuildConfig())
 
 

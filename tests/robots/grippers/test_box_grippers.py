@@ -72,13 +72,13 @@ def test_right_files_load(tmp_path: Path, text: str) -> None:
         ('name = "mine"', 'name = "../mine"', "name: is '../mine', it must be letters, digits"),
         ('source = "made for a test"', 'source = " "', "source: is empty"),
         ("force_n = 30.0", "", "it lacks force_n; give it"),
-        ("force_n = 30.0", "force = 30.0", "force: no key of this kind; missing are force_n"),
-        ("tip_depth_m = 0.110", "tip_depth_m = 0.150", "where no finger is: the finger_boxes reach from 0.07 to 0.12 along +Z"),
+        ("force_n = 30.0", "force = 30.0", "force: not a key of this kind; these are missing: force_n"),
+        ("tip_depth_m = 0.110", "tip_depth_m = 0.150", "outside the fingers: the finger_boxes reach from 0.07 to 0.12 along +Z"),
         ("[0.004, 0.0, 0.095]", "[0.0, 0.004, 0.095]", "inner face is at x = -0.004 at the tips' depth, it must be at 0"),
         ("[0.004, 0.0, 0.095]", "[0.039, 0.0, 0.095]", "inner face is at x = 0.035"),
         ("[0.006, 0.010]", "[0.006, 0.020]", "from 0.09 to 0.13 along Z, the boxes that have the inner face only from 0.07"),
         ("[0.006, 0.010]", "[0.010, 0.010]", "from -0.01 to 0.01 along Y"),
-        ('name = "mine"', 'name = "panda"', "'panda' is the name of a gripper that comes with the package"),
+        ('name = "mine"', 'name = "panda"', "'panda' is the name of a shipped gripper"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_with_jaws_is_named(tmp_path: Path, old: str, new: str, said: str) -> None:

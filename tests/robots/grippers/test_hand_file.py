@@ -113,7 +113,7 @@ def test_changed_mesh_of_a_link_is_another_gripper(tmp_path: Path) -> None:
     [
         ('"thumb_1", "thumb_2", "index_1"', '"thump_1", "thumb_2", "index_1"', "unknown joint 'thump_1'; did you mean 'thumb_1'"),
         ('["thumb_1_link", "thumb_2_link"]', '["thumb_1_link", "thumb_tip"]', "unknown link 'thumb_tip'"),
-        ('"index_1_link", "index_2_link"', '"index_1_link", "thumb_2_link"', "thumb_2_link is named twice"),
+        ('"index_1_link", "index_2_link"', '"index_1_link", "thumb_2_link"', "thumb_2_link is listed twice"),
         ("closed_rad = [0.6, 0.3,", "closed_rad = [0.6, 1.3,", "joint 'thumb_2' is at 1.3, its limits in the URDF are 0 to 1.2"),
         ("closed_rad = [0.6,", "closed_rad = [34,", "joint 'thumb_1' is at 34"),
         ("closed_rad = [0.6, 0.3, 0.6, 0.3, 0.6, 0.3]", "closed_rad = [0.6, 0.3]", "give 6 joint positions"),
@@ -129,7 +129,7 @@ def test_changed_mesh_of_a_link_is_another_gripper(tmp_path: Path) -> None:
         ("quaternion_wxyz = [1.0, 0.0, 0.0, 0.0]", "quaternion_wxyz = [0.0, 0.0, 1.0, 0.0]", "-X"),
         ("quaternion_wxyz = [1.0, 0.0, 0.0, 0.0]", "quaternion_wxyz = [0.0, 1.0, 0.0, 0.0]", "+Z points out of the palm"),
         ('grasp_types = ["pinch",', 'grasp_types = ["pich",', "grasp_types"),
-        ("speed_rad_s = 2.0", "sped_rad_s = 2.0", "no key of this kind; missing are speed_rad_s"),
+        ("speed_rad_s = 2.0", "sped_rad_s = 2.0", "not a key of this kind; these are missing: speed_rad_s"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_named(tmp_path: Path, old: str, new: str, said: str) -> None:
@@ -158,7 +158,7 @@ def test_openings_that_the_links_do_not_have_are_refused(tmp_path: Path) -> None
 
 
 def test_joint_of_the_palm_may_not_move_within_a_posture(tmp_path: Path) -> None:
-    assert "is of no finger" in refusal(tmp_path, '["middle_1_link", "middle_2_link"]', '["middle_2_link"]')
+    assert "belongs to no finger" in refusal(tmp_path, '["middle_1_link", "middle_2_link"]', '["middle_2_link"]')
 
 
 def test_finger_without_shapes_and_finger_without_joints_are_refused(tmp_path: Path) -> None:

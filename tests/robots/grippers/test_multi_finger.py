@@ -137,12 +137,12 @@ def test_missing_distribution_names_the_extra(tmp_path: Path) -> None:
 
 def test_urdf_beside_the_file_may_not_leave_its_folder(tmp_path: Path) -> None:
     beside = write(tmp_path, 'distribution = "example-robot-data"\nextra = "robots"\n', "")
-    with pytest.raises(UsageError, match=r"is not there"):
+    with pytest.raises(UsageError, match=r"does not exist"):
         load_gripper(beside)
     outside = write(
         tmp_path, 'distribution = "example-robot-data"\nextra = "robots"\nfile = "cmeel', 'file = "../cmeel'
     )
-    with pytest.raises(UsageError, match=r"leaves the folder"):
+    with pytest.raises(UsageError, match=r"lies outside the folder"):
         load_gripper(outside)
 
 

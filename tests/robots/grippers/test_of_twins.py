@@ -19,13 +19,13 @@ def test_shipped_gripper_needs_no_file() -> None:
 def test_own_gripper_is_taken_from_those_given_if_it_is_the_twins(tmp_path: Path) -> None:
     hand = load_gripper(write_hand(tmp_path))
     assert gripper_of("small_hand", hand.sha256, [hand]) is hand
-    with pytest.raises(UsageError, match="the file that is given is another than that of the twin's grasps"):
+    with pytest.raises(UsageError, match="the given file differs from the one of the twin's grasps"):
         gripper_of("small_hand", "0" * 64, [hand])
     with pytest.raises(
-        UsageError, match=r"gripper other does not come with the package.*given are small_hand; give its file"
+        UsageError, match=r"gripper other is not shipped with the package.*given are small_hand; give its file"
     ):
         gripper_of("other", hand.sha256, [hand])
-    with pytest.raises(UsageError, match="a twin has only its name; give its file with --gripper"):
+    with pytest.raises(UsageError, match="a twin stores only its name; give its file with --gripper"):
         gripper_of("small_hand", hand.sha256)
 
 

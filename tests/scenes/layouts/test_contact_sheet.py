@@ -53,7 +53,7 @@ def test_drawn_picture_that_cannot_be_read_is_said(content: bytes, tmp_path: Pat
     (scene,) = tmp_path.glob("out/scenes/*/*")
     (scene / "pictures").mkdir()
     (scene / "pictures/oblique_rgb.webp").write_bytes(content)
-    with pytest.raises(UsageError, match=r"oblique_rgb\.webp: no picture that can be read; remove its scene's folder"):
+    with pytest.raises(UsageError, match=r"oblique_rgb\.webp: not a readable picture; remove the folder of its scene"):
         write_contact_sheet(tmp_path / "twins", tmp_path / "out")
     assert not (tmp_path / "out" / CONTACT_SHEET).exists()
 
@@ -62,6 +62,6 @@ def test_run_without_an_accepted_scene_has_no_sheet(tmp_path: Path) -> None:
     write_things(tmp_path / "twins", (slab("board", 0.5, 0.5, 0.015),))
     config = LayoutsConfig(layout=LayoutSettings(objects=(3, 3), surface="tray"))
     make_layouts(tmp_path / "twins", tmp_path / "out", 1, config, executor="inline")
-    with pytest.raises(UsageError, match="no scene was accepted"):
+    with pytest.raises(UsageError, match="no accepted scene to show"):
         write_contact_sheet(tmp_path / "twins", tmp_path / "out")
     assert not (tmp_path / "out" / CONTACT_SHEET).exists()

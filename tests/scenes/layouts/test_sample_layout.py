@@ -90,7 +90,7 @@ def test_objects_stand_where_the_robot_reaches() -> None:
             x, y, _ = each.position_m
             assert near - 0.005 <= np.hypot(x, y) <= far + 0.005
             assert abs(np.degrees(np.arctan2(y, x))) <= half_deg + 1
-    with pytest.raises(UsageError, match="nothing of the table is in the workspace"):
+    with pytest.raises(UsageError, match="the table lies outside the workspace"):
         layout(workspace=(2.0, 3.0, 30.0))
 
 

@@ -40,14 +40,14 @@ def test_a_rounded_rotation_is_made_one_again(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("told", "said"),
     [
-        ({}, "says no pose of a camera"),
-        ({"camera_to_base": [[1, 2], [3, 4]]}, "says no pose of a camera"),
+        ({}, "contains no camera pose"),
+        ({"camera_to_base": [[1, 2], [3, 4]]}, "contains no camera pose"),
         ({"camera_to_base": (2 * np.eye(4)).tolist()}, "no rigid motion"),
-        ({"camera_to_base": np.diag([2.0, 2, 2, 1]).tolist()}, "its rotation is none"),
-        ({"camera_to_base": np.diag([1.0, 1, -1, 1]).tolist()}, "its rotation is none"),
-        ({"camera_to_base": transform(TURN, np.array([500.0, 0, 900])).tolist()}, "no rigid motion in metres"),
-        ({"position_m": [0, 0, 0], "quaternion_wxyz": [2, 0, 0, 0]}, "not the length 1"),
-        ({"position_m": [0, 0, 0], "quaternion_wxyz": [1e300, 1e300, 0, 0]}, "not the length 1"),
+        ({"camera_to_base": np.diag([2.0, 2, 2, 1]).tolist()}, "its rotation is invalid"),
+        ({"camera_to_base": np.diag([1.0, 1, -1, 1]).tolist()}, "its rotation is invalid"),
+        ({"camera_to_base": transform(TURN, np.array([500.0, 0, 900])).tolist()}, "not a rigid transform in metres"),
+        ({"position_m": [0, 0, 0], "quaternion_wxyz": [2, 0, 0, 0]}, "does not have length 1"),
+        ({"position_m": [0, 0, 0], "quaternion_wxyz": [1e300, 1e300, 0, 0]}, "does not have length 1"),
     ],
 )
 def test_what_is_no_pose_is_refused(told: Any, said: str, tmp_path: Path) -> None:

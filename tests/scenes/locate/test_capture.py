@@ -91,7 +91,7 @@ def test_no_camera_and_a_bent_picture_are_refused_in_one_line() -> None:
     with pytest.raises(Unavailable, match="No device connected"):
         record(FakeRealSense(plugged_in=False))
     bent = FakeRealSense(coeffs=(0.25, -0.2, 0.0, 0.0, 0.0))
-    with pytest.raises(UsageError, match="its lens bends the picture by up to"):
+    with pytest.raises(UsageError, match="its lens distorts the picture by up to"):
         record(bent)
     assert bent.calls[-1] == "stop", "the camera is let go"
 

@@ -117,7 +117,7 @@ def test_grasps_of_a_gripper_of_ones_own_are_carried_with_its_file(
     del record["revision"], record["files"]
     seal(folder, record)
     plane, found = table_plane(seen.view, np.random.default_rng(0)), found_at([seen.object_to_camera], seen, model)
-    with pytest.raises(UsageError, match=r"gripper mine does not come with the package.*--gripper"):
+    with pytest.raises(UsageError, match=r"gripper mine is not shipped with the package.*--gripper"):
         carry_grasps(found, Twin(folder), seen.view, plane, NOISE_M)
     carried = carry_grasps(found, Twin(folder), seen.view, plane, NOISE_M, [mine])
     assert carried is not None and carried.verified == 6

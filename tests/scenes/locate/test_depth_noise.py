@@ -34,7 +34,7 @@ def test_depths_beside_a_jump_are_lost_and_none_is_invented() -> None:
 
 
 def test_a_mask_of_lone_pixels_has_no_noise_to_measure() -> None:
-    with pytest.raises(UsageError, match="hardly two side by side"):
+    with pytest.raises(UsageError, match="too few adjacent ones"):
         measured_noise_m(DepthView(np.ones((40, 40)), K), np.indices((40, 40)).sum(0) % 3 == 0)
 
 

@@ -47,7 +47,7 @@ def test_cameras_of_others_are_read(tmp_path: Path, changed: dict[str, Any], uni
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"depth_unit_m": None}, "does not say the unit"),
+        ({"depth_unit_m": None}, "does not give the unit"),
         ({"depth_unit_m": None, "depth_scale": 0.001}, "librealsense"),
         ({"depth_unit_m": 1000}, "metres a unit"),
         ({"fx": -1}, "fx is -1"),
@@ -102,14 +102,14 @@ def zipped(array: bytes) -> bytes:
     [
         ("c.npz", {"other": np.zeros((100, 3))}, "no array points"),
         ("c.npz", {"points": np.zeros((100, 3))}, "behind the camera"),
-        ("c.npz", {"points": np.tile((1.0, 1.0, 1e-300), (100, 1))}, "beside the camera"),
+        ("c.npz", {"points": np.tile((1.0, 1.0, 1e-300), (100, 1))}, "more than 89 degrees off the camera axis"),
         ("c.npz", zipped(b"\x93NUMPY\x01\x00\x04\x00((  "), "no .npz that can be read"),
         ("c.npz", {"points": np.ones((100, 2))}, r"\(N, 3\)"),
         ("c.npz", {"points": np.ones((9, 3))}, "9 points"),
         ("c.npz", {"points": np.array([{}] * 100)}, "no plain numbers"),
         ("c.npz", b"PK\x03\x04 broken", "no .npz"),
         ("c.ply", b"ply\nformat ascii 1.0\nelement vertex 9000\nproperty float x\nend_header\n", "truncated"),
-        ("c.xyz", b"1 2 3", "is no cloud"),
+        ("c.xyz", b"1 2 3", "is not a point cloud"),
     ],
 )
 def test_what_is_no_cloud_is_refused(tmp_path: Path, name: str, content: Any, said: str) -> None:

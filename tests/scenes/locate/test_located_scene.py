@@ -120,5 +120,5 @@ def test_a_calibration_gives_the_base_and_one_of_another_table_is_refused(seen: 
     assert world.calibrated and world.lean_rad < np.deg2rad(1) and world.table_m == pytest.approx(0.03, abs=0.004)
     brick = world.camera_to_world @ seen.object_to_camera
     assert brick[:3, 3] == pytest.approx([0.4, -0.2, 0.03], abs=0.004)
-    with pytest.raises(UsageError, match=r"--base: the table that is seen leans by [56]\.\d degrees"):
+    with pytest.raises(UsageError, match=r"--base: the visible table leans by [56]\.\d degrees"):
         world_of_base(turned((0, 1, 0), 5.5) @ camera_to_base, plane, about)

@@ -52,5 +52,5 @@ def test_of_several_things_the_twin_is_the_one_that_it_explains(stool: PoseModel
     other[5:40, 5:60] = True  # a piece of the wall
     found = where_is(seen.view, [other, seen.mask], stool)
     assert found.location.status == "found" and np.array_equal(found.mask, seen.mask)
-    with pytest.raises(UsageError, match="nothing stands above"):
+    with pytest.raises(UsageError, match="no object stands above"):
         where_is(seen.view, [], stool)

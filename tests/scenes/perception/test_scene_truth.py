@@ -84,7 +84,7 @@ def changed(scenes: Path, tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("change", "cause"),
     [
-        (lambda facts: facts.pop("parts"), "kept no parts"),
+        (lambda facts: facts.pop("parts"), "did not store parts"),
         (lambda facts: facts["ids"].pop("object_00"), "another scene"),
         (lambda facts: facts["cameras"].update(beyond=facts["cameras"]["front"]), "another scene"),
         (lambda facts: facts["cameras"]["front"].update(width_px=10**9), "width_px"),
@@ -116,14 +116,14 @@ def test_pictures_of_another_size_or_in_colours_are_no_truth(scenes: Path, tmp_p
     file = changed(scenes, tmp_path)
     pictures = file.parent / "pictures"
     shutil.copy(pictures / "front_ids_colors.png", pictures / "front_ids.png")
-    with pytest.raises(UsageError, match="not one whole number each"):
+    with pytest.raises(UsageError, match="not single-channel integers"):
         _ = _front(read_scene_truth(file)).ids
 
 
 def test_scenes_that_were_not_drawn_are_refused(scenes: Path, tmp_path: Path) -> None:
     file = changed(scenes, tmp_path)
     shutil.rmtree(file.parent / "pictures")
-    with pytest.raises(UsageError, match=r"was not drawn; .*--pictures"):
+    with pytest.raises(UsageError, match=r"has no pictures; .*--pictures"):
         read_scene_truth(file)
 
 

@@ -293,7 +293,7 @@ def test_bop_has_a_scene_in_the_split_of_the_other_formats(scenes: Path, tmp_pat
 
 def test_what_fails_leaves_nothing(scenes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object) -> np.ndarray:
-        raise UsageError("front_ids.png: is no PNG")
+        raise UsageError("front_ids.png: is not a readable PNG")
 
     monkeypatch.setattr(Classes, "class_picture", broken)
     with pytest.raises(UsageError):

@@ -73,14 +73,16 @@ def write_affordances(
     """
     root = DatasetRoot(dataset)
     if root.local is None:
-        raise UsageError(f"{dataset}: is at a URL; copy the data set here, its twins are read whole")
+        raise UsageError(
+            f"{dataset}: is at a URL; copy the data set to this machine, since all files of its twins are read"
+        )
     twins = [
         twin
         for each in root.twin_ids()
         if (twin := Twin(root.local / root.twin_name(each))).record.status == "accepted"
     ]
     if not twins:
-        raise UsageError(f"{dataset}: has no accepted twin; build some, or give another data set")
+        raise UsageError(f"{dataset}: has no accepted twin; build twins, or give another data set")
     kinds = sorted({f"{_category(twin)}/{part.name}" for twin in twins for part in twin.record.parts})
     part_ids = {name: number for number, name in enumerate(kinds)}
     rows: list[dict[str, object]] = []

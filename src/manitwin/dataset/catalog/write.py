@@ -59,11 +59,13 @@ def write_catalog(
 
     root = DatasetRoot(dataset)
     if root.local is None:
-        raise UsageError(f"{dataset}: is at a URL; copy the data set here, its twins are read whole")
+        raise UsageError(
+            f"{dataset}: is at a URL; copy the data set to this machine, since all files of its twins are read"
+        )
     index = Index(root)
     ids: list[str] = index.select("twins", columns=["twin_id"])["twin_id"].to_pylist()
     if not ids:
-        raise UsageError(f"{dataset}: has no accepted twin; build some, or give another data set")
+        raise UsageError(f"{dataset}: has no accepted twin; build twins, or give another data set")
     groups = groups_of(ids, near_duplicates(index))
     rows: list[dict[str, Any]] = []
     left_out: dict[str, str] = {}

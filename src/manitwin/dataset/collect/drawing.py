@@ -55,15 +55,17 @@ def read_prompts(path: Path) -> list[Prompt]:
     """Return the prompts of a plan's folder, or of a CSV with the columns ``text`` and ``name``; raises UsageError."""
     file = path / PROMPTS if path.is_dir() else path
     if not file.is_file():
-        raise UsageError(f"{file}: no such file; give a folder of `manitwin collect plan`, or a CSV with text and name")
+        raise UsageError(
+            f"{file}: file not found; give a folder of `manitwin collect plan`, or a CSV with text and name"
+        )
     prompts = []
     for line, row in read_csv(file, UsageError):
         text = " ".join((row.get("text") or "").split())
         if not text:
-            raise UsageError(f"{file}:{line}: no text; give the columns text and name")
+            raise UsageError(f"{file}:{line}: the text is missing; give the columns text and name")
         prompts.append(Prompt(text, (row.get("name") or "").strip()))
         if len(prompts) > MOST_PROMPTS:
-            raise UsageError(f"{file}: more than {MOST_PROMPTS:,} prompts; divide it")
+            raise UsageError(f"{file}: more than {MOST_PROMPTS:,} prompts; split the file")
     return list(dict.fromkeys(prompts))
 
 

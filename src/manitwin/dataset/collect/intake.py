@@ -76,7 +76,7 @@ def add(catalogue: Path, given_place: Path, given: Given, root: Path | None = No
     require_place(given_place, given.source, root)
     listing = not given_place.is_dir()
     if listing and not _rows_of(given_place, files=root is not None):
-        raise UsageError(f"{given_place}: no rows; a list has a column 'file' or 'url'")
+        raise UsageError(f"{given_place}: the list has no rows; it needs a column 'file' or 'url'")
     with Catalogue(catalogue, make=True) as store:
         below = (root or given_place.parent) if listing else given_place
         return _Intake(store, given_place, given, below, files=root is not None).run()
@@ -150,7 +150,7 @@ class _Intake:
     def _row(self, listed: Listed, example: str) -> Row | None:
         place = listed.url or os.path.normpath(os.path.join(self._root, listed.file or ""))
         if _utf8(place) is None:
-            self._refuse("its name is not UTF-8; give the file another", example)
+            self._refuse("its name is not UTF-8; rename the file", example)
             return None
         if place in self._seen:
             self._added.repeated += 1
@@ -158,7 +158,7 @@ class _Intake:
         kind = _kind(place) if listed.url is None else "url"
         if kind is None:
             self._refuse(
-                f"is no image and no mesh; known: {', '.join(sorted(IMAGE_SUFFIXES | MESH_SUFFIXES))}", example
+                f"is not an image or a mesh; known: {', '.join(sorted(IMAGE_SUFFIXES | MESH_SUFFIXES))}", example
             )
             return None
         self._seen.add(place)

@@ -71,9 +71,9 @@ def _rows(path: Path, *, files: bool) -> Iterator[tuple[int, Mapping[str, Any] |
         try:
             row = parse_json(line, "row", Unreadable)
         except Unreadable:
-            yield number, Unreadable("the line is no JSON that can be read")
+            yield number, Unreadable("the line is not valid JSON")
             continue
-        yield number, row if isinstance(row, dict) else Unreadable("the line is no JSON object")
+        yield number, row if isinstance(row, dict) else Unreadable("the line is not a JSON object")
 
 
 def _listed(row: Mapping[str, Any]) -> Listed:
@@ -107,7 +107,7 @@ def _text(row: Mapping[str, Any], column: str) -> str | None:
     if value is None:
         return None
     if not isinstance(value, str):
-        raise Unreadable(f"{column} is no text")
+        raise Unreadable(f"{column} is not a text")
     text = value.strip()
     if column != "url" and (why := unusable(column if column != "source" else "name", text)):
         raise Unreadable(f"{column} {'is too long' if 'characters; give at most' in why else 'has control characters'}")
@@ -118,7 +118,7 @@ def _check_url(url: str) -> None:
     if len(url) > LONGEST_URL:
         raise Unreadable("url is too long")
     if not url.isascii() or not url.isprintable() or " " in url:
-        raise Unreadable("url has characters that none has; write them as %XX")
+        raise Unreadable("url has invalid characters; encode them as %XX")
     try:
         parts = urlsplit(url)
         wrong = parts.scheme not in ("http", "https") or not parts.hostname
@@ -126,9 +126,9 @@ def _check_url(url: str) -> None:
     except ValueError:
         wrong, secret = True, False
     if wrong:
-        raise Unreadable("url is none of http or https")
+        raise Unreadable("url is not http or https")
     if secret:
-        raise Unreadable("url has a user name or password in it")
+        raise Unreadable("url contains a user name or password")
 
 
 def _size(value: Any) -> float | None:
@@ -139,7 +139,7 @@ def _size(value: Any) -> float | None:
     except (ValueError, OverflowError):
         size = math.nan
     if not 0 < size <= LARGEST_SIZE_M:
-        raise Unreadable(f"size_m is no length in metres, above 0 and at most {LARGEST_SIZE_M:g}")
+        raise Unreadable(f"size_m is not a length in metres, above 0 and at most {LARGEST_SIZE_M:g}")
     return size
 
 

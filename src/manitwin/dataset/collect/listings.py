@@ -53,7 +53,7 @@ def read_listing(path: Path, *, files: bool) -> Iterator[tuple[int, dict[str, An
     """
     from manitwin.formats.json_file import parse_json  # imports NumPy, and a place that is no listing does not need it
 
-    told = parse_json(_text(path), str(path), UsageError, remedy="give it as it was published")
+    told = parse_json(_text(path), str(path), UsageError, remedy="give the file as it was published")
     if isinstance(told, dict) and told and all(isinstance(each, dict) and "license" in each for each in told.values()):
         shard = path.name.split(".", 1)[0]
         for number, (uid, each) in enumerate(told.items(), 1):
@@ -63,8 +63,9 @@ def read_listing(path: Path, *, files: bool) -> Iterator[tuple[int, dict[str, An
             yield number, _of_fuel(each, files=files)
     else:
         raise UsageError(
-            f"{path}: is no listing that is known; give Objaverse's metadata (an object of annotations by uid) or Fuel's (a list"
-            " of models with owner and name), or make a .csv or .jsonl of it"
+            f"{path}: is not a known listing; give Objaverse's metadata (an object of annotations by uid) or Fuel's"
+            f" (a list"
+            " of models with owner and name), or convert it to .csv or .jsonl"
         )
 
 
@@ -76,9 +77,9 @@ def _text(path: Path) -> bytes:
             source = gzip.GzipFile(fileobj=stream) if path.suffix.lower() == ".gz" else stream
             content = source.read(MAX_JSON_BYTES + 1)
         except (OSError, EOFError, zlib.error) as error:
-            raise UsageError(f"{path}: cannot be unpacked ({error}); fetch it again") from error
+            raise UsageError(f"{path}: cannot be unpacked ({error}); download it again") from error
     if len(content) > MAX_JSON_BYTES:
-        raise UsageError(f"{path}: more than {MAX_JSON_BYTES >> 20} MiB once it is unpacked; split it")
+        raise UsageError(f"{path}: more than {MAX_JSON_BYTES >> 20} MiB after unpacking; split it")
     return content
 
 

@@ -15,12 +15,10 @@ def require_place(place: Path, source: str | None, root: Path | None) -> None:
     if not place.is_dir():
         if place.suffix.lower() not in LIST_SUFFIXES and not is_listing(place):
             raise UsageError(
-                f"{place}: is no folder and no list; give a folder, a .csv or .jsonl file, or a listing (.json)"
+                f"{place}: is not a folder or a list; give a folder, a .csv or .jsonl file, or a listing (.json)"
             )
         return
     if root is not None:
-        raise UsageError("--root: is of a list, and this is a folder; leave it out")
+        raise UsageError("--root: applies to a list, but this is a folder; leave it out")
     if not source:
-        raise UsageError(
-            "--source: missing; say where the files of this folder come from, such as --source 'my photos'"
-        )
+        raise UsageError("--source: missing; give the source of the files in this folder, such as --source 'my photos'")

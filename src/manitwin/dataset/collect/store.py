@@ -19,7 +19,7 @@ from manitwin.formats.sqlite_store import BUSY_S, damaged, errors_named, flaw_in
 
 Kind = Literal["image", "mesh", "asset", "url"]
 Status = Literal["ready", "listed", "duplicate", "unreadable"]
-_DAMAGED = "is no catalogue that can be read ({cause}); give another"
+_DAMAGED = "is not a readable catalogue ({cause}); give another"
 COUNTED = ("group", "status", "licence", "source", "size_band")
 """What the rows are counted by."""
 
@@ -77,7 +77,9 @@ class Catalogue:
     def __init__(self, path: Path, *, make: bool = False):
         self.path = path
         if not make and not os.path.lexists(path):
-            raise UsageError(f"{path}: no catalogue yet; `manitwin collect add {path} FOLDER --source NAME` makes one")
+            raise UsageError(
+                f"{path}: this catalogue does not exist; `manitwin collect add {path} FOLDER --source NAME` creates one"
+            )
         fresh = not os.path.lexists(path)
         if not fresh:
             with open_regular(path, UsageError, name=str(path)) as stream:
@@ -97,7 +99,9 @@ class Catalogue:
             run(f"PRAGMA application_id = {APPLICATION}")
         (application,), (version,) = run("PRAGMA application_id").fetchone(), run("PRAGMA user_version").fetchone()
         if application != APPLICATION:
-            raise UsageError(f"{self.path}: is no catalogue; give one that `manitwin collect add` made, or a new name")
+            raise UsageError(
+                f"{self.path}: is not a catalogue; give one that `manitwin collect add` made, or a new name"
+            )
         if version > len(MIGRATIONS):
             raise UsageError(of_newer_schema(self.path, version, len(MIGRATIONS)))
         migrate(self._connection, version)

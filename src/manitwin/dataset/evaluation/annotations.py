@@ -103,7 +103,9 @@ def evaluate_annotations(dataset: str, labels: Path) -> AnnotationReport:
         scores += scores_of(twin.record, label)
         distances += _distances(twin)
     if not found:
-        raise UsageError(f"{labels}: none of its {len(known)} labels is of an accepted twin of {dataset}; give twin_id")
+        raise UsageError(
+            f"{labels}: none of its {len(known)} labels belongs to an accepted twin of {dataset}; give twin_id"
+        )
     return AnnotationReport(found, tuple(scores), tuple(distances), tuple(missing))
 
 
@@ -133,7 +135,7 @@ def _twin_of(file: str, paths: Mapping[str, str]) -> str | None:
         twin_id for path, twin_id in paths.items() if wanted and PurePosixPath(path).parts[-len(wanted) :] == wanted
     }
     if len(found) > 1:
-        raise UsageError(f"{file}: {len(found)} twins have such an input; give twin_id in the labels")
+        raise UsageError(f"{file}: {len(found)} twins have this input; give twin_id in the labels")
     return next(iter(found), None)
 
 

@@ -58,11 +58,11 @@ def evaluate_generation(
     """
     root = DatasetRoot(dataset)
     if root.local is None:
-        raise UsageError(f"{dataset}: is at a URL; copy the data set here, its twins are drawn")
+        raise UsageError(f"{dataset}: is at a URL; copy the data set to this machine, since its twins are rendered")
     tables = ReportTables.of_index(root)
     sources = tables.result(SOURCES)
     if not sources.rows:
-        raise UsageError(f"{dataset}: no input has ended, accepted or rejected; build some, or name another data set")
+        raise UsageError(f"{dataset}: no input was accepted or rejected yet; build some, or give another data set")
     folders = [root.local / root.twin_name(twin_id) for twin_id in root.twin_ids()]
     twins = (twin for folder in folders if (twin := Twin(folder)).record.status == "accepted")
     found = likeness_of_twins(twins, models, seed=seed, on_twin=on_twin)

@@ -67,7 +67,7 @@ def evaluate_grasps(dataset: str) -> EvaluationReport:
     tables = ReportTables.of_index(DatasetRoot(dataset))
     twins = tables.result(_TWINS).only
     if not twins["objects"]:
-        raise UsageError(f"{dataset}: has no accepted twin; build some, or name another data set")
+        raise UsageError(f"{dataset}: has no accepted twin; build twins, or give another data set")
     results = {
         query.name: tables.result(query)
         for query in (VERIFICATION_RATE, GRASPS_PER_OBJECT, BY_GRIPPER, BY_CATEGORY, OUTCOMES, SECOND_ENGINE)

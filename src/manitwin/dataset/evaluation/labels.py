@@ -70,10 +70,10 @@ def read_labels(path: Path) -> list[Label]:
             raise UsageError(f"{path}: more than {MOST_ROWS:,} rows; split the file")
         said = {name: (row.get(name) or "").strip() for name in COLUMNS}
         if not (said["file"] or said["twin_id"]):
-            raise UsageError(f"{path}:{line}: neither file nor twin_id; say which object this is")
+            raise UsageError(f"{path}:{line}: file and twin_id are missing; give one of them")
         labels.append(_label(said, f"{path}:{line}"))
     if not labels:
-        raise UsageError(f"{path}: no labels; give a header with some of {', '.join(COLUMNS)}, and rows")
+        raise UsageError(f"{path}: the file has no labels; give a header with some of {', '.join(COLUMNS)}, and rows")
     return labels
 
 
@@ -113,11 +113,11 @@ def _interval(said: Mapping[str, str], low: str, high: str, where: str) -> Inter
         interval = Interval(float(said[low]), float(said[high]))
     except ValueError:
         raise UsageError(
-            f"{where}: {low} and {high} are {said[low]!r} and {said[high]!r}, not two numbers; give two"
+            f"{where}: {low} and {high} are {said[low]!r} and {said[high]!r}, not two numbers; give both as numbers"
         ) from None
     if not 0 < interval.low <= interval.high < math.inf:
         raise UsageError(
-            f"{where}: {low} {interval.low:g} to {high} {interval.high:g} is no interval above 0; give two numbers above 0,"
-            " the lower one first"
+            f"{where}: {low} {interval.low:g} to {high} {interval.high:g} is not an interval above 0; give two"
+            f" numbers above 0, the lower first"
         )
     return interval

@@ -13,7 +13,7 @@ from manitwin.formats.image_file import png_of
 from manitwin.twin.shares import wilson_interval
 
 MOST_PICTURES = 28
-_NOT_MEASURED = "not measured: no model was named (--clip, --ulip)"
+_NOT_MEASURED = "not measured: no model was given (--clip, --ulip)"
 _BUILT_IN = (
     "no figure of the paper; a built-in template takes colours and outline from the photo itself, which this sees"
 )

@@ -80,7 +80,7 @@ class EvaluationReport:
                 lines += ["", table.caption, *_aligned(shown)]
                 lines += [f"  {row['metric']} ({row['comparable']}): {row[WHY]}" for row in table.rows if WHY in row]
                 if len(table.rows) > _MOST_PRINTED:
-                    lines.append(f"... and {len(table.rows) - _MOST_PRINTED} more: --out or --json has all")
+                    lines.append(f"... and {len(table.rows) - _MOST_PRINTED} more: use --out or --json for all")
         return lines
 
 

@@ -71,7 +71,9 @@ def _converter(framework: str) -> Callable[[np.ndarray], Any]:
     try:
         from torch import from_numpy
     except ImportError as error:
-        raise UsageError("framework torch: PyTorch is not installed; run pip install torch, or take numpy") from error
+        raise UsageError(
+            "framework torch: PyTorch is not installed; run pip install torch, or use framework numpy"
+        ) from error
     convert: Callable[[np.ndarray], Any] = from_numpy
     return convert
 

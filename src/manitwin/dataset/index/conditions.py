@@ -48,13 +48,13 @@ def check_condition(connection: duckdb.DuckDBPyConnection, condition: str) -> No
     """
     if len(condition) > _CONDITION_CHARACTERS:
         said = f"{len(condition)} characters, {_CONDITION_CHARACTERS} at most"
-        raise UsageError(f"condition {_short(condition[:200])}: {said}; give a shorter one")
+        raise UsageError(f"condition {_short(condition[:200])}: {said}; give a shorter condition")
     statement = f"SELECT\n{condition}\n"
     try:
         [(parsed,)] = connection.execute("SELECT json_serialize_sql(?)", [statement]).fetchall()
         _check_tree(json.loads(parsed), condition)
     except RecursionError as error:
-        raise UsageError(f"condition {_short(condition)}: nested too deeply; write it flatter") from error
+        raise UsageError(f"condition {_short(condition)}: nested too deeply; simplify it") from error
 
 
 def _check_tree(tree: dict[str, Any], condition: str) -> None:
@@ -71,7 +71,7 @@ def _check_tree(tree: dict[str, Any], condition: str) -> None:
         and all(node.get(key) == value for key, value in _ALONE.items())
     )
     if not alone:
-        raise UsageError(f"condition {_short(condition)}: not one condition; give one such as {EXAMPLE}")
+        raise UsageError(f"condition {_short(condition)}: not a single condition; give one such as {EXAMPLE}")
     _check_nodes(node["select_list"], condition)
 
 
@@ -83,7 +83,8 @@ def _check_nodes(node: Any, condition: str) -> None:
         refused = _REFUSED.get(str(node.get("type")), _REFUSED.get(str(node.get("class"))))
         if refused:
             raise UsageError(
-                f"condition {_short(condition)}: {refused} may not be used; it may read the tables {', '.join(TABLES)}"
+                f"condition {_short(condition)}: {refused} is not allowed; a condition may read the tables"
+                f" {', '.join(TABLES)}"
             )
         if node.get("type") == "BASE_TABLE":
             path = [node[part] for part in ("catalog_name", "schema_name", "table_name") if node[part]]

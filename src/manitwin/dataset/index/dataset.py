@@ -144,7 +144,9 @@ class Dataset(Sequence["Twin"]):
         """
         shares = (train, val, test)
         if min(shares) < 0 or sum(shares) > 1 + 1e-9:
-            raise UsageError(f"shares {train:g}, {val:g}, {test:g}: give shares of 0 or more that add up to 1 or less")
+            raise UsageError(
+                f"shares {train:g}, {val:g}, {test:g}: the shares must be 0 or more and add up to at most 1"
+            )
         bounds = [_hash_bound(sum(shares[:count])) for count in range(4)]
         digest = f"substr(sha256('{int(seed)}:' || source_sha256), 1, {_HASH_DIGITS})"
         return Split(*(self.filter(f"{digest} >= '{low}' AND {digest} < '{high}'") for low, high in pairwise(bounds)))

@@ -78,10 +78,10 @@ def read_part_list(root: DatasetRoot) -> PartList | None:
         found = PartList(parts, _count(data["next"]), data["schema_id"])
     except (ValueError, KeyError, TypeError) as error:
         said = printable_line(str(error), max_characters=120)
-        raise UsageError(f"{root.full(PARTS)}: no list of an index's parts ({said}); {remedy}") from error
+        raise UsageError(f"{root.full(PARTS)}: not a list of index parts ({said}); {remedy}") from error
     if found.schema_id != SCHEMA_ID:
         raise UsageError(
-            f"{root.full(PARTS)}: its tables are of another version of manitwin; run manitwin index {root.url}"
+            f"{root.full(PARTS)}: its tables were written by another version of manitwin; run manitwin index {root.url}"
         )
     return found
 
@@ -96,9 +96,9 @@ def no_index(root: DatasetRoot) -> UsageError:
 def no_dataset(root: DatasetRoot) -> UsageError:
     """Return the error of a place without twins: of a build that has not ended one yet, or of no build."""
     if root.exists(LEDGER):
-        return UsageError(f"{root.url}: none of its twins is finished; manitwin status {root.url} says how far it is")
+        return UsageError(f"{root.url}: no twin is finished yet; manitwin status {root.url} shows the progress")
     return UsageError(
-        f"{root.url}: no data set ({TWINS}/ is missing); give the folder or URL that manitwin build wrote"
+        f"{root.url}: not a data set ({TWINS}/ is missing); give the folder or URL that manitwin build wrote"
     )
 
 

@@ -135,13 +135,14 @@ class Index:
             return question(connection)
         except duckdb.InterruptException as error:
             raise UsageError(
-                f"condition on {table}: not answered within {self.timeout_s:g} s; give a simpler one, or more time (--timeout,"
+                f"condition on {table}: no answer within {self.timeout_s:g} s; simplify it, or allow more time"
+                f" (--timeout,"
                 " timeout_s)"
             ) from error
         except (duckdb.OutOfMemoryException, MemoryError) as error:
             raise UsageError(
-                f"condition on {table}: needs more than {self.memory_gb:g} GB of memory; ask for fewer rows or columns (--limit,"
-                " --columns), or give more (--memory-gb, memory_gb)"
+                f"condition on {table}: needs more than {self.memory_gb:g} GB of memory; request fewer rows or"
+                f" columns (--limit, --columns), or allow more memory (--memory-gb, memory_gb)"
             ) from error
         except _FILE_IS_GONE:
             raise

@@ -90,15 +90,16 @@ def select(noun: str, things: Iterable[tuple[str, Sequence[Terms]]], allowed: Al
 def _nothing_goes_out(noun: str, left_out: Mapping[str, int], rehearsals: int) -> UsageError:
     if rehearsals:
         return UsageError(
-            f"no {noun} may go out: {rehearsals:,} are rehearsals, made by manitwin fake and not by models; build the"
-            " twins again with models into a new folder, or ask for them with --with-rehearsals"
+            f"no {noun} can be published: {rehearsals:,} were made with a rehearsal server (manitwin fake); build the"
+            f" twins with real models into a new folder, or give --with-rehearsals"
         )
     if not left_out:
-        return UsageError(f"no {noun} is there, so nothing can go out; make some first")
+        return UsageError(f"there is no {noun} to publish; make some first")
     there = ", ".join(f"{name} ({count})" for name, count in sorted(left_out.items()))
     return UsageError(
-        f"no {noun} may go out; licences that keep them here: {there}; name those that may in --license-allow,"
-        f" {UNKNOWN!r} too if you know that you may"
+        f"no {noun} can be published; their licences are not allowed: {there}; name allowed licences in"
+        f" --license-allow,"
+        f" {UNKNOWN!r} too if you know that you are permitted"
     )
 
 

@@ -28,7 +28,7 @@ def check_source(record: TwinRecord) -> None:
     """Raise TwinError where a record's source is not a name alone."""
     file = record.source.file
     if file != PurePosixPath(file).name or "\\" in file or file in ("", ".", ".."):
-        raise TwinError(f"{record.twin_id}/{RECORD}: source.file is {file!r}, not a file's name; build the twin again")
+        raise TwinError(f"{record.twin_id}/{RECORD}: source.file is {file!r}, not a file name; build the twin again")
 
 
 def check_part(twin_id: str, part: str, content: bytes, places: tuple[bytes, ...]) -> None:
@@ -37,13 +37,13 @@ def check_part(twin_id: str, part: str, content: bytes, places: tuple[bytes, ...
     The source is its author's, byte for byte, and is not searched for people's folders.
     """
     of_people = part.endswith(_TEXT) and not part.startswith("source.")
-    remedy = "take it out of the input's name, prompt or attribution and build the twin again"
+    remedy = "remove it from the name, prompt or attribution of the input, and build the twin again"
     _refuse_folders(f"{twin_id}/{part}", content, places, TwinError, remedy, of_people=of_people)
 
 
 def check_words(where: str, words: str, places: tuple[bytes, ...], error: type[ManiTwinError]) -> None:
     """Raise ``error`` where words that are to go out name a local folder of what is published, or a person's folder."""
-    remedy = "take it out of the name, the prompt or the attribution that it comes from"
+    remedy = "remove it from the name, the prompt or the attribution that it comes from"
     _refuse_folders(where, words.encode(), places, error, remedy, of_people=True)
 
 

@@ -28,7 +28,7 @@ SUMS = "SHA256SUMS"
 OPEN = ".publish"
 _STARTED = f"{OPEN}/started"
 _SCRATCH = "scratch-"
-_ANEW = "publish into a folder that is new or empty"
+_ANEW = "publish into a new or empty folder"
 _RECEIPT = {"shard": str, "twins": int, "bytes": int, "sha256": str, "contents_sha256": str}
 
 
@@ -67,12 +67,12 @@ class Publication:
             )  # an older version wrote it empty, for twins
             if begun != self.kind.name:
                 raise UsageError(
-                    f"{root.url}: a publication of {begun} was begun there; give a folder that is new or empty"
+                    f"{root.url}: it contains an unfinished publication of {begun}; give a new or empty folder"
                 )
         elif not self._is_finished() and self._visible_entries():
             raise UsageError(
-                f"{root.url}: not empty, and no publication of {self.kind.name} by manitwin; give a folder that is new or"
-                " empty"
+                f"{root.url}: not empty, and not a publication of {self.kind.name} by manitwin; give a new or empty"
+                f" folder"
             )
 
     def begin(self) -> None:

@@ -118,7 +118,9 @@ def publish_dataset(
         _write_pages(source, publication, CardFacts(title, twins, counts, sizes, _pictures(source, twins)))
         publication.finish()
     except OSError as error:
-        raise UsageError(f"{out}: not finished ({error}); mend that and publish again, finished shards stay") from error
+        raise UsageError(
+            f"{out}: not finished ({error}); fix this and publish again, finished shards are kept"
+        ) from error
     return Published(
         twins=len(selection.published),
         left_out=selection.left_out,

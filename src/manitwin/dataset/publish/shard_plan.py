@@ -129,20 +129,22 @@ def _groups(twins: list[ShardTwin], max_bytes: int, max_twins: int | None) -> It
 def check_hub_limits(sizes: dict[str, int]) -> None:
     """Raise UsageError where files of these names and sizes are more or larger than the hub takes."""
     if len(sizes) >= HUB_FILES:
-        raise UsageError(f"{len(sizes):,} files, the hub takes fewer than {HUB_FILES:,}; give a larger --shard-size-mb")
+        raise UsageError(
+            f"{len(sizes):,} files, but the hub allows fewer than {HUB_FILES:,}; give a larger --shard-size-mb"
+        )
     entries: Counter[PurePosixPath] = Counter()
     for path in {parent for name in sizes for parent in (PurePosixPath(name), *PurePosixPath(name).parents[:-1])}:
         entries[path.parent] += 1
     fullest, count = max(entries.items(), key=lambda item: item[1], default=(PurePosixPath(), 0))
     if count >= HUB_FOLDER_ENTRIES:
         raise UsageError(
-            f"{count:,} entries in {fullest}/, the hub takes fewer than {HUB_FOLDER_ENTRIES:,}; "
+            f"{count:,} entries in {fullest}/, but the hub allows fewer than {HUB_FOLDER_ENTRIES:,}; "
             "give a larger --shard-size-mb or --twins-per-shard"
         )
     largest = max(sizes, key=lambda name: sizes[name], default="")
     if largest and sizes[largest] >= HUB_FILE_BYTES:
         raise UsageError(
-            f"{largest}: {sizes[largest]:,} bytes, the hub takes files below {HUB_FILE_BYTES:,}; "
+            f"{largest}: {sizes[largest]:,} bytes, but the hub only allows files below {HUB_FILE_BYTES:,}; "
             "give a smaller --shard-size-mb"
         )
 

@@ -91,7 +91,7 @@ def _record(root: DatasetRoot, twin: ShardTwin, content: bytes) -> TwinRecord:
     if revision_of(parse_json_object(content, place, TwinError, remedy=REMEDY)) != record.revision:
         raise TwinError(f"{place}: altered since it was written; build the twin again")
     if (record.twin_id, record.revision) != (twin.twin_id, twin.revision):
-        raise UsageError(f"{place}: not the revision that the index has; run manitwin index {root.url}")
+        raise UsageError(f"{place}: not the revision in the index; run manitwin index {root.url}")
     check_source(record)
     return record
 
@@ -116,12 +116,14 @@ def parts_of(files: Iterable[str]) -> dict[str, list[str]]:
     single: set[str] = set()
     for file in sorted(files):
         if not _FILE.fullmatch(file):
-            raise TwinError(f"{file!r}: no name for a file of a twin; give letters, digits and . _ - in relative names")
+            raise TwinError(
+                f"{file!r}: not a valid file name in a twin; use letters, digits and . _ - in relative names"
+            )
         path, alone = PurePosixPath(file), not is_archive([file])
         part = path.name if alone else f"{path.parts[0]}.zip"
         part = part.lower()  # as webdataset reads it
         if part in single or (alone and part in parts):
-            raise TwinError(f"{file}: another file of the twin has the part {part!r} already; rename one of them")
+            raise TwinError(f"{file}: another file of the twin has the same part {part!r}; rename one of them")
         if alone:
             single.add(part)
         parts.setdefault(part, []).append(file)
@@ -156,9 +158,9 @@ def unpack(files: list[str], content: bytes) -> dict[str, bytes]:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             entries = archive.infolist()
             if any(entry.compress_type != zipfile.ZIP_STORED for entry in entries):
-                raise TwinError(f"{folder}.zip: compressed, as no shard of manitwin has it; download the shard again")
+                raise TwinError(f"{folder}.zip: compressed, unlike the shards of manitwin; download the shard again")
             if sorted(f"{folder}/{entry.filename}" for entry in entries) != files:
-                raise TwinError(f"{folder}.zip: not the files that twin.json names; download the shard again")
+                raise TwinError(f"{folder}.zip: its files are not those named in twin.json; download the shard again")
             return {f"{folder}/{entry.filename}": archive.read(entry) for entry in entries}
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError) as error:
         raise TwinError(f"{folder}.zip: cannot be read ({error}); download the shard again") from error
@@ -183,7 +185,7 @@ def unpack_shard(shard: str | Path, out: str | Path) -> list[Path]:
                 folders.append(place / twin_name(twin_id))
                 replace_folder(fresh, folders[-1])
         except tarfile.TarError as error:
-            raise TwinError(f"{path}: not a whole tar file ({error}); download it again") from error
+            raise TwinError(f"{path}: not a complete tar file ({error}); download it again") from error
     return folders
 
 
@@ -196,17 +198,17 @@ def samples(shard: Path) -> Iterator[tuple[str, dict[str, bytes]]]:
             if not KEY.fullmatch(this) or not part or "/" in part or "\\" in part:
                 raise TwinError(f"{shard}: member {member.name!r} is not named <twin_id>.<part>; not unpacked")
             if not member.isreg() or member.issparse():
-                raise TwinError(f"{shard}: member {member.name!r} is no plain file; not unpacked")
+                raise TwinError(f"{shard}: member {member.name!r} is not a regular file; not unpacked")
             if key and this != key:
                 yield key, parts
                 parts = {}
             key = this
             if part in parts:
-                raise TwinError(f"{shard}: member {member.name!r} is there twice; not unpacked")
+                raise TwinError(f"{shard}: member {member.name!r} occurs twice; not unpacked")
             stream = tar.extractfile(member)
             content = stream.read() if stream is not None else b""
             if len(content) != member.size:
-                raise TwinError(f"{shard}: member {member.name!r} is cut off; download it again")
+                raise TwinError(f"{shard}: member {member.name!r} is truncated; download it again")
             parts[part] = content
     if key:
         yield key, parts

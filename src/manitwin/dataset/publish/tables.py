@@ -42,7 +42,7 @@ def parts_of_index(root: DatasetRoot, finished: set[str]) -> PartList:
     if indexed != finished:
         raise UsageError(
             f"{root.url}: its index lacks {len(finished - indexed):,} finished twins and has "
-            f"{len(indexed - finished):,} that are gone; run manitwin index {root.url} and mind what it cannot read"
+            f"{len(indexed - finished):,} that are missing; run manitwin index {root.url} and check what it cannot read"
         )
     return parts
 

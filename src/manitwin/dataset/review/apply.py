@@ -54,7 +54,7 @@ def apply_reviews(
     corrections, conflicts = settled(each for each in stored if now.get(each.review.twin_id) == each.review.revision)
     twin_ids = list(dict.fromkeys(each.twin_id for each in corrections))
     items = _items(root, twin_ids) if twin_ids else {}
-    left = {each: "no item of the ledger made it; build it here" for each in twin_ids if each not in items}
+    left = {each: "the ledger has no item for it; build it in this data set" for each in twin_ids if each not in items}
     if dry_run or not items:
         return Applied([each for each in corrections if each.twin_id not in left], conflicts, left)
     for twin_id in items:
@@ -102,7 +102,7 @@ def _label(record: TwinRecord, point_id: str) -> str | None:
     labels: dict[str, str | None] = {point.id: point.label for point in points.functional}
     labels |= {point.id: point.label for point in points.grasp}
     if point_id not in labels:
-        raise UsageError(f"{record.twin_id}: has no point {point_id} now; review it again")
+        raise UsageError(f"{record.twin_id}: no longer has a point {point_id}; review it again")
     return labels[point_id]
 
 

@@ -120,7 +120,7 @@ def write_sheets(root: DatasetRoot, photos: Sequence[DoubtedPhoto], path: Path) 
     Raises UsageError where there is none.
     """
     if not photos:
-        raise UsageError(f"{root.url}: has no doubted cut-out to be drawn")
+        raise UsageError(f"{root.url}: has no doubtful cut-out to draw")
     written = []
     for sheet, first in enumerate(range(0, len(photos), SHOWN), 1):
         tiles = [(each.twin_id, _tile(root, each.twin_id)) for each in photos[first : first + SHOWN]]
@@ -164,7 +164,7 @@ def _only(root: DatasetRoot, begun: str, twin_ids: Sequence[str], none: str) -> 
     """Return the one id that begins so; raises UsageError where it is none or several."""
     alike = [each for each in twin_ids if begun and each.startswith(begun)]
     if len(alike) != 1:
-        why = none if not alike else f"{len(alike)} photos begin so"
+        why = none if not alike else f"{len(alike)} photos match"
         raise UsageError(f"{begun}: {why}; `manitwin review cutouts {root.url}` lists them")
     return alike[0]
 

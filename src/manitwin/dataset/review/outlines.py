@@ -69,7 +69,7 @@ class OutlineSession:
     def photo(self, key: str) -> DoubtedPhoto:
         """Return a doubted photo; raises UsageError where there is none of this key."""
         if key not in self.photos:
-            raise UsageError(f"{key}: no photo here whose cut-out is doubted; reload the list")
+            raise UsageError(f"{key}: not a photo with a doubtful cut-out; reload the list")
         return self.photos[key]
 
     def words(self, key: str) -> Words:
@@ -137,7 +137,7 @@ class OutlineSession:
         rgba = self._rgba(key)
         drawn = DrawnOutline(self._mask(png, rgba), source)
         if (why := why_no_outline(drawn.mask)) is not None:
-            raise UsageError(f"not kept: the outline {why}; draw it around the thing")
+            raise UsageError(f"not kept: the outline {why}; draw it around the object")
         try:
             matte_photo(
                 as_drawn(Given(rgba[..., :3]), drawn, "this photo").pixels,
@@ -176,10 +176,10 @@ class OutlineSession:
         try:
             mask = mask_of_png(png)
         except ValueError as error:
-            raise UsageError(f"what was sent is no outline: {error}") from error
+            raise UsageError(f"the data sent is not an outline: {error}") from error
         if mask.shape != rgba.shape[:2]:
             raise UsageError(
-                f"an outline of {mask.shape[1]} x {mask.shape[0]} pixels is none of this photo; reload the page"
+                f"an outline of {mask.shape[1]} x {mask.shape[0]} pixels does not fit this photo; reload the page"
             )
         return mask
 
@@ -194,7 +194,7 @@ def _seen_again(photo: DoubtedPhoto, name: str, settings: MattingConfig) -> np.n
     try:
         rgba, _ = stage.cut_out(photo.file, name or None, lambda doubted: doubted.matte, mask=mask, box_px=box_px)
     except InputError as error:
-        raise UsageError(f"{photo.file}: cannot be looked at: {error.detail}") from error
+        raise UsageError(f"{photo.file}: cannot be read: {error.detail}") from error
     except Rejected:
         pixels = _pixels(photo, name, settings)
         rgba = np.dstack([pixels[..., :3], np.zeros(pixels.shape[:2], np.uint8)])
@@ -207,7 +207,7 @@ def _pixels(photo: DoubtedPhoto, name: str | None, settings: MattingConfig) -> n
     try:
         return pixels_of_photo(photo.file, name or None, settings, mask=mask, box_px=box_px).given.pixels
     except InputError as error:
-        raise UsageError(f"{photo.file}: cannot be looked at: {error.detail}") from error
+        raise UsageError(f"{photo.file}: cannot be read: {error.detail}") from error
 
 
 def _png(mask: np.ndarray) -> bytes:

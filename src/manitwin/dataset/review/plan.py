@@ -26,7 +26,7 @@ def draw_plan(dataset: str, size: int, seed: int, overlap: float) -> tuple[Plan,
     root = DatasetRoot(dataset)
     path, twins = reviews_path(root), listed_twins(Index(root))
     if not twins:
-        raise UsageError(f"{dataset}: no accepted twins to review; build some first")
+        raise UsageError(f"{dataset}: it has no accepted twins to review; build some first")
     plan = Plan(tuple(stratified_sample(twins, size, seed)), seed, overlap)
     with ReviewStore(path) as store:
         store.add_plan(plan)

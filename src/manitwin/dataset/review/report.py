@@ -74,7 +74,7 @@ class ReviewReport:
         of_sample = f" of a sample of {self.sample}" if self.sample is not None else ""
         lines = [f"{self.reviewed} twins{of_sample} reviewed, in {self.reviews} reviews"]
         if self.outside:
-            lines.append(f"{self.outside} reviews are of twins outside of the sample, and do not count")
+            lines.append(f"{self.outside} reviews are of twins outside the sample, and do not count")
         if self.outdated:
             lines.append(f"{self.outdated} reviews are of twins that were built anew since, which are asked for again")
         lines.append(f"{'dimension':<11} {'right':>11}  {'accuracy [95 %]':<22} {'paper':>7}  {'unsure':>6}  agreement")
@@ -93,7 +93,7 @@ class ReviewReport:
             picture = f" {each.pictures[-1]}" if each.pictures else ""
             lines.append(f"no: {each.twin_id} {each.dimension}{said}{note}{picture}")
         if len(self.disagreements) > SHOWN:
-            lines.append(f"... and {len(self.disagreements) - SHOWN} more (--json has all, with their pictures)")
+            lines.append(f"... and {len(self.disagreements) - SHOWN} more (--json lists all, with their pictures)")
         return lines
 
     def document(self) -> dict[str, Any]:
@@ -126,7 +126,7 @@ def review_report(dataset: str) -> ReviewReport:
     wanted = None if plan is None else set(plan.twins)
     counted = [each for each in current if wanted is None or each.review.twin_id in wanted]
     if not stored:
-        raise UsageError(f"{dataset}: nothing was reviewed yet; `manitwin review {dataset}` opens the page for it")
+        raise UsageError(f"{dataset}: nothing was reviewed yet; start with `manitwin review {dataset}`")
     queues = {}
     if plan is not None:
         there = [twin_id for twin_id in plan.twins if twin_id in now]

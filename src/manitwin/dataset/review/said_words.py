@@ -53,7 +53,7 @@ def words_of(item: Item, amendments: Amendments) -> Words:
 def read_name(typed: object) -> str:
     """Return a name as it was typed, '' where nothing was; raises UsageError for what a manifest's column takes for none."""
     if not isinstance(typed, str):
-        raise UsageError("a name is a text; send an empty one where nobody says it")
+        raise UsageError("a name is a text; send an empty text for unknown")
     name = typed.strip()
     why = unusable("name", name)
     if why is not None:
@@ -64,7 +64,7 @@ def read_name(typed: object) -> str:
 def read_side_cm(typed: object, gate: GateConfig) -> str:
     """Return a longest side (cm) as it was typed, '' where nothing was; raises UsageError for what ``gate`` takes no thing of."""
     if not isinstance(typed, str):
-        raise UsageError("a longest side is a text; send an empty one where nobody says it")
+        raise UsageError("a longest side is a text; send an empty text for unknown")
     number = typed.strip().replace(",", ".")
     if not number:
         return ""
@@ -116,7 +116,7 @@ def name_remark(name: str) -> str:
         return ""
     prior = lookup(name)
     if prior is None:
-        return unknown_name_words(name, "say what kind of thing it is, in English")
+        return unknown_name_words(name, "name the kind of object, in English")
     low, high = (_centimetres(length_m) for length_m in (prior.longest_axis_m.low, prior.longest_axis_m.high))
     return f"known as: {prior.category}, {low} to {high} cm long as a rule"
 

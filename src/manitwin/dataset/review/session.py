@@ -78,7 +78,7 @@ class ReviewSession:
         try:
             said = Said.model_validate(body)
             if said.revision != record.revision:
-                raise UsageError(f"{record.twin_id} was built anew since it was shown; load the page again")
+                raise UsageError(f"{record.twin_id} was rebuilt since it was shown; reload the page")
             review = Review.model_validate(
                 {
                     **said.model_dump(exclude={"request"}), "annotator": annotator, "twin_id": record.twin_id,

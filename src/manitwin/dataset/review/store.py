@@ -31,7 +31,7 @@ from manitwin.formats.sqlite_store import BUSY_S, damaged, errors_named, flaw_in
 from manitwin.twin.dataset_root import DatasetRoot
 
 REVIEWS = "reviews.sqlite"
-_DAMAGED = "no reviews that can be read ({cause}); put a copy in its place, or move it away"
+_DAMAGED = "not a readable review store ({cause}); replace it with a copy, or move it away"
 _LIVE = "kind = 'review' AND number NOT IN (SELECT undoes FROM events WHERE undoes IS NOT NULL)"
 
 
@@ -47,7 +47,9 @@ class Stored:
 def reviews_path(root: DatasetRoot) -> Path:
     """Return where the reviews of a data set lie; raises UsageError for a URL."""
     if root.local is None:
-        raise UsageError(f"{root.url}: reviews are kept beside a data set on a local disk; copy it there first")
+        raise UsageError(
+            f"{root.url}: reviews are stored beside a data set on a local disk; copy the data set to a disk first"
+        )
     return root.local / REVIEWS
 
 
@@ -61,7 +63,7 @@ class ReviewStore:
         self.path, self._now, self._lock = path, now, threading.RLock()
         if not make and not path.is_file():
             raise UsageError(
-                f"{path}: no reviews yet; `manitwin review DATASET` or `manitwin review import` makes some"
+                f"{path}: no reviews yet; `manitwin review DATASET` or `manitwin review import` creates some"
             )
         if os.path.lexists(path):
             open_regular(path, UsageError, inside=path.parent, name=str(path)).close()

@@ -119,7 +119,7 @@ def tune_dataset(dataset: str) -> list[Tuned]:
     reviews = [each for each in stored if now.get(each.review.twin_id) == each.review.revision]
     if not reviews:
         raise UsageError(
-            f"{dataset}: no twin was reviewed as it is now; `manitwin review {dataset}` opens the page for it"
+            f"{dataset}: no twin was reviewed in its current revision; start with `manitwin review {dataset}`"
         )
     records = {twin_id: read_twin(root, twin_id) for twin_id in sorted({each.review.twin_id for each in reviews})}
     configuration: dict[str, Any] = {}

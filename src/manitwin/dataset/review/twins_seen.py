@@ -18,11 +18,11 @@ _CARD = "card.png"
 def read_twin(root: DatasetRoot, twin_id: str) -> TwinRecord:
     """Return a twin's record; raises UsageError where the data set has no accepted twin of this id."""
     if not root.exists(f"{root.twin_name(twin_id)}/{RECORD}"):
-        raise UsageError(f"{twin_id}: no twin of {root.url}; `manitwin query {root.url} --format ids` lists them")
+        raise UsageError(f"{twin_id}: not a twin of {root.url}; `manitwin query {root.url} --format ids` lists them")
     with local_files(root, twin_id, (RECORD,)) as folder:
         record = read_record(folder)
     if record.status != "accepted":
-        raise UsageError(f"{twin_id}: was rejected, and only accepted twins are reviewed; go on to the next")
+        raise UsageError(f"{twin_id}: was rejected, but only accepted twins are reviewed; continue with the next")
     return record
 
 
@@ -82,7 +82,9 @@ def check_corrections(record: TwinRecord, corrections: Corrections) -> None:
     for kind in "fg":
         places = [candidate for point, candidate in moved.items() if point[0] == kind]
         if len(set(places)) < len(places):
-            raise UsageError(f"{record.twin_id}: two points at one candidate, {sorted(places)}; move each to its own")
+            raise UsageError(
+                f"{record.twin_id}: two points at the same candidate, {sorted(places)}; move each to its own"
+            )
 
 
 def pictures_of(root: DatasetRoot, twin_id: str) -> list[str]:

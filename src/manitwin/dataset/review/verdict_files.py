@@ -66,11 +66,13 @@ def read_verdicts(path: Path, root: DatasetRoot) -> list[tuple[Review, str]]:
             continue  # a row of the form that nobody has filled in
         said = {name: _as_text(value) for name, value in row.items() if value not in (None, "")}
         if missing := [name for name in ("twin_id", "annotator", "dimension", "answer") if not said.get(name)]:
-            raise UsageError(f"{path}:{line}: no {missing[0]}; every row says twin_id, annotator, dimension and answer")
+            raise UsageError(
+                f"{path}:{line}: no {missing[0]}; every row needs twin_id, annotator, dimension and answer"
+            )
         key = said["twin_id"], said["annotator"], said.get("revision", "")
         given.setdefault(key, []).append((line, said))
     if not given:
-        raise UsageError(f"{path}: no verdicts; give a header and rows, or a JSON object a line")
+        raise UsageError(f"{path}: the file has no verdicts; give a header and rows, or one JSON object per line")
     return [_review(path, root, rows) for rows in given.values()]
 
 
@@ -101,7 +103,8 @@ def _review(path: Path, root: DatasetRoot, rows: list[tuple[int, dict[str, str]]
         where = f"{path}:{line}"
         if said["dimension"] in body["answers"]:
             raise UsageError(
-                f"{where}: {said['dimension']} of {record.twin_id} is answered twice by {said['annotator']}; leave one line"
+                f"{where}: {said['dimension']} of {record.twin_id} is answered twice by {said['annotator']}; keep"
+                f" one line"
             )
         body["answers"][said["dimension"]] = said["answer"]
         body["corrections"] |= _corrections(said, where, body["corrections"])
@@ -150,4 +153,4 @@ def _number(said: Mapping[str, str], name: str, where: str) -> float:
     try:
         return float(said[name])
     except ValueError:
-        raise UsageError(f"{where}: {name} is {said[name][:40]!r}, which is no number; give one") from None
+        raise UsageError(f"{where}: {name} is {said[name][:40]!r}, which is not a number; give a number") from None

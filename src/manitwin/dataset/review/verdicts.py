@@ -40,7 +40,7 @@ _ANNOTATOR = re.compile(r"[\w][\w.@+-]{0,63}")
 
 def _annotator_name(name: str) -> str:
     if not _ANNOTATOR.fullmatch(name):
-        raise ValueError(f"{name[:40]!r} is no annotator's name: letters, digits and . _ - @ +, at most 64")
+        raise ValueError(f"{name[:40]!r} is not a valid annotator name: use letters, digits and . _ - @ +, at most 64")
     return name
 
 
@@ -79,9 +79,9 @@ class Corrections(Record):
     @model_validator(mode="after")
     def _possible(self) -> Corrections:
         if self.mass_kg is not None and self.mass_kg.high > LARGEST_KG:
-            raise ValueError(f"mass_kg of {self.mass_kg.high:g} kg, which no object has")
+            raise ValueError(f"mass_kg of {self.mass_kg.high:g} kg, which is impossible")
         if self.longest_side_m is not None and self.longest_side_m.high > LARGEST_M:
-            raise ValueError(f"longest_side_m of {self.longest_side_m.high:g} m, which no object has")
+            raise ValueError(f"longest_side_m of {self.longest_side_m.high:g} m, which is impossible")
         for point in self.points:
             if not re.fullmatch(r"[fg]\d{1,3}", point):
                 raise ValueError(

@@ -61,8 +61,8 @@ class Question:
             sizes = []  # alone it is a word as others are: descriptions say of what is large that it is
         told = [word for word in wanted if word not in sizes]
         if not told:
-            why = "says only what is not looked for" if unwanted else "has no word to look for"
-            raise UsageError(f"{text!r} {why}; say what the thing is, such as: a blue mug")
+            why = "contains only excluded words" if unwanted else "has no word to search for"
+            raise UsageError(f"{text!r} {why}; describe the object, such as: a blue mug")
         return cls(
             {word: _forms(word, vocabulary) for word in told},
             {word: _forms(word, vocabulary) for word in unwanted},

@@ -98,7 +98,7 @@ def search_picture(
     try:
         look = look_of(rgb, mask)
     except ValueError as error:
-        raise UsageError(f"the picture shows nothing ({error}); give a larger crop of one thing") from error
+        raise UsageError(f"the picture shows no object ({error}); give a larger crop of one object") from error
     looks = dict(twin_looks(root, {row["twin_id"]: row["revision"] for row in rows}, on_twin))
     scores = [likeness(look, looks[row["twin_id"]]) for row in rows]
     order = np.argsort(-np.array(scores), kind="stable").tolist()[:limit]
@@ -126,7 +126,7 @@ def text_vectors(root: DatasetRoot, rows: Sequence[dict[str, Any]], embedder: Te
     vectors = [each.vectors[0] for each in kept if each is not None]
     if len({len(vector) for vector in vectors}) > 1:
         raise UsageError(
-            f"{root.url}/search: vectors of several lengths for one model; remove the folder, and search again"
+            f"{root.url}/search: the vectors of one model have different lengths; remove the folder, and search again"
         )
     return np.array(vectors)
 

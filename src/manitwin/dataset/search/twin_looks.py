@@ -37,7 +37,8 @@ def twin_looks(
     """
     if root.local is None:
         raise UsageError(
-            f"{root.url}: is at a URL; copy the data set here, its twins are drawn to be compared with a picture"
+            f"{root.url}: is at a URL; copy the data set to this machine, since its twins are rendered for the"
+            f" comparison"
         )
     store = VectorStore(root, SPACE, LENGTH)
     for twin_id, revision in revisions.items():

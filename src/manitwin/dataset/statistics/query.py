@@ -180,7 +180,7 @@ class ReportTables:
             rows = cursor.fetchall()
         except (duckdb.IOException, FileNotFoundError) as error:
             line = str(error).split("\n")[0]
-            raise UsageError(f"the index changed while it was read ({line}); run the same command again") from error
+            raise UsageError(f"the index changed while it was read ({line}); rerun the same command") from error
         except (duckdb.Error, MemoryError) as error:
             raise self._unreadable(error) from error
         except RuntimeError as error:

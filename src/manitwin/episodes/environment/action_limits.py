@@ -35,12 +35,12 @@ def checked_action(action: object, names: Sequence[str]) -> np.ndarray:
     try:
         told = np.asarray(action, float)
     except (TypeError, ValueError) as error:
-        raise UsageError(f"action: no numbers ({error}); give {len(names)}: {', '.join(names)}") from error
+        raise UsageError(f"action: not numbers ({error}); give {len(names)}: {', '.join(names)}") from error
     if told.shape != (len(names),):
         raise UsageError(f"action has shape {told.shape}; give {len(names)} numbers: {', '.join(names)}")
     if not np.isfinite(told).all():
         wrong = ", ".join(name for name, value in zip(names, told, strict=True) if not np.isfinite(value))
-        raise UsageError(f"action is not finite for {wrong}; look at what the policy returned")
+        raise UsageError(f"action is not finite for {wrong}; check the output of the policy")
     return told
 
 

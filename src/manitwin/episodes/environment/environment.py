@@ -115,7 +115,9 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
     def __reduce__(self) -> tuple[Callable[[], TaskEnvironment], tuple[()]]:
         """Return what makes the environment anew; raises PicklingError for one that was put together by hand."""
         if self._made_by is None:
-            raise PicklingError("an environment that make_env has not made cannot be pickled; make one in each process")
+            raise PicklingError(
+                "an environment that was not made by make_env cannot be pickled; make one in each process"
+            )
         return self._made_by, ()
 
     @property
@@ -204,9 +206,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         if self._noise is None:
             start, world = self._settled(self._setting.problem, None)
             if start is None:
-                raise UsageError(
-                    f"task {self.task.task_id}: its scene does not stay where it is; make the layouts again"
-                )
+                raise UsageError(f"task {self.task.task_id}: its scene is not stable; make the layouts again")
             return start, world, None
         for _ in range(STARTS_TRIED):
             drawn = draw_start(self._noise, self._setting, self._planner, self.np_random)
@@ -215,8 +215,8 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
                 return start, world, drawn
         self._leave()
         raise UsageError(
-            f"task {self.task.task_id}: of {STARTS_TRIED} starts with {self._noise} none stays with the goal still to reach; "
-            "give less start_noise"
+            f"task {self.task.task_id}: of {STARTS_TRIED} starts with {self._noise} none is stable with the goal"
+            f" not yet reached; give less start_noise"
         )
 
     def _settled(self, problem: PickPlaceProblem, joints_rad: np.ndarray | None) -> tuple[Start | None, RobotWorld]:

@@ -56,7 +56,7 @@ def make_env(
     folder = Path(tasks) if Path(tasks).is_dir() else Path(tasks).parent
     said = read_json_object(folder / CONFIG, UsageError, inside=folder, name=str(folder / CONFIG), remedy=_REMEDY)
     if not isinstance(said.get("dataset"), str) or not isinstance(said.get("scenes"), str):
-        raise UsageError(f"{folder / CONFIG}: does not say of which scenes its tasks are; {_REMEDY}")
+        raise UsageError(f"{folder / CONFIG}: does not name the scenes of its tasks; {_REMEDY}")
     dataset = said["dataset"] if twins is None else DatasetRoot(twins).absolute()
     settings, chosen = EpisodeSettings(), load_robot(task.robot if robot is None else robot)
     for step in task.steps:
@@ -72,7 +72,7 @@ def make_env(
     setting = task_setting(task, said["scenes"], dataset, pool_of(dataset), chosen, grasps, seed=task.seed)
     if setting is None:
         raise UsageError(
-            f"task {task.task_id}: cannot begin with the robot {chosen.name}; give the one it was made for"
+            f"task {task.task_id}: cannot begin with the robot {chosen.name}; give the robot that the task was made for"
         )
     painter = None
     if cameras:

@@ -68,7 +68,8 @@ class Literal:
             raise UsageError(f"{self.predicate} {wants}: {self.subject}, {self.second}")
         if self.second is not None and self.second == self.subject:
             raise UsageError(
-                f"{self.predicate}({self.subject}, {self.second}): needs two different things; name another one second"
+                f"{self.predicate}({self.subject}, {self.second}): needs two different objects; name another second"
+                f" object"
             )
         if signature.unit is None and self.value is not None:
             raise UsageError(f"{self.predicate} takes no value; leave out {self.value:g}")
@@ -104,10 +105,10 @@ class Goal:
     def __post_init__(self) -> None:
         """Raise UsageError for a goal that asks for nothing, or twice for the same."""
         if not self.literals:
-            raise UsageError("a goal without a literal; give one or more")
+            raise UsageError("the goal has no literal; give one or more")
         everything = self.literals + self.stays
         if len(set(everything)) != len(everything):
-            raise UsageError(f"a goal that says a thing twice: {self}; say each once")
+            raise UsageError(f"the goal repeats a literal: {self}; give each once")
 
     def __str__(self) -> str:
         stays = f", with {' and '.join(map(str, self.stays))}" if self.stays else ""
@@ -126,17 +127,17 @@ class Goal:
         try:
             unknown = sorted(set(said) - {"literals", "stays"})
             if unknown:
-                raise UsageError(f"a goal with unknown fields: {', '.join(unknown)}; valid: literals, stays")
+                raise UsageError(f"the goal has unknown fields: {', '.join(unknown)}; valid: literals, stays")
             return cls(tuple(map(_literal, said["literals"])), tuple(map(_literal, said.get("stays", ()))))
         except (TypeError, KeyError, AttributeError) as error:
-            raise UsageError(f"no goal ({error!r}); give {{literals: [{{predicate, subject, ...}}]}}") from error
+            raise UsageError(f"not a goal ({error!r}); give {{literals: [{{predicate, subject, ...}}]}}") from error
 
 
 def _literal(said: Mapping[str, Any]) -> Literal:
     fields: dict[str, Any] = {name: said.get(name) for name in ("predicate", "subject", "second", "value")}
     unknown = sorted(set(said) - set(fields))
     if unknown:
-        raise UsageError(f"a literal with unknown fields: {', '.join(unknown)}; valid: {', '.join(fields)}")
+        raise UsageError(f"the literal has unknown fields: {', '.join(unknown)}; valid: {', '.join(fields)}")
     for name in ("predicate", "subject", "second"):
         if not isinstance(fields[name], str) and not (name == "second" and fields[name] is None):
             raise UsageError(f"a literal whose {name} is {fields[name]!r}; give a text")

@@ -20,7 +20,7 @@ _EXAMPLE = "give literals such as in(object_00, object_01), joined by and"
 def parse_goal(text: str) -> Goal:
     """Read what ``str`` of a goal wrote; raises UsageError naming what cannot be read, in one line."""
     if len(text) > MOST_CHARACTERS:
-        raise UsageError(f"a goal of {len(text)} characters; give at most {MOST_CHARACTERS}")
+        raise UsageError(f"the goal has {len(text)} characters; give at most {MOST_CHARACTERS}")
     come_true, with_, stay = text.strip().partition(STAYS)
     stays = _literals(stay, text) if with_ else ()
     return Goal(_literals(come_true, text), stays)
@@ -48,4 +48,4 @@ def _literal(text: str, whole: str) -> Literal:
 
 def _refuse(whole: str, part: str) -> NoReturn:
     shown = printable_line(whole, max_characters=80)
-    raise UsageError(f"{shown}: {printable_line(part, max_characters=60)!r} is no literal; {_EXAMPLE}")
+    raise UsageError(f"{shown}: {printable_line(part, max_characters=60)!r} is not a literal; {_EXAMPLE}")

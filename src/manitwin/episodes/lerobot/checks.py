@@ -35,7 +35,7 @@ def statistics_of(path: Path, table: pa.Table, name: str, feature: dict[str, Any
         while pa.types.is_list(flat.type):
             flat = flat.flatten()
         if not (pa.types.is_floating(flat.type) or pa.types.is_integer(flat.type)):
-            raise EpisodesError(f"{path}: stats/{name}/{kind} are of type {flat.type}, no numbers; {_REMEDY}")
+            raise EpisodesError(f"{path}: stats/{name}/{kind} are of type {flat.type}, not numbers; {_REMEDY}")
         if flat.null_count or len(flat) != len(table) * int(np.prod(shape)):
             raise EpisodesError(f"{path}: stats/{name}/{kind} has not {shape} numbers in each row; {_REMEDY}")
         result[kind] = flat.to_numpy(zero_copy_only=False).astype(np.float64).reshape(len(table), *shape)
@@ -61,12 +61,14 @@ def checked_frames(
     wanted = [root / info["data_path"].format(chunk_index=chunk, file_index=file) for chunk, file in by_file]
     if files != wanted or list(by_file) != [place_of(number) for number in range(len(files))]:
         odd = sorted(set(files) ^ set(wanted)) or files or [root / "data"]
-        raise EpisodesError(f"{odd[0]}: the data files are not those that the episodes name, in their order; {_REMEDY}")
+        raise EpisodesError(
+            f"{odd[0]}: the data files do not match those named by the episodes, in their order; {_REMEDY}"
+        )
     features = {name: f for name, f in info["features"].items() if f["dtype"] != "video"}
     for path, episodes in zip(files, by_file.values(), strict=True):
         table = _table(path, features)
         if len(table) != sum(row["length"] for row in episodes):
-            raise EpisodesError(f"{path}: {len(table)} frames, its episodes have another number; {_REMEDY}")
+            raise EpisodesError(f"{path}: {len(table)} frames, but its episodes have another number; {_REMEDY}")
         begin = 0
         for row in episodes:
             told = {
@@ -129,7 +131,7 @@ def _check_episode(
         right_count = told["count"].tolist() == [len(number)]
         ends = _close(told["min"], values.min(0)) and _close(told["max"], values.max(0))
         if not right_count or not ends or not _close(told["mean"], values.mean(0)):
-            raise EpisodesError(f"{where}: its statistics of {name} are not those of its frames; {_REMEDY}")
+            raise EpisodesError(f"{where}: its statistics of {name} do not match its frames; {_REMEDY}")
 
 
 def check_statistics(path: Path, features: dict[str, dict[str, Any]], statistics: dict[str, EpisodeStatistics]) -> None:
@@ -137,13 +139,13 @@ def check_statistics(path: Path, features: dict[str, dict[str, Any]], statistics
     stats = read_json_object(path, EpisodesError, inside=path.parent.parent, name=str(path), remedy=_REMEDY)
     for name, feature in features.items():
         if not isinstance(stats.get(name), dict) or set(stats[name]) != set(STATISTICS):
-            raise EpisodesError(f"{path}: not all statistics of {name} are there; {_REMEDY}")
+            raise EpisodesError(f"{path}: some statistics of {name} are missing; {_REMEDY}")
         shape = _shape(feature)
         try:
             told = {kind: np.array(value, float) for kind, value in stats[name].items()}
         except (ValueError, TypeError, OverflowError) as error:
             raise EpisodesError(
-                f"{path}: the statistics of {name} are no numbers ({str(error)[:120]}); {_REMEDY}"
+                f"{path}: the statistics of {name} are not numbers ({str(error)[:120]}); {_REMEDY}"
             ) from error
         if not all(np.isfinite(value).all() for value in told.values()):
             raise EpisodesError(f"{path}: the statistics of {name} are not finite; {_REMEDY}")
@@ -157,7 +159,7 @@ def check_statistics(path: Path, features: dict[str, dict[str, Any]], statistics
         mean = (each["mean"] * weights).sum(0) / weights.sum()
         together = _close(told["min"], each["min"].min(0)) and _close(told["max"], each["max"].max(0))
         if not together or not _close(told["mean"], mean) or told["count"][0] != each["count"].sum():
-            raise EpisodesError(f"{path}: the statistics of {name} are not those of the episodes together; {_REMEDY}")
+            raise EpisodesError(f"{path}: the statistics of {name} do not match those of all episodes; {_REMEDY}")
         order = [told[kind] for kind in ("min", "q01", "q10", "q50", "q90", "q99", "max")]
         if any((later < earlier - _ROUNDING * (1 + np.abs(earlier))).any() for earlier, later in pairwise(order)):
             raise EpisodesError(f"{path}: the quantiles of {name} are not in order; {_REMEDY}")

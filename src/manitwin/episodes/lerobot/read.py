@@ -155,7 +155,7 @@ def _tasks(path: Path, total: int) -> tuple[str, ...]:
     if table["task_index"].to_pylist() != list(range(len(tasks))) or len(tasks) != total:
         raise _wrong(path, f"task_index does not count from 0 to {total - 1} in order")
     if len(set(tasks)) != len(tasks) or not all(tasks):
-        raise _wrong(path, "a task is empty or there twice")
+        raise _wrong(path, "a task is empty or repeated")
     return tuple(tasks)
 
 
@@ -183,9 +183,9 @@ def _episodes(
             statistics[name].append(statistics_of(path, table, name, feature))
         for name in _NUMBERS:
             if table.schema.field(name).type != pa.int64() or table[name].null_count:
-                raise _wrong(path, f"{name} are no whole numbers")
+                raise _wrong(path, f"{name} are not integers")
         if table.schema.field("tasks").type != pa.list_(pa.string()):
-            raise _wrong(path, "tasks are no lists of texts")
+            raise _wrong(path, "tasks are not lists of texts")
         for row in table.select([name for name in table.column_names if not name.startswith("stats/")]).to_pylist():
             where = f"episode {row['episode_index']}"
             if row["episode_index"] != len(rows):

@@ -74,7 +74,9 @@ def write_lerobot(
                     writer = stack.enter_context(opened)
                 writer.add(episode)
         if writer is None:
-            raise EpisodesError(f"{place}: no episode, and LeRobot reads no empty set; keep at least one episode")
+            raise EpisodesError(
+                f"{place}: there is no episode, and LeRobot cannot read an empty set; keep at least one episode"
+            )
         writer.describe()
         return LeRobotSummary(writer.rows.count, writer.frames, len(writer.tasks))
 
@@ -116,11 +118,14 @@ class _Set:
         attempt, steps = episode.attempt, episode.recording.steps
         if episode.robot != self.robot:
             raise EpisodesError(
-                f"episode {attempt.episode_id}: robot {episode.robot.name}, the set's is {self.robot.name}; one set a robot"
+                f"episode {attempt.episode_id}: robot {episode.robot.name}, the set's is {self.robot.name}; write"
+                f" one set per robot"
             )
         tasks = list(dict.fromkeys(attempt.instructions))
         if not tasks:
-            raise EpisodesError(f"episode {attempt.episode_id}: no instruction, and LeRobot needs a task; run it again")
+            raise EpisodesError(
+                f"episode {attempt.episode_id}: it has no instruction, but LeRobot needs a task; run it again"
+            )
         for task in tasks:
             self.tasks.setdefault(task, len(self.tasks))
         chosen = self.tasks[_chosen(tasks, self.seed, attempt.episode_id)]

@@ -117,7 +117,7 @@ def _read(source: TwinSource, twin_id: str) -> TwinInEpisodes:
     record = parse_record(source.record_bytes(twin_id), f"{source.root.url}/{source.root.twin_name(twin_id)}/{RECORD}")
     if record.language is None:
         raise UsageError(
-            f"{source.root.url}: twin {twin_id} was rejected since; name the data set of the episodes (--twins)"
+            f"{source.root.url}: twin {twin_id} has been rejected; give the data set of the episodes (--twins)"
         )
     return TwinInEpisodes(
         twin_id,

@@ -59,9 +59,9 @@ def drawn_from(episodes: Path) -> tuple[tuple[str, ...], int]:
     said = read_json_object(path, EpisodesError, inside=episodes, name=str(path), remedy=_DRAW)
     cameras, rate_hz = said.get("cameras"), said.get("rate_hz", RATE_HZ)
     if not isinstance(cameras, list) or not all(isinstance(each, str) and _CAMERA.fullmatch(each) for each in cameras):
-        raise EpisodesError(f"{path}: cameras are no names; {_DRAW}")
+        raise EpisodesError(f"{path}: cameras are not names; {_DRAW}")
     if rate_hz not in RATES_HZ:
-        raise EpisodesError(f"{path}: rate_hz is none of {', '.join(map(str, RATES_HZ))}; {_DRAW}")
+        raise EpisodesError(f"{path}: rate_hz is not one of {', '.join(map(str, RATES_HZ))}; {_DRAW}")
     return tuple(cameras), int(rate_hz)
 
 
@@ -101,7 +101,7 @@ def _cut(film: Path, shown: Film, first_frames: dict[str, int], allowed: Set[str
     order = sorted(first_frames, key=first_frames.__getitem__)
     if order and not 0 <= first_frames[order[0]] <= first_frames[order[-1]] < facts.frames:
         raise EpisodesError(
-            f"{film}: has {facts.frames} frames, which are not those recorded; run manitwin render again"
+            f"{film}: has {facts.frames} frames, but another number was recorded; run manitwin render again"
         )
     ends = [*(later for _, later in pairwise(first_frames[name] for name in order)), facts.frames]
     clips: dict[str, Clip] = {}
@@ -181,7 +181,7 @@ def publish_episodes(
             publication.write(page, words.encode())
         publication.finish()
     except OSError as error:
-        raise UsageError(f"{out}: not finished ({error}); mend that and publish again") from error
+        raise UsageError(f"{out}: not finished ({error}); fix this and publish again") from error
     return PublishedEpisodes(
         episodes=checked.info["total_episodes"],
         frames=checked.info["total_frames"],
@@ -197,7 +197,7 @@ def publish_episodes(
 def _configuration(episodes: Path) -> dict[str, Any]:
     if not (episodes / ATTEMPTS).is_file():
         raise UsageError(
-            f"{episodes}: no {ATTEMPTS}, so this is no folder of finished episodes; run manitwin trajectories"
+            f"{episodes}: no {ATTEMPTS}, so this is not a folder of finished episodes; run manitwin trajectories"
         )
     return read_configuration(episodes)
 

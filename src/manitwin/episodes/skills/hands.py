@@ -29,14 +29,15 @@ def check_hand(robot: Robot, skill: Skill | None) -> None:
     """Raise UsageError where a robot's arms or hand are none for a skill, naming what would do."""
     if skill is not None and not _has_arms(robot, skill):
         raise UsageError(
-            f"skill {skill.name} wants two arms, {robot.name} has one; "
-            f"give one of {', '.join(shipped_two_arms())}, or a .toml file of two arms"
+            f"skill {skill.name} needs two arms, but {robot.name} has one; give one of"
+            f" {', '.join(shipped_two_arms())}, or a .toml file of two arms"
         )
     if skill is None or _has_hand(robot, skill):
         return
     others = ", ".join([PICK_PLACE, *(each.name for each in skills_of(robot))])
     raise UsageError(
-        f"skill {skill.name} wants a hand of two jaws, {robot.name} has {robot.gripper.name} ({robot.gripper.kind}); "
+        f"skill {skill.name} needs a two-jaw gripper, but {robot.name} has {robot.gripper.name}"
+        f" ({robot.gripper.kind}); "
         f"give one of {_with_jaws()}, or with this robot one of the skills {others}"
     )
 
@@ -50,18 +51,19 @@ def check_grasps(robot: Robot, skill: Skill | None, twin_ids: Sequence[str], has
         return
     hand = robot.gripper.name
     raise UsageError(
-        f"none of {len(twin_ids)} twins has a verified grasp for {hand}, the hand of {robot.name}; build them for it too "
-        f"(manitwin build --gripper {hand}, or its .toml file: docs/grippers.md), or give a robot with another hand"
+        f"none of {len(twin_ids)} twins has a verified grasp for {hand}, the hand of {robot.name}; build the twins"
+        f" for it too (manitwin build --gripper {hand}, or its .toml file: docs/grippers.md), or give a robot with"
+        f" another hand"
     )
 
 
 def check_jaws(robot: Robot, what: str) -> None:
     """Raise UsageError where a robot is none of one arm with two jaws, which ``what`` is made for."""
     if robot.arms:
-        raise UsageError(f"{what} want one arm, {robot.name} has two; give one of {_with_jaws()}")
+        raise UsageError(f"{what} need one arm, but {robot.name} has two; give one of {_with_jaws()}")
     if not robot.has_jaws:
         raise UsageError(
-            f"{what} want a hand of two jaws, {robot.name} has {robot.gripper.name} ({robot.gripper.kind}); "
+            f"{what} need a two-jaw gripper, but {robot.name} has {robot.gripper.name} ({robot.gripper.kind}); "
             f"give one of {_with_jaws()}"
         )
 

@@ -173,7 +173,7 @@ def episode_statistics(folder: Path) -> EpisodeReport:
     attempts = folder / ATTEMPTS
     if not attempts.is_file():
         raise EpisodesError(
-            f"{folder}: no {ATTEMPTS}, so this is no folder of finished episodes; run manitwin trajectories"
+            f"{folder}: no {ATTEMPTS}, so this is not a folder of finished episodes; run manitwin trajectories"
         )
     files = sorted(folder.glob(EPISODE_FILES)) or [path for path in [folder / _MERGED] if path.is_file()]
     check_parquet(attempts, EpisodesError, schema=SCHEMA, remedy=_REMEDY, inside=folder)

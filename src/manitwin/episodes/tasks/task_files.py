@@ -39,14 +39,14 @@ def read_tasks(place: str | Path) -> list[TaskRecord]:
     """
     path = Path(place) / TASKS if Path(place).is_dir() else Path(place)
     if not path.is_file():
-        raise UsageError(f"{path}: not there; give a folder that manitwin tasks wrote, or its {TASKS}")
+        raise UsageError(f"{path}: not found; give a folder that manitwin tasks wrote, or its {TASKS}")
     text = decode_text(
         read_bytes(path, MOST_BYTES, UsageError, inside=path.parent, name=str(path)), str(path), UsageError
     )
     tasks = [_task(line, f"{path}:{number}") for number, line in enumerate(text.splitlines(), 1) if line.strip()]
     ids = {task.task_id for task in tasks}
     if len(ids) != len(tasks):
-        raise UsageError(f"{path}: {len(tasks) - len(ids)} tasks come twice; {_REMEDY}")
+        raise UsageError(f"{path}: {len(tasks) - len(ids)} tasks are repeated; {_REMEDY}")
     return tasks
 
 

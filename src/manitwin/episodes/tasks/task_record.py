@@ -69,7 +69,7 @@ class TaskRecord(_Said):
         except ManiTwinError as error:
             raise ValueError(str(error)) from error
         if len(goal.literals) != len(self.steps):
-            raise ValueError(f"{len(goal.literals)} literals and {len(self.steps)} steps; each literal has one")
+            raise ValueError(f"{len(goal.literals)} literals but {len(self.steps)} steps; each literal needs one step")
         for step, literal in zip(self.steps, goal.literals, strict=True):
             if literal.subject != step.target:
                 raise ValueError(f"{literal} is not about {step.target}, which its step takes")

@@ -52,7 +52,7 @@ def read_model(cameras: Path, images: Path) -> list[PosedCamera]:
             found = list((_binary_images if binary else _text_images)(_bounded(stream, images)))
     except (struct.error, ValueError, EOFError, OverflowError) as error:
         cause = printable_line(str(error), max_characters=_SHOWN)
-        raise _refused(f"{cameras.parent.name}: no model of COLMAP, or cut short ({cause}); export it again") from error
+        raise _refused(f"{cameras.parent.name}: not a COLMAP model, or truncated ({cause}); export it again") from error
     if not found:
         raise _refused(f"{images.name}: has no images; export the model again")
     posed = []
@@ -68,7 +68,7 @@ def read_model(cameras: Path, images: Path) -> list[PosedCamera]:
 def _bounded(stream: BinaryIO, path: Path) -> BinaryIO:
     size = os.fstat(stream.fileno()).st_size
     if size > _MAX_BYTES:
-        raise _refused(f"{path.name}: {size} bytes are more than the limit of {_MAX_BYTES}; leave its points out")
+        raise _refused(f"{path.name}: {size} bytes exceed the limit of {_MAX_BYTES}; leave out its points")
     return stream
 
 
@@ -76,7 +76,7 @@ def _rotation(quaternion: tuple[float, ...], told: str) -> np.ndarray:
     length = math.sqrt(sum(each * each for each in quaternion))
     if not abs(length - 1) < 0.01:
         raise _refused(
-            f"{told}: its quaternion has the length {length:.3g}, and that of a rotation has 1; mend the file"
+            f"{told}: its quaternion has the length {length:.3g}, but a rotation has length 1; correct the file"
         )
     w, x, y, z = (each / length for each in quaternion)
     return np.array(
@@ -95,7 +95,7 @@ def _lens(model: str, size_px: tuple[float, float], values: tuple[float, ...]) -
             f"the camera model {printable_line(model, max_characters=_SHOWN)} is not read; undistort the photos"
         )
     if len(values) != count:
-        raise _refused(f"a camera {model} has {len(values)} parameters and needs {count}; export the model again")
+        raise _refused(f"a camera {model} has {len(values)} parameters, but needs {count}; export the model again")
     one = model.startswith(("SIMPLE", "RADIAL"))
     focal = (values[0], values[0]) if one else (values[0], values[1])
     at = 1 if one else 2

@@ -30,7 +30,8 @@ def cameras_of(photos: Sequence[Path], cameras: Sequence[PosedCamera], called: s
             both = f"{_told(photos[found.index(taken)])} and {_told(photos[number])}"
             raise InputError(
                 "unreadable",
-                f"{both}: both match one pose of {called}, {_told(Path(cameras[taken].file))}; give one of them",
+                f"{both}: both match the same pose of {called}, {_told(Path(cameras[taken].file))}; give only one"
+                f" of them",
             )
     return [None if number is None else cameras[number] for number in found]
 
@@ -49,7 +50,8 @@ def _camera_of(photo: Path, parts: Sequence[tuple[str, ...]], by_stem: dict[str,
             shown = printable_line(names, max_characters=200)
             raise InputError(
                 "unreadable",
-                f"{_told(photo)}: may be any of {shown} of {called}; keep the photos in the folders that the file names",
+                f"{_told(photo)}: matches several entries of {called}: {shown}; keep the photos in the folders that"
+                f" the file names",
             )
         return best[0]
     return None

@@ -92,14 +92,15 @@ def rigid(matrix: np.ndarray, told: str) -> np.ndarray:
     and at right angles, and for a mirror.
     """
     if not np.isfinite(matrix).all() or np.abs(matrix).max() > LARGEST_NUMBER:
-        raise InputError("unreadable", f"{told}: a number is not finite or above {LARGEST_NUMBER:g}; mend the file")
+        raise InputError("unreadable", f"{told}: a number is not finite or above {LARGEST_NUMBER:g}; correct the file")
     turn = matrix[:, :3]
     lengths = np.linalg.norm(turn, axis=0)
     if np.abs(turn.T @ turn - np.eye(3)).max() > 2 * _ROUNDED:
         shown = ", ".join(f"{length:.3g}" for length in lengths)
         raise InputError(
             "unreadable",
-            f"{told}: no rotation: its axes have the lengths {shown} or are not at right angles; write the matrix without scale"
+            f"{told}: not a rotation: its axes have the lengths {shown} or are not at right angles; write the"
+            f" matrix without scale"
             " and shear",
         )
     if np.linalg.det(turn) < 0:
@@ -113,13 +114,13 @@ def checked_lens(lens: Lens, told: str) -> Lens:
     numbers = [*lens.focal, *(lens.centre_px or ()), *(lens.size_px or ())]
     if not all(math.isfinite(each) and abs(each) <= LARGEST_NUMBER for each in numbers):
         raise InputError(
-            "unreadable", f"{told}: a number of its lens is not finite or above {LARGEST_NUMBER:g}; mend the file"
+            "unreadable", f"{told}: a lens parameter is not finite or above {LARGEST_NUMBER:g}; correct the file"
         )
     if min(*lens.focal, *(lens.size_px or (1.0,))) <= 0:
-        raise InputError("unreadable", f"{told}: a focal length or a size of the picture is not above 0; give pixels")
+        raise InputError("unreadable", f"{told}: a focal length or picture size is not above 0; give pixels")
     if not all(math.isfinite(each) and abs(each) <= MOST_COEFFICIENT for each in lens.distortion):
         raise InputError(
             "unreadable",
-            f"{told}: a coefficient of distortion is not finite or above {MOST_COEFFICIENT:g}; mend the file",
+            f"{told}: a distortion coefficient is not finite or above {MOST_COEFFICIENT:g}; correct the file",
         )
     return lens

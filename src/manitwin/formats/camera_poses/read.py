@@ -37,7 +37,7 @@ def read_camera_poses(path: Path) -> CameraPoses:
         if files is None and path.is_dir() and (path / "transforms.json").is_file():
             return read_camera_poses(path / "transforms.json")
         if files is None:
-            raise InputError("unreadable", f"{called}: no {CAMERAS} and {IMAGES} of one COLMAP model there; {GIVE}")
+            raise InputError("unreadable", f"{called}: no {CAMERAS} and {IMAGES} of a COLMAP model found; {GIVE}")
         if not path.is_dir():  # in the format, text or binary, of the file that was named
             files = folder / f"{CAMERAS}{path.suffix}", folder / f"{IMAGES}{path.suffix}"
         return CameraPoses("colmap", folder, tuple(read_model(*files)), None)

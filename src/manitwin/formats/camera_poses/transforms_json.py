@@ -43,14 +43,14 @@ def read_transforms(path: Path) -> tuple[list[PosedCamera], float | None]:
     frames = document.get("frames")
     if not isinstance(frames, list) or not frames:
         raise _refused(
-            f"{_name(path)}: no list 'frames' in it; give a transforms.json of NeRF, instant-ngp or nerfstudio"
+            f"{_name(path)}: it has no list 'frames'; give a transforms.json of NeRF, instant-ngp or nerfstudio"
         )
     if len(frames) > MOST_CAMERAS:
-        raise _refused(f"{_name(path)}: {len(frames)} frames are more than {MOST_CAMERAS}; leave some out")
+        raise _refused(f"{_name(path)}: {len(frames)} frames exceed the limit of {MOST_CAMERAS}; leave some out")
     try:
         return [_camera(path, number, frame, document) for number, frame in enumerate(frames)], _unit_m(path, document)
     except AssetError as error:
-        raise _refused(f"{_name(path)}: {error}; mend the file") from error
+        raise _refused(f"{_name(path)}: {error}; correct the file") from error
 
 
 def transforms_of(
@@ -112,17 +112,19 @@ def _mask(path: Path, said: Any, told: str) -> Path | None:
         )
     if relative.is_absolute() or relative.parts[0].endswith(":") or ".." in relative.parts:
         shown = printable_line(said, max_characters=_SHOWN)
-        raise _refused(f"{told}: mask_path {shown} leads out of the folder of {_name(path)}; keep the masks below it")
+        raise _refused(f"{told}: mask_path {shown} leads outside the folder of {_name(path)}; keep the masks below it")
     return path.parent / relative
 
 
 def _matrix(value: Any, told: str) -> np.ndarray:
     rows = value if isinstance(value, list) else []
     if len(rows) not in (3, 4) or not all(isinstance(row, list) and len(row) == 4 for row in rows):
-        raise _refused(f"{told}: transform_matrix has not 4 rows of 4 numbers; write the camera's pose to the world")
+        raise _refused(
+            f"{told}: transform_matrix does not have 4 rows of 4 numbers; write the camera's pose to the world"
+        )
     matrix = np.array([[json_number(each, "transform_matrix") for each in row] for row in rows])
     if len(rows) == 4 and np.abs(matrix[3] - [0, 0, 0, 1]).max() > 1e-6:
-        raise _refused(f"{told}: the last row of transform_matrix is not 0, 0, 0, 1; write it by rows")
+        raise _refused(f"{told}: the last row of transform_matrix is not 0, 0, 0, 1; write the matrix row by row")
     return matrix[:3]
 
 
@@ -139,7 +141,7 @@ def _lens(said: Mapping[str, Any], told: str) -> Lens:
     if focal[0] is None:
         angle = number("camera_angle_x")
         if angle is None or not 0 < angle < math.pi:
-            raise _refused(f"{told}: no lens: give fl_x (pixels), or camera_angle_x between 0 and pi")
+            raise _refused(f"{told}: the lens is not given; give fl_x (pixels), or camera_angle_x between 0 and pi")
         focal, in_widths = (0.5 / math.tan(angle / 2), None), True
         vertical = number("camera_angle_y")
         if vertical is not None and size is not None and 0 < vertical < math.pi:

@@ -95,7 +95,7 @@ def _tell_of_lost_shapes(document: Any, parts: list[trimesh.Trimesh], source: Me
     said = [str(each).rpartition(f"{type(each).__name__}: ")[2] for each in document.errors]
     lost = sorted((each for each in said if _OF_SHAPES.match(each)), key=lambda each: each.startswith(_NOT_FOUND))
     if lost and not parts:
-        cause = f"it has no faces that can be read, as its COLLADA is broken ({lost[0][:100]})"
+        cause = f"it has no readable faces because its COLLADA is broken ({lost[0][:100]})"
         raise source.refused("no_faces", cause, _REMEDY)
     if lost:
         source.find(f"broken shapes or nodes in it were left out ({lost[0][:100]})")
@@ -106,7 +106,7 @@ def _check_size(data: bytes, source: MeshSource) -> None:
     if len(data) > _MAX_BYTES or data.count(b"<") + data.count(b"=") > _MAX_NODES:
         raise source.too_large(f"more than {_MAX_BYTES >> 20} MiB or {_MAX_NODES} elements", "export it as glTF 2.0")
     if _END_OF_ARCHIVE in data:
-        raise source.unreadable("it hides a ZIP archive", _REMEDY)
+        raise source.unreadable("it contains a ZIP archive", _REMEDY)
 
 
 def _inspect(data: bytes, source: MeshSource) -> tuple[float | None, str | None, bool]:

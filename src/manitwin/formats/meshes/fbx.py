@@ -74,17 +74,17 @@ def read_fbx(source: MeshSource) -> tuple[list[trimesh.Trimesh], float, Literal[
     Raises InputError ``wrong_type`` where what ``manitwin[fbx]`` installs is missing, ``unreadable``, ``too_large``.
     """
     if find_spec("assimp_py") is None:
-        raise source.refused("wrong_type", "what reads FBX is not installed", f"{INSTALL}, or export it as glTF 2.0")
+        raise source.refused("wrong_type", "the FBX reader is not installed", f"{INSTALL}, or export it as glTF 2.0")
     data = source.data()
     version = _version(data)
     if version is not None and version < _OLDEST:
         raise source.unreadable(
-            f"FBX {version / 1000:.1f} is not read, only {_OLDEST / 1000:.1f} (2011) and later", _REMEDY
+            f"FBX {version / 1000:.1f} is not supported, only {_OLDEST / 1000:.1f} (2011) and later", _REMEDY
         )
     try:
         meshes, materials = run_isolated(f"{__name__}:scene_of", data, source.limits.max_faces, limits=_LIMITS)
     except ProcessCrashed as error:
-        raise source.unreadable("its FBX is so broken that its reader crashes or hangs on it", _REMEDY) from error
+        raise source.unreadable("its FBX is so damaged that the reader crashes or hangs", _REMEDY) from error
     except ValueError as error:
         raise source.unreadable(str(error), _REMEDY) from error
     except OverflowError as error:
@@ -116,7 +116,7 @@ def scene_of(data: bytes, max_faces: int) -> tuple[list[FbxMesh], list[FbxMateri
         try:
             scene = assimp_py.import_file(str(place), flags)
         except (RuntimeError, ValueError, TypeError) as error:  # its words may be those of the file before
-            only = "its FBX is broken, or holds nothing but points, lines and curved surfaces"
+            only = "its FBX is broken, or contains only points, lines and curved surfaces"
             mixed = "it holds points or lines beside its meshes, which its reader cannot leave out"
             raise ValueError(mixed if "assumes triangulated" in str(error) else only) from None
     placed: list[FbxMesh] = []
@@ -131,7 +131,7 @@ def scene_of(data: bytes, max_faces: int) -> tuple[list[FbxMesh], list[FbxMateri
             mesh = scene.meshes[index]
             faces += mesh.num_faces
             if faces > max_faces:
-                raise OverflowError(f"{faces} faces are more than the limit of {max_faces}")
+                raise OverflowError(f"{faces} faces exceed the limit of {max_faces}")
             if mesh.num_indices == 3 * mesh.num_faces:
                 placed.append(_mesh(mesh, str(node.name), matrix))
         todo.extend((child, matrix, depth + 1) for child in reversed(node.children))

@@ -90,14 +90,14 @@ def _parse(text: bytes, source: MeshSource) -> dict[str, Any]:
     refuse = partial(InputError, "unreadable")
     tree = parse_json(decode_text(text, source.name, refuse).rstrip("\0 "), source.name, refuse)
     if not isinstance(tree, dict) or not isinstance(tree.get("asset"), dict):
-        raise source.unreadable("its JSON is no glTF document", "export it as glTF 2.0")
+        raise source.unreadable("its JSON is not a glTF document", "export it as glTF 2.0")
     return tree
 
 
 def _check_document(tree: dict[str, Any], source: MeshSource) -> None:
     version = str(tree["asset"].get("version", ""))
     if not version.startswith("2"):
-        raise source.unreadable(f"glTF version {version[:10]!r}, only 2 is read", "export it as glTF 2.0")
+        raise source.unreadable(f"glTF version {version[:10]!r}, only version 2 is supported", "export it as glTF 2.0")
     for table in (
         "accessors",
         "bufferViews",
@@ -112,7 +112,7 @@ def _check_document(tree: dict[str, Any], source: MeshSource) -> None:
         if not isinstance(tree.get(table, []), list) or not all(
             isinstance(entry, dict) for entry in tree.get(table, [])
         ):
-            raise source.unreadable(f"{table!r} is no list of objects", "export it again as glTF 2.0")
+            raise source.unreadable(f"{table!r} is not a list of objects", "export it again as glTF 2.0")
     unknown = [str(e) for e in tree.get("extensionsRequired", []) if not str(e).startswith(_KNOWN_REQUIRED)]
     if unknown:
         raise source.unreadable(
@@ -138,7 +138,7 @@ def _placed_nodes(tree: dict[str, Any], source: MeshSource) -> dict[int, np.ndar
         index, parent = stack.pop()
         if not isinstance(index, int) or not 0 <= index < len(nodes) or index in placed:
             # section 3.5.2: nodes form strict trees; anything else would never end
-            raise source.unreadable("its nodes form no tree", "export it again")
+            raise source.unreadable("its nodes do not form a tree", "export it again")
         node = nodes[index]
         with np.errstate(all="ignore"):  # what overflows is found where vertices are checked
             matrix = parent @ _local_matrix(node, source)

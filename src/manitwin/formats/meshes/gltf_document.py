@@ -26,9 +26,9 @@ def split_glb(data: bytes, source: MeshSource) -> tuple[bytes, memoryview | None
         raise source.unreadable("the GLB ends inside its header", _REMEDY)
     _, version, length = struct.unpack_from("<III", data)
     if version != 2:
-        raise source.unreadable(f"GLB version {version}, only 2 is read", "export it as glTF 2.0")
+        raise source.unreadable(f"GLB version {version}, only version 2 is supported", "export it as glTF 2.0")
     if length > len(data):
-        raise source.unreadable(f"truncated: the GLB says {length} bytes and has {len(data)}", _REMEDY)
+        raise source.unreadable(f"truncated: the GLB declares {length} bytes but has {len(data)}", _REMEDY)
     chunks: list[tuple[int, memoryview]] = []
     offset = 12
     while offset + 8 <= length and len(chunks) < 2:  # all that a reader may look at
@@ -101,7 +101,7 @@ class Accessors:
         self._source.check_vertices(count)
         self._decompressed_bytes += count * stride
         if self._decompressed_bytes > self._source.limits.max_bytes:
-            raise self._source.too_large(f"decompressed it has more than {self._source.limits.max_bytes} bytes")
+            raise self._source.too_large(f"it decompresses to more than {self._source.limits.max_bytes} bytes")
         mode, filter = str(told.get("mode")), str(told.get("filter", "NONE"))
         try:
             return decompressed(
@@ -132,12 +132,12 @@ class Accessors:
             if data is None:
                 raise self._source.unreadable(
                     f"buffer {str(uri)[:80]!r} cannot be read",
-                    "keep the .bin beside the .gltf, or pack both as one .glb",
+                    "put the .bin beside the .gltf, or pack both as one .glb",
                 )
             declared = self._count(entry.get("byteLength"))
             if declared > len(data):
                 raise self._source.unreadable(
-                    f"truncated: buffer {index} says {declared} bytes and has {len(data)}", _REMEDY
+                    f"truncated: buffer {index} declares {declared} bytes but has {len(data)}", _REMEDY
                 )
             self._buffers[index] = data
         return self._buffers[index]
@@ -152,7 +152,7 @@ class Accessors:
         self._values += count * columns
         limit = _VALUES_PER_VERTEX * self._source.limits.max_vertices
         if self._values > limit:
-            raise self._source.too_large(f"its accessors ask for more than {limit} numbers")
+            raise self._source.too_large(f"its accessors need more than {limit} numbers")
         dtype = np.dtype(kind).newbyteorder("<")
         if "bufferView" in accessor:
             values = self._strided(accessor["bufferView"], accessor.get("byteOffset", 0), count, columns, dtype)
@@ -179,7 +179,7 @@ class Accessors:
         places, news = sparse.get("indices", {}), sparse.get("values", {})
         kind = np.dtype(_DTYPES.get(places.get("componentType", 0), np.uint32))
         if kind.kind != "u":
-            raise self._source.unreadable("a sparse accessor has indices of a wrong type", _REMEDY)
+            raise self._source.unreadable("a sparse accessor has indices of the wrong type", _REMEDY)
         index_type = kind.newbyteorder("<")
         where = self._strided(places.get("bufferView"), places.get("byteOffset", 0), count, 1, index_type)[:, 0]
         if count and int(where.max()) >= len(values):

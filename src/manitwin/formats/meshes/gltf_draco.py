@@ -61,7 +61,7 @@ def decoded(data: bytes) -> tuple[np.ndarray, dict[int, np.ndarray]]:
     try:
         mesh = DracoPy.decode(data)
     except (DracoPy.FileTypeException, ValueError, RuntimeError) as error:
-        raise ValueError("no mesh that Draco can decode") from error
+        raise ValueError("Draco cannot decode the mesh") from error
     faces = getattr(mesh, "faces", None)
     if faces is None or not len(faces):
         raise ValueError("points without faces")

@@ -20,7 +20,7 @@ def target_weights(given: Any, source: MeshSource) -> tuple[float, ...]:
     if not isinstance(given, list) or not all(
         isinstance(each, int | float) and not isinstance(each, bool) for each in given
     ):
-        raise source.unreadable("its weights of morph targets are no list of numbers", "export it again")
+        raise source.unreadable("its morph target weights are not a list of numbers", "export it again")
     return tuple(float(each) for each in given)
 
 
@@ -37,7 +37,7 @@ def morphed(
     Targets beyond the weights have none, and what a target does not name it does not change. Raises InputError ``unreadable``.
     """
     if not isinstance(targets, list) or not all(isinstance(target, dict) for target in targets):
-        raise source.unreadable("its morph targets are no list of objects", "export it again")
+        raise source.unreadable("its morph targets are not a list of objects", "export it again")
     moved = rows.astype(np.float64)
     for target, weight in zip(targets, weights, strict=False):
         if weight == 0 or attribute not in target:

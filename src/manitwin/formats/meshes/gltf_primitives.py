@@ -128,10 +128,10 @@ class GltfPrimitives:
         if "indices" in primitive:
             indices = self._accessors.array(primitive["indices"])[:, 0]
             if indices.dtype.kind != "u":  # section 3.7.2.1
-                raise self._source.unreadable("its indices are no unsigned integers", "export it again")
+                raise self._source.unreadable("its indices are not unsigned integers", "export it again")
             order = indices.astype(np.int64)
         if len(order) and int(order.max()) >= count:
-            raise self._source.unreadable("a face names a vertex that is not there", "export it again")
+            raise self._source.unreadable("a face refers to a vertex that does not exist", "export it again")
         if mode == 4:
             faces = order[: len(order) // 3 * 3].reshape(-1, 3)
         elif mode == 5:

@@ -78,7 +78,7 @@ def posed(
     """
     joints, shares = bound_to
     if len(joints) and int(joints.max()) >= len(matrices):
-        raise source.unreadable("a vertex is bound to a joint that its skeleton has not", "export it again")
+        raise source.unreadable("a vertex is bound to a joint that is not in its skeleton", "export it again")
     with np.errstate(all="ignore"):
         blend = np.zeros((len(vertices), 3, 4))
         for place in range(joints.shape[1]):

@@ -26,9 +26,9 @@ def read_msh(source: MeshSource) -> list[trimesh.Trimesh]:
     numbers = np.frombuffer(data, "<f4", 3 * (vertices + normals) + 2 * coordinates, MSH_HEADER_BYTES)
     indices = np.frombuffer(data, "<i4", 3 * faces, MSH_HEADER_BYTES + numbers.nbytes).reshape(-1, 3)
     if not faces and not source.hull_of_points:
-        raise source.refused("no_faces", f"{vertices} vertices and no faces", "give it triangles")
+        raise source.refused("no_faces", f"{vertices} vertices and no faces", "export it with triangles")
     if faces and (indices.min() < 0 or indices.max() >= vertices):
-        raise source.unreadable("a face names a vertex that is not there", _REMEDY)
+        raise source.unreadable("a face refers to a vertex that does not exist", _REMEDY)
     with np.errstate(invalid="ignore"):  # signalling NaNs, which the checks of every mesh find
         positions, directions, uv = np.split(numbers.astype(np.float64), [3 * vertices, 3 * (vertices + normals)])
     if not faces:

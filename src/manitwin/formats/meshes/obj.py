@@ -151,11 +151,11 @@ def _unique_corners(
     for column, (count, what) in enumerate(zip(counts, ("vertex", "texture coordinate", "normal"), strict=True)):
         if column and not count and rows[:, column].max() >= 0:
             rows[:, column] = -1  # loaders do not miss what they can do without
-            source.find(f"its faces name {what}s, of which it has none")
+            source.find(f"its faces refer to {what}s, but it has none")
         if rows[:, column].max() >= count:
             raise source.unreadable(
                 f"a face names {what} {rows[:, column].max() + 1} of {count}",
-                "the file is cut short or broken; export it again",
+                "the file is truncated or broken; export it again",
             )
     # one integer a corner sorts much faster than rows
     key = rows[:, 0] * (counts[1] + 1) + rows[:, 1] + 1
@@ -171,7 +171,7 @@ def _table(lines: list[str], columns: int, keyword: str, source: MeshSource) -> 
     try:
         return _numbers(lines, range(columns))
     except ValueError as error:
-        raise source.unreadable(f"a {keyword!r} line does not hold {columns} numbers", "export it again") from error
+        raise source.unreadable(f"a {keyword!r} line does not contain {columns} numbers", "export it again") from error
 
 
 def _numbers(lines: list[str], columns: Sequence[int]) -> np.ndarray:

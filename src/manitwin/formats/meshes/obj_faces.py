@@ -70,7 +70,7 @@ class Faces:
         try:
             corners = [known(word) or self._corner(word, counts) for word in said.split()]
         except ValueError as error:
-            raise self.source.unreadable(f"line {number} is no face: {line[:60]!r}", "export it again") from error
+            raise self.source.unreadable(f"line {number} is not a face: {line[:60]!r}", "export it again") from error
         if len(corners) >= 3:  # else a point or a line written as a face
             self._sizes.append(len(corners))
             self._corners.extend(corners)

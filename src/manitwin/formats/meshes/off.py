@@ -23,7 +23,7 @@ def read_off(source: MeshSource) -> list[trimesh.Trimesh]:
     text = source.data().decode("utf-8", errors="replace").lstrip("\ufeff \t\r\n")
     header = OFF_KEYWORD.match(text)
     if header is None or text[header.end() :].lstrip()[:6].upper() == "BINARY":
-        raise source.unreadable("it is no OFF text", _REMEDY)
+        raise source.unreadable("it is not an OFF text", _REMEDY)
     textured, colored, normals, *more = (said is not None for said in header.groups())
     if any(more):
         raise source.unreadable("its vertices have more than three coordinates", _REMEDY)
@@ -61,7 +61,7 @@ def _counts(lines: list[list[str]], source: MeshSource) -> tuple[int, int]:
     if not faces:
         raise source.refused("no_faces", f"{vertices} vertices and no faces", "export the surface, not points")
     if len(lines) - 1 < vertices + faces:
-        cause = f"truncated: it says {vertices} vertices and {faces} faces and has {len(lines) - 1} lines"
+        cause = f"truncated: it declares {vertices} vertices and {faces} faces but has {len(lines) - 1} lines"
         raise source.unreadable(cause, "download or export it again")
     return vertices, faces
 
@@ -79,12 +79,12 @@ def _polygons(
     """Return the corner counts ``(P,)``, the corners one after another, and colours ``(P, 3)`` where each face has one."""
     sizes = np.array([int(words[0]) for words in lines], np.int64)
     if sizes.min() < 1 or any(len(words) - 1 < size for words, size in zip(lines, sizes.tolist(), strict=True)):
-        raise source.unreadable("a face has fewer corners than it says", _REMEDY)
+        raise source.unreadable("a face has fewer corners than it declares", _REMEDY)
     corners = np.array(
         [word for words, size in zip(lines, sizes, strict=True) for word in words[1 : 1 + size]], np.int64
     )
     if corners.min() < 0 or corners.max() >= vertices:
-        raise source.unreadable("a face names a vertex that is not there", _REMEDY)
+        raise source.unreadable("a face refers to a vertex that does not exist", _REMEDY)
     said = [words[1 + size :] for words, size in zip(lines, sizes, strict=True)]
     if any(len(words) not in _COLORS for words in said):
         source.find("numbers behind its faces that are no colours were left out")

@@ -72,7 +72,7 @@ def _tables(data: bytes, encoding: str, elements: list[Element], offset: int, so
 def _header(data: bytes, source: MeshSource) -> tuple[str, list[Element], str | None, int]:
     end = re.search(rb"^end_header[ \t]*+\r?\n", data[: 1 << 20], re.MULTILINE)
     if end is None:
-        raise source.unreadable("its PLY header does not end", REMEDY)
+        raise source.unreadable("its PLY header has no end", REMEDY)
     encoding = ""
     elements: list[tuple[str, int, list[Property]]] = []
     for line in data[: end.start()].decode("utf-8", errors="replace").splitlines()[1:]:
@@ -121,7 +121,7 @@ def _part(tables: dict[str, Columns], texture: str | None, source: MeshSource) -
     corners, owner = triangle_fans(polygons.sizes)
     named = polygons.values[corners]
     if not ((named >= 0) & (named < len(positions))).all():  # false for NaN
-        raise source.unreadable("a face names a vertex that is not there", REMEDY)
+        raise source.unreadable("a face refers to a vertex that does not exist", REMEDY)
     faces = named.astype(np.int64)
     image = _texture(texture, source)
     uv = next(

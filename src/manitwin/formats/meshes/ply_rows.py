@@ -53,7 +53,7 @@ def check_rows(element: Element, body_bytes: int, source: MeshSource) -> None:
     if not element.properties:
         return
     if element.count > body_bytes:
-        cause = f"truncated: it says {element.count} {element.name} rows and has {body_bytes} bytes"
+        cause = f"truncated: it declares {element.count} {element.name} rows but has {body_bytes} bytes"
         raise source.unreadable(cause, REMEDY)
     if element.name == "face":
         source.check_faces(element.count)

@@ -80,7 +80,7 @@ def read_mesh(
         path, limits or MeshLimits(), root=root, texture_folders=texture_folders, hull_of_points=hull_of_points
     )
     if sniffed.kind != "mesh":
-        raise source.refused("wrong_type", f"holds an image ({sniffed.format}), not a mesh", "give it as an image")
+        raise source.refused("wrong_type", f"contains an image ({sniffed.format}), not a mesh", "pass it as an image")
     if path.suffix.lower() not in _SUFFIXES[sniffed.format]:
         source.find(
             f"the file is named {path.suffix or 'without a suffix'} and holds {sniffed.format}; it was read as that"
@@ -117,7 +117,7 @@ def _read_usdz(source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None,
     try:
         parts, unit_m, up, findings, source.bytes_read = run_isolated("manitwin.formats.meshes.usdz:read_usdz", source)
     except ProcessCrashed as error:
-        cause = "its USD is so broken that the USD library crashes on it"
+        cause = "its USD is so damaged that the USD library crashes"
         raise source.unreadable(cause, "export it again") from error
     source.findings[:] = findings
     return parts, unit_m, up
@@ -139,7 +139,7 @@ def _checked(parts: list[trimesh.Trimesh], source: MeshSource) -> list[trimesh.T
             cause = (
                 f"{far} of {total} vertices lie farther out than {_MAX_COORDINATE:.0e}, which no size can be told of"
             )
-        raise source.refused("not_finite", cause, "repair it where it was made and export again")
+        raise source.refused("not_finite", cause, "repair the mesh in the program that made it, and export it again")
     for part in parts:
         unused = ~(np.abs(part.vertices) <= _MAX_COORDINATE).all(axis=1)
         if unused.any():

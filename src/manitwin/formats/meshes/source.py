@@ -161,13 +161,13 @@ class MeshSource:
     def check_faces(self, faces: int) -> None:
         """Raise InputError ``too_large`` where there are more triangles than the limit."""
         if faces > self.limits.max_faces:
-            raise self.too_large(f"{faces} faces are more than the limit of {self.limits.max_faces}")
+            raise self.too_large(f"{faces} faces exceed the limit of {self.limits.max_faces}")
 
     def check_vertices(self, vertices: int) -> None:
         """Raise InputError ``too_large`` where there are more vertices than triangles within the limit can use."""
         if vertices > self.limits.max_vertices:
             limit = f"{self.limits.max_vertices}, three for each of {self.limits.max_faces} faces"
-            raise self.too_large(f"{vertices} vertices are more than the limit of {limit}")
+            raise self.too_large(f"{vertices} vertices exceed the limit of {limit}")
 
     def count_texture(self, pixels: int) -> None:
         """Count the pixels of one more texture; raises InputError ``too_large`` where all together are too many."""
@@ -188,7 +188,7 @@ class MeshSource:
         try:
             yield
         except MemoryError as error:
-            raise self.too_large("it asks for more memory than there is") from error
+            raise self.too_large("it needs more memory than is available") from error
         except _BROKEN as error:
             said = f"{type(error).__name__}: {str(error)[:80]}"
             if isinstance(error, KeyError) and error.args:  # an attribute or an entry that the format wants
@@ -199,7 +199,7 @@ class MeshSource:
     def _read(self, found: Path, inside: Path) -> bytes:
         # each file once: many materials may name one texture
         if found not in self._contents:
-            together = f"it and the files that it names have more than {self.limits.max_bytes} bytes"
+            together = f"it and the files that it references have more than {self.limits.max_bytes} bytes"
             left, refuse = self.limits.max_bytes - self.bytes_read, partial(InputError, "unreadable")
             self._contents[found] = read_bytes(
                 found, left, refuse, inside=inside, refuse_size=lambda _: self.too_large(together)

@@ -22,14 +22,14 @@ def read_step(source: MeshSource) -> list[trimesh.Trimesh]:
     Raises InputError ``wrong_type`` where what ``manitwin[cad]`` installs is missing, ``unreadable``, ``too_large``.
     """
     if find_spec("cascadio") is None:
-        raise source.refused("wrong_type", "what reads STEP is not installed", f"{INSTALL}, or export it as glTF 2.0")
+        raise source.refused("wrong_type", "the STEP reader is not installed", f"{INSTALL}, or export it as glTF 2.0")
     try:
         glb = run_isolated(f"{__name__}:triangulated", source.data(), limits=_LIMITS)
     except ProcessCrashed as error:
         cause = f"OpenCASCADE crashes on it, or takes more than {_LIMITS.seconds:g} s"
         raise source.unreadable(cause, "export it as glTF 2.0") from error
     if not glb:
-        raise source.unreadable("its STEP is broken, or holds no solid or surface", "export it again")
+        raise source.unreadable("its STEP is broken, or contains no solid or surface", "export it again")
     return read_gltf(source, binary=True, data=glb)
 
 

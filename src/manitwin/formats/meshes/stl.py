@@ -34,7 +34,7 @@ def read_stl(source: MeshSource) -> list[trimesh.Trimesh]:
         corners = _ascii(data, source)
     else:
         raise source.unreadable(
-            f"truncated: it says {count} triangles and has {len(data)} bytes",
+            f"truncated: it declares {count} triangles but has {len(data)} bytes",
             _REMEDY,
         )
     vertices, faces = weld_equal(corners, np.arange(len(corners)).reshape(-1, 3))
@@ -68,4 +68,4 @@ def _numbers(rows: list[list[bytes]], source: MeshSource) -> np.ndarray:
     try:
         return np.array(rows, dtype=np.float64).reshape(-1, 3)
     except ValueError as error:
-        raise source.unreadable("a vertex does not hold three numbers", _REMEDY) from error
+        raise source.unreadable("a vertex does not have three numbers", _REMEDY) from error

@@ -178,7 +178,7 @@ class _Walker:
                 groups[some], corners[some] = group, np.array(places, np.int64)[corners[some]]
         vertices = np.array(self._vertices).reshape(-1, 3)
         if len(rows) and not (rows[:, :3].min() >= 0 and rows[:, :3].max() < len(vertices)):
-            raise self._source.unreadable("a triangle names a vertex that is not there", "export it again")
+            raise self._source.unreadable("a triangle refers to a vertex that does not exist", "export it again")
         self.model.objects[int(self._attributes["id"])] = ModelObject(
             kind=self._attributes.get("type", "model"),
             name=self._attributes.get("name", ""),

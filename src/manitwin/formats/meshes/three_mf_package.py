@@ -50,7 +50,7 @@ class ThreeMfPackage:
                     return _part_name(each.get("Target") or "")
         found = sorted(name for name in self._members if name.endswith(".model"))
         if not found:
-            raise self._source.unreadable("no 3D model is in its archive", "export it again as 3MF")
+            raise self._source.unreadable("its archive contains no 3D model", "export it again as 3MF")
         return found[0]
 
     def blocks(self, name: str) -> Iterator[bytes]:
@@ -88,7 +88,7 @@ class ThreeMfPackage:
         self._source.bytes_read += size_bytes
         limit = self._source.limits.max_bytes
         if self._source.bytes_read > limit:
-            raise self._source.too_large(f"unpacked it has more than {limit} bytes")
+            raise self._source.too_large(f"it unpacks to more than {limit} bytes")
 
 
 def _part_name(name: str) -> str:

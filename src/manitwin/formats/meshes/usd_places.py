@@ -119,7 +119,7 @@ class _Places:
         if len(numbers) + self._copies > MAX_INSTANCES:
             raise self._source.too_large(
                 f"point instancer {instancer.prim.GetName()!r} and others repeat more than {MAX_INSTANCES} instances",
-                "it is no single object",
+                "it is not a single object",
             )
         if len(numbers) == 0:
             return

@@ -33,7 +33,7 @@ def read_usdz(
     """
     archive = UsdzArchive(source)
     if archive.root is None:
-        raise source.unreadable("its first member is no USD layer", "pack it with usdzip")
+        raise source.unreadable("its first member is not a USD layer", "pack it with usdzip")
     archive.check_layers()
     try:
         parts, unit_m, up = _read(Usd.Stage.Open(str(source.path)), archive, source)

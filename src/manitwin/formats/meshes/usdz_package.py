@@ -27,7 +27,7 @@ class UsdzArchive:
         self._source = source
         size = source.path.stat().st_size
         if size > source.limits.max_bytes:
-            raise source.too_large(f"{size} bytes are more than the limit of {source.limits.max_bytes}")
+            raise source.too_large(f"{size} bytes exceed the limit of {source.limits.max_bytes}")
         members_said = _central_headers(source)
         if members_said > _MAX_MEMBERS:  # before a list of them is made
             raise source.too_large(f"{members_said} members in the archive", "pack fewer files")

@@ -50,7 +50,7 @@ class ClipFolder:
             self._path(name)
         for name in (PREPROCESSOR, "vocab.json", "merges.txt"):
             if not (folder / name).is_file():
-                raise UsageError(f"{folder / name}: not there; {_FEW}")
+                raise UsageError(f"{folder / name}: not found; {_FEW}")
 
     @property
     def name(self) -> str:
@@ -73,7 +73,7 @@ class ClipFolder:
         network = self._network(TEXT)
         length = (network.shape[-1] if network.shape else None) or LENGTH
         if not 2 <= length <= MOST_TOKENS:
-            raise UsageError(f"{network.path}: takes texts of {length} tokens; 2 to {MOST_TOKENS} are run")
+            raise UsageError(f"{network.path}: takes texts of {length} tokens; 2 to {MOST_TOKENS} are supported")
         return self._unit([self._run(TEXT, self._tokens.encode(text, length)[None]) for text in texts])
 
     def points(self, points_m: np.ndarray) -> np.ndarray:
@@ -91,7 +91,7 @@ class ClipFolder:
             raise UsageError(f"{POINTS}: takes {shape}, not (1, N, 3); give a network of points without colours")
         count = shape[1] or POINT_COUNT
         if not 1 <= count <= MOST_POINTS:
-            raise UsageError(f"{POINTS}: takes {count} points; at most {MOST_POINTS} are run")
+            raise UsageError(f"{POINTS}: takes {count} points; at most {MOST_POINTS} are supported")
         return count
 
     @cached_property
@@ -110,7 +110,7 @@ class ClipFolder:
             side = int(json_number(size, "crop_size"))
             mean, deviation = (json_vector(said[key], 3, key) for key in ("image_mean", "image_std"))
         except (KeyError, TypeError, ValueError, UsageError) as error:
-            raise UsageError(f"{path}: says no crop_size, image_mean and image_std ({error}); {_FEW}") from error
+            raise UsageError(f"{path}: lacks crop_size, image_mean or image_std ({error}); {_FEW}") from error
         if not 8 <= side <= 2048 or (deviation <= 0).any():
             raise UsageError(f"{path}: pictures of {side} px with deviation {deviation.tolist()} cannot be; {_FEW}")
         return side, mean.astype(np.float32), deviation.astype(np.float32)
@@ -130,7 +130,7 @@ class ClipFolder:
         vectors = np.array(rows, np.float64)
         lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
         if not np.isfinite(vectors).all() or not (lengths > 0).all():
-            raise UsageError(f"{self.folder}: its networks answer with no finite vector; give another model")
+            raise UsageError(f"{self.folder}: its networks return vectors that are not finite; give another model")
         return np.asarray(vectors / lengths)
 
     def _found(self, name: str) -> Path | None:
@@ -139,7 +139,7 @@ class ClipFolder:
     def _path(self, name: str) -> Path:
         path = self._found(name)
         if path is None:
-            raise UsageError(f"{self.folder / name}: not there, nor in onnx/; {_FEW}")
+            raise UsageError(f"{self.folder / name}: not found, also not in onnx/; {_FEW}")
         return path
 
     def _network(self, name: str) -> _Network:
@@ -200,7 +200,7 @@ class _Network:
             raise self._refused(error) from error
         if answer.size != answer.shape[-1]:
             raise UsageError(
-                f"{self.path}: its answer of shape {answer.shape} is no vector; give a network of embeddings"
+                f"{self.path}: its answer of shape {answer.shape} is not a vector; give an embedding network"
             )
         return answer.ravel()
 

@@ -36,9 +36,7 @@ class ClipEndpoint:
         """Take the model and the address; raises ConfigError for what names none, or where a key may not go there."""
         model, url = split_url(spec)
         if url is None or not model:
-            raise ConfigError(
-                f"--clip {spec!r}: names no model at an address; give MODEL@http://HOST:PORT, or a folder"
-            )
+            raise ConfigError(f"--clip {spec!r}: not a model at an address; give MODEL@http://HOST:PORT, or a folder")
         self._model, self._sizes = model, set[int]()
         key = key_from_environment((KEY,), url, "--clip", own_server=True)
         self._service = HttpService("CLIP", url, authorization=bearer(key), services=services, key=key)
@@ -77,8 +75,8 @@ class ClipEndpoint:
             self._sizes.add(len(vector))
         if sorted(found) != list(range(count)) or len(self._sizes) != 1:
             raise BadReply(
-                f"{self.name}: answers with no vector of one length for each of {count} inputs; it is no server of"
-                " embeddings of pictures and texts"
+                f"{self.name}: answers with no vector of one length for each of {count} inputs; it is not a server"
+                f" of picture and text embeddings"
             )
         return [found[place] for place in range(count)]
 

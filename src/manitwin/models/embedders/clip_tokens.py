@@ -39,7 +39,7 @@ class ClipTokens:
         """Read ``vocab.json`` and ``merges.txt``; raises UsageError for files that are no such vocabulary."""
         said = read_json_object(folder / "vocab.json", UsageError)
         if not all(type(value) is int for value in said.values()) or not {BEGIN, END} <= said.keys():
-            raise UsageError(f"{folder / 'vocab.json'}: is no vocabulary of CLIP; give tokens with their numbers")
+            raise UsageError(f"{folder / 'vocab.json'}: is not a CLIP vocabulary; give tokens with their numbers")
         lines = [line.split() for line in read_lines(folder / "merges.txt", UsageError) if line[:1] != "#"]
         pairs = [(line[0], line[1]) for line in lines if len(line) == 2]
         return cls({name: int(value) for name, value in said.items()}, {pair: rank for rank, pair in enumerate(pairs)})

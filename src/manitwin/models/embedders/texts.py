@@ -109,7 +109,8 @@ def text_embedder(spec: str, services: ServicesConfig) -> TextEmbedder:
     model, url = split_url(argument)
     if name != "openai" or not model:
         raise ConfigError(
-            f"{spec!r} names no embedding model; give clip:FOLDER, openai:MODEL, or openai:MODEL@URL for a server of your own"
+            f"{spec!r} is not an embedding model; give clip:FOLDER, openai:MODEL, or openai:MODEL@URL for a server"
+            f" of your own"
         )
     url = url or OPENAI_URL
     key_name = KEY_OF_HOST.get(urlsplit(url).hostname or "", KEY_OF_OTHERS)

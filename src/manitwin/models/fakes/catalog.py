@@ -89,9 +89,9 @@ def serving(
     takes = inspect.signature(factory).parameters
     given: dict[str, Any] = {"faults": faults or Faults()}
     if polls is not None and "polls" not in takes:
-        raise UsageError(f"{name} has no jobs to look at: leave --polls out")
+        raise UsageError(f"{name} has no jobs to poll: leave --polls out")
     if key is not None and rehearsal.key_variable is None:
-        raise UsageError(f"{name} asks for no key: leave --key out")
+        raise UsageError(f"{name} needs no key: leave --key out")
     given |= {word: value for word, value in (("key", key), ("polls", polls)) if value is not None}
     if rehearsal.key_variable is not None and key is None:
         key = takes["key"].default

@@ -140,7 +140,11 @@ class CommandGenerator:
             raise Unsupported(f"command: {self.model} takes a {{text}} and no {{image}}; give a text, or add {{image}}")
         text = request.text or request.name or ""
         if "\0" in text:
-            raise Rejected("generator_failed", "the text holds a NUL character, which no argument can", "generate")
+            raise Rejected(
+                "generator_failed",
+                "the text contains a NUL character, which is not possible in an argument",
+                "generate",
+            )
         image = folder / "image.png"
         if request.rgba is not None:
             image.write_bytes(png_of(request.rgba))
@@ -169,8 +173,8 @@ class CommandGenerator:
                 return process.wait(self.max_wait_s)
             except subprocess.TimeoutExpired as error:
                 raise Unavailable(
-                    f"command: {self.model} did not end in {self.max_wait_s:g} s and was stopped;"
-                    " run again, or raise generate.max_wait_s"
+                    f"command: {self.model} did not end in {self.max_wait_s:g} s and was stopped; run it again, or"
+                    f" raise generate.max_wait_s"
                 ) from error
 
     def _state(self, status: int, folder: Path) -> JobState:
@@ -237,6 +241,6 @@ def _check_mesh(path: Path) -> None:
     try:
         found = sniff(path)
     except InputError as error:
-        raise BadReply(f"command: what the program wrote to {{out}} is no mesh: {error.detail}") from error
+        raise BadReply(f"command: what the program wrote to {{out}} is not a mesh: {error.detail}") from error
     if found.format not in FORMATS:
-        raise BadReply(f"command: the program wrote {found.format} to {{out}}; it has to be {' or '.join(FORMATS)}")
+        raise BadReply(f"command: the program wrote {found.format} to {{out}}; it must be {' or '.join(FORMATS)}")

@@ -68,7 +68,7 @@ class FalGenerator(VendorGenerator):
         self, endpoint: str, url: str, key: str | None, config: BuildConfig, sleep: Callable[[float], None] = time.sleep
     ):
         if endpoint.count("/") < 1 or not all(endpoint.split("/")):
-            raise ConfigError(f"fal: {endpoint!r} is no endpoint; give OWNER/APP such as {DEFAULT}")
+            raise ConfigError(f"fal: {endpoint!r} is not an endpoint; give OWNER/APP such as {DEFAULT}")
         self.takes = self.taken_by(endpoint)
         super().__init__(endpoint, url, key, config, sleep, listed_usd=self.takes.usd if url == VENDOR else None)
         takes: dict[Asked, bool] = {"image": self.takes.image is not None, "text": self.takes.prompt}
@@ -142,7 +142,9 @@ class FalGenerator(VendorGenerator):
         takes, body = self.takes, dict[str, Any]()
         if request.rgba is not None:
             if takes.image is None:
-                raise Unsupported(f"fal: {self.model} takes no picture; give a text, or choose another endpoint")
+                raise Unsupported(
+                    f"fal: {self.model} does not accept pictures; give a text, or choose another endpoint"
+                )
             picture = data_uri(request.rgba)
             body[takes.image] = [picture] if takes.image_list else picture
         else:

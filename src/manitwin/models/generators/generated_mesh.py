@@ -39,7 +39,7 @@ def flaw(path: Path) -> str | None:
     vertices, faces = trimesh.util.append_faces([part.vertices for part in parts], [part.faces for part in parts])
     diagonal = float(np.linalg.norm(np.ptp(vertices[np.unique(faces)], axis=0)))
     if diagonal == 0.0:
-        return f"{path.name}: all of it lies in one point"
+        return f"{path.name}: all of its vertices coincide"
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     result = repair(mesh)
     if not result.watertight:

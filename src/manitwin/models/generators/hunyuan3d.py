@@ -142,7 +142,7 @@ class Hunyuan3dGenerator:
     def _parts(self, job_id: str) -> tuple[str, str]:
         how, _, uid = job_id.partition(":")
         if how not in ("send", "generate") or not uid:
-            raise BadReply(f"hunyuan3d: {job_id!r} is no id of a job of this generator; run it again")
+            raise BadReply(f"hunyuan3d: {job_id!r} is not a job id of this generator; run it again")
         if how == "generate" and job_id not in self._made:
             raise Gone(f"hunyuan3d: job {job_id} ended with the process that began it; run it again")
         return how, uid

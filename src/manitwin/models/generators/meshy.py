@@ -140,7 +140,7 @@ class MeshyGenerator(VendorGenerator):
     def _listed(self, page: int) -> list[dict[str, Any]]:
         tasks = self._service.get_list(f"{TEXT}?page_num={page}&page_size={PAGE}&sort_by=-created_at")
         if not all(isinstance(task, dict) for task in tasks):
-            raise BadReply("meshy: its list of tasks holds something else than tasks; run it again")
+            raise BadReply("meshy: its list of tasks contains other items; run it again")
         return tasks
 
     def _submit(self, place: str, body: Mapping[str, Any]) -> str:
@@ -163,7 +163,7 @@ class MeshyGenerator(VendorGenerator):
 def _parts(job_id: str) -> tuple[str, str]:
     kind, _, id = job_id.partition(":")
     if kind not in ("image", "text") or not id:
-        raise BadReply(f"meshy: {job_id!r} is no id of a job of this generator; run it again")
+        raise BadReply(f"meshy: {job_id!r} is not a job id of this generator; run it again")
     return kind, id
 
 

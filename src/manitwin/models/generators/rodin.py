@@ -107,7 +107,7 @@ class RodinGenerator(VendorGenerator):
     def _link(self, job_id: str) -> str:
         files = self._service.post_json("download", {"task_uuid": json.loads(job_id)[0]}).get("list")
         if not files:
-            raise Gone("rodin: nothing is left to download of a finished task; its data is kept for 7 days")
+            raise Gone("rodin: the files of a finished task are gone; they are kept for 7 days")
         for file in files if isinstance(files, list) else ():
             if isinstance(file, dict) and str(file.get("name", "")).lower().endswith(f".{self._format}"):
                 return checked_address(file.get("url"), "rodin", "model")

@@ -151,8 +151,8 @@ class _Drive:
         charge(note.unsettled_usd)
         if note.submitting and self.generator.usd_per_job and not submit_again:
             raise BadReply(
-                f"{self.generator.name}: an earlier submit was broken off before its answer came, so a job may be paid for"
-                " and lost; look at the jobs of your account, then set services.submit_again = true and run again"
+                f"{self.generator.name}: an earlier submission was interrupted before the answer arrived, so a paid"
+                f" job may be lost; check the jobs of your account, then set services.submit_again = true and run again"
             )
         return replace(note, submitting=False)
 
@@ -196,8 +196,8 @@ class _Drive:
         while (job := self.generator.poll(job_id)).state not in ("done", "failed"):
             if pause > self.left_s:
                 raise Unavailable(
-                    f"{self.generator.name}: its job is still {job.state} after all of generate.max_wait_s; it stays"
-                    " remembered: run again later"
+                    f"{self.generator.name}: its job is still {job.state} after all of generate.max_wait_s; the job"
+                    f" is remembered; run again later"
                 )
             self.sleep(pause)
             self.left_s -= pause

@@ -106,8 +106,8 @@ def usd_per_job(name: str, url: str, services: ServicesConfig, listed: float | N
     if listed is not None:
         return listed
     raise ConfigError(
-        f"generator {name}: what a job costs is not known; set services.usd_per_job to what your plan says"
-        " (0 for a server of your own)"
+        f"generator {name}: the price of a job is unknown; set services.usd_per_job to the price in your plan (0"
+        f" for your own server)"
     )
 
 
@@ -160,7 +160,7 @@ def number(value: Any) -> float | None:
 def checked_address(value: Any, who: str, what: str) -> str:
     """Return an address that a reply names; raises BadReply for what cannot be one."""
     if not isinstance(value, str) or not value:
-        raise BadReply(f"{who}: its answer names no {what}; run it again")
+        raise BadReply(f"{who}: its answer contains no {what}; run it again")
     if not is_name(value) or origin(value) is None:
-        raise BadReply(f"{who}: what its answer names as {what} is no address; run it again")
+        raise BadReply(f"{who}: the {what} in its answer is not an address; run it again")
     return value

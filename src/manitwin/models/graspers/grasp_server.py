@@ -51,7 +51,7 @@ def server_url(argument: str, what: str) -> str:
         raise ConfigError(f"{what} takes only the address of its server: {what}@tcp://HOST:5556; it is {argument!r}")
     parts = urlsplit(url or DEFAULT_URL)
     if parts.scheme != "tcp" or parts.path:
-        raise ConfigError(f"{what}: {url} is no address of ZeroMQ; give tcp://HOST:5556")
+        raise ConfigError(f"{what}: {url} is not a ZeroMQ address; give tcp://HOST:5556")
     return f"tcp://{parts.netloc}" if parts.port else f"tcp://{parts.netloc}:5556"
 
 
@@ -94,7 +94,7 @@ class GraspServer:
             raise Unavailable(f"{self.what}: nothing listens at {self.url}; start its server ({error})") from None
         except zmtp.NotZmtp as error:
             raise BadReply(
-                f"{self.what}: what answers at {self.url} cannot be used: {error}; look at what runs there"
+                f"{self.what}: the server at {self.url} cannot be used: {error}; check what runs there"
             ) from None
         except TimeoutError:
             raise Unavailable(

@@ -81,7 +81,7 @@ class PadScreen:
         caster, anything = request.surface, float(np.linalg.norm(request.solid.extents))
         pairs = antipodal_pairs(caster, points, normals, friction=self._friction, max_width_m=anything, rng=rng)
         if not len(pairs):
-            return Rejected("no_proposal", "no two opposite surface points can be pressed together")
+            return Rejected("no_proposal", "the fingers cannot press on any two opposite surface points")
         square = pairs.take(np.flatnonzero(pairs.alignment >= SQUARE))
         # aslant across an edge or a ball two points are as near as one likes; where no pads touch well, such pairs are no grips
         least = (square if len(square) and not counts.get("after_collision") else pairs).width_m.min()
@@ -187,5 +187,5 @@ class HandScreen:
         stages = ", ".join(f"{name} {count}" for name, count in counts.items())
         if not counts["raw"]:
             opening = f"{1000 * self._hand.opening_m:.0f} mm between thumb and fingers"
-            return Rejected("too_wide", f"no two opposite surface points fit into {opening}")
+            return Rejected("too_wide", f"no two opposite surface points fit between the fingers: {opening}")
         return Rejected("no_proposal", f"the open hand overlaps the object in every grasp ({stages})")

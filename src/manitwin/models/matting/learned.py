@@ -64,11 +64,12 @@ def find_networks(names: str) -> tuple[Network, ...]:
     if said == [NONE]:
         return ()
     if NONE in said:
-        raise UsageError(f"matting {printable_line(names)!r}: {NONE!r} stands alone; leave it out, or the others")
+        raise UsageError(f"matting {printable_line(names)!r}: {NONE!r} cannot be combined; leave it out, or the others")
     found = tuple(find_network(name) for name in said)
     if len(found) > MOST_NETWORKS or len({network.sha256 for network in found}) < len(found):
         raise UsageError(
-            f"matting {printable_line(names)!r}: asks {len(found)} networks; name {MOST_NETWORKS} different ones at most"
+            f"matting {printable_line(names)!r}: asks {len(found)} networks; give at most {MOST_NETWORKS} different"
+            f" ones"
         )
     return found
 
@@ -87,7 +88,7 @@ def find_network(name: str) -> Network:
     added = stored(name)
     if added is None:
         raise UsageError(
-            f"matting {name!r}: its weights are not here, and nothing is fetched unasked; manitwin models add {name}"
+            f"matting {name!r}: its weights are not installed; install them with manitwin models add {name}"
         )
     return _network(name, added.path, read_stored(added), source=added.source, licence=added.licence)
 
@@ -142,7 +143,7 @@ def learned_alpha(network: Network, rgb: np.ndarray) -> np.ndarray:
         raise BadReply(f"{network.name}: OpenCV cannot run it ({_cause(error)}); give another network") from error
     mask = np.squeeze(answer)
     if mask.ndim != 2 or min(mask.shape) < 8 or not np.isfinite(mask).all():
-        raise BadReply(f"{network.name}: its answer of shape {answer.shape} is no mask; give another network")
+        raise BadReply(f"{network.name}: its answer of shape {answer.shape} is not a mask; give another network")
     if mask.min() < -0.01 or mask.max() > 1.01:  # before the logistic function
         mask = np.asarray(1 / (1 + np.exp(-np.clip(mask, -30, 30))), np.float32)
     return np.asarray(np.clip(cv2.resize(mask, rgb.shape[1::-1], interpolation=cv2.INTER_LINEAR), 0, 1))

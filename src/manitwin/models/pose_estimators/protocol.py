@@ -62,7 +62,7 @@ def parse_guesses(answer: Any, who: str) -> PoseGuesses:
         or not isinstance(poses, list)
         or not 0 < len(poses) <= MOST_POSES
     ):
-        raise BadReply(f"{who}: answered with no 'model' and 1 to {MOST_POSES} 'poses'; it has to keep {PROTOCOL}")
+        raise BadReply(f"{who}: answered with no 'model' and 1 to {MOST_POSES} 'poses'; it must follow {PROTOCOL}")
     found = [_pose(each, place, who) for place, each in enumerate(poses)]
     return PoseGuesses(np.array(found), printable_line(model.strip(), max_characters=80))
 
@@ -79,7 +79,8 @@ def _pose(told: Any, place: int, who: str) -> np.ndarray:
             raise ValueError
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise BadReply(
-            f"{who}: poses[{place}].object_to_camera is no rigid motion (4 x 4, metres) to before the camera; it has to keep"
+            f"{who}: poses[{place}].object_to_camera is not a rigid transform (4 x 4, metres) in front of the"
+            f" camera; it must follow"
             f" {PROTOCOL}"
         ) from error
     pose[:3, :3], pose[3] = turn, (0, 0, 0, 1)

@@ -48,7 +48,9 @@ class Reach:
                 if self.on_this_machine and not ip_address(_without_zone(address)).is_loopback:
                     raise ForbiddenAddress(f"{host} is {address} here, which is not this machine")
             elif not is_public(address):
-                raise ForbiddenAddress(f"{host}:{port} is {address}, which is no public address and not its own server")
+                raise ForbiddenAddress(
+                    f"{host}:{port} is {address}, which is neither a public address nor its own server"
+                )
         return addresses
 
 
@@ -100,7 +102,7 @@ def addresses_of(host: str, port: int, timeout_s: float) -> list[str]:
     if not found and _is_localhost(host):
         return list(_LOOPBACK)
     if not found:
-        raise UnknownName(f"the name {host} is not known: {why[0]}")
+        raise UnknownName(f"the host name {host} cannot be resolved: {why[0]}")
     return list(found)
 
 

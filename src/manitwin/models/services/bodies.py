@@ -73,7 +73,7 @@ def _unpacker(encoding: str) -> _Plain | _Zipped:
         return _Plain()
     if encoding in ("gzip", "x-gzip", "deflate"):
         return _Zipped()
-    raise httpx2.DecodingError("it is packed in a way that was not asked for")
+    raise httpx2.DecodingError("its content encoding was not requested")
 
 
 def whole_body(answer: httpx2.Response, max_bytes: int) -> bytes:

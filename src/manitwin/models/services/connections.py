@@ -197,7 +197,9 @@ def proxy_for(url: httpx2.URL) -> httpx2.URL | None:
     except (httpx2.InvalidURL, ValueError):
         proxy = httpx2.URL("")
     if proxy.scheme not in ("http", "https") or not proxy.host:
-        raise ConfigError("https_proxy (or all_proxy) is no address of a proxy; give http://HOST:PORT, or unset it")
+        raise ConfigError(
+            "https_proxy (or all_proxy) is not the address of a proxy; give http://HOST:PORT, or unset it"
+        )
     return proxy
 
 
@@ -218,7 +220,7 @@ def _as_httpx(deadline: Deadline) -> Iterator[None]:
     except (httpcore2.NetworkError, httpcore2.ProtocolError, httpcore2.ProxyError, httpcore2.UnsupportedProtocol) as e:
         failure = getattr(httpx2, type(e).__name__)(str(e))
     except (ValueError, LookupError, ArithmeticError) as error:  # what the parser below makes of what is no HTTP
-        failure = httpx2.RemoteProtocolError(f"its answer is no HTTP ({type(error).__name__})")
+        failure = httpx2.RemoteProtocolError(f"its answer is not HTTP ({type(error).__name__})")
     else:
         return
     raise failure

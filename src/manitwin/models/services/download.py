@@ -46,15 +46,15 @@ def download_file(
     except httpx2.RequestError as failure:
         if part.exists() and isinstance(failure, httpx2.ReadTimeout):  # it answers, but the rest does not come
             return BadReply(
-                f"{name}: its file comes too slowly ({failure}); run it again, or raise services.timeout_s"
+                f"{name}: its file downloads too slowly ({failure}); run it again, or raise services.timeout_s"
             ), True
         if part.exists() and isinstance(failure, httpx2.RemoteProtocolError | httpx2.ReadError):
-            return BadReply(f"{name}: its file was cut short ({redacted(str(failure), None)}); run it again"), True
+            return BadReply(f"{name}: its file was truncated ({redacted(str(failure), None)}); run it again"), True
         where, why = (redacted(text, None) for text in (urlsplit(url).netloc, str(failure) or type(failure).__name__))
         return Unavailable(f"{name}: {where} does not answer ({why}); run again later"), True
     except ForbiddenAddress as forbidden:
         where = redacted(str(forbidden), None)
-        return BadReply(f"{name}: its file is not fetched from where it leads: {where}; ask the vendor"), False
+        return BadReply(f"{name}: its file is not downloaded from this address: {where}; ask the vendor"), False
     except TooLarge:
         return BadReply(f"{name}: its file is larger than {max_bytes} bytes; ask for a simpler mesh"), False
     finally:
@@ -66,7 +66,7 @@ def _fetched(
 ) -> tuple[BackendError | None, bool]:
     for _ in range(MAX_REDIRECTS + 1):
         if not _is_url(url):
-            return BadReply(f"{name}: the link to its file leads to what is no URL"), False
+            return BadReply(f"{name}: the link to its file leads to an invalid URL"), False
         scheme = httpx2.URL(url).scheme
         if scheme not in schemes:
             return BadReply(
@@ -92,9 +92,9 @@ def _written(
     if status in EXPIRED:
         return Gone(f"{name}: the link to its file is no longer valid (HTTP {status})"), False
     if status == 429 or status >= 500:
-        return Unavailable(f"{name}: its file cannot be had now (HTTP {status}); run again later"), True
+        return Unavailable(f"{name}: its file is not available now (HTTP {status}); run again later"), True
     if status != 200:
-        return BadReply(f"{name}: its file cannot be had (HTTP {status})"), False
+        return BadReply(f"{name}: its file is not available (HTTP {status})"), False
     announced = response.headers.get("Content-Length", "")
     length = 0
     with part.open("wb") as stream:
@@ -103,7 +103,7 @@ def _written(
             deadline.extend(len(piece) / LEAST_BYTES_PER_S)
             stream.write(piece)
     if announced.isdecimal() and "Content-Encoding" not in response.headers and length != int(announced):
-        return BadReply(f"{name}: its file was cut short at {length} of {announced} bytes; run it again"), True
+        return BadReply(f"{name}: its file was truncated at {length} of {announced} bytes; run it again"), True
     if not length:
         return BadReply(f"{name}: its file is empty; run it again"), True
     return None, False

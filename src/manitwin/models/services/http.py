@@ -87,7 +87,7 @@ class HttpService:
     ):
         self._own = origin(base_url)
         if self._own is None or self._own[0] not in ("http", "https"):
-            raise ConfigError(f"{name}: {base_url!r} is no address of a web service; give http:// or https://")
+            raise ConfigError(f"{name}: {base_url!r} is not the address of a web service; give http:// or https://")
         check_key(key, base_url, f"the key of {name}")
         _, host, port = self._own
         self._reach = Reach(host, port, on_this_machine=is_local(base_url))
@@ -179,7 +179,7 @@ class HttpService:
         """Return the error for an answer that lacks ``what``; of one that ``pays`` the job may have been taken."""
         if pays:
             return Unanswered(
-                f"{self.name}: its answer to a submit has no {what}; whether it took the job is not known"
+                f"{self.name}: its answer to a submit has no {what}; it is unknown whether the service accepted the job"
             )
         return BadReply(f"{self.name}: its answer has no {what}; run it again")
 
@@ -226,7 +226,9 @@ class HttpService:
         if isinstance(error, NotTaken):
             error.words = without_key(refusal.message[:_WORDS], self._key)
         if pays and status in _ANSWER_LOST:
-            return FailedRequest(Unanswered(f"{error}; whether it took the job is not known"), again=False)
+            return FailedRequest(
+                Unanswered(f"{error}; it is unknown whether the service accepted the job"), again=False
+            )
         retryable = refusal.kind == "busy" or (refusal.kind == "down" and (not pays or status in _NOT_TAKEN))
         return FailedRequest(error, again=retryable, wait_s=after if isinstance(error, RateLimited) else None)
 
@@ -256,7 +258,9 @@ class HttpService:
     def _silent(self, error: httpx2.RequestError, pays: bool) -> ManiTwinError:
         cause = self.said(str(error)) or type(error).__name__
         if pays:
-            return Unanswered(f"{self.name}: no answer to a submit ({cause}); whether it took the job is not known")
+            return Unanswered(
+                f"{self.name}: no answer to a submit ({cause}); it is unknown whether the service accepted the job"
+            )
         return error_for(self.name, Refusal(f"{self.base_url} does not answer ({cause})", "down"), None, "", None)
 
     def _value(self, data: bytes) -> Any:

@@ -35,25 +35,25 @@ def split_url(argument: str) -> tuple[str, str | None]:
     """Return what stands before ``@scheme://`` and the URL, each possibly missing; raises ConfigError for a bad URL."""
     found = ADDRESS.search(argument)
     if found is None and (bare := _BARE_HOST.search(argument)) is not None:
-        raise ConfigError(f"{bare[1]!r} is no URL of a server; give its scheme too, such as http://{bare[1]}")
+        raise ConfigError(f"{bare[1]!r} is not the URL of a server; give its scheme too, such as http://{bare[1]}")
     return (argument, None) if found is None else (argument[: found.start()], _checked(found.group(1)))
 
 
 def _checked(url: str) -> str:
     if "@" in url.partition("://")[2].partition("/")[0]:  # first of all: what comes after shows the URL
-        raise ConfigError("a server's URL holds a user name or password; keys come from the environment only")
+        raise ConfigError("the URL of a server contains a user name or password; pass keys in the environment only")
     try:
         parts = urlsplit(url)
         host, port = parts.hostname or "", parts.port
     except ValueError as error:
-        raise ConfigError(f"{url!r} is no URL of a server ({error}); give {_EXAMPLE}") from error
+        raise ConfigError(f"{url!r} is not the URL of a server ({error}); give {_EXAMPLE}") from error
     if parts.scheme not in SCHEMES:
         raise ConfigError(f"{url!r}: {choose_from('scheme', parts.scheme, SCHEMES)}")
     if not HOST.fullmatch(host) or port == 0 or any(letter.isspace() for letter in url):
-        raise ConfigError(f"{url!r} is no URL of a server; give {_EXAMPLE}")
+        raise ConfigError(f"{url!r} is not the URL of a server; give {_EXAMPLE}")
     if parts.query or parts.fragment:
         raise ConfigError(
-            f"the URL of {host} holds a query or a fragment, and a server's has none; keys come from the environment only"
+            f"the URL of {host} contains a query or a fragment; remove it, and pass keys in the environment only"
         )
     return url.rstrip("/")
 
@@ -81,11 +81,11 @@ def check_key(key: str | None, url: str, name: str) -> None:
     if key is None:
         return
     if not (key.isascii() and key.isprintable() and " " not in key):
-        raise ConfigError(f"{name} holds spaces or characters that no key has; copy it again")
+        raise ConfigError(f"{name} contains spaces or characters that are invalid in a key; copy it again")
     if urlsplit(url).scheme != "https" and not is_local(url):
         raise ConfigError(
-            f"{name}: a key goes over https only, or to this machine itself ({', '.join(sorted(LOCAL_HOSTS))}); {url} is"
-            " neither. Give an https:// address, or unset the key for a server that asks for none"
+            f"{name}: a key is sent over https only, or to this machine ({', '.join(sorted(LOCAL_HOSTS))}); {url} is"
+            " neither. Give an https:// address, or unset the key for a server that needs none"
         )
 
 

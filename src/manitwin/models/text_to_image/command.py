@@ -17,7 +17,7 @@ class CommandPictures(CommandGenerator):
     def __init__(self, command: str, config: BuildConfig):
         super().__init__(command, config)
         if "image" in self.asked_with:
-            raise ConfigError("command: a picture is drawn of {text} alone; leave {image} out")
+            raise ConfigError("command: a picture is drawn from {text} alone; leave out {image}")
 
     def check(self, made: Path) -> None:
         """Raise BadReply where there is nothing; whether it is a picture is looked at as with any other."""

@@ -73,7 +73,7 @@ class OpenAiPictures:
     def submit(self, request: GenerationRequest) -> str:
         """Ask for a picture, keep the answer, and return the name that it is kept under."""
         if not request.text:
-            raise Unsupported("openai: a picture is drawn of a text alone; give one")
+            raise Unsupported("openai: a picture is drawn from a text alone; give a text")
         body = {"model": self.model, "prompt": request.text, "n": 1} | self._options
         answer = self._service.post_json("/images/generations", body, pays=True, max_bytes=_LARGEST_ANSWER)
         entries = answer.get("data")

@@ -35,7 +35,7 @@ def check_jaws(gripper: ParallelGripper) -> None:
     there = (low[:, 2] <= tip_m + TOLERANCE_M) & (high[:, 2] >= tip_m - TOLERANCE_M)
     if not there.any():
         raise ValueError(
-            f"tip_depth_m: is {tip_m:g}, where no finger is: the finger_boxes reach from {low[:, 2].min():.4g} to"
+            f"tip_depth_m: is {tip_m:g}, outside the fingers: the finger_boxes reach from {low[:, 2].min():.4g} to"
             f" {high[:, 2].max():.4g} along +Z; give the depth of the pads' centre"
         )
     inner_m = float(low[there, 0].min())
@@ -53,7 +53,8 @@ def check_jaws(gripper: ParallelGripper) -> None:
         if least_m < from_m - TOLERANCE_M or most_m > to_m + TOLERANCE_M:
             raise ValueError(
                 f"pad_half_extents_m: the pads reach from {least_m:.4g} to {most_m:.4g} along {name}, the boxes that have the"
-                f" inner face only from {from_m:.4g} to {to_m:.4g}: mend tip_depth_m, the pads' halves or finger_boxes"
+                f" inner face only from {from_m:.4g} to {to_m:.4g}: correct tip_depth_m, pad_half_extents_m or"
+                f" finger_boxes"
             )
 
 
@@ -63,6 +64,6 @@ def check_cup(gripper: SuctionGripper) -> None:
         end_m = float(box_bounds(gripper.body_boxes)[1][:, 2].max())
         if end_m > gripper.tip_depth_m + TOLERANCE_M:
             raise ValueError(
-                f"body_boxes: they reach to {end_m:.4g} along +Z, past the lip at tip_depth_m = {gripper.tip_depth_m:g}, which"
-                " could touch nothing: end them before it"
+                f"body_boxes: they reach to {end_m:.4g} along +Z, past the lip at tip_depth_m ="
+                f" {gripper.tip_depth_m:g}, which therefore could touch nothing: end the boxes before the lip"
             )

@@ -70,7 +70,7 @@ def with_followers(
             raise ValueError(
                 f"joints_rad: row {row} has {name!r} at {columns[name][row]:g}, its <mimic> puts it at {follows[row]:.4g}"
                 f" ({coupling.ratio:g} times {coupling.leader!r} plus {coupling.offset:g}, within its limits); leave"
-                f" {name!r} out of joints, or mend the row"
+                f" {name!r} out of joints, or correct the row"
             )
     joints = (*named, *left_out)
     return joints, np.stack([columns[name] for name in joints], axis=-1)

@@ -19,8 +19,8 @@ class Fingertips:
             shaped = [index for index in map(names.index, finger) if hand.links[index].shapes]
             if not shaped:
                 raise ValueError(
-                    f"fingers: finger {number} ({', '.join(finger)}) has no <collision> in the URDF, so that it can touch"
-                    " nothing; name its links that have one, or give them one"
+                    f"fingers: finger {number} ({', '.join(finger)}) has no <collision> in the URDF, so it can"
+                    f" touch nothing; name links with a <collision>, or add one"
                 )
             self.links.append(max(shaped, key=lambda index: _depth(hand, index)))
         self._corners_m = [

@@ -136,7 +136,8 @@ def load_gripper(name_or_path: str | Path, *, checked: bool = True) -> Gripper:
         path = Path(name_or_path)
         if not path.is_file():
             raise UsageError(
-                f"gripper file {name_or_path} is not there; give a .toml file or one of {', '.join(shipped_grippers())}"
+                f"gripper file {name_or_path} does not exist; give a .toml file or one of"
+                f" {', '.join(shipped_grippers())}"
             )
     elif name_or_path.endswith(ROBOT_DESCRIPTIONS):
         raise UsageError(
@@ -168,7 +169,7 @@ def _check_name(name: str, path: Path, content: bytes) -> None:
     """Raise ValueError where another gripper has the name of a shipped one, for which exports, pages and robots would take it."""
     shipped = _shipped_folder() / f"{name}.toml"
     if content != read_bytes(shipped, MAX_TOML_BYTES, UsageError, name=str(shipped)):
-        raise ValueError(f"name: {name!r} is the name of a gripper that comes with the package; give this one another")
+        raise ValueError(f"name: {name!r} is the name of a shipped gripper; choose another name")
 
 
 def _first_of(error: ValidationError) -> str:
@@ -179,8 +180,8 @@ def _first_of(error: ValidationError) -> str:
     first = (unknown or complaints)[0]
     where = ".".join(str(part) for part in first["loc"])
     if unknown:
-        lacks = f"; missing are {', '.join(missing)}" if missing else ""
-        return f"{where}: no key of this kind{lacks}; mend or remove it"
+        lacks = f"; these are missing: {', '.join(missing)}" if missing else ""
+        return f"{where}: not a key of this kind{lacks}; correct or remove it"
     if missing:
         return f"it lacks {', '.join(missing)}; give {'it' if len(missing) == 1 else 'them'}"
     return f"{where}: {first['msg'].removeprefix('Value error, ')}"

@@ -142,4 +142,4 @@ def find_mesh(path: Path, root: Path, name: str) -> Path:
                 return found
         except (OSError, ValueError):  # a name that no file system can hold
             continue
-    raise ConfigError(f"{path}: mesh {name[:120]!r} is not below {root}; put it there, or mend its name in the URDF")
+    raise ConfigError(f"{path}: mesh {name[:120]!r} is not below {root}; put it there, or correct its name in the URDF")

@@ -168,19 +168,20 @@ def _urdf_path(name: str, urdf: _UrdfField, folder: Path) -> tuple[Path, Path]:
         path = (folder / urdf.file).resolve()
         if not path.is_relative_to(folder.resolve()):
             raise UsageError(
-                f"gripper {name}: {urdf.file} leaves the folder of the gripper's file; put the gripper's file into a folder"
+                f"gripper {name}: {urdf.file} lies outside the folder of the gripper file; put the gripper's file"
+                f" into a folder"
                 " that has the URDF and its meshes below it"
             )
         if not path.is_file():
             raise UsageError(
-                f"gripper {name}: {path} is not there; [urdf] file is a path below the folder of the gripper's file"
+                f"gripper {name}: {path} does not exist; [urdf] file is a path below the folder of the gripper's file"
             )
         return path, folder
     remedy = f"pip install 'manitwin[{urdf.extra}]'" if urdf.extra else f"pip install {urdf.distribution}"
     try:
         files = distribution(urdf.distribution)
     except PackageNotFoundError as error:
-        raise UsageError(f"gripper {name} wants the files of {urdf.distribution}: {remedy}") from error
+        raise UsageError(f"gripper {name} needs the files of {urdf.distribution}: {remedy}") from error
     path = Path(str(files.locate_file(urdf.file)))
     if not path.is_file():
         raise UsageError(f"gripper {name}: {urdf.distribution} {files.version} has no {urdf.file}: {remedy}")
@@ -194,24 +195,24 @@ def _check_names(file: _File, links: tuple[Link, ...], couplings: dict[str, Coup
         if name not in moving:
             raise ValueError(f"joints: {choose_from('joint', name, moving)}")
     if len(set(file.joints)) < len(file.joints):
-        raise ValueError("joints: one is named twice; name each once")
+        raise ValueError("joints: a joint is listed twice; list each once")
     left_out = [name for name in moving if name not in file.joints and name not in couplings]
     if left_out:
         raise ValueError(
-            f"joints: {', '.join(left_out)} of the URDF move and are not named; name all joints of the hand that move, but"
-            " those that <mimic> another"
+            f"joints: {', '.join(left_out)} move in the URDF but are not listed; list all movable joints of the"
+            f" hand except those that <mimic> another"
         )
     names = [link.name for link in links]
     for name in (name for finger in file.fingers for name in finger):
         if name not in names:
             raise ValueError(f"fingers: {choose_from('link', name, names)}")
     if not file.postures:
-        raise ValueError("postures: there are none; give at least one")
+        raise ValueError("postures: the list is empty; give at least one")
 
 
 def _check_drive(file: _File) -> None:
     if file.drive.press_nm > file.drive.torque_limit_nm:
         raise ValueError(
-            f"drive.press_nm: is {file.drive.press_nm:g}, above torque_limit_nm = {file.drive.torque_limit_nm:g}, which no joint"
-            " exceeds; give less"
+            f"drive.press_nm: is {file.drive.press_nm:g}, above torque_limit_nm = {file.drive.torque_limit_nm:g},"
+            f" the limit of every joint; give less"
         )

@@ -17,14 +17,15 @@ def gripper_of(name: str, sha256: str, given: Sequence[Gripper] = ()) -> Gripper
         if gripper.name == name:
             if gripper.sha256 != sha256:
                 raise UsageError(
-                    f"gripper {name}: the file that is given is another than that of the twin's grasps; give that one, or"
-                    " build the twin again with this"
+                    f"gripper {name}: the given file differs from the one of the twin's grasps; give that file, or"
+                    f" build the twin again with this one"
                 )
             return gripper
     if name not in shipped_grippers():
         named = f"; given are {', '.join(gripper.name for gripper in given)}" if given else ""
         raise UsageError(
-            f"gripper {name} does not come with the package, and a twin has only its name{named}; give its file with --gripper"
+            f"gripper {name} is not shipped with the package, and a twin stores only its name{named}; give its file"
+            f" with --gripper"
         )
     return load_gripper(name)
 
@@ -51,7 +52,8 @@ def require_same(gripper: Gripper, twins: Iterable[tuple[str, Mapping[str, str]]
     more = f" (and {len(others) - 1:,} more of {len(given):,})" if len(others) > 1 else ""
     of = f" of {carrier}" if carrier else ""
     raise UsageError(
-        f"twin {others[0]}{more} has grasps of a gripper {gripper.name} whose file is another than that of the"
-        f" {gripper.name}{of}; build the twins again with this one (--gripper FILE.toml), give the file that they were built"
+        f"twin {others[0]}{more} has grasps of a gripper {gripper.name} whose file differs from that of the"
+        f" {gripper.name}{of}; build the twins again with this one (--gripper FILE.toml), give the file that they"
+        f" were built"
         " with, or give the changed file a name of its own and build for it too"
     )

@@ -74,7 +74,7 @@ def check_fingers(hand: MultiFingerGripper) -> None:
         raise ValueError("fingers: there are fewer than two; name the links of the thumb, then those of each finger")
     twice = [name for name, count in Counter(name for finger in hand.fingers for name in finger).items() if count > 1]
     if twice:
-        raise ValueError(f"fingers: {', '.join(twice)} is named twice; a link is of one finger")
+        raise ValueError(f"fingers: {', '.join(twice)} is listed twice; a link belongs to one finger")
     moving = {link.name for link in hand.links if link.joint_type != "fixed"}
     for number, finger in enumerate(hand.fingers):
         if not moving & set(finger):
@@ -95,12 +95,12 @@ def check_positions(hand: MultiFingerGripper, tips: Fingertips, posture: Posture
         if column.min() < low - LIMIT_TOLERANCE or column.max() > high + LIMIT_TOLERANCE:
             worst = column[np.argmax(np.maximum(low - column, column - high))]
             raise ValueError(
-                f"{where}: joint {joint!r} is at {worst:g}, its limits in the URDF are {low:g} to {high:g} rad; mend the"
-                " position, whose order is that of joints"
+                f"{where}: joint {joint!r} is at {worst:g}, its limits in the URDF are {low:g} to {high:g} rad;"
+                f" correct the position (positions are in the order of joints)"
             )
         if owner[joint] < 0 and np.ptp(column) > LIMIT_TOLERANCE:
             raise ValueError(
-                f"{where}: joint {joint!r} moves, but the link that it holds is of no finger; name that under fingers, or"
+                f"{where}: joint {joint!r} moves, but its link belongs to no finger; list that link under fingers, or"
                 " keep the joint at one position"
             )
     centers = tips.centers_m(rows[-1])
@@ -113,7 +113,7 @@ def check_positions(hand: MultiFingerGripper, tips: Fingertips, posture: Posture
     if max(thumb[2], fingers[2]) <= hand.palm_front_m:
         raise ValueError(
             f"{where}: the fingertips are at z = {fingers[2]:.3f} of the grasp frame, the palm's front at"
-            f" {hand.palm_front_m:.3f}; +Z points out of the palm: turn root_to_gripper, or mend palm_front_m"
+            f" {hand.palm_front_m:.3f}; +Z points out of the palm: turn root_to_gripper, or correct palm_front_m"
         )
 
 
@@ -127,18 +127,19 @@ def check_closing(hand: MultiFingerGripper, tips: Fingertips, posture: Posture) 
     if open_m < least_m:
         raise ValueError(
             f"{where}: its widest opening is said to be {posture.openings_m[-1]:.4g} m, thumb and fingers of the URDF are then"
-            f" {open_m:.4g} m apart along X; mend openings_m, or give closed_rad and open_rad, between which they are measured"
+            f" {open_m:.4g} m apart along X; correct openings_m, or give closed_rad and open_rad, between which"
+            f" they are measured"
         )
     reach_m = float(posture_reach_m(tips, rows).max())
     if posture.depth_m[1] > reach_m:
         raise ValueError(
-            f"{where}: depth_m ends at {posture.depth_m[1]:g}, thumb and fingers reach to {reach_m:.3f} along +Z in it, and"
-            " would close behind what is held; give less, or mend root_to_gripper"
+            f"{where}: depth_m ends at {posture.depth_m[1]:g}, thumb and fingers reach to {reach_m:.3f} along +Z in"
+            f" it, and would close behind the object; give less, or correct root_to_gripper"
         )
 
 
 def _not_closing(name: str, closed_m: float, open_m: float, closed: str, opened: str) -> str:
     return (
         f"posture {name!r}: thumb and fingers do not come nearer as it closes, they are {closed_m:.4g} m apart along X in"
-        f" {closed} and {open_m:.4g} m in {opened}; look at the signs of the positions: each joint turns about its <axis>"
+        f" {closed} and {open_m:.4g} m in {opened}; check the signs of the positions: each joint turns about its <axis>"
     )

@@ -63,7 +63,7 @@ def _name(value: str) -> str:
 
 def _said(value: str) -> str:
     if not value.strip():
-        raise ValueError("is empty: say where the numbers come from, it is kept with every twin")
+        raise ValueError("is empty: give the source of the numbers; it is stored with every twin")
     return value
 
 

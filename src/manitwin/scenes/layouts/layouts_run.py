@@ -108,7 +108,8 @@ def _stale_scenes(root: DatasetRoot, pool: Pool) -> list[str]:
     if found.line is None:
         return [] if found.remark is None else [found.remark]
     return [
-        f"{found.line}, which stay as they are: tasks and episodes refuse them; sample the layouts again into a new folder"
+        f"{found.line}, which are left unchanged, but rejected by tasks and episodes; sample the layouts again into"
+        f" a new folder"
     ]
 
 
@@ -121,7 +122,7 @@ def _with_pictures_there(config: LayoutsConfig, before: dict[str, Any], place: s
         return LayoutsConfig.model_validate({**config.model_dump(), **drawn}, strict=True)
     except ValidationError as error:
         raise UsageError(
-            f"{place}/{CONFIG}: its picture_px is no size of pictures; remove the file: the run writes it again"
+            f"{place}/{CONFIG}: its picture_px is not a picture size; remove the file: the next run writes a new one"
         ) from error
 
 
@@ -141,7 +142,7 @@ def _scene(root: DatasetRoot, scene_id: str) -> SceneRecord:
     try:
         return parse_scene(root.read_bytes(name, UsageError), root.full(name))
     except FileNotFoundError as error:
-        raise UsageError(f"{root.full(name)}: gone; run manitwin layout again, which makes it again") from error
+        raise UsageError(f"{root.full(name)}: missing; rerun manitwin layout to make it again") from error
 
 
 def layout_totals(out: str | Path) -> LayoutTotals:

@@ -100,14 +100,12 @@ class Pool:
         self._read_body = read_body
         self._bodies: dict[str, PoolBody] = {} if bodies is None else bodies
         if not self.twins:
-            raise UsageError("no accepted twin that stays where it is set down; build some first")
+            raise UsageError("no accepted twin with a stable placement; build some first")
 
     def twin(self, twin_id: str) -> PoolTwin:
         """Return a twin by its id; raises UsageError where there is none."""
         if twin_id not in self._by_id:
-            raise UsageError(
-                f"no twin {twin_id!r} that stays where it is set down; build it again, or name its data set"
-            )
+            raise UsageError(f"no twin {twin_id!r} with a stable placement found; build it again, or give its data set")
         return self._by_id[twin_id]
 
     def find(self, twin_id: str) -> PoolTwin | None:
@@ -164,7 +162,7 @@ def read_pool(dataset: str | Path, cache: Path | None = None) -> Pool:
     read = (_pool_twin(source.record_bytes(twin_id), f"{dataset}: {twin_id}/{RECORD}") for twin_id in source.twin_ids())
     twins = [twin for twin in read if twin is not None]
     if not twins:
-        raise UsageError(f"{dataset}: no accepted twin that stays where it is set down; give the folder of a build")
+        raise UsageError(f"{dataset}: no accepted twin with a stable placement; give the folder of a build")
 
     def body(twin_id: str) -> RigidBody:
         twin = source.twin(twin_id)
@@ -218,7 +216,7 @@ def _pool_twin(content: bytes, name: str) -> PoolTwin | None:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))[:80]
-        raise TwinError(f"{name}: no record of a twin ({where}: {first['msg']}); {REMEDY}") from error
+        raise TwinError(f"{name}: not a record of a twin ({where}: {first['msg']}); {REMEDY}") from error
     poses = tuple(
         StandingPose(
             number,

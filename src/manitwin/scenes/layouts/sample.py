@@ -93,9 +93,7 @@ class _Making:
             mine = [slot for slot, chosen in zip(standing, shelf_of, strict=True) if chosen == index]
             patch = Patch.draw(support, workspace, [_radius(slot) for slot in mine] or [0.1], self.level, rng)
             if patch is None:
-                raise UsageError(
-                    f"nothing of the {support.name} is in the workspace; give another workspace or surface"
-                )
+                raise UsageError(f"the {support.name} lies outside the workspace; give another workspace or surface")
             self.patches |= {slot.number: patch for slot in mine}
 
     def judged(self) -> Judgement:

@@ -34,7 +34,7 @@ def write_contact_sheet(dataset: str | Path, out: str | Path, *, most: int = SCE
     root, source = DatasetRoot(out), TwinSource(dataset)
     shown = accepted_scenes(out)[:most]
     if not shown:
-        raise UsageError(f"{out}: no scene was accepted, so there is none to show; `manitwin status {out}` says why")
+        raise UsageError(f"{out}: there is no accepted scene to show; `manitwin status {out}` shows why")
     sheet = contact_sheet([(scene_id, _picture(root, source, scene_id)) for scene_id in shown])
     stream = io.BytesIO()
     sheet.save(stream, "WEBP", quality=SHEET_QUALITY, method=4)
@@ -50,8 +50,8 @@ def _read_picture(root: DatasetRoot, name: str) -> np.ndarray:
         try:
             return read_image(copy).pixels[..., :3]
         except InputError as error:
-            again = "remove its scene's folder and run manitwin layout again, which makes it again"
-            raise UsageError(f"{root.full(name)}: no picture that can be read; {again}") from error
+            again = "remove the folder of its scene and rerun manitwin layout to make it again"
+            raise UsageError(f"{root.full(name)}: not a readable picture; {again}") from error
 
 
 def _picture(root: DatasetRoot, source: TwinSource, scene_id: str) -> np.ndarray:

@@ -41,13 +41,15 @@ def least_objects(pool: Pool, settings: LayoutSettings) -> int:
     for category in settings.include:
         pool.of_category(category)
     if settings.contained and not any(twin.vessel for twin in pool.twins):
-        raise UsageError("nothing in the data set is a vessel that holds something; ask for contained = 0")
+        raise UsageError("no twin in the data set is a container that can hold another; use contained = 0")
     spare = bool(settings.stacked) and not any(_can_carry(pool, category) for category in settings.include)
     standing = max(settings.least_standing, len(settings.include) + spare)
     least = standing + settings.stacked + settings.contained
     if least > settings.objects[1]:
         asked = ", ".join(dict.fromkeys(settings.include))
-        raise UsageError(f"nothing of {asked} has a level top for something to stand on; allow {least} objects or more")
+        raise UsageError(
+            f"none of {asked} has a level top that another object can stand on; allow {least} objects or more"
+        )
     return least
 
 

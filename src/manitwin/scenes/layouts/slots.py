@@ -73,7 +73,7 @@ def draw_twin(
     if slot.vessel:
         fitting = tuple(twin for twin in fitting if twin.vessel)
         if not fitting:
-            raise UsageError("nothing in the data set is a vessel that holds something; ask for contained = 0")
+            raise UsageError("no twin in the data set is a container that can hold another; use contained = 0")
     taken = {other.twin.twin_id for other in slots if other.twin is not None and other is not slot}
     for refused in (taken | but, but, frozenset()):
         free = [twin for twin in fitting if twin.twin_id not in refused]

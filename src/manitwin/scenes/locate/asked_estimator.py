@@ -47,7 +47,8 @@ def pose_request(view: DepthView, mask: np.ndarray, model: PoseModel, twin: Twin
     unit_m = next((each for each in UNITS_M if depth.max() / each < MOST_NUMBER), None)
     if unit_m is None:
         raise UsageError(
-            f"--estimator: depths of up to {depth.max():.0f} m fit into no picture of 16 bits; give a nearer view"
+            f"--estimator: depths of up to {depth.max():.0f} m do not fit into a 16-bit picture; give a view from"
+            f" nearer"
         )
     shape = merged(twin.visual)
     mesh = trimesh.Trimesh(shape.vertices, shape.faces, process=False).export(file_type="ply")

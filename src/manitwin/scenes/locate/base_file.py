@@ -29,16 +29,16 @@ def read_base(path: Path) -> np.ndarray:
         else:
             position, quaternion = (np.array(told[key], float) for key in ("position_m", "quaternion_wxyz"))
             if not np.abs(quaternion).max() < 2 or abs(np.linalg.norm(quaternion.reshape(4)) - 1) > _OFF:
-                raise UsageError(f"{path}: quaternion_wxyz has not the length 1; {REMEDY}")
+                raise UsageError(f"{path}: quaternion_wxyz does not have length 1; {REMEDY}")
             pose = transform(rotation_from_quaternion_wxyz(quaternion), position.reshape(3))
     except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise UsageError(f"{path}: says no pose of a camera; {REMEDY}") from error
+        raise UsageError(f"{path}: contains no camera pose; {REMEDY}") from error
     if not np.isfinite(pose).all() or np.abs(pose).max() > _MOST_M or np.abs(pose[3] - [0, 0, 0, 1]).max() > _OFF:
-        raise UsageError(f"{path}: says no rigid motion in metres; {REMEDY}")
+        raise UsageError(f"{path}: is not a rigid transform in metres; {REMEDY}")
     turn = pose[:3, :3]
     if np.abs(turn @ turn.T - np.eye(3)).max() > _OFF or np.linalg.det(turn) < 0:
         raise UsageError(
-            f"{path}: its rotation is none (columns of length 1, square to each other, right-handed); {REMEDY}"
+            f"{path}: its rotation is invalid (columns must be of length 1, orthogonal and right-handed); {REMEDY}"
         )
     left, _, right = np.linalg.svd(turn)
     return transform(left @ right, pose[:3, 3])

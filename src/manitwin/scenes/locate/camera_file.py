@@ -55,14 +55,14 @@ def _intrinsics(told: dict[str, Any], path: Path) -> np.ndarray:
         try:
             matrix = np.array(given, float).reshape(3, 3)
         except (TypeError, ValueError, OverflowError) as error:
-            raise UsageError(f"{path}: K is no matrix of 3 x 3 numbers; {REMEDY}") from error
+            raise UsageError(f"{path}: K is not a matrix of 3 x 3 numbers; {REMEDY}") from error
     else:
         principal = next((names for names in _PRINCIPAL if names[0] in told), _PRINCIPAL[0])
         fx, fy, cx, cy = (_number(told, key, path) for key in ("fx", "fy", *principal))
         matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
     upright = matrix[0, 0] > 0 and matrix[1, 1] > 0 and matrix[1, 0] == 0 and (matrix[2] == [0, 0, 1]).all()
     if not upright or not np.isfinite(matrix).all():
-        raise UsageError(f"{path}: K is no matrix of a pinhole camera (fx, fy > 0, last row 0 0 1); {REMEDY}")
+        raise UsageError(f"{path}: K is not the matrix of a pinhole camera (fx, fy > 0, last row 0 0 1); {REMEDY}")
     return matrix
 
 
@@ -73,19 +73,20 @@ def _depth_unit_m(told: dict[str, Any], path: Path) -> float:
         scale = _number(told, "depth_scale", path)
         if scale < _LEAST_BOP_SCALE:
             raise UsageError(
-                f"{path}: depth_scale {scale:g} may be metres (librealsense) or millimetres (BOP) a unit; say depth_unit_m"
+                f"{path}: depth_scale {scale:g} may mean metres (librealsense) or millimetres (BOP) per unit; give"
+                f" depth_unit_m"
             )
         unit = scale / 1000
     else:
-        raise UsageError(f"{path}: does not say the unit of its depths; {REMEDY}")
+        raise UsageError(f"{path}: does not give the unit of its depths; {REMEDY}")
     if unit > 1:
-        raise UsageError(f"{path}: a depth unit of {unit:g} m; say metres a unit, 0.001 for millimetres")
+        raise UsageError(f"{path}: a depth unit of {unit:g} m; give metres per unit, 0.001 for millimetres")
     return unit
 
 
 def _number(told: dict[str, Any], key: str, path: Path) -> float:
     value = told.get(key)
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < 1e6:
-        said = "is missing" if value is None else f"is {str(value)[:40]}, no number above 0"
+        said = "is missing" if value is None else f"is {str(value)[:40]}, not a number above 0"
         raise UsageError(f"{path}: {key} {said}; {REMEDY}")
     return float(value)

@@ -78,8 +78,8 @@ def measured_noise_m(view: DepthView, mask: np.ndarray) -> float:
     told = np.concatenate(apart)
     if len(told) < 10:
         raise UsageError(
-            f"the mask has {int(known.sum())} pixels with a depth, hardly two side by side; give a mask of one thing that"
-            " the depth picture shows"
+            f"the mask has {int(known.sum())} pixels with a depth, but too few adjacent ones; give a mask of one"
+            f" object in the depth image"
         )
     rounding_m = min(view.step_m / np.sqrt(12.0), MOST_ROUNDING_M)
     return max(float(_OF_SECOND_DIFFERENCE * np.median(told)), float(rounding_m))

@@ -31,12 +31,12 @@ _MARGIN = 0.5
 def read_view(depth: Path, camera: Path, rgb: Path | None, mask: Path | None) -> tuple[DepthView, np.ndarray | None]:
     """Read a depth picture with its camera, its colours and the mask ``(H, W) bool`` of a thing; raises UsageError."""
     said = read_camera(camera)
-    numbers = _labels(depth, said, camera, "save depths as a PNG of one channel with 16 bits")
+    numbers = _labels(depth, said, camera, "save depths as a 16-bit PNG with one channel")
     pixels = None if rgb is None else _colors(rgb, said, camera)
     told = (
         None
         if mask is None
-        else _labels(mask, said, camera, "save masks as a PNG of one channel, 0 where the thing is not")
+        else _labels(mask, said, camera, "save masks as a PNG with one channel, 0 outside the object")
     )
     view = DepthView(numbers * said.depth_unit_m, said.intrinsics, pixels, said.depth_unit_m)
     return view, None if told is None else told > 0
@@ -55,7 +55,7 @@ def read_cloud(path: Path) -> tuple[DepthView, np.ndarray]:
         except InputError as error:
             raise UsageError(f"{path}: {error.detail}") from error
     else:
-        raise UsageError(f"{path}: is no cloud; give a .ply, or an .npz with an array of points")
+        raise UsageError(f"{path}: is not a point cloud; give a .ply, or an .npz with an array of points")
     if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "fiu":
         raise UsageError(f"{path}: has points of the shape {points.shape}; give (N, 3) numbers, metres")
     points = points[np.isfinite(points).all(1)].astype(float)
@@ -75,7 +75,7 @@ def view_of_cloud(points_m: np.ndarray, name: str) -> tuple[DepthView, np.ndarra
         )
     tangents = points_m[:, :2] / np.maximum(points_m[:, 2:], np.finfo(float).tiny)
     if np.abs(tangents).max() > _MOST_TANGENT:
-        raise UsageError(f"{name}: has points beside the camera, farther than 89 degrees off its axis; take them out")
+        raise UsageError(f"{name}: has points more than 89 degrees off the camera axis; remove them")
     low, high = tangents.min(0), tangents.max(0)
     spacing = float(np.median(cKDTree(tangents).query(tangents, k=2)[0][:, 1]))
     pitch = max(_PITCH_OF_SPACING * spacing, float((high - low).max()) / MOST_SIDE_PX, 1e-6)
@@ -109,7 +109,8 @@ def _colors(path: Path, camera: CameraFile, camera_path: Path) -> np.ndarray:
 def _of_size(pixels: np.ndarray, path: Path, camera: CameraFile, camera_path: Path) -> np.ndarray:
     if pixels.shape[:2] != (camera.height_px, camera.width_px):
         raise UsageError(
-            f"{path}: {pixels.shape[1]} x {pixels.shape[0]} pixels, {camera_path} says {camera.width_px} x {camera.height_px};"
+            f"{path}: {pixels.shape[1]} x {pixels.shape[0]} pixels, but {camera_path} says {camera.width_px} x"
+            f" {camera.height_px};"
             " give pictures that are aligned, and their own camera"
         )
     return pixels

@@ -43,7 +43,7 @@ def table_plane(view: DepthView, rng: np.random.Generator) -> Plane:
     """
     pixels = np.flatnonzero(known_depth(view))
     if len(pixels) < _FITTED // 10:
-        raise UsageError(f"the depth picture knows {len(pixels)} depths; give --mask, or a picture with more")
+        raise UsageError(f"the depth image has only {len(pixels)} known depths; give --mask, or an image with more")
     points = view.points(rng.choice(pixels, min(_FITTED, len(pixels)), replace=False))
     near_m = _NEAR_M + 2 * min(measured_noise_m(view, np.ones(view.depth_m.shape, bool)), _MOST_NOISE_M)
     planes: list[Plane] = []
@@ -58,7 +58,7 @@ def table_plane(view: DepthView, rng: np.random.Generator) -> Plane:
             planes.append(plane)
         left = left[~within]
     if not planes:
-        raise UsageError("no plane takes up enough of the depth picture to be a table; give --mask")
+        raise UsageError("no plane in the depth image is large enough to be a table; give --mask")
     return max(planes, key=lambda plane: -abs(plane.offset_m))
 
 
@@ -106,7 +106,7 @@ def _largest(points: np.ndarray, near_m: float, rng: np.random.Generator) -> tup
             if best is None or count > best[0]:
                 best = count, plane
     if best is None:
-        raise UsageError("the depth picture shows points on one line; give --mask")
+        raise UsageError("the points of the depth image lie on one line; give --mask")
     within = np.abs(best[1].height_m(points)) < near_m
     mean = points[within].mean(0)
     fitted = _through(np.linalg.svd(points[within] - mean, full_matrices=False)[2][2], mean)

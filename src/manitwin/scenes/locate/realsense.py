@@ -51,9 +51,7 @@ def record(rs: Any, *, bag: Path | None = None, serial: str | None = None, frame
     try:
         profile = pipeline.start(config)
     except RuntimeError as error:
-        raise Unavailable(
-            f"realsense: cannot start ({error}); connect a camera, or give a file that it recorded"
-        ) from error
+        raise Unavailable(f"realsense: cannot start ({error}); connect a camera, or give a recorded file") from error
     try:
         device = profile.get_device()
         unit_m = float(device.first_depth_sensor().get_depth_scale())
@@ -69,7 +67,7 @@ def record(rs: Any, *, bag: Path | None = None, serial: str | None = None, frame
                 if depths:
                     break
                 raise Unavailable(
-                    f"realsense: no frame comes ({error}); look at the camera in realsense-viewer"
+                    f"realsense: no frame received ({error}); check the camera in realsense-viewer"
                 ) from error
             depth, color = both.get_depth_frame(), both.get_color_frame()
             if depth and color:
@@ -100,7 +98,8 @@ def _intrinsics(lens: Any) -> np.ndarray:
     bent_px = float((lens.fx * (radial + (abs(p1) + abs(p2)) * 3 * r2)).max())
     if bent_px > MOST_DISTORTION_PX:
         raise UsageError(
-            f"realsense: its lens bends the picture by up to {bent_px:.1f} px, at most {MOST_DISTORTION_PX} are taken for none;"
-            " rectify pictures and depths, and give them to manitwin locate by --depth, --rgb and --camera"
+            f"realsense: its lens distorts the picture by up to {bent_px:.1f} px, but at most {MOST_DISTORTION_PX}"
+            f" px are supported; rectify colour and depth images, and pass them to manitwin locate by --depth,"
+            f" --rgb and --camera"
         )
     return k

@@ -18,7 +18,7 @@ from manitwin.scenes.locate.pose_model import PoseModel
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import Twin
 
-NO_MASK = "nothing stands above the table in this picture; give --mask"
+NO_MASK = "no object stands above the table in this picture; give --mask"
 CANDIDATES = 5
 """Twins that are tried of a thing, the most alike: the first alone is often another (docs/search.md)."""
 
@@ -52,7 +52,7 @@ class DatasetTwins:
         self._looks = dict(twin_looks(root, {row["twin_id"]: row["revision"] for row in rows}, on_twin))
         self._models: dict[str, PoseModel] = {}
         if not self._looks:
-            raise UsageError(f"{root.url}: has no accepted twin; build some, or name another data set")
+            raise UsageError(f"{root.url}: has no accepted twin; build twins, or give another data set")
 
     def twin(self, twin_id: str) -> Twin:
         """Return one of the twins."""
@@ -88,7 +88,7 @@ def which_twin(
     Raises UsageError for a view without colours.
     """
     if view.rgb is None:
-        raise UsageError("which twin a thing is, is told by its looks first; give --rgb")
+        raise UsageError("finding the twin of an object needs its appearance; give --rgb")
     answers = []
     for twin_id, alike in twins.ranked(view.rgb, mask)[:tried]:
         location = locate_in_view(view, mask, twins.model(twin_id), seed=seed, guess=guess)

@@ -24,7 +24,7 @@ def capture_of_scene(place: Path, camera: str, seed: int) -> Capture:
     """
     files = scene_files(place)
     if len(files) != 1:
-        raise UsageError(f"{place}: holds {len(files)} scenes; give the folder of one")
+        raise UsageError(f"{place}: contains {len(files)} scenes; give the folder of one")
     truth = read_scene_truth(files[0])
     pictures = {each.name: each for each in truth.pictures}
     if camera not in pictures:

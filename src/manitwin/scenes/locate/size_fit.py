@@ -23,7 +23,8 @@ COARSE, NEAR, NEAR_STEP, FINE_STEP = 7, 4, 0.03, 0.01
 SAME_SIZE = 0.05
 """A size that differs by less changes no grasp: wider than the hand's play it is not."""
 OTHER_SIZE = (
-    "the thing is of another size than its twin, whose grasps and mass are of its own; build it again at the size found"
+    "the object has another size than its twin, so the grasps and the mass of the twin do not apply; build the twin"
+    " again with the size found"
 )
 _POSES = 4
 

@@ -44,8 +44,9 @@ def world_of_base(camera_to_base: np.ndarray, plane: Plane, about: np.ndarray) -
     lean_rad = float(np.arccos(np.clip(up @ _UP, -1, 1)))
     if lean_rad > MOST_LEAN_RAD:
         raise UsageError(
-            f"--base: the table that is seen leans by {np.rad2deg(lean_rad):.1f} degrees in the base's frame, at most"
-            f" {np.rad2deg(MOST_LEAN_RAD):.0f} are taken; calibrate again, or look at a level table"
+            f"--base: the visible table leans by {np.rad2deg(lean_rad):.1f} degrees in the frame of the base, but"
+            f" at most"
+            f" {np.rad2deg(MOST_LEAN_RAD):.0f} are allowed; calibrate again, or look at a level table"
         )
     below = transform_points(camera_to_base, (about - plane.height_m(about) * plane.normal)[None])[0]
     level = transform(rotation_between(up, _UP))

@@ -147,14 +147,14 @@ def read_scene_truth(scene_file: Path) -> SceneTruth:
     record = parse_scene(content, scene_file)
     facts_file = folder / PICTURES_FOLDER / PICTURES_FACTS
     if not facts_file.is_file():
-        raise UsageError(f"{folder}: was not drawn; {REMEDY}")
+        raise UsageError(f"{folder}: has no pictures; {REMEDY}")
     told = read_bytes(facts_file, MAX_JSON_BYTES, UsageError, inside=folder, name=str(facts_file))
     facts = _facts(parse_json_object(told, str(facts_file), UsageError, remedy=REMEDY), facts_file)
     cameras = {each.name: each for each in record.cameras}
     unknown = [name for name in facts.cameras if name not in cameras]
     missing = [thing.name for thing in record.objects if thing.name not in facts.ids]
     if unknown or missing:
-        raise UsageError(f"{facts_file}: is of another scene ({(unknown + missing)[0]!r}); {REMEDY}")
+        raise UsageError(f"{facts_file}: belongs to another scene ({(unknown + missing)[0]!r}); {REMEDY}")
     pictures = tuple(
         PictureTruth(
             name,
@@ -172,7 +172,7 @@ def read_scene_truth(scene_file: Path) -> SceneTruth:
 
 def _facts(told: dict[str, object], file: Path) -> _Pictures:
     if "parts" not in told:
-        raise UsageError(f"{file}: drawn by a version that kept no parts; {REMEDY}")
+        raise UsageError(f"{file}: drawn by a version that did not store parts; {REMEDY}")
     try:
         return _Pictures.model_validate(told)
     except ValidationError as error:

@@ -86,7 +86,7 @@ def write_segmentation(
         raise UsageError(f"a validation share of {validation_share:g}; give 0 to 1")
     files = scene_files(Path(scenes))
     if not files:
-        raise UsageError(f"{scenes}: no scene there; `manitwin layout DATASET -o {scenes} --pictures` makes some")
+        raise UsageError(f"{scenes}: no scene found; create some with `manitwin layout DATASET -o {scenes} --pictures`")
     read = _Scenes(files)
     classes = Classes.of(read)
     source = TwinSource(dataset if dataset is not None else dataset_of(files[0]))

@@ -221,7 +221,7 @@ def test_nearest_categories_are_named() -> None:
     ],
 )
 def test_several_things_are_refused(text: str) -> None:
-    with pytest.raises(UsageError, match="asks for several things"):
+    with pytest.raises(UsageError, match="asks for several objects"):
         read(text)
 
 

@@ -160,7 +160,7 @@ def test_metal_colours_and_clear_choose_the_material() -> None:
 
 @pytest.mark.parametrize("text", ["a red and white mug", "a steel and wood knife", "a red mug, blue"])
 def test_two_colours_or_materials_of_one_part_are_refused(text: str) -> None:
-    with pytest.raises(UsageError, match="of one thing"):
+    with pytest.raises(UsageError, match="for one object"):
         read(text)
 
 

@@ -61,9 +61,9 @@ def test_lengths_of_parts_are_no_lengths_of_the_whole(text: str, parts: dict[str
 
 
 def test_what_no_part_has_is_refused() -> None:
-    with pytest.raises(UsageError, match=r"only its longest side.*'wide'"):
+    with pytest.raises(UsageError, match=r"only the longest side.*'wide'"):
         read("a desk lamp, shade 20 cm wide")
-    with pytest.raises(UsageError, match=r"only its longest side.*'wide'"):
+    with pytest.raises(UsageError, match=r"only the longest side.*'wide'"):
         read("a paint roller with a blue handle, roller 23 cm wide")
     with pytest.raises(UsageError, match="a plate has no 'flower' here"):
         made_of("a plate with a green edge and a flower in the middle")
@@ -139,9 +139,9 @@ def test_words_behind_a_name_that_are_no_name_are_told(text: str, category: str,
 def test_colours_and_materials_at_both_ends_are_of_one_thing() -> None:
     assert whole("Wooden rolling pin 45 cm beech").material == MATERIALS["beech"]
     for text in ("a red jar with a black lid, blue", "a steel rolling pin, beech"):
-        with pytest.raises(UsageError, match=r"two (colours|materials) of one thing"):
+        with pytest.raises(UsageError, match=r"two (colours|materials) for one object"):
             read(text)
-    with pytest.raises(UsageError, match="red and white: say which part has which"):
+    with pytest.raises(UsageError, match="red and white: state which part has which"):
         read("a jar, red and white lid")
 
 

@@ -91,7 +91,7 @@ def _level_set(field: np.ndarray, cell: float, origin: np.ndarray) -> Manifold:
     solid = Manifold.level_set(interpolated(field, cell, origin), _bounds(field, cell, origin), 1.3 * cell)
     solid = solid.simplify(SIMPLER_CELLS * cell)
     if solid.is_empty():
-        raise Rejected("generator_failed", "the outlines have nothing in common; check the turns", "generate")
+        raise Rejected("generator_failed", "the outlines do not intersect; check the turns", "generate")
     return solid
 
 

@@ -165,13 +165,14 @@ def _told(
             " counter-clockwise, seen from above, turns the camera clockwise about the thing: state -90 for its first quarter"
         )
     names = [name for name, _ in photos]
-    remedy = "check its turn (degrees, counter-clockwise from above) and that it shows the same thing whole"
+    remedy = "check its turn (degrees, counter-clockwise from above) and that it shows the whole of the same object"
     other = _another(photos, turns_deg, focal_mm, without)
     if other is not None:
-        return f"{names[other]}: its outline does not go with those of the other photos; {remedy}, or leave it out"
+        return f"{names[other]}: its outline does not match those of the other photos; {remedy}, or leave it out"
     least = int(np.argmin(covered))
     return (
-        f"these {len(names)} outlines are not of one thing at these turns (their hull fills {covered[least]:.0%} of that of"
+        f"these {len(names)} outlines are not of one object at these turns (their hull fills {covered[least]:.0%}"
+        f" of that of"
         f" {names[least]}); check the turns (degrees, counter-clockwise from above), and take all photos uncropped from one place"
         " while the thing is turned, or each from the thing's own height"
     )

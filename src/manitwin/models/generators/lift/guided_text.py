@@ -79,4 +79,4 @@ def _made(filled: Filled, text: str, seed: int) -> Made:
     try:
         return make_filled(filled, text, np.random.default_rng(seed))
     except (UsageError, SolidError) as error:
-        raise Rejected("generator_failed", f"lift: {error}; say it in other words", "generate") from error
+        raise Rejected("generator_failed", f"lift: {error}; rephrase the text", "generate") from error

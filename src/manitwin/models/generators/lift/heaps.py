@@ -35,8 +35,9 @@ def reject_heap(fitted: Fitted, name: str, category: str) -> None:
     )
     raise Rejected(
         "several_objects",
-        f"no {category} has this outline ({residual.outline:.3f} of its length apart where it comes nearest, at most"
-        f" {FAR_OUTLINE}), as several have that touch or hide one another, or a piece of one; {remedy}, or check the cut-out",
+        f"no {category} has this outline ({residual.outline:.3f} of its length apart at the best fit, at most"
+        f" {FAR_OUTLINE}), but several objects that touch or hide one another may have it, or a piece of one;"
+        f" {remedy}, or check the cut-out",
         "generate",
     )
 

@@ -177,9 +177,9 @@ def _told(outlines: Sequence[Outline], covered: Sequence[float]) -> str:
         without = [min(covered_shares([*outlines[:k], *outlines[k + 1 :]])) for k in range(len(outlines))]
         worst = int(np.argmax(without))
         if without[worst] >= LEAST_COVERED:
-            return f"{outlines[worst].name}: its outline does not go with those of the other photos; {remedy}"
+            return f"{outlines[worst].name}: its outline does not match those of the other photos; {remedy}"
     names = ", ".join(outline.name for outline in outlines)
-    return f"{names}: these outlines are not of one thing at these turns (their hull fills {min(covered):.0%} of one); {remedy}"
+    return f"{names}: these outlines are not of one object at these turns (their hull fills {min(covered):.0%} of one); {remedy}"
 
 
 def _field(outlines: Sequence[Outline], power: float) -> tuple[np.ndarray, float, np.ndarray]:

@@ -82,14 +82,15 @@ def _explaining(view: View, hint: ShapeHint) -> tuple[Primitive, Made]:
     if hint.hollow_below:
         raise Rejected(
             "generator_failed",
-            "lift cannot make this: such a thing is hollow from below, of which one outline says nothing; choose another"
+            "lift cannot make this: the object is hollow from below, which one outline does not show; choose another"
             " generator, or give a mesh",
             "generate",
         )
     if hint == ShapeHint() and _is_ellipse(view.silhouette):
         raise Rejected(
             "generator_failed",
-            "the outline is an ellipse: a disc seen at an angle has it as well as an egg; say what it is with --name, or take the"
+            "the outline is an ellipse, which may be a disc seen at an angle or an egg; name the object with"
+            " --name, or take the"
             " photo from the side",
             "generate",
         )
@@ -100,8 +101,9 @@ def _explaining(view: View, hint: ShapeHint) -> tuple[Primitive, Made]:
     if hint.container and primitive != "revolution":
         raise Rejected(
             "generator_failed",
-            "lift cannot make this open container: its outline is not that of a round one, with or without a handle, and one"
-            " outline says nothing of another hollow; choose another generator, or give a mesh",
+            "lift cannot make this open container: its outline is not that of a round one, with or without a"
+            " handle, and one outline does not show the shape of another cavity; choose another generator, or give"
+            " a mesh",
             "generate",
         )
     made = {"revolution": revolved, "box": boxed, "inflation": inflated}[primitive](view, hint)

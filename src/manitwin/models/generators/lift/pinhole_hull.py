@@ -58,7 +58,7 @@ def hull_field(
     axes = [np.arange(middle - radius, middle + radius + rough, rough) for middle in centre]
     inside = _depth(sights, np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)) > -rough
     if not inside.any():
-        raise Rejected("generator_failed", "the outlines have nothing in common; check the turns", "generate")
+        raise Rejected("generator_failed", "the outlines do not intersect; check the turns", "generate")
     low, high = (np.array([pick(np.nonzero(inside)[k]) for k in range(3)]) for pick in (np.min, np.max))
     first = np.array([axis[at] for axis, at in zip(axes, low, strict=True)]) - rough
     last = np.array([axis[at] for axis, at in zip(axes, high, strict=True)]) + rough

@@ -76,8 +76,8 @@ def _require_crossing(sights: Sequence[Sight]) -> None:
     if sines.max() < LEAST_CROSSING:
         raise Rejected(
             "generator_failed",
-            f"all {len(sights)} cameras are in one direction from the thing, or its opposite, and outlines from there say nothing"
-            " of the depth; add a photo from the side",
+            f"all {len(sights)} cameras are in one direction from the object, or the opposite one, so their"
+            f" outlines do not show the depth; add a photo from the side",
             "generate",
         )
 

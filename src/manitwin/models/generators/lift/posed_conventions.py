@@ -62,15 +62,17 @@ def told(
     alone = int(np.argmax(others))
     if len(names) > 2 and others[alone] >= LEAST_COVERED:
         return (
-            f"{names[alone]}: its outline does not go with its pose and those of the other photos; check that the pose is its own"
-            " and that it shows the same thing whole, or leave it out"
+            f"{names[alone]}: its outline does not match its pose and the outlines of the other photos; check that"
+            f" the pose is its own"
+            " and that it shows the whole of the same object, or leave it out"
         )
     worst = sorted(range(len(names)), key=lambda k: covered[k])[:3]
     filled_of = ", ".join(f"{covered[k]:.0%} of that of {names[k]}" for k in worst)
     return (
-        f"these {len(names)} outlines are not of one thing at the stated poses (their common solid fills {filled_of}); check"
-        " that the poses are those of these photos, uncropped, that the focal lengths are in pixels of them, and that the thing"
-        " stayed where it was"
+        f"these {len(names)} outlines are not of one object at the stated poses (their common solid fills"
+        f" {filled_of}); check"
+        " that the poses are those of these photos, uncropped, that the focal lengths are in pixels of them, and"
+        " that the object did not move"
     )
 
 

@@ -128,8 +128,8 @@ def _carved(views: Sequence[PhotoView], hint: ShapeHint) -> MadeOfViews:
         names = ", ".join(view.name for view in views)
         raise Rejected(
             "generator_failed",
-            f"{names}: all from one direction or its opposite, and outlines from there say nothing of the depth; add a photo"
-            " from the side",
+            f"{names}: all are from one direction or its opposite, so their outlines do not show the depth; add a"
+            f" photo from the side",
             "generate",
         )
     lenses = {view.focal_mm for view in views}
@@ -147,7 +147,7 @@ def _round(views: Sequence[PhotoView], hint: ShapeHint) -> MadeOfViews:
     if not (hint.round and same_from_every_side([(view.name, view.rgba) for view in views])):
         raise Rejected(
             "generator_failed",
-            f"{names}: without a template that fits, outlines alone do not tell from where the photos were taken; state the"
+            f"{names}: without a matching template, outlines alone do not determine the camera directions; give the"
             " camera's turns with --turns, or in a column turn_deg (degrees, counter-clockwise from above, such as 0,90,180)",
             "generate",
         )

@@ -48,7 +48,7 @@ def held_m3(made: Made, amount: Amount) -> float:
     held = capacity_m3(made)
     if held is None:
         raise UsageError(
-            f"a {made.category} is no vessel, so {amount.said} cannot be what it holds; say a length or a mass"
+            f"a {made.category} is not a container, so {amount.said} cannot be its capacity; give a length or a mass"
         )
     return held
 

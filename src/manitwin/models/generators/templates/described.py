@@ -112,7 +112,7 @@ def described(words: Sequence[str], of: Prior | None = None) -> Described:
     sizes = [word for word in unused if word in RELATIVE]
     relative = [RELATIVE[word] for word in sizes]
     if relative and min(relative) < 0.5 < max(relative):
-        raise UsageError(f"two sizes of one thing, {' and '.join(sizes)}: say one")
+        raise UsageError(f"two sizes for one object, {' and '.join(sizes)}: say one")
     left = tuple(word for word in unused if word not in RELATIVE)
     color = _color(said, words)
     look = _material(said)
@@ -244,7 +244,7 @@ def _color(said: Sequence[_Said], words: Sequence[str]) -> _Said | None:
         if each.start != end:
             first, second = " ".join(words[color.start : end]), " ".join(words[each.start : each.end])
             raise UsageError(
-                f"two colours of one thing, {first} and {second}: say which part has which, such as"
+                f"two colours for one object, {first} and {second}: state which part has which, such as"
                 f" 'a {first} mug with a {second} handle'"
             )
         if CLEAR in (color.kind, each.kind):  # transparent blue is a blue that is seen through
@@ -267,7 +267,7 @@ def _material(said: Sequence[_Said]) -> Look | None:
     if len(looks) > 1 and len({look.surface for look in looks}) > 1:
         first, second = looks[0].material, looks[1].material
         raise UsageError(
-            f"two materials of one thing, {first} and {second}: say which part has which, such as"
+            f"two materials for one object, {first} and {second}: state which part has which, such as"
             f" 'a {first} knife with a {second} handle'"
         )
     exact = [look for look in looks if look.material not in _PLAIN] or looks

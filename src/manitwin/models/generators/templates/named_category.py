@@ -231,7 +231,7 @@ def _without_counter(before: list[str]) -> list[str]:
 
 
 def _check_one_thing(text: str, before: list[str], name: list[str], prior: Prior, names: set[str]) -> None:
-    """Raise UsageError where a text asks for several things: a pair of pliers is one, and two forks are not."""
+    """Raise UsageError where a text asks for several objects: a pair of pliers is one, and two forks are not."""
     words = [*before, *name]
     plural = name[-1].endswith("s") and named(name[-1].removesuffix("s")) is not None
     groups = [word for word, of in pairwise(words) if of == "of" and word in _GROUPS]
@@ -242,17 +242,17 @@ def _check_one_thing(text: str, before: list[str], name: list[str], prior: Prior
     several = [group for group in groups if f"{group} of" != prior.counter] + counted + numbers
     if several:
         raise UsageError(
-            f"{text!r} asks for several things ({several[0]}): one text makes one thing; describe that, and say how many with"
-            " --count"
+            f"{text!r} asks for several objects ({several[0]}): one text makes one object; describe one, and give"
+            f" the number with --count"
         )
     if "and" in name and " ".join(name) not in names:
         raise UsageError(
-            f"{text!r} asks for several things ({' '.join(name)}): one text makes one thing; name one of them"
+            f"{text!r} asks for several objects ({' '.join(name)}): one text makes one object; name one of them"
         )
     other = next((first for first, word in pairwise(before) if word == "and" and first in names), None)
     if other is not None:
         raise UsageError(
-            f"{text!r} asks for several things ({other} and {' '.join(name)}): give each a --text of its own"
+            f"{text!r} asks for several objects ({other} and {' '.join(name)}): give a separate --text for each"
         )
 
 

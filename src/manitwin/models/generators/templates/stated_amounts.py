@@ -51,7 +51,7 @@ def amounts_in(plain: str, prior: Prior) -> list[Amount]:
     Raises UsageError where the text says from which to which amount.
     """
     if (between := _RANGE.search(plain)) is not None:
-        raise UsageError(f"{between[0]!r} says from which to which amount; say one")
+        raise UsageError(f"{between[0]!r} states a range; give one amount")
     holds = prior.vessel or prior.container
     found = list[Amount]()
     end = -1

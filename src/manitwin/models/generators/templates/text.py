@@ -207,7 +207,7 @@ def _check_numbers(text: str, unused: list[str]) -> None:
         numbered = at > 0 and (unused[at - 1] in _NUMBERED or re.fullmatch(r"[a-wyz]", unused[at - 1]) is not None)
         if _NO_LENGTH.fullmatch(word) and not counted and not numbered:
             raise UsageError(
-                f"{text!r}: {word!r} has no unit; say what it measures, such as '30 cm', '12 in' or '500 ml', or leave it out"
+                f"{text!r}: {word!r} has no unit; give one, such as '30 cm', '12 in' or '500 ml', or leave it out"
             )
 
 
@@ -236,11 +236,11 @@ def _joined(before: Described, own: Described, tail: Described) -> Described:
     """Return what is said before a name, in it and behind it: of one thing, so that two colours contradict each other."""
     one, other = before.wish, tail.wish
     if one.rgb is not None and other.rgb is not None and one.rgb != other.rgb:
-        raise UsageError("two colours of one thing: say which part has which")
+        raise UsageError("two colours for one object: state which part has which")
     if one.material is not None and other.material is not None:
         exact = more_exact(one.material, other.material)
         if exact is None:
-            raise UsageError("two materials of one thing: say which part has which")
+            raise UsageError("two materials for one object: state which part has which")
         one = replace(one, material=exact)
     wish = one.over(other).over(own.wish)
     relative = next((said.relative for said in (before, tail) if said.relative is not None), None)
@@ -250,15 +250,13 @@ def _joined(before: Described, own: Described, tail: Described) -> Described:
 def _check_taken(text: str, plain: str) -> None:
     """Raise UsageError for what a template cannot be told."""
     if (below := _NEGATIVE.search(text)) is not None:
-        raise UsageError(f"{text!r}: a length below zero ({below[0].strip()!r}); state it without the sign")
+        raise UsageError(f"{text!r}: a negative length ({below[0].strip()!r}); state it without the sign")
     if (said := _NEGATION.search(plain)) is not None:
-        raise UsageError(
-            f"{text!r}: a template cannot be told what a thing is not ({said[0]!r}); leave it out, or say a length"
-        )
+        raise UsageError(f"{text!r}: a template cannot use a negation ({said[0]!r}); leave it out, or give a length")
     if (sized := _IS_SIZED.search(plain)) is not None:
         raise UsageError(
-            f"{text!r}: {sized[0]!r} is not understood, as sizes of clothes, shoes and rings are no lengths; say one,"
-            " such as '28 cm long', or 'small' or 'large' before the name"
+            f"{text!r}: {sized[0]!r} is not understood, because sizes of clothes, shoes and rings are not lengths;"
+            f" give a length, such as '28 cm long', or 'small' or 'large' before the name"
         )
 
 

@@ -159,7 +159,7 @@ def _of_part_in(phrase: str, template: Template) -> str | None:
     number, unit, direction = lengths[0].groups()
     if direction in DIRECTIONS and direction not in _ALONG:
         raise UsageError(
-            f"{phrase.strip()!r}: of a part only its longest side can be told, such as '{part} {number} {unit}'; leave"
+            f"{phrase.strip()!r}: only the longest side of a part can be given, such as '{part} {number} {unit}'; leave"
             f" {direction!r} out or say it of the whole"
         )
     return " ".join(["a", number, unit, *others, part])
