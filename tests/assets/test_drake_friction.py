@@ -59,5 +59,5 @@ def test_sdf_has_that_of_the_first_collision_and_the_range_where_others_differ(
 
 def test_what_is_no_number_is_named(tmp_path: Path) -> None:
     (tmp_path / "cup.urdf").write_text(URDF.format(said='<drake:mu_static value="much"/>'))
-    with pytest.raises(AssetError, match=r"cup\.urdf: mu_static: 'much' is not a number"):
+    with pytest.raises(AssetError, match=r"cup\.urdf: mu_static: 'much' is no number"):
         read_asset(tmp_path / "cup.urdf")

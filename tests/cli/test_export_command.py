@@ -87,7 +87,7 @@ def test_two_twins_of_one_name_do_not_overwrite_each_other(
 ) -> None:
     made.write_twin(dataset / "other", twin_id=made.TWIN_ID[:8] + "ffffffff")
     status, told, refused = said(capsys, dataset, out=tmp_path / "out")
-    assert status == 3 and f"has the same name {made.NAME} too" in refused
+    assert status == 3 and f"has the same name {made.NAME}; export it" in refused
     assert "2 twins exported" in told
 
 

@@ -55,7 +55,7 @@ def test_what_cannot_be_published_leaves_nothing(run: Path, twins: Path, tmp_pat
     out = tmp_path / "out"
     with pytest.raises(UsageError, match=r"no kept episode can be published; .*CC-BY-4.0 \+ CC-BY-NC-4.0 \(2\)"):
         publish_episodes(run, out, license_allow=["MIT"])
-    with pytest.raises(UsageError, match=r"no such folder.*--twins"):
+    with pytest.raises(UsageError, match=r"this folder does not exist.*--twins"):
         publish_episodes(run, out, twins=tmp_path / "elsewhere")
     half = tmp_path / "half"
     write_run(half, twins, drawn=True)

@@ -233,7 +233,7 @@ def test_pictures_of_netpbm_are_read_as_png_are(tmp_path: Path, magic: int, most
         (b"P3\n64 64\n255\n" + b"7 " * 100, "unreadable", "truncated or corrupt"),
         (b"P2\n64 64\n255\n" + b"1" * 100_000, "unreadable", "truncated or corrupt"),
         (b"P5\n99999 99999\n255\n", "too_large", "megapixels"),
-        (b"P3\n4000 4000\n255\n7 7 7", "too_large", "written as text"),
+        (b"P3\n4000 4000\n255\n7 7 7", "too_large", "in a text format"),
         (b"P6\n8 8\n255\n" + bytes(192), "too_small", "8 x 8"),
         (b"P6 and other words", "wrong_type", "plain text"),
     ],

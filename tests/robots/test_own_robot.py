@@ -133,7 +133,7 @@ def test_meshes_outside_the_folder_are_not_read(tmp_path: Path, name: str):
     folder = tmp_path / "robot"
     folder.mkdir()
     (folder / "link.stl").symlink_to(tmp_path / "secret.stl")
-    with pytest.raises(UsageError, match="leaves"):
+    with pytest.raises(UsageError, match="lies outside"):
         load_robot(small_arm(folder, upper=mesh(name)))
 
 

@@ -109,7 +109,7 @@ def test_what_is_no_name_or_size_is_refused_and_nothing_is_kept(
     ("raw", "why"),
     [
         (b"", "its JSON is broken"),
-        (b"\xff\xfe", "the data sent"),
+        (b"\xff\xfe", "what was sent"),
         (b'{"png": null, "name": "\\ud800", "longest_side_cm": null}', "its JSON is broken"),
         (b'{"png": null, "name": null}', "has other names than png, name, longest_side_cm"),
         (b'{"png": "%%", "name": null, "longest_side_cm": null}', "no outline in base64"),

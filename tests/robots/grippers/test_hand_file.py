@@ -93,7 +93,9 @@ def test_xacro_in_place_of_a_urdf_is_told_how_to_expand_it(tmp_path: Path) -> No
     source = urdf().replace(
         '<robot name="small_hand"><link', f'<robot name="h" xmlns:xacro="http://www.ros.org/wiki/xacro">{macro}', 1
     )
-    with pytest.raises(ManiTwinError, match=r"hand\.urdf: <xacro:property> is of xacro.*run 'xacro FILE > FILE\.urdf'"):
+    with pytest.raises(
+        ManiTwinError, match=r"hand\.urdf: <xacro:property> is a xacro file.*run 'xacro FILE > FILE\.urdf'"
+    ):
         load_gripper(write_hand(tmp_path, description=source))
     expanded = urdf().replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ')
     assert load(write_hand(tmp_path, description=expanded)).name == "small_hand"
