@@ -164,7 +164,7 @@ def _posed(
     carved, longest = carve_posed(photos, [stated.cameras[number] for number in numbers], turns)
     part = carved_part(carved)
     size = (
-        "their unit is not stated, so the mesh has no scale"
+        "their unit is not stated, and the mesh has none"
         if stated.unit_m is None
         else f"their unit is {stated.unit_said}"
     )
@@ -175,4 +175,4 @@ def _posed(
 
 
 def _left_out(carved: Carved) -> list[str]:
-    return [f"{left}: left out, its outline does not match those of the other photos" for left in carved.left_out]
+    return [f"{left}: left out, its outline does not go with those of the other photos" for left in carved.left_out]

@@ -60,15 +60,15 @@ def test_addresses_unknown_licences_categories_and_sizes_are_left_out_and_counte
     plan = plan_inputs(rows, 60)
     assert {each.place for each in plan.chosen} == {"/inputs/1.obj", "/inputs/5.obj"}
     assert plan.left_out == {
-        "an address, which is not downloaded": 1,
-        "size outside 2 to 37 cm": 1,
+        "an address, which nothing is fetched from": 1,
+        "size outside of 2 to 37 cm": 1,
         "unknown category": 1,
         "unknown licence": 1,
     }
     only = plan_inputs(rows, 60, licenses=["CC0-1.0"])
     assert [each.place for each in only.chosen] == ["/inputs/1.obj"]
     assert plan_inputs(rows, 60, licenses=["cc0-1.0", "MIT"]).chosen == only.chosen
-    assert only.left_out["licence not allowed"] == 2
+    assert only.left_out["licence not among those allowed"] == 2
 
 
 def test_every_group_has_categories_of_sizes_that_the_paper_keeps() -> None:

@@ -184,7 +184,7 @@ def test_indices_of_normals_and_texture_coordinates_that_are_nowhere_are_left_ou
     mesh = read_mesh(path)
     assert len(mesh.parts) == 1 and len(mesh.parts[0].faces) == 1
     said = " ".join(mesh.findings)
-    assert "refer to normals, but it has none" in said and "name texture coordinates, of which it has none" in said
+    assert "name normals, of which it has none" in said and "name texture coordinates, of which it has none" in said
     path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//2 3//3\n")  # some: the file was cut
     with pytest.raises(InputError, match="normal 3 of 1"):
         read_mesh(path)

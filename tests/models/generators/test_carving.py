@@ -208,7 +208,7 @@ def test_views_of_a_nameless_thing_are_carved_at_their_stated_turns() -> None:
 @pytest.mark.slow
 def test_outlines_alone_do_not_tell_turns_but_a_round_thing_needs_none() -> None:
     for mesh, name in ((BOX, None), (CYLINDER, None), (BOX, "orange")):
-        with pytest.raises(Rejected, match=r"0\.png, 90\.png: .*state the camera's turns with --turns"):
+        with pytest.raises(Rejected, match=r"0\.png, 90\.png: .*give the camera's turns with --turns"):
             from_views(_views(mesh, (0.0, 90.0), stated=False), name)
     made = from_views(_views(CYLINDER, (0.0, 90.0), stated=False), "orange")
     assert made.notes["primitive"] == "revolution"
@@ -226,7 +226,7 @@ def test_the_command_says_what_it_needs(tmp_path: Path) -> None:
     for words, told in (
         (["--turns", "0,x", "-o", str(tmp_path / "a.glb")], "list of degrees"),
         (["--turns", "0,90", "-o", str(tmp_path / "a.obj")], "GLB"),
-        (["--turns", "0,90", "-o", str(tmp_path / "none" / "a.glb")], "no folder"),
+        (["--turns", "0,90", "-o", str(tmp_path / "none" / "a.glb")], "this folder does not exist"),
     ):
         done = CliRunner().invoke(app, ["carve", str(photo), str(photo), *words])
         assert done.exit_code != 0 and told in " ".join(done.output.split()) + str(done.exception)

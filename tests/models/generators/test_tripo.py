@@ -136,7 +136,7 @@ def test_textured_model_is_taken_before_others(output: dict[str, str], link: str
 
 def test_finished_task_without_a_model_is_a_bad_reply() -> None:
     body = {"code": 0, "data": {"status": "success", "output": {"rendered_image": "R"}}}
-    with FakeServer(Fixed(200, body)) as server, pytest.raises(BadReply, match="names no model"):
+    with FakeServer(Fixed(200, body)) as server, pytest.raises(BadReply, match="contains no model"):
         TripoGenerator.from_spec(f"@{server.url}", config()).fetch("task", Path())
 
 

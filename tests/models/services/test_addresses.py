@@ -132,7 +132,7 @@ def test_link_that_two_readers_read_in_two_ways_is_no_link(link: str, tmp_path: 
 
 
 def test_name_that_is_not_known_is_said() -> None:
-    with pytest.raises(UnknownName, match=r"no-such-name\.invalid is not known"):
+    with pytest.raises(UnknownName, match=r"no-such-name\.invalid cannot be resolved"):
         addresses_of("no-such-name.invalid", 80, 5)
     with pytest.raises(UnknownName):
         addresses_of("x" * 70 + ".example", 80, 5)

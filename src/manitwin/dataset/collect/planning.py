@@ -87,16 +87,16 @@ def shares(items: int, parts: int) -> list[int]:
 
 def _why_left_out(row: Row, licenses: Sequence[str] | None) -> str | None:
     if row.kind == "url":
-        return "an address, which is not downloaded"
+        return "an address, which nothing is fetched from"
     if licenses is None and row.licence == UNKNOWN:
         return "unknown licence"
     if licenses is not None and row.licence.lower() not in {
         each.strip().lower() for each in licenses
     }:  # SPDX 2.3, annex D.2
-        return "licence not allowed"
+        return "licence not among those allowed"
     if row.grp == UNKNOWN:
         return "unknown category"
-    return None if row.size_band in INSIDE else "size outside 2 to 37 cm"
+    return None if row.size_band in INSIDE else "size outside of 2 to 37 cm"
 
 
 def _in_turn(bands: Mapping[str, Mapping[str, list[Row]]], count: int, seed: int) -> list[Row]:

@@ -151,7 +151,7 @@ def _unique_corners(
     for column, (count, what) in enumerate(zip(counts, ("vertex", "texture coordinate", "normal"), strict=True)):
         if column and not count and rows[:, column].max() >= 0:
             rows[:, column] = -1  # loaders do not miss what they can do without
-            source.find(f"its faces refer to {what}s, but it has none")
+            source.find(f"its faces name {what}s, of which it has none")
         if rows[:, column].max() >= count:
             raise source.unreadable(
                 f"a face names {what} {rows[:, column].max() + 1} of {count}",
