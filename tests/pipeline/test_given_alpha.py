@@ -95,7 +95,7 @@ def test_a_photo_with_transparent_bars_is_cut_out_where_its_name_is_no_rectangle
 
 
 def test_an_upright_rectangle_without_a_name_is_doubted_and_kept_to_be_looked_at(tmp_path: Path) -> None:
-    for name, remedy in ((None, "name the object with --name"), ("thingamajig", "the priors know no 'thingamajig'")):
+    for name, remedy in ((None, "name the object with --name"), ("thingamajig", "the priors have no 'thingamajig'")):
         with pytest.raises(Rejected, match="an upright rectangle") as caught:
             cut_out(with_bars(photo_of_a_block(), 60), tmp_path, name)
         assert caught.value.reason == "low_confidence_matte" and CUTOUT in caught.value.files

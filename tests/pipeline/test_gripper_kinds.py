@@ -73,7 +73,7 @@ def real_rejection(folder: Path, extents_m: list[float], mass_kg: float, tips_m:
 
 def test_heavy_box_is_rejected_as_slippery_by_the_real_trial(tmp_path: Path) -> None:
     detail = real_rejection(tmp_path, [0.04, 0.04, 0.04], 9.0, [[0, 0, 0.02], [0, 0.005, 0.02]])
-    assert detail.startswith("none of 2 simulated grasps held: 2 drops; slippery for its weight")
+    assert detail.startswith("none of 2 simulated grasps held: 2 drops; too slippery for its weight")
     assert "out of reach" not in detail
 
 

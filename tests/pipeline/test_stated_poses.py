@@ -72,7 +72,7 @@ def test_rows_of_a_group_may_have_poses(photos: list[Path]) -> None:
         ("file,group,poses,turn_deg\n0.png,a,transforms.json,0\n1.png,a,,9\n", "give only one of them"),
         ("file,group,poses\n0.png,a,transforms.json\n", "there is only one"),
         ("file,group,poses\n0.png,a,nothing.json\n1.png,a,\n", r"group 'a' .*nothing\.json: not found"),
-        ("file,group,poses\n0.png,a,a.json\n1.png,a,b.json\n", "one poses"),
+        ("file,group,poses\n0.png,a,a.json\n1.png,a,b.json\n", "the same poses"),
     ):
         (folder / "things.csv").write_text(rows)
         with pytest.raises(UsageError, match=told):

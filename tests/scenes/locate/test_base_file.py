@@ -42,7 +42,7 @@ def test_a_rounded_rotation_is_made_one_again(tmp_path: Path) -> None:
     [
         ({}, "contains no camera pose"),
         ({"camera_to_base": [[1, 2], [3, 4]]}, "contains no camera pose"),
-        ({"camera_to_base": (2 * np.eye(4)).tolist()}, "no rigid motion"),
+        ({"camera_to_base": (2 * np.eye(4)).tolist()}, "not a rigid transform"),
         ({"camera_to_base": np.diag([2.0, 2, 2, 1]).tolist()}, "its rotation is invalid"),
         ({"camera_to_base": np.diag([1.0, 1, -1, 1]).tolist()}, "its rotation is invalid"),
         ({"camera_to_base": transform(TURN, np.array([500.0, 0, 900])).tolist()}, "not a rigid transform in metres"),
