@@ -79,7 +79,7 @@ def test_a_process_that_ends_or_hangs_costs_its_trial_and_nothing_else(
         ended: dict[int, Any] = dict(player._pool._processes)  # type: ignore[union-attr]
         for number in ended:
             os.kill(number, signal.SIGKILL)
-        with pytest.raises(TwinError, match="crashed its process"):
+        with pytest.raises(TwinError, match="ended its process"):
             player.play(twin, "panda", "panda-0001")
         assert player.play(twin, "panda", "panda-0000") is first, "what was played is kept"
         assert json.loads(player.play(twin, "panda", "panda-0001"))["outcome"] == "held"
