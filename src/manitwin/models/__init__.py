@@ -1,1 +1,1 @@
-"""Models that others trained or serve, behind small protocols, with built-in defaults that need no weights and no key."""
+"""Trained models and hosted services behind small protocols, with built-in defaults that need no weights and no API key."""

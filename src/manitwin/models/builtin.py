@@ -1,4 +1,7 @@
-"""The backends that come with the package. What needs a key, a server or a program says so when it is created."""
+"""Table of the backends that come with the package, by kind and name.
+
+A backend that needs a key, a server or an external program raises an error that says so when it is created.
+"""
 
 BACKENDS: dict[str, dict[str, str]] = {
     "generator": {

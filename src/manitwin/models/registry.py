@@ -1,9 +1,9 @@
-"""Backends by kind and name: the built-in ones and those of installed packages, registered in the same way.
+"""Registry of backends by kind and name; built-in backends and those of installed packages are registered in the same way.
 
-A package adds backends by an entry point of the group ``manitwin.backends`` whose module has a dictionary ``BACKENDS``:
-``{kind: {name: "module:attribute"}}``. A backend is chosen by ``name``, ``name:argument``, ``name@URL`` or
-``name:argument@URL``. An attribute with a method ``from_spec(argument, config)`` is created by it; any other is called without
-arguments.
+A package adds backends with an entry point in the group ``manitwin.backends`` whose module defines a dictionary ``BACKENDS``:
+``{kind: {name: "module:attribute"}}``. A backend specification (spec) has the form ``name``, ``name:argument``, ``name@URL``
+or ``name:argument@URL``. If the attribute has a method ``from_spec(argument, config)``, that method creates the backend;
+otherwise the attribute is called without arguments.
 """
 
 from __future__ import annotations
@@ -23,7 +23,10 @@ URL_OF_SERVER = re.compile(r"^(?!command:)(.*)@[A-Za-z][A-Za-z0-9+.-]*://\S+$")
 
 @cache
 def backends() -> dict[str, dict[str, str]]:
-    """Return ``{kind: {name: target}}`` of all installed backends; two packages may not claim one name."""
+    """Return ``{kind: {name: target}}`` of all installed backends.
+
+    Raises ConfigError if two packages register the same name for different targets.
+    """
     found: dict[str, dict[str, str]] = {}
     for entry in sorted(entry_points(group=GROUP), key=lambda e: e.name):
         for kind, targets in entry.load().BACKENDS.items():
@@ -38,7 +41,7 @@ def backends() -> dict[str, dict[str, str]]:
 
 
 def target(kind: str, spec: str) -> str:
-    """Return where the backend of a spec is defined; raises ConfigError listing the valid names."""
+    """Return the ``module:attribute`` of the backend that a spec names; raises ConfigError, which lists the valid names."""
     name, names = _parts(spec)[0], backends().get(kind, {})
     if name not in names:
         raise ConfigError(choose_from(kind, name, names))
@@ -46,7 +49,10 @@ def target(kind: str, spec: str) -> str:
 
 
 def factory(kind: str, spec: str) -> Any:
-    """Return the class or function that makes a backend; raises ConfigError, or Unavailable where it cannot be imported."""
+    """Return the class or function that creates a backend.
+
+    Raises ConfigError for an unknown name, Unavailable if the import fails.
+    """
     module, _, attribute = target(kind, spec).partition(":")
     try:
         return getattr(import_module(module), attribute)
@@ -57,7 +63,11 @@ def factory(kind: str, spec: str) -> Any:
 
 
 def create(kind: str, spec: str, config: BuildConfig) -> Any:
-    """Create a backend; raises ConfigError for a spec that cannot be, Unavailable where it cannot be imported."""
+    """Create the backend that a spec describes.
+
+    Raises ConfigError for an unknown name or an argument that the backend does not take, Unavailable if it cannot be
+    imported.
+    """
     name, argument = _parts(spec)
     made_by = factory(kind, spec)
     if hasattr(made_by, "from_spec"):
@@ -68,11 +78,11 @@ def create(kind: str, spec: str, config: BuildConfig) -> Any:
 
 
 def _parts(spec: str) -> tuple[str, str]:
-    """Return the name and the argument, which begins with the ``@`` of an address where there is nothing before it."""
+    """Split a spec into name and argument; the argument starts with ``@`` if the spec has an address and no argument before it."""
     end = next((at for at, letter in enumerate(spec) if letter in ":@"), len(spec))
     return spec[:end], spec[end:].removeprefix(":")
 
 
 def without_url(spec: str) -> str:
-    """Return a spec without the address of its server: where a model is served does not decide what it answers."""
+    """Return a spec without its server address, because the address does not affect the results of the model."""
     return URL_OF_SERVER.sub(r"\1", spec)

@@ -1,1 +1,1 @@
-"""Classifiers: what a picture shows, in the words of the priors, with a probability that can be believed."""
+"""Image classifiers: the name of the object in a picture, in the vocabulary of the priors, with a calibrated probability."""

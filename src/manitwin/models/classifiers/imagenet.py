@@ -1,8 +1,8 @@
-"""ImageNet's classes in the words of the priors: ``imagenet_classes.csv`` beside this module, a row a class.
+"""Mapping of ImageNet classes to the vocabulary of the priors: ``imagenet_classes.csv`` beside this module, one row per class.
 
-``name`` is what a person calls the thing, found in the priors; empty where no such thing is made (animals, vehicles, rooms) or
-the class says nothing of the thing. ``general`` is a wider word that holds of several such names: a water bottle and a
-wine bottle are bottles.
+``name`` is the everyday name of the object, which is in the priors; it is empty for classes that are no such objects
+(animals, vehicles, rooms) or say nothing about the object. ``general`` is a more general term for several such names: a water
+bottle and a wine bottle are bottles.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ CLASSES = 1000
 
 @dataclass(frozen=True)
 class ImageNetNames:
-    """The names in alphabetical order, and which classes each sums: ``members (N, 1000) bool``; ``general`` alike."""
+    """Names in alphabetical order with the classes that each covers, ``members (N, 1000) bool``, and the same for general terms."""
 
     names: tuple[str, ...]
     members: np.ndarray
@@ -32,7 +32,7 @@ class ImageNetNames:
 
 @cache
 def load_names() -> ImageNetNames:
-    """Read the table; raises ManiTwinError where it does not hold each class once, in order."""
+    """Read the table; raises ManiTwinError unless it has each class once, in order."""
     rows = [row for _, row in read_csv(Path(__file__).with_name(TABLE), ManiTwinError, name=TABLE)]
     if [row["class"] for row in rows] != [str(number) for number in range(CLASSES)]:
         raise ManiTwinError(f"{TABLE}: not the classes 0 to {CLASSES - 1} in order; install the package again")
@@ -45,7 +45,10 @@ def load_names() -> ImageNetNames:
 
 @cache
 def load_limits() -> dict[str, float]:
-    """Return by name the highest probability that a picture of another thing has given it (benchmarks/naming.py)."""
+    """Return for each name the highest probability that a picture of another object has given it (benchmarks/naming.py).
+
+    Raises ManiTwinError if the names are not those of the table.
+    """
     rows = (row for _, row in read_csv(Path(__file__).with_name(LIMITS), ManiTwinError, name=LIMITS))
     limits = {row["name"]: float(row["highest_wrong"]) for row in rows}
     table = load_names()

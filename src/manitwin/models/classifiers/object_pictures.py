@@ -1,4 +1,4 @@
-"""The squares that a classifier looks at: the object of a matted picture, on its own background and on plain ones."""
+"""Input pictures of a classifier: the object of a matted picture in a square, on its own background and on plain ones."""
 
 from __future__ import annotations
 
@@ -6,24 +6,24 @@ import cv2
 import numpy as np
 
 MARGIN = 0.1
-"""Of the object's longer side, around it."""
+"""Margin around the object, as a share of its longer side."""
 PLAIN_GREYS = (127, 255)
-"""The mean grey of what the network was trained on, and white."""
+"""Plain backgrounds: the mean grey of the network's training data, and white."""
 
 
 def object_pictures(rgba: np.ndarray, side_px: int) -> np.ndarray:
-    """Return the object of ``rgba (H, W, 4) uint8`` in squares ``(3, side_px, side_px, 3) uint8``, centred, upright.
+    """Return the object of ``rgba (H, W, 4) uint8`` in squares ``(3, side_px, side_px, 3) uint8``, centred and upright.
 
-    The first has the picture's own background, continued at its border; the others are plain. What is not the object speaks
-    as loudly to a classifier as the object does, so its answers to all of them are averaged. Raises ValueError where alpha
-    is empty.
+    The first square has the picture's own background, with border pixels repeated; the others have plain backgrounds. The
+    background influences a classifier as much as the object does, so its outputs for all squares are averaged. Raises
+    ValueError if alpha is empty.
     """
     rows, columns = np.nonzero(rgba[..., 3] > 127)
     if not len(rows):
         raise ValueError("no object: alpha is empty")
     top, left, bottom, right = rows.min(), columns.min(), rows.max() + 1, columns.max() + 1
     half = (0.5 + MARGIN) * max(bottom - top, right - left)
-    # a photo is large: the rest of it is not needed, and one channel at a time is 80 MB less
+    # only the surroundings of the object are processed, one channel at a time, which saves 80 MB for a large photo
     around = _square(rgba, ((left + right) / 2, (top + bottom) / 2), half)
     alpha = around[..., 3].astype(np.float32) / 255
     free = 1 - _resized(alpha, side_px)
@@ -39,7 +39,7 @@ def object_pictures(rgba: np.ndarray, side_px: int) -> np.ndarray:
 
 
 def _square(picture: np.ndarray, center: tuple[float, float], half: float) -> np.ndarray:
-    """Return the square of ``2 half`` pixels around a centre; what is beyond the border is its nearest pixel."""
+    """Return the square of ``2 half`` pixels around a centre; border pixels are repeated beyond the border."""
     side, x, y = max(1, round(2 * half)), round(center[0] - half), round(center[1] - half)
     rows, columns = (
         np.clip(np.arange(begin, begin + side), 0, size - 1)

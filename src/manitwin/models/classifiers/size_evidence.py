@@ -1,4 +1,4 @@
-"""What a known size says of a thing's name: a mug is not as long as a bucket."""
+"""Likelihood of a known object size for each class: a mug is not as long as a bucket."""
 
 from __future__ import annotations
 
@@ -13,17 +13,18 @@ from manitwin.models.annotators.priors import unknown_prior
 from manitwin.models.classifiers.imagenet import load_names
 
 OTHER_SIZE_SHARE = 0.1
-"""So many things have any size: a toy, a sample, a file whose unit is another one."""
+"""Share of objects with an unusual size: a toy, a sample, or a file in another unit."""
 ANY_SIZE_LOG_M = math.log(200)
-"""The width of the logarithms of any size: 5 mm to 1 m."""
+"""Width of the uniform distribution of the logarithm of an unusual size: 5 mm to 1 m."""
 _STANDARD_NORMAL_95 = 1.645
 _LEAST_LOG_SPREAD = 0.05
 
 
 def size_likelihoods(longest_m: float) -> np.ndarray:
-    """Return how likely each of ImageNet's classes ``(1000,)`` makes it that a thing is ``longest_m`` long.
+    """Return the likelihood ``(1000,)`` of the longest side ``longest_m`` for each ImageNet class.
 
-    Densities of the logarithm: those of the usual interval of a class's name, of anything where it has none.
+    It is the density of the logarithm of the length, from the usual interval of the class's name, or that of unknown objects
+    if it has no name.
     """
     table = load_names()
     likelihoods = np.full(table.members.shape[1], _density(unknown_prior().longest_axis_m, longest_m))
@@ -39,7 +40,7 @@ def _usual_lengths_m() -> tuple[Interval, ...]:
 
 
 def _density(usual: Interval, longest_m: float) -> float:
-    """Return the density of two halves of a log-normal, 90 % of which is in the usual interval, mixed with that of any size."""
+    """Return the density of a two-sided log-normal with 90 % in the usual interval, mixed with a uniform one for unusual sizes."""
     below, above = (
         max(abs(math.log(end / usual.typical)) / _STANDARD_NORMAL_95, _LEAST_LOG_SPREAD)
         for end in (usual.low, usual.high)

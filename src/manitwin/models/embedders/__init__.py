@@ -1,1 +1,1 @@
-"""Embedders: what a picture or a text is, as numbers that lie near those of what is alike."""
+"""Embedding models: pictures, texts and point clouds as vectors, with similar inputs close together."""

@@ -1,9 +1,9 @@
-"""CLIP, and models of its kind, from a folder of ONNX files: pictures, texts and points as vectors of one space.
+"""CLIP and similar models from a folder of ONNX files: pictures, texts and point clouds as vectors in one space.
 
 Radford et al. 2021, "Learning transferable visual models from natural language supervision"; ULIP (Xue et al. 2023) adds a
-network of points. A folder is laid out as Hugging Face keeps such models for ONNX:
-``vision_model.onnx``, ``text_model.onnx`` (there or in ``onnx/``), ``preprocessor_config.json``, ``vocab.json`` and
-``merges.txt``; ULIP's has ``point_model.onnx`` besides. Run by OpenCV on the CPU: no other runtime is needed.
+network for point clouds. The folder has the layout that Hugging Face uses for ONNX models: ``vision_model.onnx``,
+``text_model.onnx`` (at the top or in ``onnx/``), ``preprocessor_config.json``, ``vocab.json`` and ``merges.txt``; ULIP adds
+``point_model.onnx``. OpenCV runs the networks on the CPU; no other runtime is needed.
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ from manitwin.models.embedders.clip_tokens import LENGTH, ClipTokens
 
 VISION, TEXT, POINTS = "vision_model.onnx", "text_model.onnx", "point_model.onnx"
 OUTPUTS = {VISION: "image_embeds", TEXT: "text_embeds", POINTS: "point_embeds"}
-"""What a network's vector is called, where it has several outputs."""
+"""Name of a network's embedding, used if the network has several outputs."""
 PREPROCESSOR = "preprocessor_config.json"
 FLOAT, INT64 = 1, 7
 POINT_COUNT = 8192
-"""Points of ULIP's backbones, where the network leaves the number open."""
+"""Number of points of ULIP's backbones, used if the network leaves it open."""
 MOST_TOKENS, MOST_POINTS = 4096, 1 << 17
 LIMITS = Limits(seconds=300.0, memory_bytes=12 << 30)
-"""Of a network's trial, as of networks for cut-outs."""
+"""Limits of a network's test run, the same as for matting networks."""
 _FEW = "give a folder with vision_model.onnx, text_model.onnx, preprocessor_config.json, vocab.json and merges.txt"
 
 
 class ClipFolder:
-    """The networks of a folder, each read when it is first asked for; vectors have unit length."""
+    """The networks of a folder, each loaded when it is first used; all vectors have unit length."""
 
     def __init__(self, folder: Path, *, points: bool = False):
-        """Look for the files that are needed, with ``points`` a network of points; raises UsageError for one not there."""
+        """Check that the required files exist, with ``points`` also a point-cloud network; raises UsageError for a missing file."""
         self.folder = folder
         self._networks: dict[str, _Network] = {}
         self._tried: set[str] = set()
@@ -54,22 +54,22 @@ class ClipFolder:
 
     @property
     def name(self) -> str:
-        """Return what the model is called: its folder's name."""
+        """Name of the model: the name of its folder."""
         return self.folder.resolve().name
 
     @cached_property
     def sha256(self) -> dict[str, str]:
-        """Return the sha256 of each file that decides a vector, by name."""
+        """SHA-256 of each file that affects the vectors, by file name."""
         files = [self._path(name) for name in (VISION, TEXT, POINTS) if self._found(name) is not None]
         files += [self.folder / name for name in (PREPROCESSOR, "vocab.json", "merges.txt")]
         return {path.name: hashlib.sha256(read_bytes(path, MAX_ONNX_BYTES, UsageError)).hexdigest() for path in files}
 
     def pictures(self, pictures: Sequence[np.ndarray]) -> np.ndarray:
-        """Return the vectors ``(N, D)`` of pictures ``(H, W, 3) uint8`` sRGB."""
+        """Return the unit vectors ``(N, D)`` of pictures ``(H, W, 3) uint8`` sRGB."""
         return self._unit([self._run(VISION, self._prepared(picture)) for picture in pictures])
 
     def texts(self, texts: Sequence[str]) -> np.ndarray:
-        """Return the vectors ``(N, D)`` of texts."""
+        """Return the unit vectors ``(N, D)`` of texts."""
         network = self._network(TEXT)
         length = (network.shape[-1] if network.shape else None) or LENGTH
         if not 2 <= length <= MOST_TOKENS:
@@ -77,7 +77,10 @@ class ClipFolder:
         return self._unit([self._run(TEXT, self._tokens.encode(text, length)[None]) for text in texts])
 
     def points(self, points_m: np.ndarray) -> np.ndarray:
-        """Return the vector ``(D,)`` of surface points ``(N, 3)`` with +Z up, as ULIP takes them: +Y up, in the unit ball."""
+        """Return the unit vector ``(D,)`` of surface points ``(N, 3)`` with +Z up.
+
+        They are transformed to ULIP's convention: +Y up, centred, scaled into the unit ball.
+        """
         turned = np.stack([points_m[:, 0], points_m[:, 2], -points_m[:, 1]], axis=1)
         centered = turned - turned.mean(0)
         ball = centered / max(float(np.linalg.norm(centered, axis=1).max()), 1e-12)
@@ -85,7 +88,7 @@ class ClipFolder:
 
     @property
     def point_count(self) -> int:
-        """Return how many points the network takes."""
+        """Number of points that the network takes."""
         shape = self._network(POINTS).shape
         if len(shape) != 3 or shape[2] not in (3, None):
             raise UsageError(f"{POINTS}: takes {shape}, not (1, N, 3); give a network of points without colours")
@@ -100,7 +103,7 @@ class ClipFolder:
 
     @cached_property
     def _scaling(self) -> tuple[int, np.ndarray, np.ndarray]:
-        """Return the side in pixels, the mean and the deviation that ``preprocessor_config.json`` states."""
+        """Side in pixels, mean and standard deviation from ``preprocessor_config.json``."""
         path = self.folder / PREPROCESSOR
         said = read_json_object(path, UsageError)
         try:
@@ -116,7 +119,7 @@ class ClipFolder:
         return side, mean.astype(np.float32), deviation.astype(np.float32)
 
     def _prepared(self, picture: np.ndarray) -> np.ndarray:
-        """Scale the shorter side by a bicubic, cut the middle, and standardise, as CLIP's processor does."""
+        """Scale the shorter side bicubically, crop the centre, and standardize, as CLIP's preprocessor does."""
         side, mean, deviation = self._scaling
         height, width = picture.shape[:2]
         factor = side / min(height, width)
@@ -155,7 +158,7 @@ class ClipFolder:
 
 
 def _require_working(path: Path, output: str, value: np.ndarray) -> None:
-    """Run a network once in a process of its own: OpenCV ends its process over some that are broken."""
+    """Run a network once in a subprocess, because OpenCV crashes on some broken networks."""
     try:
         run_isolated("manitwin.models.embedders.clip:run_once", path, output, value, limits=LIMITS)
     except (ProcessCrashed, MemoryError) as error:
@@ -164,12 +167,12 @@ def _require_working(path: Path, output: str, value: np.ndarray) -> None:
 
 
 def run_once(path: Path, output: str, value: np.ndarray) -> None:
-    """Load a network and run it on one input; raises UsageError where OpenCV cannot."""
+    """Load a network and run it on one input; raises UsageError if OpenCV cannot run it."""
     _Network(path, output).run(value)
 
 
 class _Network:
-    """A network of one input, besides a mask of all ones, whose answer is a vector."""
+    """A network with one input, apart from an attention mask of ones, and a vector as output."""
 
     def __init__(self, path: Path, output: str):
         content = read_bytes(path, MAX_ONNX_BYTES, UsageError)
@@ -190,7 +193,7 @@ class _Network:
         return cv2.dnn.readNetFromONNX(np.frombuffer(self._content, np.uint8))
 
     def run(self, value: np.ndarray) -> np.ndarray:
-        """Return the vector ``(D,)`` of one input; raises UsageError where OpenCV cannot run the network."""
+        """Return the vector ``(D,)`` of one input; raises UsageError if OpenCV cannot run the network."""
         try:
             self._net.setInput(np.ascontiguousarray(value), self.input)
             for mask in self._masks:

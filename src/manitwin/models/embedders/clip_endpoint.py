@@ -1,7 +1,7 @@
-"""CLIP behind HTTP: pictures and texts as vectors of one space, by the embeddings route that servers of such models have.
+"""CLIP behind HTTP: pictures and texts as vectors in one space, through an embeddings endpoint.
 
-The body is that of OpenAI's ``/embeddings`` with ``modality`` (``image``: data URIs; ``text``), as the server infinity takes it
-(github.com/michaelfeil/infinity): ``{"model", "input": [...], "modality"}``, answered by
+The body is that of OpenAI's ``/embeddings`` with the additional field ``modality`` (``image``: data URIs; ``text``), as the
+server infinity accepts it (github.com/michaelfeil/infinity): ``{"model", "input": [...], "modality"}``; the answer is
 ``{"data": [{"index", "embedding"}, ...]}``.
 """
 
@@ -22,18 +22,19 @@ from manitwin.models.services.keys import bearer, key_from_environment, split_ur
 KEY = "MANITWIN_CLIP_KEY"
 PATH = "embeddings"
 BATCH = 16
-"""Pictures and texts of one request."""
+"""Pictures or texts per request."""
 MOST_NUMBERS = 1 << 14
 
 
 class ClipEndpoint:
-    """A CLIP at ``MODEL@http://HOST:PORT/...``; a key is in the environment, or there is none. Vectors have unit length.
+    """A CLIP model at ``MODEL@http://HOST:PORT/...`` with an optional key from the environment; vectors have unit length.
 
-    What the server runs nobody can check: there is a name and an address, and no sha256. Raises what ``HttpService`` does.
+    The model that the server runs cannot be verified: its identity is a name and an address, without SHA-256. Raises the
+    errors of ``HttpService``.
     """
 
     def __init__(self, spec: str, services: ServicesConfig):
-        """Take the model and the address; raises ConfigError for what names none, or where a key may not go there."""
+        """Take model and address; raises ConfigError if one of them is missing, or if the key may not be sent to that address."""
         model, url = split_url(spec)
         if url is None or not model:
             raise ConfigError(f"--clip {spec!r}: not a model at an address; give MODEL@http://HOST:PORT, or a folder")
@@ -43,11 +44,11 @@ class ClipEndpoint:
         self.name, self.sha256 = f"{model} at {url}", dict[str, str]()
 
     def pictures(self, pictures: Sequence[np.ndarray]) -> np.ndarray:
-        """Return the vectors ``(N, D)`` of pictures ``(H, W, 3) uint8`` sRGB."""
+        """Return the unit vectors ``(N, D)`` of pictures ``(H, W, 3) uint8`` sRGB."""
         return self._vectors([_data_uri(picture) for picture in pictures], "image")
 
     def texts(self, texts: Sequence[str]) -> np.ndarray:
-        """Return the vectors ``(N, D)`` of texts."""
+        """Return the unit vectors ``(N, D)`` of texts."""
         return self._vectors(list(texts), "text")
 
     def _vectors(self, inputs: Sequence[str], modality: str) -> np.ndarray:
@@ -59,7 +60,7 @@ class ClipEndpoint:
         return np.array(rows)
 
     def _read(self, data: object, count: int) -> list[np.ndarray]:
-        """Return the unit vectors of an answer in the order of what was asked; raises BadReply for any other answer."""
+        """Return the unit vectors of an answer in the order of the inputs; raises BadReply for any other answer."""
         found: dict[int, np.ndarray] = {}
         for entry in data if isinstance(data, list) else ():
             numbers = entry.get("embedding") if isinstance(entry, dict) else None

@@ -1,7 +1,7 @@
-"""Texts as CLIP's text network takes them: byte-pair encoding of lower-case words (Radford et al. 2021, section 2.4).
+"""Tokenizer of CLIP's text network: byte-pair encoding of lower-case text (Radford et al. 2021, section 2.4).
 
-The words of a vocabulary and the order of its merges are files of the model's folder, ``vocab.json`` and ``merges.txt``, as
-Hugging Face keeps them. https://github.com/openai/CLIP/blob/main/clip/simple_tokenizer.py says how a text is cut.
+The vocabulary and the ranks of its merges are the files ``vocab.json`` and ``merges.txt`` in the model's folder, in Hugging
+Face's format. Text is split as in https://github.com/openai/CLIP/blob/main/clip/simple_tokenizer.py.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from manitwin.formats.csv_file import read_lines
 from manitwin.formats.json_file import read_json_object
 
 LENGTH = 77
-"""Tokens that CLIP's text network takes, begin and end included."""
+"""Tokens that CLIP's text network takes, including begin and end."""
 BEGIN, END = "<|startoftext|>", "<|endoftext|>"
 _WORD_END = "</w>"
 _SUFFIXES = ("'s", "'t", "'re", "'ve", "'m", "'ll", "'d")
@@ -36,7 +36,7 @@ class ClipTokens:
 
     @classmethod
     def of_folder(cls, folder: Path) -> ClipTokens:
-        """Read ``vocab.json`` and ``merges.txt``; raises UsageError for files that are no such vocabulary."""
+        """Read ``vocab.json`` and ``merges.txt``; raises UsageError for invalid files."""
         said = read_json_object(folder / "vocab.json", UsageError)
         if not all(type(value) is int for value in said.values()) or not {BEGIN, END} <= said.keys():
             raise UsageError(f"{folder / 'vocab.json'}: is not a CLIP vocabulary; give tokens with their numbers")
@@ -45,9 +45,9 @@ class ClipTokens:
         return cls({name: int(value) for name, value in said.items()}, {pair: rank for rank, pair in enumerate(pairs)})
 
     def encode(self, text: str, length: int = LENGTH) -> np.ndarray:
-        """Return the ids ``(length,) int64`` of a text; what does not fit is cut, what is left is filled with the end's id.
+        """Return the token ids ``(length,) int64`` of a text, truncated, or padded with the id of the end token.
 
-        Raises UsageError for a text with a token that the vocabulary does not have.
+        Raises UsageError for a text with a token that is not in the vocabulary.
         """
         tokens = [token for word in words(text) for token in self._merged(word)]
         unknown = [token for token in tokens if token not in self.vocabulary]
@@ -57,7 +57,7 @@ class ClipTokens:
         return np.array(ids + [self.vocabulary[END]] * (length - len(ids)), np.int64)
 
     def _merged(self, word: str) -> list[str]:
-        """Join the characters of a word by the merges, the earliest first."""
+        """Merge the characters of a word into tokens, the merge of lowest rank first."""
         characters = [_BYTES[byte] for byte in word.encode()]
         parts = [*characters[:-1], characters[-1] + _WORD_END]
         while len(parts) > 1:
@@ -78,7 +78,7 @@ class ClipTokens:
 
 
 def words(text: str) -> Iterator[str]:
-    """Yield what a text is cut into: words, single digits, runs of other signs, and English endings after an apostrophe."""
+    """Yield the parts into which a text is split: words, single digits, runs of other characters, and English contractions."""
     plain = re.sub(r"\s+", " ", html.unescape(html.unescape(text))).strip().lower()
     place = 0
     while place < len(plain):
@@ -103,7 +103,7 @@ def _kind(character: str) -> str:
 
 
 def _byte_characters() -> dict[int, str]:
-    """Return the printable character that stands for each byte (GPT-2's table)."""
+    """Return the printable character that represents each byte (GPT-2's table)."""
     shown = [*range(ord("!"), ord("~") + 1), *range(ord("¡"), ord("¬") + 1), *range(ord("®"), ord("ÿ") + 1)]
     others = [byte for byte in range(256) if byte not in shown]
     return {byte: chr(byte) for byte in shown} | {byte: chr(256 + place) for place, byte in enumerate(others)}

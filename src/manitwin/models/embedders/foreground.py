@@ -1,4 +1,4 @@
-"""The thing in a close crop or a photo: its alpha where there is one, else what unlike the border is."""
+"""Foreground mask of a close crop or photo: its alpha channel, else a GrabCut segmentation against the border."""
 
 from __future__ import annotations
 
@@ -8,21 +8,22 @@ import cv2
 import numpy as np
 
 Found = Literal["alpha", "border", "none"]
-"""By what the background was told: the picture's transparency, its border, or not at all."""
+"""Source of the mask: the picture's transparency, its border, or none."""
 
 WORKING_PX = 192
 BORDER_PX = 3
 ROUNDS = 4
 LEAST_SHARE, MOST_SHARE = 0.03, 0.97
-"""A thing of less or more of the picture was not told from its background."""
+"""If the segmented object covers less or more of the picture, the segmentation has failed."""
 OPAQUE = 250
 
 
 def foreground(pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray, Found]:
-    """Return ``rgb (H, W, 3) uint8`` and a mask ``(H, W) float32`` of the thing in ``pixels (H, W, 3 or 4) uint8``.
+    """Return ``rgb (H, W, 3) uint8`` and the object mask ``(H, W) float32`` of ``pixels (H, W, 3 or 4) uint8``, and its source.
 
-    A picture with transparency is taken at its word. Of another one the border is background, and GrabCut tells what else is
-    (Rother, Kolmogorov and Blake 2004), at 192 pixels; where that leaves next to nothing, or all, the mask is the whole picture.
+    The alpha channel is used if a picture has transparency. Otherwise the border is taken as background and GrabCut (Rother,
+    Kolmogorov and Blake 2004) segments the object; for this, and in the result, a picture is scaled down to at most 192
+    pixels. If the result covers almost nothing or almost everything, the mask is the whole picture.
     """
     rgb = pixels[..., :3]
     if pixels.shape[2] == 4 and (pixels[..., 3] < OPAQUE).any():
@@ -34,11 +35,11 @@ def foreground(pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray, Found]:
         rgb = cv2.resize(rgb, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     marks = np.full(rgb.shape[:2], cv2.GC_PR_FGD, np.uint8)
     marks[:BORDER_PX] = marks[-BORDER_PX:] = marks[:, :BORDER_PX] = marks[:, -BORDER_PX:] = cv2.GC_BGD
-    cv2.setRNGSeed(0)  # its mixtures begin with k-means at random places
+    cv2.setRNGSeed(0)  # GrabCut initializes its mixtures by k-means at random
     try:
         models = np.zeros((1, 65)), np.zeros((1, 65))
         cv2.grabCut(np.ascontiguousarray(rgb), marks, (0, 0, 1, 1), *models, ROUNDS, cv2.GC_INIT_WITH_MASK)
-    except cv2.error:  # a picture of one colour has no two mixtures
+    except cv2.error:  # two mixtures cannot be fitted to a picture of one colour
         return rgb, np.ones(rgb.shape[:2], np.float32), "none"
     mask = np.isin(marks, (cv2.GC_FGD, cv2.GC_PR_FGD))
     if not LEAST_SHARE < mask.mean() < MOST_SHARE:

@@ -1,4 +1,4 @@
-"""What a thing looks like in a picture, as one vector: a network's features and its colours, without its background."""
+"""Appearance descriptor of an object in a picture: network features and a colour histogram, without the background."""
 
 from __future__ import annotations
 
@@ -8,27 +8,30 @@ import numpy as np
 from manitwin.models.classifiers.efficientnet_lite import SIDE_PX, features
 
 VERSION = 1
-"""Vectors of another version are of no use beside these."""
+"""Version of the descriptor; vectors of different versions cannot be compared."""
 NETWORK, COLORS = 1280, 256
 LENGTH = NETWORK + COLORS
 COLOR_WEIGHT = 0.3
-"""Against the network's 1. Of 0, 0.3, 0.5 and 1 it names most of the tuning twins in scenes (benchmarks/search.py)."""
+"""Weight of colours relative to 1 for the network.
+
+Of 0, 0.3, 0.5 and 1 it identifies the most tuning twins in scenes (benchmarks/search.py).
+"""
 MARGIN = 0.1
-"""Of the thing's longer side, around it."""
+"""Margin around the object, as a share of its longer side."""
 GREY = 127
-"""Behind the thing: the mean of what the network was trained on, and of the kinds of background that were tried the best."""
+"""Background grey: the mean of the network's training data, and the best of the tested backgrounds."""
 LEAST_PX = 16
-"""A mask of fewer pixels shows nothing."""
+"""Minimum number of pixels of a mask."""
 _LIGHTNESS_BINS, _CHROMA_BINS, _CHROMA_REACH = 4, 8, 96.0
 _BLUR = np.array([0.107, 0.786, 0.107])
-"""A Gaussian of half a bin: a colour at the border of a bin is near to those beyond it."""
+"""Gaussian with a standard deviation of half a bin, so that a colour near the edge of a bin also matches the next bin."""
 
 
 def look_of(rgb: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Return the unit vector ``(1536,) float32`` of what ``mask (H, W)``, 0..1, shows of ``rgb (H, W, 3) uint8``.
+    """Return the descriptor ``(1536,) float32`` of the object ``mask (H, W)``, 0..1, in ``rgb (H, W, 3) uint8``: a unit vector.
 
-    Its dot product with another is (cosine of the networks' features + 0.3 times the Bhattacharyya coefficient of the
-    histograms in CIELAB) / 1.3: 1 for the same picture. Raises ValueError for a mask of fewer than 16 pixels, Unavailable
+    The dot product of two descriptors is (cosine of the network features + 0.3 times the Bhattacharyya coefficient of the
+    CIELAB histograms) / 1.3: 1 for the same picture. Raises ValueError for a mask of fewer than 16 pixels, Unavailable
     without the network's weights.
     """
     square, inside = centered(rgb, mask)
@@ -39,7 +42,7 @@ def look_of(rgb: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 def centered(rgb: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the thing on grey in a square ``(224, 224, 3) uint8``, centred, as large as may be, and its mask there."""
+    """Return the object on grey in a square ``(224, 224, 3) uint8``, centred and scaled to fit, and its mask there."""
     rows, columns = np.nonzero(mask > 0.5)
     if len(rows) < LEAST_PX:
         raise ValueError(f"a mask of {len(rows)} pixels shows nothing")
@@ -68,9 +71,10 @@ def centered(rgb: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def color_histogram(square: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """Return the square roots ``(256,)`` of the shares of colours, whose squares add up to 1.
+    """Return the square roots ``(256,)`` of a colour histogram with sum 1, so that a dot product is a Bhattacharyya coefficient.
 
-    Four bins of lightness by 8 x 8 of chroma, over the pixels well inside: edges are mixed with what is behind.
+    It has 4 bins of lightness and 8 x 8 bins of chroma, over the pixels well inside the mask, since edge pixels are mixed
+    with the background.
     """
     sure = inside > 0.9
     lab = cv2.cvtColor(square.astype(np.float32) / 255, cv2.COLOR_RGB2LAB)[sure if sure.any() else inside > 0.5]

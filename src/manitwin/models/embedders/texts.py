@@ -1,4 +1,4 @@
-"""Texts as vectors: by a model behind the embeddings API that OpenAI, vLLM, Ollama and others serve, or by a CLIP's files."""
+"""Text embeddings: from the embeddings API that OpenAI, vLLM, Ollama and others serve, or from the files of a CLIP model."""
 
 from __future__ import annotations
 
@@ -23,22 +23,23 @@ MOST_NUMBERS = 65536
 
 
 class TextEmbedder(Protocol):
-    """A model that embeds texts."""
+    """Protocol of a model that embeds texts."""
 
     @property
     def identity(self) -> str:
-        """What decides the vectors."""
+        """Identity of the model; it determines the vectors."""
         ...
 
     def embed(self, texts: Sequence[str]) -> np.ndarray:
-        """Return the unit vectors ``(N, D) float32`` of texts, in their order."""
+        """Return the unit vectors ``(N, D) float32`` of texts, in order."""
         ...
 
 
 class ServedTexts:
-    """Embed texts by one model at one server (https://platform.openai.com/docs/api-reference/embeddings/create).
+    """Text embeddings of a model on a server (https://platform.openai.com/docs/api-reference/embeddings/create).
 
-    Raises what ``HttpService`` does, and BadReply for an answer that is no finite vector for each text, all of one length.
+    Raises the errors of ``HttpService``, and BadReply unless the answer has one finite vector per text, all of the same
+    length.
     """
 
     def __init__(self, model: str, base_url: str, key: str | None, services: ServicesConfig):
@@ -49,11 +50,11 @@ class ServedTexts:
 
     @property
     def identity(self) -> str:
-        """What decides the vectors: server and model."""
+        """Identity of the model: server and model name."""
         return f"{self.base_url} {self.model}"
 
     def embed(self, texts: Sequence[str]) -> np.ndarray:
-        """Return the unit vectors ``(N, D) float32`` of texts, in their order."""
+        """Return the unit vectors ``(N, D) float32`` of texts, in order."""
         rows: list[np.ndarray] = []
         for begin in range(0, len(texts), BATCH):
             asked = list(texts[begin : begin + BATCH])
@@ -64,7 +65,7 @@ class ServedTexts:
         return np.array(rows, np.float32)
 
     def _vectors(self, data: Any, count: int) -> list[np.ndarray]:
-        """Read ``data[].embedding``, put in order by ``index``."""
+        """Read ``data[].embedding``, ordered by ``index``, and normalize the vectors."""
         found: dict[int, np.ndarray] = {}
         for each in data if isinstance(data, list) else ():
             values = each.get("embedding") if isinstance(each, dict) else None
@@ -81,27 +82,27 @@ class ServedTexts:
 
 
 class ClipTexts:
-    """Embed texts by the text network of a CLIP's folder (``ClipFolder``), on this machine."""
+    """Text embeddings of the text network in a CLIP folder (``ClipFolder``), computed locally."""
 
     def __init__(self, folder: Path):
-        """Look for its files; raises UsageError where they are not there."""
+        """Check the folder's files; raises UsageError if some are missing."""
         self._clip = ClipFolder(folder)
 
     @property
     def identity(self) -> str:
-        """What decides the vectors: the network and its vocabulary."""
+        """Identity of the model: digests of the network and its vocabulary."""
         digests = self._clip.sha256
         return f"clip {' '.join(digests[name] for name in (TEXT, 'vocab.json', 'merges.txt'))}"
 
     def embed(self, texts: Sequence[str]) -> np.ndarray:
-        """Return the unit vectors ``(N, D) float32`` of texts, in their order."""
+        """Return the unit vectors ``(N, D) float32`` of texts, in order."""
         return self._clip.texts(texts).astype(np.float32) if len(texts) else np.empty((0, 0), np.float32)
 
 
 def text_embedder(spec: str, services: ServicesConfig) -> TextEmbedder:
-    """Return the embedder of ``openai:MODEL``, ``openai:MODEL@URL`` or ``clip:FOLDER``.
+    """Return the embedder named by ``openai:MODEL``, ``openai:MODEL@URL`` or ``clip:FOLDER``.
 
-    Raises ConfigError without a model or a key, UsageError for a folder without a CLIP's files.
+    Raises ConfigError for a missing model or key, UsageError for a folder without the files of a CLIP model.
     """
     name, _, argument = spec.partition(":")
     if name == "clip" and argument:

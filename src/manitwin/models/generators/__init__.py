@@ -1,1 +1,1 @@
-"""Image or text to a mesh file, behind one job protocol (submit, poll, fetch) that local code and slow services share."""
+"""3D generators: an image or a text to a mesh file, behind one job protocol (submit, poll, fetch) for local code and services."""

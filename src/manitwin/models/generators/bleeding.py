@@ -1,4 +1,4 @@
-"""Colours of a cut-out continued past its outline: none of the background's are left in a texture."""
+"""Extension of an object's colours beyond its mask, so that a texture contains no background colours."""
 
 from __future__ import annotations
 
@@ -8,13 +8,16 @@ from scipy import ndimage
 
 
 def bled(colours: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Replace what is not well inside ``mask`` by the nearest colour that is."""
+    """Replace the colours of pixels that are not well inside ``mask`` by the nearest colour that is, smoothed.
+
+    ``colours`` is (H, W, 3), ``mask`` (H, W) bool.
+    """
     depth = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
-    # edge pixels mix object and background; thin parts keep their middle line
+    # edge pixels mix object and background; thin parts keep their centre line
     local = ndimage.maximum_filter(depth, size=1 + 2 * max(4, round(0.010 * max(mask.shape))))
     inset = max(3.5, 0.010 * max(mask.shape))
     inner = mask & (depth >= np.minimum(inset, 0.6 * local)) & (depth > 0)
-    del depth, local  # of a large photo 25 MB
+    del depth, local  # 25 MB for a large photo
     nearest = ndimage.distance_transform_edt(~inner, return_distances=False, return_indices=True)
     filled = colours[nearest[0], nearest[1]]
     soft = cv2.GaussianBlur(filled, (0, 0), 2.0)

@@ -1,8 +1,9 @@
-"""The generator ``command``: any program of the user's that writes a mesh.
+"""The generator ``command``: any user program that writes a mesh.
 
-``command:PROGRAM ARGUMENT...`` is split as a POSIX shell would split it, but no shell runs it: what is filled in for a
-placeholder stays one argument, whatever it holds. Placeholders: ``{image}`` the matted photo (PNG, RGBA), ``{text}``,
-``{out}`` the GLB or USDZ to write (its name ends in .glb), ``{seed}``, ``{folder}`` a scratch folder that is removed.
+``command:PROGRAM ARGUMENT...`` is split as a POSIX shell would split it, but no shell runs it: the value of a placeholder
+stays one argument, whatever characters it contains. Placeholders: ``{image}`` the matted photo (PNG, RGBA), ``{text}`` the
+text or name, ``{out}`` the GLB or USDZ file to write (its name ends in .glb), ``{seed}``, ``{folder}`` a scratch folder that
+is removed afterwards.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ PLACEHOLDER = re.compile(r"\{([a-z_]+)\}")
 PASSED = re.compile(r"PATH|HOME|LANG|TMPDIR|LD_LIBRARY_PATH|VIRTUAL_ENV|(CUDA|HF|CONDA)_.*|PYTHON.*")
 SECRET = re.compile(r"KEY|TOKEN|SECRET|PASSWORD", re.IGNORECASE)
 OPTION = "environment"
-TRY_LATER = 75  # EX_TEMPFAIL of sysexits.h: the program asks to be run again another time
+TRY_LATER = 75  # EX_TEMPFAIL of sysexits.h: the program asks to be run again later
 ENDED_BY_SIGNAL = 128
 TAIL_BYTES = 1 << 16
 FORMATS = ("glb", "usdz")
@@ -46,19 +47,19 @@ class _Ended:
 
 
 class CommandGenerator:
-    """Run a program that makes a mesh of an image or a text.
+    """Run a program that makes a mesh from an image or a text.
 
-    ``submit`` runs it to its end; jobs live as long as this object. It is given the variables of the environment that
-    ``PASSED`` names and those that the setting ``generate.options.environment`` names, and no others: no keys of other
-    services. HF_TOKEN is among them, since models with gated weights need it.
-    Raises ConfigError for a command that has no ``{out}``, neither ``{image}`` nor ``{text}``, or an unknown placeholder.
+    ``submit`` runs the program to its end; jobs live as long as this object. The program receives the environment variables
+    that match ``PASSED`` and those named by the setting ``generate.options.environment``, and no others, so that it sees no
+    keys of other services. HF_TOKEN is passed, since models with gated weights need it. Raises ConfigError for a command
+    without ``{out}``, without both ``{image}`` and ``{text}``, or with an unknown placeholder.
     """
 
     name = "command"
     written_name = "generated.glb"
-    """What the program writes to; its ending says of which kind it is to be."""
+    """Name of the file that the program writes; its suffix tells the program which format is expected."""
     needs: Resource = "gpu"
-    asked_with: frozenset[Asked] = IMAGE_OR_TEXT  # by what stands in the command; so as long as none is chosen
+    asked_with: frozenset[Asked] = IMAGE_OR_TEXT  # set per instance from the command's placeholders
 
     def __init__(self, command: str, config: BuildConfig):
         self.words = _words(command)
@@ -70,22 +71,23 @@ class CommandGenerator:
         self._takes = {name for word in self.words for name in PLACEHOLDER.findall(word)}
         self.asked_with = frozenset(
             {"image" if "image" in self._takes else "text"}
-        )  # beside a picture, {text} is the name
+        )  # if an image is given, {text} is the object's name
 
     @classmethod
     def from_spec(cls, argument: str, config: BuildConfig) -> CommandGenerator:
-        """Create it from what stands after ``command:``."""
+        """Create the generator from the part of a spec after ``command:``."""
         return cls(argument, config)
 
     def probe(self) -> str:
-        """Look for the program; raises Unavailable where it is not there."""
+        """Look for the program without running it; raises Unavailable if it is missing."""
         return f"{self.words[0]} is {self._program()}; it was not run"
 
     def submit(self, request: GenerationRequest) -> str:
         """Run the program to its end and return the job's id.
 
-        Raises Unavailable where it cannot be started, does not end in ``generate.max_wait_s``, is killed or asks to be
-        run later (exit status 75), and where it does not take what is asked; any other failure is a failed job.
+        Raises Unavailable if the program cannot be started, does not end within ``generate.max_wait_s``, is ended by a signal
+        or asks to be run later (exit status 75). Raises Unsupported if it takes a text and an image is given, or the reverse.
+        Any other failure is a failed job.
         """
         self._program()
         folder = Path(tempfile.mkdtemp(prefix="manitwin-command-"))
@@ -101,11 +103,11 @@ class CommandGenerator:
         return folder.name
 
     def poll(self, job_id: str) -> JobState:
-        """Return how the program ended; raises Gone for a job of another process."""
+        """Return the outcome of the program; raises Gone for a job of another process."""
         return self._job(job_id).state
 
     def fetch(self, job_id: str, folder: Path) -> Generated:
-        """Write the mesh below ``folder``; raises BadReply where the program left none."""
+        """Move the mesh into ``folder``; raises BadReply if the program wrote none."""
         made = self._job(job_id).folder / self.written_name
         try:
             self.check(made)
@@ -116,7 +118,7 @@ class CommandGenerator:
         return Generated(path, self.model, {"program": self.model})
 
     def check(self, made: Path) -> None:
-        """Raise BadReply for what is no mesh."""
+        """Raise BadReply if the written file is missing or not a mesh."""
         _check_mesh(made)
 
     def _job(self, job_id: str) -> _Ended:
@@ -165,9 +167,9 @@ class CommandGenerator:
                 stdout=output,
                 stderr=errors,
                 env=passed(os.environ, self.environment),
-                start_new_session=True,  # a Ctrl-C is for this process; the supervisor learns of it by the pipe
+                start_new_session=True,  # Ctrl-C reaches only this process; the supervisor notices by the pipe
             )
-        # leaving this block, also by an exception, closes the pipe, and the supervisor ends the program
+        # leaving this block, also by an exception, closes the pipe, upon which the supervisor ends the program
         with process:
             try:
                 return process.wait(self.max_wait_s)
@@ -200,7 +202,7 @@ class CommandGenerator:
 
 
 def passed(environment: Mapping[str, str], named: tuple[str, ...]) -> dict[str, str]:
-    """Return the variables that a program is given: those of ``PASSED`` and those that are named."""
+    """Return the environment variables that a program receives: those that match ``PASSED`` and those in ``named``."""
     return {name: value for name, value in environment.items() if name in named or PASSED.fullmatch(name)}
 
 
@@ -220,7 +222,7 @@ def _words(command: str) -> tuple[str, ...]:
 
 
 def _called(words: tuple[str, ...]) -> str:
-    """Return what a command is called: its program and script without their folders."""
+    """Return the display name of a command: its program and script without their folders."""
     named = [Path(word).name for word in words[:2] if not PLACEHOLDER.search(word) and not word.startswith("-")]
     return " ".join(named) or words[0]
 

@@ -1,8 +1,8 @@
 """The generator ``fal``: any image-to-3d or text-to-3d endpoint behind fal's queue.
 
-Contract of the queue: https://fal.ai/docs/api-reference/inference-api and .../documentation/model-apis/request-errors; an empty
-account answers 403 (github.com/fal-ai/fal, issue 1147). Read 2026-11. Not verified: what a key that is refused is told, and
-endpoints other than those of ``ENDPOINTS``; the mesh is the first address of a ``.glb`` in whatever they return.
+API of the queue: https://fal.ai/docs/api-reference/inference-api and .../documentation/model-apis/request-errors; an account
+without balance gets status 403 (github.com/fal-ai/fal, issue 1147). Read 2026-11. Not verified: the answer to a rejected key,
+and endpoints other than those of ``ENDPOINTS``; the mesh is the first address of a ``.glb`` file in the result.
 """
 
 from __future__ import annotations
@@ -23,17 +23,22 @@ from manitwin.models.services.http import HttpService, origin
 from manitwin.models.services.refusal import Gone, Refusal, refusal_by_status, words_of
 
 VENDOR = "https://queue.fal.run"
-# the queue's hosts as documented (.../inference-api/openapi/queue.json, "servers"): a key for one is good for the other
+# documented hosts of the queue (.../inference-api/openapi/queue.json, "servers"): a key for one is valid for the other
 VENDOR_HOSTS = ("queue.fal.run", "queue.falrun.com")
 KEY = "FAL_KEY"
 DEFAULT = "fal-ai/trellis"
 WORKING: dict[str, Literal["queued", "running"]] = {"IN_QUEUE": "queued", "IN_PROGRESS": "running"}
-MOST_PARTS = 100_000  # of a result that is searched for a mesh
+MOST_PARTS = 100_000  # maximum number of values of a result that are searched for a mesh
 
 
 @dataclass(frozen=True)
 class Endpoint:
-    """The input of an endpoint: the field of the picture and whether it is a list, a prompt, a seed below ``seeds``."""
+    """Input of an endpoint.
+
+    ``image`` is the field of the picture (None: takes no picture) and ``image_list`` whether it is a list; ``prompt`` tells
+    whether it takes a text; ``seeds`` is the exclusive upper bound of seeds (None: takes no seed); ``usd`` is the listed
+    price of a job.
+    """
 
     image: str | None
     image_list: bool = False
@@ -53,9 +58,10 @@ ENDPOINTS = {
 
 
 class FalGenerator(VendorGenerator):
-    """Have an endpoint of fal make a mesh; ``generate.options`` are added to its input.
+    """Make meshes with an endpoint of fal; ``generate.options`` are added to its input.
 
-    The addresses that a reply names to ask next are asked only on the host that was chosen, or on the queue's other one.
+    Addresses that a reply gives for follow-up requests are used only on the chosen host, or on the queue's other documented
+    host.
     """
 
     name = "fal"
@@ -76,46 +82,49 @@ class FalGenerator(VendorGenerator):
         hosts = [url]
         if url.startswith("https://") and urlsplit(url).netloc in VENDOR_HOSTS:
             hosts += [f"https://{host}" for host in VENDOR_HOSTS if f"https://{host}" != url]
-        # where a request that was taken is asked after
+        # services for follow-up requests about an accepted job
         self._begun = [self._served(host, key, config, sleep, _unless_failed) for host in hosts]
 
     @staticmethod
     def taken_by(endpoint: str) -> Endpoint:
-        """Return what an endpoint takes."""
+        """Return the input description of an endpoint."""
         return ENDPOINTS.get(endpoint) or _guessed(endpoint)
 
     @staticmethod
     def first_address(result: Any) -> str | None:
-        """Return the address of what was made, None where a result has none."""
+        """Return the address of the generated file, None if the result has none."""
         return first_glb(result)
 
     def priced_as(self, model: str) -> str:
-        """Return the name by which a missing price is asked for: prices are those of endpoints."""
+        """Return the name used in the error about a missing price: prices belong to endpoints."""
         return f"fal:{model}"
 
     def authorization(self, key: str | None) -> dict[str, str]:
-        """Return the headers that hold the key."""
+        """Return the headers that carry the key."""
         return {"Authorization": f"Key {key}"} if key else {}
 
     def probe(self) -> str:
-        """Ask for a request that cannot be, which only a valid key is told of (not documented; costs nothing)."""
+        """Ask for the status of a request that does not exist: only a valid key is told so (undocumented; costs nothing)."""
         app = "/".join(str(self.model).split("/")[:2])
-        with suppress(Gone):  # the answer that is hoped for
+        with suppress(Gone):  # the expected answer
             self._service.get_json(f"/{app}/requests/00000000-0000-0000-0000-000000000000/status")
         return "the queue takes the key"
 
     def submit(self, request: GenerationRequest) -> str:
-        """Put a request into the queue; raises Unsupported where the endpoint does not take what is asked."""
+        """Put a request into the queue and return its status and result addresses as job id.
+
+        Raises Unsupported if the endpoint does not take the kind of input.
+        """
         body = self._input(request) | self._options
         answer = submit_paid(self._service, f"/{self.model}", body, ("status_url", "response_url"))
-        # fal's addresses use the app without its path, so they are kept and not built from the request's id
+        # the addresses contain the app without its path, so they are stored instead of built from the request's id
         status, response = (checked_address(answer.get(n), "fal", n) for n in ("status_url", "response_url"))
         self._service_of(status)
         self._service_of(response)
         return f"{status} {response}"
 
     def poll(self, job_id: str) -> JobState:
-        """Return where a request stands; a complete one may be a failed one."""
+        """Return the state of a request; a completed request may have failed."""
         status_url, response_url = _addresses(job_id)
         status = self._service_of(status_url).get_json(status_url).get("status")
         if isinstance(status, str) and status in WORKING:
@@ -128,7 +137,7 @@ class FalGenerator(VendorGenerator):
         return JobState("done")
 
     def fetch(self, job_id: str, folder: Path) -> Generated:
-        """Write what was made below ``folder``."""
+        """Download the generated file into ``folder``."""
         response_url = _addresses(job_id)[1]
 
         def link() -> str:
@@ -173,7 +182,7 @@ class FalGenerator(VendorGenerator):
 
 
 def first_glb(result: Any) -> str | None:
-    """Return the first address in a result that is one of a GLB by its path, or that is said to be one beside it."""
+    """Return the first address in a result whose path ends in ``.glb``, or whose file name or content type says that it is a GLB."""
     for part in _parts(result):
         if isinstance(part, str) and _is_glb_address(part):
             return part
@@ -185,7 +194,7 @@ def first_glb(result: Any) -> str | None:
 
 
 def _parts(result: Any) -> Iterator[Any]:
-    """Go through a result in the order of its text, without recursion; at most ``MOST_PARTS``."""
+    """Iterate over the values of a nested result in document order, without recursion; at most ``MOST_PARTS``."""
     waiting = [result]
     for _ in range(MOST_PARTS):
         if not waiting:
@@ -212,14 +221,14 @@ def _addresses(job_id: str) -> tuple[str, str]:
 
 
 def _unless_failed(status: int, body: Any) -> Refusal | None:
-    """Read a refusal; what says that a request has failed for good is an answer, not a refusal."""
+    """Read a refusal; an answer that reports a permanently failed request is not one, so that it can be read as a result."""
     if status in (400, 422) or (status >= 500 and isinstance(body, Mapping) and "error_type" in body):
         return None
     return refusal_by_status(status, body)
 
 
 def _guessed(endpoint: str) -> Endpoint:
-    """Return what an endpoint that is not listed takes, by its name: a text, a picture, or either."""
+    """Guess from the name of an unlisted endpoint what it takes: a text, a picture, or either."""
     if "text-to-3d" in endpoint:
         return Endpoint(None, prompt=True)
     return Endpoint("image_url", prompt="image-to-3d" not in endpoint)

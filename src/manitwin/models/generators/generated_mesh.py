@@ -1,4 +1,4 @@
-"""Check and convert the mesh file that a generator made."""
+"""Validation and conversion of the mesh file that a generator produced."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from manitwin.geometry.poses import GLTF_TO_OBJECT
 from manitwin.geometry.repair.cascade import repair
 from manitwin.geometry.repair.surface import signed_volumes
 
-# of the cube over the bounding box's diagonal: a sheet of A4 paper has 8e-4, a needle of 1 x 1 x 1000 has 1e-6
+# of the cube of the bounding box's diagonal: a sheet of A4 paper has 8e-4, a needle of 1 x 1 x 1000 has 1e-6
 LEAST_VOLUME_SHARE = 1e-8
-# of the mesh's area that is part of the solid. Of 1,000 scraps of a bottle's 5,120 faces 0.29 is, of 200 0.02; of a mesh
-# that shows every face from both sides 0.5, of whole ones all but inner walls.
+# Share of the mesh's area that belongs to the repaired solid: 0.29 for 1,000 random faces of a bottle's 5,120, 0.02 for 200;
+# 0.5 for a mesh with each face doubled from both sides; everything but inner walls for intact meshes.
 LEAST_AREA_SHARE = 0.4
-MAX_TEXTURE_PX = 8192  # the largest that generators make; the mesh stage brings them down to its own limit
+MAX_TEXTURE_PX = 8192  # the largest that generators make; the mesh stage reduces textures to its own limit
 
 
 def flaw(path: Path) -> str | None:
-    """Return why a mesh file cannot be used, None where it can.
+    """Return why a mesh file cannot be used, None if it can.
 
-    It is read as the mesh stage reads it, and repaired with its default settings: unreadable or truncated files, meshes without
-    faces, with coordinates that are not finite, without extent or volume, and those that no repair closes to a watertight
-    solid, or only by leaving most of the surface out. An open sheet that repair can give a wall to (a bowl without thickness)
-    is not refused.
+    The file is read as the mesh stage reads it, and repaired with default settings. Refused are unreadable or truncated
+    files; meshes without faces, with non-finite coordinates, or without extent or volume; and meshes that no repair closes to
+    a watertight solid, or only one that leaves most of the surface out. An open surface that repair can thicken (a bowl
+    without wall thickness) is accepted.
     """
     try:
         parts = read_mesh(path).parts
@@ -58,10 +58,10 @@ def flaw(path: Path) -> str | None:
 
 
 def as_glb(path: Path) -> bytes:
-    """Return a mesh file as a Y-up GLB: one that is a GLB already stays as it is, byte for byte.
+    """Return a mesh file as a Y-up GLB; a GLB is returned unchanged, byte for byte.
 
-    Of any other format (USDZ) all meshes, textures and materials are kept, one part a mesh and material; lengths become
-    metres where the file says its unit. Raises BadReply where it cannot be read.
+    For other formats (USDZ) all meshes, textures and materials are kept, one part per mesh and material, and lengths are
+    converted to metres if the file states its unit. Raises BadReply if the file cannot be read.
     """
     try:
         if sniff(path).format == "glb":

@@ -1,11 +1,11 @@
-"""The generator ``hunyuan3d``: Hunyuan3D's own ``api_server.py``, 2.0 or 2.1, on a machine of one's own.
+"""The generator ``hunyuan3d``: a self-hosted server of Hunyuan3D's own ``api_server.py``, version 2.0 or 2.1.
 
-Contract: github.com/Tencent-Hunyuan/Hunyuan3D-2, api_server.py at 9cc41a37; github.com/Tencent-Hunyuan/Hunyuan3D-2.1,
-api_server.py at 0406efee and api_models.py at 4ebf83bc. It was read, not run. No key, no price.
+API: github.com/Tencent-Hunyuan/Hunyuan3D-2, api_server.py at 9cc41a37; github.com/Tencent-Hunyuan/Hunyuan3D-2.1,
+api_server.py at 0406efee and api_models.py at 4ebf83bc. The sources were read, not run. No key, no price.
 
-``/send`` and ``/status`` tell neither of a failure nor, in 2.1, of an untextured mesh that is done; ``/generate`` answers when it
-is done and tells of a failure. So a job goes by ``/send`` where it can be told done (2.0 untextured, 2.1 textured), else by
-``/generate``.
+``/send`` and ``/status`` report no failures and, in 2.1, do not report that an untextured mesh is finished; ``/generate``
+answers when the mesh is finished and reports failures. Therefore a job uses ``/send`` where completion is reported (2.0
+untextured, 2.1 textured), otherwise ``/generate``.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ from manitwin.models.services.http import HttpService
 from manitwin.models.services.keys import split_url
 from manitwin.models.services.refusal import Gone, Refusal, refusal_by_status
 
-VENDOR = "http://localhost:8081"  # the port that api_server.py listens on by itself
+VENDOR = "http://localhost:8081"  # default port of api_server.py
 VERSION = "2.1"
 OPTIONS = {
     "2.0": ("texture", "octree_resolution", "num_inference_steps", "guidance_scale", "face_count"),
     "2.1": ("texture", "octree_resolution", "num_inference_steps", "guidance_scale", "face_count", "num_chunks"),
 }
 SEEDS = 2**32
-MAX_ANSWER_BYTES = 384 << 20  # a mesh of 288 MiB in base 64; all of it is held in memory, twice while it is read
+MAX_ANSWER_BYTES = 384 << 20  # a mesh of 288 MiB in base64, held in memory, twice while it is parsed
 WORKING = {"processing": "running", "texturing": "running"}
 
 
 class Hunyuan3dGenerator:
-    """Have a Hunyuan3D server make a mesh, textured unless ``generate.options.texture`` is false.
+    """Make meshes with a Hunyuan3D server, textured unless ``generate.options.texture`` is false.
 
-    A job of ``/send`` survives a restart; one that failed at the server stays under way until ``generate.max_wait_s``. One of
-    ``/generate`` is done by the time that ``submit`` returns, and lives as long as this object.
+    A job of ``/send`` survives a restart of this process; if it failed at the server, it appears to be running until
+    ``generate.max_wait_s``. A job of ``/generate`` is finished when ``submit`` returns, and lives as long as this object.
     """
 
     name = "hunyuan3d"
@@ -70,12 +70,12 @@ class Hunyuan3dGenerator:
 
     @classmethod
     def from_spec(cls, argument: str, config: BuildConfig) -> Hunyuan3dGenerator:
-        """Create it from ``2.0@URL`` or ``2.1@URL``, each with a default."""
+        """Create the generator from ``2.0@URL`` or ``2.1@URL``; version and URL are optional."""
         version, url = split_url(argument)
         return cls(version or VERSION, url or VENDOR, config)
 
     def probe(self) -> str:
-        """Ask 2.1 for its health, 2.0, which cannot tell, for the status of no job."""
+        """Query the health of a 2.1 server; a 2.0 server has no health check and is asked for the status of an unknown job."""
         if self.version == "2.1":
             status = self._service.get_json("/health").get("status")
             if status != "healthy":
@@ -85,7 +85,7 @@ class Hunyuan3dGenerator:
         return "the server answers"
 
     def submit(self, request: GenerationRequest) -> str:
-        """Submit a picture; raises Unsupported for a text, which neither server takes."""
+        """Submit a picture; raises Unsupported for a text, which neither server version takes."""
         if request.rgba is None:
             raise Unsupported(
                 f"hunyuan3d cannot make a mesh from text ({request.text!r}): its server loads no text model;"
@@ -95,12 +95,12 @@ class Hunyuan3dGenerator:
         if self.version == "2.0":
             body["type"] = "glb"
         else:
-            body["remove_background"] = False  # the photo is cut out already
+            body["remove_background"] = False  # the photo is already matted
         told_when_done = bool(self._options["texture"]) == (self.version == "2.1")
         return self._send(body) if told_when_done else self._generate(body)
 
     def poll(self, job_id: str) -> JobState:
-        """Return where a job stands; raises Gone for one of ``/generate`` that another process had."""
+        """Return the state of a job; raises Gone for a ``/generate`` job of another process."""
         how, uid = self._parts(job_id)
         if how == "generate" or job_id in self._made:
             return JobState("done")
@@ -109,7 +109,7 @@ class Hunyuan3dGenerator:
         if status == "completed":
             self._made[job_id] = _model(answer)
             return JobState("done")
-        if status == "error":  # of forks; the servers above have no such state
+        if status == "error":  # a state of forks; the servers above do not have it
             return JobState("failed", self._service.said(str(answer.get("message") or "")))
         if not isinstance(status, str) or status not in WORKING:
             raise BadReply(
@@ -131,7 +131,7 @@ class Hunyuan3dGenerator:
 
     def _generate(self, body: Mapping[str, Any]) -> str:
         made = self._patient.ask("POST", "/generate", body=body, pays=True, max_bytes=MAX_ANSWER_BYTES)
-        # by what was asked: no job of another process can be taken for this one
+        # derived from the request, so that a job of another process cannot be mistaken for this one
         job_id = f"generate:{hashlib.sha256(json.dumps(body, sort_keys=True).encode()).hexdigest()[:32]}"
         self._made[job_id] = made
         return job_id
@@ -157,7 +157,7 @@ class Hunyuan3dGenerator:
 
 
 def _refusal(status: int, body: Any) -> Refusal | None:
-    """Read a refusal; every failure of a job is a 404 with the same words (api_server.py, ``generate``)."""
+    """Read a refusal; every failed job is a 404 with the same message (api_server.py, ``generate``)."""
     if status == 404 and isinstance(body, Mapping) and "error_code" in body:
         return Refusal(
             f"the job failed, and the server says only {str(body.get('text'))[:80]!r}; its own log says why. A texture needs"

@@ -1,7 +1,8 @@
 """The generator ``meshy``: Meshy's image-to-3d and text-to-3d.
 
-Contract: https://docs.meshy.ai/api/image-to-3d, https://docs.meshy.ai/api/text-to-3d, https://docs.meshy.ai/api/errors and
-https://docs.meshy.ai/api/balance, read 2026-11. Not verified: that a PNG's alpha is used as the mask; models newer than meshy-6.
+API: https://docs.meshy.ai/api/image-to-3d, https://docs.meshy.ai/api/text-to-3d, https://docs.meshy.ai/api/errors and
+https://docs.meshy.ai/api/balance, read 2026-11. Not verified: that the alpha channel of a PNG is used as the mask; models
+newer than meshy-6.
 """
 
 from __future__ import annotations
@@ -25,15 +26,15 @@ LONGEST_TEXT = 600  # characters of a prompt, as documented
 OF_REFINE = frozenset({"enable_pbr", "hd_texture", "texture_prompt", "texture_image_url", "remove_lighting"})
 OF_BOTH = frozenset({"moderation", "auto_size", "origin_at"})
 STATES = {"PENDING": "queued", "IN_PROGRESS": "running", "SUCCEEDED": "done", "FAILED": "failed", "CANCELED": "failed"}
-PAGE = 50  # tasks of a page of the list: the most that is documented
+PAGE = 50  # tasks per page of the list; the documented maximum
 PAGES = 20
 
 
 class MeshyGenerator(VendorGenerator):
-    """Have Meshy make a textured mesh; ``generate.options`` are added to what is asked.
+    """Make textured meshes with Meshy; ``generate.options`` are added to the request.
 
-    A text takes two paid tasks, a preview and the refine that textures it, as one job named by its preview. A process that
-    takes a job over looks for the refine among the account's latest tasks, by its text, before it asks for one.
+    A text takes two paid tasks, a preview and a refine task that textures it; the job is identified by the preview. A process
+    that takes over a job looks for the refine task among the account's latest tasks, by its text, before it submits one.
     """
 
     name = "meshy"
@@ -45,18 +46,18 @@ class MeshyGenerator(VendorGenerator):
         self, model: str, url: str, key: str | None, config: BuildConfig, sleep: Callable[[float], None] = time.sleep
     ):
         super().__init__(model, url, key, config, sleep)
-        self._own_previews: set[str] = set()  # begun by this object and not yet refined
+        self._own_previews: set[str] = set()  # submitted by this object and not yet refined
         self._refines: dict[str, str] = {}
 
     def probe(self) -> str:
-        """Ask for the balance."""
+        """Query the account's balance."""
         balance = number(self._service.get_json(BALANCE).get("balance"))
         if balance is None:
             raise BadReply("meshy: its answer about the balance has no 'balance'")
         return f"{balance:g} credits left"
 
     def submit(self, request: GenerationRequest) -> str:
-        """Submit a task; raises Rejected for a text that is longer than Meshy takes."""
+        """Submit a task; raises Rejected for an empty text or one that is longer than Meshy takes."""
         if request.rgba is not None:
             body = {
                 "image_url": data_uri(request.rgba),
@@ -78,7 +79,7 @@ class MeshyGenerator(VendorGenerator):
         return job_id
 
     def poll(self, job_id: str) -> JobState:
-        """Return where a job stands; a text whose preview is done is refined."""
+        """Return the state of a job; for a text, a finished preview is followed by a refine task."""
         kind, id = _parts(job_id)
         if kind == "image":
             return _state(self._task(IMAGE, id))
@@ -91,7 +92,7 @@ class MeshyGenerator(VendorGenerator):
         return _state(self._task(TEXT, self._refines[id]))
 
     def fetch(self, job_id: str, folder: Path) -> Generated:
-        """Write the GLB below ``folder``."""
+        """Download the GLB into ``folder``."""
         kind, id = _parts(job_id)
         place, tasks = IMAGE, [id]
         if kind == "text":
@@ -105,7 +106,7 @@ class MeshyGenerator(VendorGenerator):
         return Generated(path, self.model, {"consumed_credits": sum(credits)} if credits else {})
 
     def _refine(self, preview: Mapping[str, Any]) -> None:
-        """Find the refine of a preview that another process may have asked for, else ask for it."""
+        """Find the refine task of a preview that another process may have submitted, otherwise submit one."""
         id, text = str(preview["id"]), str(preview.get("prompt") or "")
         body: dict[str, Any] = {
             "mode": "refine",
@@ -115,11 +116,11 @@ class MeshyGenerator(VendorGenerator):
             "target_formats": ["glb"],
         }
         if text and "texture_image_url" not in self._options:
-            body["texture_prompt"] = text  # the list of tasks gives it back: by it a refine is found again
+            body["texture_prompt"] = text  # the list of tasks returns this text, which identifies the refine task
         body |= {name: value for name, value in self._options.items() if name in OF_REFINE | OF_BOTH}
         if id in self._own_previews:
             found = None
-            self._own_previews.discard(id)  # an answer that is lost now is looked for in the list
+            self._own_previews.discard(id)  # if this answer is lost, the next attempt looks in the list
         else:
             found = self._refine_among_latest(preview, str(body.get("texture_prompt", text)))
         self._refines[id] = found or self._submit(TEXT, body)

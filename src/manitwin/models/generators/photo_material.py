@@ -1,4 +1,4 @@
-"""The material of meshes that are coloured by photos."""
+"""Material of meshes that are textured from photos."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from PIL import Image
 from trimesh.visual.material import PBRMaterial
 
 ROUGHNESS = 0.6
-"""Between a glossy and a matt surface: a photo does not tell, and its own highlights are in the texture already."""
+"""Between glossy and matt: a photo does not tell the roughness, and its highlights are already in the texture."""
 
 
 def photo_material(texture: np.ndarray) -> PBRMaterial:
-    """Return the glTF material whose base colour is ``texture (H, W, 3) uint8`` sRGB; not metallic."""
+    """Return the non-metallic glTF material whose base colour is ``texture (H, W, 3) uint8`` sRGB."""
     return PBRMaterial(
         name="photo",
         baseColorFactor=[255, 255, 255, 255],

@@ -1,4 +1,4 @@
-"""The protocol of a 3D generator."""
+"""Protocol of a 3D generator: requests, jobs and results."""
 
 from __future__ import annotations
 
@@ -13,19 +13,20 @@ from manitwin.formats.camera_poses.posed_camera import PosedCamera
 from manitwin.twin.import_record import ImportRecord
 
 Asked = Literal["image", "text"]
-"""What a generator may be asked with."""
+"""Kind of input that a generator takes."""
 MOST_PHOTOS = 72
-"""Of one thing, every 5 degrees: more say nothing new of its shape, and all are held in memory at once."""
+"""Maximum number of photos of one object, one every 5 degrees: more add nothing about its shape and take memory."""
 IMAGE_OR_TEXT: frozenset[Asked] = frozenset({"image", "text"})
 
 
 @dataclass(frozen=True)
 class PhotoView:
-    """One of several photos of a thing: its file's name, ``rgba (H, W, 4) uint8`` matted, and where it was taken from.
+    """One of several photos of an object: its file name, the matted photo ``rgba (H, W, 4) uint8``, and its camera.
 
-    ``turn_deg`` is the camera's turn about the vertical, counter-clockwise seen from above, that of the first given photo 0; None
-    where nobody states it. ``focal_mm`` is the lens as 35 mm equivalent, None where the photo does not state it. ``pose`` is the
-    camera where a file states it: its world has z up, its lens is that of the uncropped photo; ``turn_deg`` is then as it says.
+    ``turn_deg`` is the camera's rotation about the vertical, counter-clockwise seen from above, 0 for the first photo; None
+    if not stated. ``focal_mm`` is the 35 mm equivalent focal length, None if the photo does not state it. ``pose`` is the
+    camera pose if a file states it: its world frame has z up and its intrinsics are those of the uncropped photo;
+    ``turn_deg`` then agrees with it.
     """
 
     name: str
@@ -37,14 +38,16 @@ class PhotoView:
 
 @dataclass(frozen=True)
 class GenerationRequest:
-    """A request for a mesh of a photo, several photos of one thing, or a text.
+    """Request for a mesh of a photo, several photos of one object, or a text.
 
-    ``rgba`` is the matted photo, ``(H, W, 4) uint8`` upright sRGB whose alpha is the object's mask, or None where ``text`` is
-    given. ``name`` is what the user says it is, or with ``guessed`` what a classifier takes it for. ``seed`` makes the answer
-    repeatable where the generator can. ``views`` are all photos where there are several, ``rgba`` the first of them; only a
-    generator that ``takes_views`` is given them. ``focal_mm`` is the lens of ``rgba`` as 35 mm equivalent, where it is stated.
-    ``likely`` are the names that a thing without one may have, each with its probability, the likeliest first. ``unit_m`` is how
-    many metres the unit of the views' poses is, None where nobody knows.
+    - ``rgba``: the matted photo, ``(H, W, 4) uint8`` upright sRGB with the object's mask as alpha; None if ``text`` is given
+    - ``name``: name of the object as given by the user, or predicted by a classifier if ``guessed``
+    - ``seed``: makes the result repeatable if the generator supports it
+    - ``views``: all photos if there are several, with ``rgba`` the first of them; only passed to a generator with
+      ``takes_views``
+    - ``focal_mm``: 35 mm equivalent focal length of ``rgba``, if stated
+    - ``likely``: candidate names of an unnamed object with their probabilities, the most probable first
+    - ``unit_m``: length in metres of the unit of the views' poses, None if unknown
     """
 
     rgba: np.ndarray | None
@@ -60,7 +63,7 @@ class GenerationRequest:
 
 @dataclass(frozen=True)
 class JobState:
-    """The state of a job; ``message`` says why it failed, in the generator's own words."""
+    """State of a job; ``message`` is the generator's reason for a failure."""
 
     state: Literal["queued", "running", "done", "failed"]
     message: str = ""
@@ -68,11 +71,12 @@ class JobState:
 
 @dataclass(frozen=True)
 class Generated:
-    """A mesh file (GLB or USDZ, any scale) and what the generator says about how it was made.
+    """A generated mesh file (GLB or USDZ, any scale) and the generator's notes on how it was made.
 
-    ``metric``: its units are true metres. ``rests``: it stands or lies on y = 0 as such a thing does, so that its pose is kept.
-    ``unseen_share``: how much of its surface the photo does not show and no model knows; None where the generator does not say.
-    ``known``: what the generator knows of the thing by construction, in the object frame (Z up) of its mesh.
+    - ``metric``: its unit is the true metre
+    - ``rests``: it stands or lies on y = 0 in its natural pose, so the pose is kept
+    - ``unseen_share``: share of the surface that neither the photo nor a model determines; None if the generator does not say
+    - ``known``: what the generator knows about the object by construction, in the object frame (Z up) of its mesh
     """
 
     path: Path
@@ -85,17 +89,17 @@ class Generated:
 
 
 class Generator(Protocol):
-    """Turn an image or a text into a mesh. ``usd_per_job`` is what a job costs, ``model`` what makes it, where that is known.
+    """Protocol of a generator that turns an image or a text into a mesh.
 
-    ``asked_with`` says which of the two it takes; one that does not say takes both. What it cannot take is refused before
-    anything is built.
+    ``model`` names the model if known, and ``usd_per_job`` is the price of a job. ``asked_with`` lists the kinds of input
+    that the generator takes, both if the attribute is missing; other inputs are refused before anything is built.
 
-    One that makes a mesh of several photos of a thing has ``takes_views = True``; any other is given the first of them alone.
+    A generator that uses several photos of an object has ``takes_views = True``; others get only the first photo. A generator
+    that supports only some texts also has ``why_not(text)``, which returns why it cannot make a text, or None if it can.
 
-    One that makes only some texts has ``why_not(text)`` too, which says why it never makes one; None where it does.
-
-    ``submit`` returns a job id that survives a restart of this process wherever the generator can keep it; ``fetch`` may be
-    called once ``poll`` says done and writes below ``folder``. Raises BackendError, or Rejected where the input is at fault.
+    ``submit`` returns a job id that survives a restart of this process if the generator supports that. ``fetch`` may be
+    called once ``poll`` returns done, and writes into ``folder``. The methods raise BackendError, or Rejected if the input is
+    at fault.
     """
 
     name: str
@@ -109,9 +113,9 @@ class Generator(Protocol):
         ...
 
     def poll(self, job_id: str) -> JobState:
-        """Return where the job stands."""
+        """Return the state of a job."""
         ...
 
     def fetch(self, job_id: str, folder: Path) -> Generated:
-        """Write the finished mesh below ``folder``."""
+        """Write the finished mesh into ``folder``."""
         ...

@@ -1,10 +1,10 @@
 """Rodin by Hyper3D (Deemos), the product of the paper's CLAY: ``rodin``, ``rodin:TIER``, ``rodin:TIER@URL``.
 
-Contract: developer.hyper3d.ai, api-specification/{rodin-generation, rodin-gen2.5, check-status, download-results,
-check-balance}, as stored in November 2026 at the latest. Verified there: fields, enums, seed range, states, answers. Not
-verified: which HTTP status comes with which error code, how a task is refused whose data has been deleted (after 7 days),
-and that ``use_original_alpha`` works for every tier. The codes beyond the vendor's own list (IMAGE_CONTENT_VIOLATION,
-PARALLELISM_LIMIT_REACHED, the prefix API_) are those that public clients of the service handle.
+API: developer.hyper3d.ai, api-specification/{rodin-generation, rodin-gen2.5, check-status, download-results, check-balance},
+as archived up to November 2026. Verified there: fields, enums, seed range, states, answers. Not verified: which HTTP status
+comes with which error code, the refusal of a task whose data has been deleted (after 7 days), and that ``use_original_alpha``
+works for every tier. The codes beyond the vendor's own list (IMAGE_CONTENT_VIOLATION, PARALLELISM_LIMIT_REACHED, the prefix
+API_) are those that public clients of the service handle.
 """
 
 from __future__ import annotations
@@ -39,10 +39,11 @@ OF_THE_INPUT = {"IMAGE_CONTENT_VIOLATION", "OBJECT_NOT_FOUND_ON_IMAGE"}
 
 
 class RodinGenerator(VendorGenerator):
-    """Ask Rodin for a textured mesh of an image or a text.
+    """Make textured meshes of an image or a text with Rodin.
 
-    Settings ``generate.options`` go into the form as they are; ``geometry_file_format`` may be glb or usdz (the paper's).
-    The key is RODIN_API_KEY or HYPER3D_API_KEY. Raises ConfigError for an unknown tier or format, and without key or price.
+    Settings ``generate.options`` are passed on as form fields; ``geometry_file_format`` may be glb or usdz (as in the paper).
+    The key is RODIN_API_KEY or HYPER3D_API_KEY. Raises ConfigError for an unknown tier or format, and for a missing key or
+    price.
     """
 
     name = "rodin"
@@ -63,18 +64,18 @@ class RodinGenerator(VendorGenerator):
             raise ConfigError(choose_from("geometry_file_format of rodin", self._format, READABLE))
 
     def probe(self) -> str:
-        """Ask for the account's credits."""
+        """Query the account's credits."""
         balance = number(self._service.get_json("check_balance").get("balance"))
         if balance is None:
             raise BadReply("rodin: its answer about the balance has no 'balance'")
         return f"{balance:g} credits left"
 
     def submit(self, request: GenerationRequest) -> str:
-        """Start a task; its id holds what another process needs to poll and to download it."""
+        """Start a task and return an id that contains what another process needs to poll and download it."""
         fields = {**self._fields, "seed": str(request.seed % SEEDS)}
         files = []
         if request.rgba is not None:
-            fields.setdefault("use_original_alpha", "true")  # the object is cut out already
+            fields.setdefault("use_original_alpha", "true")  # the photo is already matted
             files = [FormFile("images", "image.png", png_of(request.rgba), "image/png")]
         elif request.text is not None:
             fields["prompt"] = request.text
@@ -86,7 +87,7 @@ class RodinGenerator(VendorGenerator):
         return json.dumps([task, subscription])
 
     def poll(self, job_id: str) -> JobState:
-        """Return done once all jobs of the task are, failed where one is; the vendor gives no reasons."""
+        """Return done if all jobs of the task are done, failed if one of them failed; the vendor gives no reasons."""
         answer = self._service.post_json("status", {"subscription_key": json.loads(job_id)[1]})
         jobs = answer.get("jobs")
         if not isinstance(jobs, list) or not all(isinstance(job, dict) for job in jobs):
@@ -99,7 +100,7 @@ class RodinGenerator(VendorGenerator):
         return JobState("running" if states - {"Waiting"} else "queued")
 
     def fetch(self, job_id: str, folder: Path) -> Generated:
-        """Download the model; links are valid for ten minutes and are asked for anew once."""
+        """Download the model; links are valid for ten minutes and are renewed once."""
         path = folder / f"rodin.{self._format}"
         self._service.download(self._link(job_id), path, fresh_url=lambda: self._link(job_id))
         return Generated(path, self.model, {"format": self._format})
@@ -115,7 +116,7 @@ class RodinGenerator(VendorGenerator):
 
 
 def refusal_of(status: int, body: Any) -> Refusal | None:
-    """Read Rodin's ``{"error": CODE, "message": ...}``; "OK" and null are no error."""
+    """Read Rodin's ``{"error": CODE, "message": ...}``; the codes "OK" and null are no errors."""
     code = body.get("error") if isinstance(body, dict) else None
     if code in (None, "", "OK"):
         return refusal_by_status(status, body)
@@ -127,7 +128,7 @@ def refusal_of(status: int, body: Any) -> Refusal | None:
         return Refusal(message, "input")
     if plain == "PARALLELISM_LIMIT_REACHED":
         return Refusal(message, "busy")
-    if status < 400:  # a code that is not known, in an answer that looks like success
+    if status < 400:  # an unknown code in an answer with a success status
         return Refusal(message, "down" if plain == "UNKNOWN" else "bad")
     return Refusal(message, kind_of_status(status))
 

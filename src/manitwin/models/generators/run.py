@@ -1,4 +1,4 @@
-"""Drive a generator's job to its end, across crashes, without paying for it twice."""
+"""Run a generator's job to its end, across crashes of this process, without paying for it twice."""
 
 from __future__ import annotations
 
@@ -35,19 +35,18 @@ def run_generator(
     sleep: Callable[[float], None] = time.sleep,
     flaw_of: Callable[[Path], str | None] = flaw,
 ) -> Generated:
-    """Return the mesh that ``request`` gives, written below ``folder``.
+    """Return the mesh for ``request``, written into ``folder``.
 
     A job that was submitted before is polled again. Waits double from 1 s to 30 s and add up to at most
-    ``settings.max_wait_s`` (waits are counted, not the clock). A job that fails, or whose mesh cannot be used
-    (``flaw_of``, for meshes the failure classes of the paper's "Asset Generation"), is asked again with the next seed,
-    ``settings.attempts`` times in all. A job that the service no longer knows is submitted again. Jobs of services
-    (``needs`` "generator") are remembered, also after success, with what they cost: a crash before the result is stored
-    loses neither. ``submit_again`` allows what may pay twice: to submit again where an earlier submit of a paid job
-    was broken off before its answer came.
+    ``settings.max_wait_s`` (the sum of the waits, not clock time). A job that fails, or whose mesh is unusable, is repeated
+    with the next seed, up to ``settings.attempts`` times in total; ``flaw_of`` tells whether a mesh is unusable, for meshes
+    by the failure classes of the paper's "Asset Generation". A job that the service no longer knows is submitted again. Jobs
+    of services (``needs`` "generator") are stored with their cost, also after success, so that a crash before the result is
+    stored loses neither. ``submit_again`` permits what may be paid for twice: to submit again after a paid submit that was
+    interrupted before its answer arrived.
 
-    Raises Rejected ``generator_failed`` with what was wrong at every attempt, Unavailable where a job does not finish
-    (it stays remembered), BadReply where a broken-off submit is remembered or no file is left, and what the generator
-    itself raises.
+    Raises Rejected ``generator_failed`` with the reason for every attempt, Unavailable if a job does not finish (it stays
+    stored), BadReply if an interrupted submit is stored or no file was written, and the errors of the generator itself.
     """
     service = generator.needs == "generator"
     drive = _Drive(
@@ -62,7 +61,7 @@ def run_generator(
     try:
         return _driven(drive, request, settings.attempts, submit_again)
     except (Exception, KeyboardInterrupt):
-        drive.settle()  # whoever runs this counts what was charged, as it ends by an error and not by a crash
+        drive.settle()  # the caller counts the charges after an error, unlike after a crash
         raise
 
 
@@ -85,7 +84,7 @@ def _driven(drive: _Drive, request: GenerationRequest, attempts: int, submit_aga
 
 
 def request_digest(generator: Generator, request: GenerationRequest, settings: GenerateConfig) -> str:
-    """Return the name under which a request's job is remembered: what is asked, and of what."""
+    """Return the digest under which a request's job is stored; it covers the request, the generator, its model and its options."""
     asked: dict[str, Any] = {
         "generator": generator.name,
         "model": generator.model,
@@ -108,15 +107,15 @@ def request_digest(generator: Generator, request: GenerationRequest, settings: G
 
 
 class _Failed(Exception):
-    """An attempt that came to nothing, in words for a person."""
+    """A failed attempt, with a message for the user."""
 
 
 @dataclass(frozen=True)
 class _Note:
-    """The state of a request: which attempt, its job, and why the earlier attempts came to nothing.
+    """Stored state of a request: the number of the attempt, its job, and the reasons why earlier attempts failed.
 
-    ``submitting`` is true while a submit is under way: it is what a crash in the middle of one leaves. ``unsettled_usd`` was
-    charged by a process that may have crashed before anybody counted it: the next one charges it again.
+    ``submitting`` is true while a submit is in progress, so it stays true after a crash during one. ``unsettled_usd`` was
+    charged by a process that may have crashed before the amount was counted; the next process charges it again.
     """
 
     attempt: int = 0
@@ -143,7 +142,7 @@ class _Drive:
     kept: _Note | None = None
 
     def recalled(self, submit_again: bool) -> _Note:
-        """Return what is remembered of the request; raises BadReply for a submit of unknown outcome."""
+        """Return the stored state of the request; raises BadReply for a paid submit of unknown outcome, unless ``submit_again``."""
         text = self.jobs.recall(self.digest)
         if text is None:
             return _Note()
@@ -157,10 +156,10 @@ class _Drive:
         return replace(note, submitting=False)
 
     def submitted(self, request: GenerationRequest, note: _Note) -> _Note:
-        """Submit a job and remember it; what it costs is charged once it may have been taken."""
+        """Submit a job and store it; its cost is charged as soon as the service may have accepted it."""
         usd = self.generator.usd_per_job
         if usd:
-            # a crash from here on leaves a note that says so
+            # a crash from here on leaves a note with ``submitting`` set
             self._keep(replace(note, submitting=True, unsettled_usd=note.unsettled_usd + usd))
         try:
             job_id = self.generator.submit(request)
@@ -179,7 +178,7 @@ class _Drive:
         return note
 
     def result(self, job_id: str) -> Generated:
-        """Return the mesh of a job; raises _Failed, Gone, Unavailable."""
+        """Return the mesh of a job; raises _Failed, Gone, Unavailable, and BadReply if no file was written."""
         self._wait_for(job_id)
         generated = self.generator.fetch(job_id, self.folder)
         if not generated.path.is_file() or generated.path.stat().st_size == 0:
@@ -206,12 +205,12 @@ class _Drive:
             raise _Failed(job.message or "its job failed and it gave no reason")
 
     def settle(self) -> None:
-        """Note that what was charged is counted."""
+        """Record that the charges have been counted."""
         if self.kept is not None and self.kept.unsettled_usd:
             self._keep(replace(self.kept, unsettled_usd=0.0))
 
     def forget(self) -> None:
-        """Drop what is remembered."""
+        """Delete the stored state."""
         self.jobs.forget(self.digest)
         self.kept = None
 

@@ -1,10 +1,10 @@
-"""Tripo (VAST): ``tripo``, ``tripo:MODEL_VERSION``, ``tripo:MODEL_VERSION@URL``; the vendor's API v2.
+"""Tripo (VAST): ``tripo``, ``tripo:MODEL_VERSION``, ``tripo:MODEL_VERSION@URL``; version 2 of the vendor's API.
 
-Contract: docs.tripo3d.ai (get-started/errors-and-error-handling, other/support-faq, model-generation, file-upload) and the
-vendor's own client VAST-AI-Research/tripo-python-sdk be675df, as stored in November 2026 at the latest. Verified there:
-fields, states, error codes and their HTTP statuses, links that expire after five minutes, failed tasks that cost nothing.
-Two paths for uploads are documented, ``/upload`` (the vendor's client) and ``/upload/sts`` (its pages): the first is used.
-Not verified: how a picture's alpha is used. A version 3 of the API exists beside this one.
+API: docs.tripo3d.ai (get-started/errors-and-error-handling, other/support-faq, model-generation, file-upload) and the
+vendor's own client VAST-AI-Research/tripo-python-sdk be675df, as archived up to November 2026. Verified there: fields,
+states, error codes and their HTTP statuses, links that expire after five minutes, failed tasks that cost nothing. Two paths
+for uploads are documented, ``/upload`` (the vendor's client) and ``/upload/sts`` (its pages): the first is used. Not
+verified: how the alpha channel of a picture is used. Version 3 of the API is not used.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ URL = "https://api.tripo3d.ai/v2/openapi"
 KEYS = ("TRIPO_API_KEY",)
 DEFAULT_MODEL = "v2.5-20250123"
 SEEDS = 1 << 31
-# Tripo makes FBX of the first, quantised meshes of the second, and no textures with the third
+# these options produce FBX files, quantised meshes, and meshes without textures
 UNREADABLE = ("quad", "compress", "generate_parts")
-# docs.tripo3d.ai/get-started/pricing.html, as stored in November 2026: an image to a textured model (a text costs 10
-# credits less); "H2 / H3" there are the versions v2 and v3. $1 is 100 credits.
+# docs.tripo3d.ai/get-started/pricing.html, as archived in November 2026: image to textured model (a text costs 10 credits
+# less); "H2 / H3" there are the versions v2 and v3. $1 is 100 credits.
 CREDITS = {"v2.": 30, "v3.": 30, "P1-": 50}
 MORE_CREDITS = {("texture_quality", "detailed"): 10, ("smart_low_poly", True): 10}
 UNPRICED = ("geometry_quality",)
@@ -41,10 +41,10 @@ NO_CREDIT, NO_TASK, REFUSED_INPUT, TOO_MANY = 2010, 2001, 2008, 2000
 
 
 class TripoGenerator(VendorGenerator):
-    """Ask Tripo for a textured mesh of an image or a text.
+    """Make textured meshes of an image or a text with Tripo.
 
-    Settings ``generate.options`` go into the task as they are; with ``auto_size = true`` the mesh is taken to be in true
-    metres. The key is TRIPO_API_KEY. Raises ConfigError for options whose mesh cannot be read, and without key or price.
+    Settings ``generate.options`` are added to the task; with ``auto_size = true`` the mesh is taken to be in true metres. The
+    key is TRIPO_API_KEY. Raises ConfigError for options whose meshes cannot be read, and for a missing key or price.
     """
 
     name = "tripo"
@@ -64,7 +64,7 @@ class TripoGenerator(VendorGenerator):
             raise ConfigError(f"generator tripo: meshes of generate.options.{wrong[0]} cannot be read; leave it out")
 
     def probe(self) -> str:
-        """Ask for the account's credits."""
+        """Query the account's credits."""
         balance = number(self._data(self._service.get_json("user/balance"), "balance")["balance"])
         if balance is None:
             raise BadReply("tripo: its answer about the balance has no 'balance'")
@@ -86,7 +86,7 @@ class TripoGenerator(VendorGenerator):
         return str(job)
 
     def poll(self, job_id: str) -> JobState:
-        """Return where the task stands; one that Tripo calls expired is gone."""
+        """Return the state of the task; raises Gone for a task that has expired."""
         task = self._task(job_id)
         status = str(task.get("status"))
         if status in STATES:
@@ -99,7 +99,7 @@ class TripoGenerator(VendorGenerator):
         return JobState("failed", self._service.said(": ".join([f"the task is {status}", *why])))
 
     def fetch(self, job_id: str, folder: Path) -> Generated:
-        """Download the model; links are valid for five minutes and are asked for anew once."""
+        """Download the model; links are valid for five minutes and are renewed once."""
         path = folder / "tripo.glb"
         self._service.download(self._link(job_id), path, fresh_url=lambda: self._link(job_id))
         return Generated(path, self.model, metric=bool(self._options.get("auto_size")))
@@ -132,7 +132,7 @@ def refusal_of(status: int, body: Any) -> Refusal | None:
 
 
 def _listed_usd(options: dict[str, Any]) -> float | None:
-    """Return at most what a job with these options costs by the vendor's list, None where the list does not say."""
+    """Return the maximum price of a job with these options by the vendor's list, None if the list does not cover them."""
     credits = next((n for prefix, n in CREDITS.items() if str(options["model_version"]).startswith(prefix)), None)
     if credits is None or any(name in options for name in UNPRICED):
         return None

@@ -1,4 +1,4 @@
-"""Generators behind a vendor's HTTP service: address, key, price, model, picture, submission."""
+"""Base class of generators behind a vendor's HTTP service: address, key, price, model, picture upload, paid submission."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ LARGEST_NUMBER = 1e15  # credits, seconds since 1970 in milliseconds
 class VendorGenerator:
     """A generator behind a vendor's HTTP service.
 
-    A vendor has a name, the address of its service, the variables of the environment that may hold the key, the model that is
-    asked where none is named, the option of ``generate.options`` that may name one, and what a person does about a refused
-    key. ``listed_usd`` is what a job costs by the vendor's own list.
+    Class attributes: ``name``; ``url``, the address of the service; ``keys``, the environment variables that may hold the
+    key; ``default_model``, used if none is named; ``model_option``, the option of ``generate.options`` that may name a model;
+    and ``remedy``, the advice for a refused key. ``listed_usd`` is the price of a job by the vendor's list.
     """
 
     name: str
@@ -60,18 +60,18 @@ class VendorGenerator:
 
     @classmethod
     def from_spec(cls, argument: str, config: BuildConfig) -> Self:
-        """Create it from ``MODEL@URL``, each with a default; raises ConfigError for a missing key or price."""
+        """Create the generator from ``MODEL@URL``, both optional; raises ConfigError for a missing key or price."""
         said, given = split_url(argument)
         url = address(given, cls.url)
         model = chosen(cls.name, said, config, cls.model_option, cls.default_model)
         return cls(model, url, key_from_environment(cls.keys, url, cls.name), config)
 
     def priced_as(self, model: str) -> str:
-        """Return the name by which a missing price is asked for."""
+        """Return the name used in the error about a missing price."""
         return self.name
 
     def authorization(self, key: str | None) -> dict[str, str]:
-        """Return the headers that hold the key."""
+        """Return the headers that carry the key."""
         return bearer(key)
 
     def _served(
@@ -95,9 +95,9 @@ class VendorGenerator:
 
 
 def usd_per_job(name: str, url: str, services: ServicesConfig, listed: float | None = None) -> float:
-    """Return what a job costs: as the settings say, nothing on this machine, or as the vendor's list has it.
+    """Return the price of a job: that of the settings, 0 for a server on this machine, or the vendor's list price.
 
-    Raises ConfigError where none of them says.
+    Raises ConfigError if the price is unknown.
     """
     if services.usd_per_job is not None:
         return services.usd_per_job
@@ -112,14 +112,14 @@ def usd_per_job(name: str, url: str, services: ServicesConfig, listed: float | N
 
 
 def address(url: str | None, vendors: str) -> str:
-    """Return where a service is reached: the vendor's own address, or a given one, with the vendor's path if it has none."""
+    """Return the address of a service: the vendor's, or the given one, completed with the vendor's path if it has none."""
     if url is None:
         return vendors
     return url if urlsplit(url).path.strip("/") else url.rstrip("/") + urlsplit(vendors).path
 
 
 def chosen(name: str, said: str, config: BuildConfig, option: str, default: str) -> str:
-    """Return the model that a spec or an option of the settings names; raises ConfigError where they disagree."""
+    """Return the model named by a spec or by an option of the settings, else the default; raises ConfigError if the two disagree."""
     set_to = config.generate.options.get(option)
     if said and set_to is not None and said != set_to:
         raise ConfigError(
@@ -134,9 +134,9 @@ def data_uri(rgba: np.ndarray) -> str:
 
 
 def submit_paid(service: HttpService, path: str, body: Mapping[str, Any], needed: tuple[str, ...]) -> dict[str, Any]:
-    """Submit a job that is paid for and return the answer, whose ``needed`` are strings that can name something.
+    """Submit a paid job and return the answer; its fields ``needed`` are checked to be usable as names.
 
-    Raises Unanswered for an answer that looks like success and cannot be used: the job may have been taken, and paid for.
+    Raises Unanswered for an unusable answer with a success status, because the job may have been accepted and paid for.
     """
     answer = service.post_json(path, body, pays=True)
     for name in needed:
@@ -146,19 +146,19 @@ def submit_paid(service: HttpService, path: str, body: Mapping[str, Any], needed
 
 
 def is_name(value: Any) -> bool:
-    """Tell whether a part of an answer can be the name of a job, or an address: a text of bounded length in one line."""
+    """Tell whether a value of an answer can be a job id or an address: a printable string in one line of bounded length."""
     return isinstance(value, str) and 0 < len(value) <= LONGEST_ADDRESS and value.isprintable()
 
 
 def number(value: Any) -> float | None:
-    """Return a part of an answer that is a plain number; None for all else, and for what no account or task has."""
+    """Return a value of an answer if it is a number of plausible size, else None."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not -LARGEST_NUMBER <= value <= LARGEST_NUMBER:
         return None
     return value
 
 
 def checked_address(value: Any, who: str, what: str) -> str:
-    """Return an address that a reply names; raises BadReply for what cannot be one."""
+    """Return an address from a reply; raises BadReply if it is missing or not an address."""
     if not isinstance(value, str) or not value:
         raise BadReply(f"{who}: its answer contains no {what}; run it again")
     if not is_name(value) or origin(value) is None:

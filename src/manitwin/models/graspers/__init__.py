@@ -1,1 +1,1 @@
-"""Grasp proposals: where a gripper may hold an object, before any physics."""
+"""Grasp proposals: poses of a gripper that may hold an object, before any physics trial."""

@@ -1,11 +1,9 @@
-"""A server of grasps over ZeroMQ: one message each way, each question on a connection of its own.
+"""Client of a grasp server over ZeroMQ: one message each way, each request on its own connection.
 
-A server works on one question at a time and keeps those of others in a queue: one that is busy does not answer.
-
-Messages are msgpack with numpy arrays in them, as the library msgpack-numpy writes them: a map with the binary keys ``nd``,
-``type``, ``kind``, ``shape`` and ``data``. msgpack-numpy itself calls ``pickle.loads`` on arrays of the kind ``O`` (its
-``decode``, version 0.4.8): whoever answers could run anything. So answers are decoded here, and only arrays of plain numbers
-are taken.
+A server handles one request at a time and queues others, so a busy server does not answer. Messages are msgpack with numpy
+arrays in the format of the library msgpack-numpy: a map with the binary keys ``nd``, ``type``, ``kind``, ``shape`` and
+``data``. msgpack-numpy itself calls ``pickle.loads`` on arrays of kind ``O`` (``decode``, version 0.4.8), which would let a
+server execute any code. Answers are therefore decoded here, and only arrays of plain numbers are accepted.
 """
 
 from __future__ import annotations
@@ -25,16 +23,16 @@ from manitwin.errors import BadReply, ConfigError, Unavailable
 from manitwin.models.graspers import zmtp
 from manitwin.models.services.keys import redacted, split_url
 
-DEFAULT_URL = "tcp://localhost:5556"  # the port of both servers' documentation
+DEFAULT_URL = "tcp://localhost:5556"  # port in the documentation of both servers
 CONNECT_TIMEOUT_S = 5.0
-MAX_REPLY_BYTES = 8 << 20  # 4,000 grasps are 0.3 MB, 0.6 as lists of doubles
+MAX_REPLY_BYTES = 8 << 20  # 4,000 grasps take 0.3 MB, or 0.6 MB as lists of doubles
 FIRST_PAUSE_S = 1.0
 PLAIN_KINDS = "biuf"
-"""Kinds of numpy types whose bytes are the numbers themselves: bool, integers, floats."""
+"""Numpy type kinds whose bytes are the numbers themselves: bool, integers, floats."""
 
 
 class ServerError(BadReply):
-    """The server answered that it could not; ``detail`` is what it said."""
+    """The server reported an error; ``detail`` is its message."""
 
     def __init__(self, message: str, detail: str = ""):
         super().__init__(message)
@@ -45,7 +43,7 @@ class ServerError(BadReply):
 
 
 def server_url(argument: str, what: str) -> str:
-    """Return the URL that an argument gives, ``tcp://localhost:5556`` for none; raises ConfigError for another."""
+    """Return the URL given by an argument, by default ``tcp://localhost:5556``; raises ConfigError for an invalid one."""
     model, url = split_url(argument)
     if model or (argument and url is None):
         raise ConfigError(f"{what} takes only the address of its server: {what}@tcp://HOST:5556; it is {argument!r}")
@@ -56,16 +54,16 @@ def server_url(argument: str, what: str) -> str:
 
 
 class GraspServer:
-    """A client of the grasp server at ``url``; ``what`` names the server in messages."""
+    """Client of the grasp server at ``url``; ``what`` names the server in messages."""
 
     def __init__(self, url: str, what: str, services: ServicesConfig, sleep: Callable[[float], None] = time.sleep):
         self.url, self.what, self._services, self._sleep = url, what, services, sleep
 
     def ask(self, question: dict[str, Any]) -> dict[str, Any]:
-        """Return the answer; raises Unavailable without one after all retries, BadReply for one that is no message.
+        """Return the answer; raises Unavailable if there is none after all retries, BadReply if it is not a valid message.
 
-        After a timeout the question may still be in the server's queue: it is sent again only once the server answers
-        ``health``, so that a busy one is not given the same work over and over.
+        After a timeout the request may still be in the server's queue. It is sent again only after the server has answered
+        ``health``, so that a busy server does not get the same work repeatedly.
         """
         pause_s = FIRST_PAUSE_S
         for left in range(self._services.retries, -1, -1):
@@ -121,17 +119,17 @@ class GraspServer:
 
 
 def said(value: Any) -> str:
-    """Return a part of an answer as one short line that a terminal may show."""
+    """Return a value of an answer as one short printable line."""
     return redacted(str(value), None)
 
 
 def pack(message: dict[str, Any]) -> bytes:
-    """Return a message as bytes."""
+    """Encode a message."""
     return msgpack.packb(message, default=msgpack_numpy.encode, use_bin_type=True)
 
 
 def unpack(data: bytes) -> dict[str, Any]:
-    """Read a message; raises ValueError for what is none, or holds an array that is not of plain numbers."""
+    """Decode a message; raises ValueError if it is invalid or contains an array that is not of plain numbers."""
     try:
         message = msgpack.unpackb(data, raw=False, object_hook=_array_of)
     except (msgpack.UnpackException, ValueError, TypeError, LookupError, ArithmeticError, SyntaxError) as error:

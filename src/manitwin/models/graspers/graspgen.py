@@ -1,11 +1,11 @@
 """GraspGen, the paper's grasp model, behind its own server.
 
-The contract is that of the public repository github.com/NVlabs/GraspGen (``grasp_gen/serving/zmq_server.py`` and
+The protocol is that of the public repository github.com/NVlabs/GraspGen (``grasp_gen/serving/zmq_server.py`` and
 ``client-server/README.md``, 2026): msgpack over ZeroMQ REQ/REP, ``{"action": "health" | "metadata" | "infer", ...}``. The
-model's code and weights are NVIDIA's, for non-commercial research only; nothing of them is here. Written from the
-source and tested against a server of this package that keeps it; not tried against the model itself.
+model's code and weights are NVIDIA's, for non-commercial research only, and are not included here. The client was written
+from the source and tested against a mock server of this package, not against the model itself.
 
-The server takes no seed: asked twice, it proposes other grasps. What it proposed is kept with the stage.
+The server takes no seed, so repeated requests return different grasps. The proposals are stored with the stage.
 """
 
 from __future__ import annotations
@@ -20,35 +20,35 @@ from manitwin.models.graspers.served_proposals import ASKED_FOR, BASE_LINK_Z_M, 
 from manitwin.robots.grippers.gripper import Gripper, load_gripper, of_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 
-POINTS = 2000  # what its client samples of a mesh (client-server/graspgen_client.py) and what it is trained with
+POINTS = 2000  # points that its client samples of a mesh (client-server/graspgen_client.py), as in training
 NO_THRESHOLD = -1.0
 
 
 class GraspGenGrasper:
-    """Ask a GraspGen server for grasps of the hand that it serves."""
+    """Propose grasps with a GraspGen server, for the hand that it serves."""
 
     name = "graspgen"
     needs: Resource = "gpu"
-    # One answer is the paper's whole sample; asked again, the same cloud gives more of the same.
+    # one answer is the paper's whole sample; further requests add similar grasps
     rounds: int | None = 1
 
     def __init__(self, server: GraspServer, hand: str):
-        """Take the server, and which of GraspGen's hands is wanted of it."""
+        """Take the server and the name of the GraspGen hand that it must serve."""
         self._server, self._hand = server, hand
         self.model: str | None = f"GraspGen {hand}, {POINTS} points, {ASKED_FOR} grasps"
 
     @classmethod
     def from_spec(cls, argument: str, config: BuildConfig) -> GraspGenGrasper:
-        """Create it from the server's address; raises ConfigError where no model is for a gripper of the configuration."""
+        """Create it from the server's address; raises ConfigError if GraspGen has no model for a configured parallel gripper."""
         parallel = [g for g in map(load_gripper, config.grippers) if g.kind == ParallelGripper.kind]
         hands = [_hand_of(gripper) for gripper in parallel] or list(HANDS.values())
         return cls(GraspServer(server_url(argument, cls.name), cls.name, config.services), hands[0])
 
     def propose(self, request: GraspRequest) -> GraspProposals:
-        """Return up to ``max_proposals`` grasps, best first; none where the model finds none.
+        """Return up to ``max_proposals`` grasps, best first; an empty result if the model finds none.
 
-        Raises Unavailable where the server does not answer or serves another hand, BadReply where its answer cannot be
-        used, ConfigError for a gripper without a model.
+        Raises Unavailable if the server does not answer or serves another hand, BadReply if its answer is unusable,
+        ConfigError for a gripper without a model.
         """
         gripper = of_kind(request.gripper, ParallelGripper)
         hand = _hand_of(gripper)
@@ -57,19 +57,19 @@ class GraspGenGrasper:
         question = {
             "action": "infer",
             "point_cloud": point_cloud(request, POINTS),
-            # a threshold of -1 without a topk of its own means the best hundred
+            # a threshold of -1 without topk would return only the best hundred
             "grasp_threshold": NO_THRESHOLD,
             "num_grasps": count,
             "topk_num_grasps": count,
             "min_grasps": 1,
             "max_tries": 6,
-            # the cloud is of a mesh; points of a large one lie farther apart than what the server takes for outliers
+            # the points of a large mesh lie farther apart than the server's limit for outliers
             "remove_outliers": False,
         }
         return ask_for_proposals(self._server, question, request, gripper, BASE_LINK_Z_M[hand])
 
     def probe(self) -> str:
-        """Ask for the server's state; raises Unavailable where it serves another hand."""
+        """Query the server's state; raises Unavailable if it serves another hand."""
         self._server.ask({"action": "health"})
         return f"serves {self._hand} ({said(self._require(self._hand).get('model_name'))})"
 

@@ -1,13 +1,13 @@
 """GraspGenX, one grasp model for any gripper, behind its own server.
 
-The contract is that of the public repository github.com/NVlabs/GraspGenX (``client-server/README.md``, "Protocol
-Reference", and ``graspgenx/serving/{zmq_server,types}.py``, Apache-2.0, read 2026-11; weights under the NVIDIA Open Model
-License): msgpack over ZeroMQ REQ/REP. Of its actions ``infer_object`` is used: the gripper is described by two boxes
-between its open and half-open fingers, in its base frame (+Z approach, +X closing). They are those of our gripper file,
-in the grasp frame, so that the answer is in the grasp frame too and the server needs no files of the gripper.
+The protocol is that of the public repository github.com/NVlabs/GraspGenX (``client-server/README.md``, "Protocol Reference",
+and ``graspgenx/serving/{zmq_server,types}.py``, Apache-2.0, read 2026-11; weights under the NVIDIA Open Model License):
+msgpack over ZeroMQ REQ/REP. The action ``infer_object`` describes the gripper by two boxes, between its open and its
+half-open fingers, in its base frame (+Z approach, +X closing). They are computed from our gripper file in the grasp frame, so
+the answer is in the grasp frame too and the server needs no files of the gripper.
 
-Tested against a server of this package that keeps that contract; not tried against the model itself. Unverified: how well
-the model does with grippers that it was not trained with. The server takes no seed.
+The client was tested against a mock server of this package, not against the model itself. Unverified: the quality for
+grippers that the model was not trained with. The server takes no seed.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from manitwin.models.graspers.served_proposals import ASKED_FOR, ask_for_proposa
 from manitwin.robots.grippers.gripper import of_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 
-POINTS = 3500  # what its demonstration samples of a mesh (scripts/demo_object_mesh.py)
+POINTS = 3500  # points that its demo samples of a mesh (scripts/demo_object_mesh.py)
 ACTION = "infer_object"
-PARALLEL_2F = 0  # its number of the kind of gripper
+PARALLEL_2F = 0  # the server's code of the gripper type
 
 
 def sweep_volume(gripper: ParallelGripper) -> dict[str, Any]:
-    """Return the boxes between the pads, open and half open: extents and centres ``(3,) float32`` m in the grasp frame.
+    """Return the boxes between the pads, open and half open: extents and centres ``(3,) float32`` in m, in the grasp frame.
 
-    The released description of the Panda takes the space between its pads (sweep_volume of
+    The published description of the Panda also uses the space between the pads (sweep_volume of
     gripper_descriptions/assets/x_grippers/franka_panda/config.json, github.com/beininghan/gripper_descriptions).
     """
     across_m, along_m = (2 * half for half in gripper.pad_half_extents_m)
@@ -48,11 +48,11 @@ def sweep_volume(gripper: ParallelGripper) -> dict[str, Any]:
 
 
 class GraspGenXGrasper:
-    """Ask a GraspGenX server for grasps of any parallel gripper."""
+    """Propose grasps with a GraspGenX server, for any parallel gripper."""
 
     name = "graspgenx"
     needs: Resource = "gpu"
-    # One answer is the paper's whole sample; asked again, the same cloud gives more of the same.
+    # one answer is the paper's whole sample; further requests add similar grasps
     rounds: int | None = 1
     model: str | None = f"GraspGenX by swept volume, diffusion, {POINTS} points, {ASKED_FOR} grasps"
 
@@ -65,9 +65,9 @@ class GraspGenXGrasper:
         return cls(GraspServer(server_url(argument, cls.name), cls.name, config.services))
 
     def propose(self, request: GraspRequest) -> GraspProposals:
-        """Return up to ``max_proposals`` grasps, best first; none where the model finds none.
+        """Return up to ``max_proposals`` grasps, best first; an empty result if the model finds none.
 
-        Raises Unavailable where the server does not answer, BadReply where its answer cannot be used.
+        Raises Unavailable if the server does not answer, BadReply if its answer is unusable.
         """
         gripper = of_kind(request.gripper, ParallelGripper)
         question = {
@@ -75,13 +75,13 @@ class GraspGenXGrasper:
             "point_cloud": point_cloud(request, POINTS),
             "sweep_volume_params": sweep_volume(gripper),
             "num_grasps": min(ASKED_FOR, request.max_proposals),
-            # the other planner adds grasps of the bounding box, which need no model
+            # the other planner adds grasps of the bounding box, which do not come from the model
             "planner": "diffusion",
         }
         return ask_for_proposals(self._server, question, request, gripper)
 
     def probe(self) -> str:
-        """Ask for the server's state; raises Unavailable where it is too old to be told of a gripper."""
+        """Query the server's state; raises Unavailable if it is too old to take a gripper description."""
         self._server.ask({"action": "health"})
         served = self._server.ask({"action": "metadata"})
         actions = served.get("actions")

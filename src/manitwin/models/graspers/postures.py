@@ -1,4 +1,4 @@
-"""Grasps of a hand with many joints: a posture of its fingertips around two opposite surface points. No weights, no GPU."""
+"""Grasps of a multi-finger hand: a posture of its fingertips around two opposite surface points; no weights, no GPU."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from manitwin.models.graspers.surface_sampling import (
 from manitwin.robots.grippers.gripper import of_kind
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper, Posture
 
-OPENING_STEP_M = 0.004  # hands open to multiples of this: so few of them are looked at for collisions
-SQUEEZE_M = 0.03  # how far inside the surface each fingertip's target ends
+OPENING_STEP_M = 0.004  # openings are multiples of this, which limits the number of collision shapes
+SQUEEZE_M = 0.03  # depth of each fingertip's target below the surface
 PALM_GAP_M = 0.003
-SUITED_SHARE = 0.75  # of the grasps near a point take the posture that suits its type
+SUITED_SHARE = 0.75  # share of the grasps that take a posture that suits the nearest grasp point's type
 
 
 class PostureGrasper:
-    """Propose grasps with thumb and fingers on opposite sides, fingertips only or the object in the hand."""
+    """Propose grasps with thumb and fingers on opposite sides, by the fingertips only or with the object inside the hand."""
 
     name = "postures"
     model: str | None = None
@@ -35,9 +35,9 @@ class PostureGrasper:
     rounds: int | None = None
 
     def propose(self, request: GraspRequest) -> GraspProposals:
-        """Return up to ``max_proposals`` grasps; none where no pair fits between thumb and fingers.
+        """Return up to ``max_proposals`` grasps; none if no pair of points fits between thumb and fingers.
 
-        A hand that can hold its object deeper comes as near as its palm allows, or up to its fingertips, at random.
+        The approach depth is, at random, the deepest that the palm allows or a value between that and the fingertips.
         """
         hand = of_kind(request.gripper, MultiFingerGripper)
         rng = np.random.default_rng(request.seed)
@@ -69,7 +69,7 @@ class PostureGrasper:
 
 
 def _frames(pairs: AntipodalPairs, rng: np.random.Generator) -> np.ndarray:
-    """Return frames ``(N, 4, 4)`` at the pairs' middles: X from the thumb's side to the fingers', Z at a random angle."""
+    """Return frames ``(N, 4, 4)`` at the midpoints of the pairs: X from the thumb's side to the fingers', Z at a random angle."""
     count = len(pairs)
     x = (pairs.second_m - pairs.first_m) / pairs.width_m[:, None]
     x *= rng.choice([-1.0, 1.0], count)[:, None]
@@ -85,7 +85,7 @@ def _frames(pairs: AntipodalPairs, rng: np.random.Generator) -> np.ndarray:
 def _postures(
     hand: MultiFingerGripper, request: GraspRequest, poses: np.ndarray, rng: np.random.Generator
 ) -> np.ndarray:
-    """Return the posture ``(N,)`` of each grasp: mostly one that suits the nearest grasp point's type, else any."""
+    """Return the posture index ``(N,)`` of each grasp: mostly one that suits the nearest grasp point's type, else any."""
     chosen = rng.integers(len(hand.postures), size=len(poses))
     if not len(request.grasp_types) or not len(poses):
         return chosen
@@ -97,7 +97,7 @@ def _postures(
 
 
 def _palm_distance(caster: RayCaster, poses: np.ndarray, request: GraspRequest) -> np.ndarray:
-    """Return how far behind each frame's origin, against its Z axis, the object ends ``(N,)`` m."""
+    """Return the distance ``(N,)`` in m from each frame's origin to the object's surface in direction -Z."""
     far_m = float(np.linalg.norm(request.solid.extents))
     distance_m, _ = caster.first_hits(poses[:, :3, 3] - far_m * poses[:, :3, 2], poses[:, :3, 2])
     return np.clip(far_m - distance_m, 0.0, far_m)
@@ -110,7 +110,7 @@ def _depth(hand: MultiFingerGripper, posture: Posture, reach_m: np.ndarray, rng:
 
 
 def _joints(hand: MultiFingerGripper, posture: Posture, width_m: np.ndarray) -> np.ndarray:
-    """Return the joints ``(N, 2, J)`` of the hand opened wider than the object, and of fingertips well inside it."""
+    """Return joint angles ``(N, 2, J)``: of the hand opened wider than the object, and with fingertip targets inside the object."""
     opening_m = np.ceil((width_m + 2 * hand.clearance_m) / OPENING_STEP_M) * OPENING_STEP_M
     return np.stack(
         [posture.joints_at(opening_m), posture.joints_at(opening_m - 2 * (hand.clearance_m + SQUEEZE_M))], axis=1

@@ -1,4 +1,4 @@
-"""The protocol of a grasp proposer."""
+"""Protocol of grasp proposers: requests, proposals, and screens that filter proposals before physics trials."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from manitwin.robots.grippers.gripper import Gripper
 
 @dataclass(frozen=True)
 class GraspRequest:
-    """An object, a gripper and the places to propose grasps for.
+    """An object, a gripper and the points to propose grasps for.
 
-    ``solid`` is the watertight mesh, ``hulls`` the convex collision vertices (each ``(V, 3)``), both in the object frame in
-    metres. ``focus_points_m`` ``(P, 3)`` are the selected points: proposals should be denser around them.
-    ``grasp_points_m (G, 3)`` are those of them that are for grasping, ``grasp_types`` how each wants to be grasped.
-    ``supports`` are the placements ``object_to_plane (4, 4)`` that it will be picked from. Where ``within_m`` is given, only
-    grasps of the surface within it of a focus point are of use.
+    ``solid`` is the watertight mesh, ``hulls`` the vertices of the convex collision hulls (each ``(V, 3)``), both in the
+    object frame in metres. ``focus_points_m (P, 3)`` are the selected points, around which proposals should be denser;
+    ``grasp_points_m (G, 3)`` are those of them that are grasp points, and ``grasp_types`` are their grasp types. ``supports``
+    are the placements ``object_to_plane (4, 4)`` from which the object will be picked. If ``within_m`` is given, only grasps
+    on the surface within that distance of a focus point are useful.
     """
 
     solid: trimesh.Trimesh
@@ -43,7 +43,7 @@ class GraspRequest:
 
     @cached_property
     def surface(self) -> RayCaster:
-        """The solid, prepared for rays."""
+        """Ray caster of the solid."""
         return RayCaster(self.solid)
 
 
@@ -51,9 +51,9 @@ class GraspRequest:
 class GraspProposals:
     """Grasps in the grasp frame (+Z approach, X closing, origin at the gripper's base).
 
-    ``gripper_to_object (N, 4, 4)``, ``width_m (N,)`` distance of the two contacts along X, ``depth_m (N,)`` fingertip
-    centre along +Z, ``score (N,)`` in [0, 1]. For a hand with more joints than one, ``joints_rad (N, 2, J)`` are those
-    before it closes and those it closes to.
+    ``gripper_to_object (N, 4, 4)``; ``width_m (N,)``, distance of the two contacts along X; ``depth_m (N,)``, position of the
+    fingertip centre along +Z; ``score (N,)`` in [0, 1]. For a multi-finger hand ``joints_rad (N, 2, J)`` are the joint angles
+    before closing and the targets of closing.
     """
 
     gripper_to_object: np.ndarray
@@ -77,7 +77,7 @@ class GraspProposals:
 
     @staticmethod
     def joined(parts: list[GraspProposals]) -> GraspProposals:
-        """Return the proposals of all parts, one after the other; all of them have joints, or none."""
+        """Concatenate proposals; either all parts have joints, or none."""
         joints = [p.joints_rad for p in parts if p.joints_rad is not None]
         return GraspProposals(
             np.concatenate([p.gripper_to_object for p in parts]),
@@ -89,9 +89,10 @@ class GraspProposals:
 
 
 class Grasper(Protocol):
-    """Propose grasps; raises BackendError where it cannot.
+    """Protocol of a grasp proposer.
 
-    ``rounds`` bounds how often one object is asked about (None: as the configuration says).
+    ``rounds`` limits the number of requests per object (None: as the configuration says). ``propose`` raises BackendError if
+    it fails.
     """
 
     name: str
@@ -100,13 +101,13 @@ class Grasper(Protocol):
     rounds: int | None
 
     def propose(self, request: GraspRequest) -> GraspProposals:
-        """Return up to ``max_proposals`` grasps, not yet filtered for collision or proven."""
+        """Return up to ``max_proposals`` grasps, not yet checked for collisions or tried in physics."""
         ...
 
 
 @dataclass(frozen=True)
 class Screened:
-    """The proposals that are left: with the widths as measured, their merits, and how many were left after each filter."""
+    """Remaining proposals with measured widths, their merits, and the number of proposals left after each filter."""
 
     proposals: GraspProposals
     merits: Merits
@@ -114,12 +115,12 @@ class Screened:
 
 
 class Screen(Protocol):
-    """A filter of proposals for one object and one kind of gripper, before any trial."""
+    """Protocol of a filter of proposals for one object and one kind of gripper, before any physics trial."""
 
     def __call__(self, raw: GraspProposals) -> Screened:
-        """Keep the proposals that are worth a trial."""
+        """Return the proposals that are worth a trial."""
         ...
 
     def why_none(self, counts: dict[str, int]) -> Rejected:
-        """Say why nothing was left."""
+        """Return the rejection that explains why no proposal was left."""
         ...

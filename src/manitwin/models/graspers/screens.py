@@ -1,4 +1,4 @@
-"""Screens for each kind of gripper: the proposals that are worth a trial, what they cost, and why none is left."""
+"""Screens for each kind of gripper: filter proposals before physics trials, rate them, and explain why none is left."""
 
 from __future__ import annotations
 
@@ -22,29 +22,30 @@ from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.robots.grippers.suction import SuctionGripper
 
-MIN_WIDTH_M = 0.0005  # thinner than this, a wall is not told from the surface's noise
+MIN_WIDTH_M = 0.0005  # thinner walls cannot be told from noise of the surface
 WIDTH_SAMPLES = 2000
 CLEARANCE_M = 0.0005
-MOSTLY = 0.8  # of where pads would lie flat: beyond the hand's opening there, a thing is held by a rim at best
-SQUARE = 0.98  # cosine of normal and closing axis: of pads that lie flat
-MOST_JAMMED_SHARE = 0.75  # of what whole pads bear, where less than whole ones touch, and what touches does not bear it
-GOOD_LOAD = 0.5  # half of the limits: what is left over is for what the twin does not know
-# The arm at which friction under the closing force would just carry weight and slides. Of 600 grasps of six objects 93 % held
-# where it is under 10 mm, 62 % to 20 mm, 42 % beyond.
+MOSTLY = 0.8  # share of the pairs with flat pads that must exceed the opening for the object to count as too wide
+SQUARE = 0.98  # cosine of normal and closing axis for pads that lie flat
+# load limit relative to whole pads, for grasps in which only parts of the pads touch and do not bear the load
+MOST_JAMMED_SHARE = 0.75
+GOOD_LOAD = 0.5  # half of the limit; the margin covers unknown properties of the object
+# Lever arm at which friction under the closing force would just bear weight and slides. Of 600 grasps of six objects, 93 % held
+# with an arm under 10 mm, 62 % up to 20 mm, 42 % beyond.
 GOOD_ARM_M, WEAK_ARM_M = 0.010, 0.020
 
 
 class PadScreen:
-    """Keep grasps of a parallel gripper whose pads touch well and bear the object, and whose open hand is free of it."""
+    """Screen for parallel grippers: the pads touch well and bear the load, and the open gripper does not collide with the object."""
 
     def __init__(self, request: GraspRequest):
         self._request, self._gripper = request, of_kind(request.gripper, ParallelGripper)
-        # the mean, as PhysX combines materials
+        # PhysX combines the friction of two materials by their mean
         self._friction = (self._gripper.finger_friction + request.object_friction) / 2
         self._passes = GraspFilter(self._gripper, request.hulls, request.center_of_mass_m, self._friction)
 
     def __call__(self, raw: GraspProposals) -> Screened:
-        """Keep the proposals that pass, with the widths at the pads."""
+        """Return the proposals that pass, with the widths measured at the pads."""
         left = self._passes(raw.gripper_to_object)
         proposals = replace(raw.take(left.index), width_m=left.contacts.width_m)
         contacts, poses = left.contacts, proposals.gripper_to_object
@@ -62,7 +63,10 @@ class PadScreen:
         return Screened(proposals.take(borne), merits, counts)
 
     def _load(self, pads: PressedPads, gripper_to_object: np.ndarray, *, flat: bool = True) -> np.ndarray:
-        """Return the largest share ``(N,)`` of what the pads of grasps ``(N, 4, 4)`` bear that weight and slides need."""
+        """Return the load ratio ``(N,)`` of grasps ``(N, 4, 4)``: required over available pad wrench.
+
+        It is the maximum over the weight and the slides of the trial.
+        """
         return load_share(
             pads,
             gripper_to_object,
@@ -74,7 +78,7 @@ class PadScreen:
         )
 
     def why_none(self, counts: dict[str, int]) -> Rejected:
-        """Say why nothing is left, with the widths that were measured."""
+        """Return the rejection, with measured widths of the object."""
         request, opening_m = self._request, self._gripper.opening_m
         rng = np.random.default_rng(request.seed)
         points, normals, _ = sample_surface(request.solid, WIDTH_SAMPLES, rng)
@@ -83,7 +87,7 @@ class PadScreen:
         if not len(pairs):
             return Rejected("no_proposal", "the fingers cannot press on any two opposite surface points")
         square = pairs.take(np.flatnonzero(pairs.alignment >= SQUARE))
-        # aslant across an edge or a ball two points are as near as one likes; where no pads touch well, such pairs are no grips
+        # slanted pairs across an edge or a ball can be arbitrarily close; if no pads touch well, such pairs are no grasps
         least = (square if len(square) and not counts.get("after_collision") else pairs).width_m.min()
         gripper = f"the {self._gripper.name} opens {opening_m * 1000:.0f} mm"
         room_m = opening_m - 2 * CLEARANCE_M
@@ -106,7 +110,7 @@ class PadScreen:
 
 
 class SealScreen:
-    """Keep grasps of a suction cup that seal and whose gripper is free of the object."""
+    """Screen for suction cups: the lip seals, and the gripper does not collide with the object."""
 
     def __init__(self, request: GraspRequest):
         self._request, self._gripper = request, of_kind(request.gripper, SuctionGripper)
@@ -114,7 +118,7 @@ class SealScreen:
         self._surface, self._collision = request.surface, HandCollision(request.hulls)
 
     def __call__(self, raw: GraspProposals) -> Screened:
-        """Keep the proposals that seal; they cost what they need of the lip's limits."""
+        """Return the proposals that seal; their cost is the load relative to the lip's limits."""
         found = seal(self._gripper, raw.gripper_to_object, self._surface)
         sealed = np.flatnonzero(found.sealed)
         overlaps = self._collision.overlaps(
@@ -126,7 +130,7 @@ class SealScreen:
         return Screened(raw.take(left), Merits(load <= 1, load > 1, load, GOOD_LOAD), counts)
 
     def _load(self, center_m: np.ndarray, inward: np.ndarray) -> np.ndarray:
-        """Return the largest share ``(N,)`` of the lip's limits that weight and slides need."""
+        """Return the load ratio ``(N,)``: the maximum over weight and slides of the required share of the lip's limits."""
         gravity = np.array([0.0, 0.0, -GRAVITY_M_S2])
         accelerations = gravity + PEAK_SLIDE_ACCELERATION_M_S2 * SLIDE_DIRECTIONS
         arm_m = self._request.center_of_mass_m - center_m
@@ -140,21 +144,21 @@ class SealScreen:
         ).max(1)
 
     def why_none(self, counts: dict[str, int]) -> Rejected:
-        """Say how many were left after each filter."""
+        """Return the rejection with the number of proposals left after each filter."""
         stages = ", ".join(f"{name} {count}" for name, count in counts.items())
         across = f"{2000 * self._gripper.lip_radius_m:.0f} mm"
         return Rejected("no_proposal", f"nowhere does a lip of {across} seal free of collision ({stages})")
 
 
 class HandScreen:
-    """Keep grasps of a many-jointed hand that is free of the object while open."""
+    """Screen for multi-finger hands: the open hand does not collide with the object."""
 
     def __init__(self, request: GraspRequest):
         self._request, self._hand = request, of_kind(request.gripper, MultiFingerGripper)
         self._collision = HandCollision(request.hulls)
 
     def __call__(self, raw: GraspProposals) -> Screened:
-        """Keep the proposals that are free; they cost the arm that friction needs about the contacts."""
+        """Return the collision-free proposals; their cost is the lever arm that friction needs to bear weight and slides."""
         free = ~self._overlaps(raw)
         left = raw.take(np.flatnonzero(free))
         friction = (self._hand.finger_friction + self._request.object_friction) / 2
@@ -164,7 +168,7 @@ class HandScreen:
         return Screened(left, Merits(~weak, weak, arm_m, GOOD_ARM_M), {"raw": len(raw), "after_collision": len(left)})
 
     def _lever_m(self, grasps: GraspProposals) -> np.ndarray:
-        """Return the distance ``(N,)`` of the centre of mass from the line between the contacts."""
+        """Return the distance ``(N,)`` of the centre of mass from the segment between the contacts."""
         rotation, origin = grasps.gripper_to_object[:, :3, :3], grasps.gripper_to_object[:, :3, 3]
         offset = self._request.center_of_mass_m - origin - grasps.depth_m[:, None] * rotation[:, :, 2]
         along = (offset * rotation[:, :, 0]).sum(1)
@@ -183,7 +187,7 @@ class HandScreen:
         return result
 
     def why_none(self, counts: dict[str, int]) -> Rejected:
-        """Say how many were left after each filter."""
+        """Return the rejection with the number of proposals left after each filter."""
         stages = ", ".join(f"{name} {count}" for name, count in counts.items())
         if not counts["raw"]:
             opening = f"{1000 * self._hand.opening_m:.0f} mm between thumb and fingers"

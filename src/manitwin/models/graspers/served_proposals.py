@@ -1,13 +1,14 @@
-"""Questions to served grasp models, and their answers as proposals in the grasp frame.
+"""Requests to served grasp models, and conversion of their answers to proposals in the grasp frame.
 
 GraspGen's convention (github.com/NVlabs/GraspGen, docs/GRIPPER_DESCRIPTION.md v1.0.0, read 2026-11): origin at the hand's
-base link, +Z the approach direction, fingers close along X. That is the grasp frame itself; left to decide is where along
-Z a hand's base link lies in our gripper file.
+base link, +Z the approach direction, fingers close along X. That is the grasp frame, up to the position of the base link
+along Z in our gripper file.
 
-For ``franka_panda`` it is the origin of ``panda_hand``, as in ``panda.toml``: the hand's mesh of GraspGen and that of the
-Franka description have the same extents about it, turned by 90 degrees about Z. GraspGen's ``depth`` of 0.10527 m is a
-control point of its training loss (that of ACRONYM), 1.9 mm nearer to the finger's end than the pads' centre at 0.1034 m.
-Moving grasps by the difference would push the hand 1.9 mm away from where the model saw it: poses stay as they are.
+For ``franka_panda`` the base link is the origin of ``panda_hand``, as in ``panda.toml``: GraspGen's mesh of the hand and that
+of the Franka description have the same extents about it, up to a rotation of 90 degrees about Z. GraspGen's ``depth`` of
+0.10527 m is a control point of its training loss (that of ACRONYM), 1.9 mm closer to the fingertip than the pads' centre at
+0.1034 m. Shifting grasps by the difference would move the hand 1.9 mm away from the pose that the model predicts, so poses
+are not shifted.
 """
 
 from __future__ import annotations
@@ -24,22 +25,22 @@ from manitwin.physics.grasp_filters import pad_contacts
 from manitwin.robots.grippers.parallel import ParallelGripper
 
 BASE_LINK_Z_M = {"franka_panda": 0.0}
-"""Where the base link of a GraspGen hand lies along +Z of the grasp frame of our gripper."""
+"""Position of a GraspGen hand's base link along +Z of the grasp frame of our gripper."""
 
 HANDS = {"panda": "franka_panda"}
-"""The hand of GraspGen that is our gripper of that name."""
+"""GraspGen hand that corresponds to a gripper of ours, by gripper name."""
 
-MAX_SKEW = 1e-2  # float32 rotations of a network are off by 1e-6; what is off by more is no rotation
+MAX_SKEW = 1e-2  # maximum deviation from a rotation; float32 rotations of a network deviate by 1e-6
 FARTHEST_M = 100.0
 ASKED_FOR = 4000  # paper, implementation details
-# What both servers say where the model yields no grasp at all: they join empty lists as if they were tensors.
+# Error message of both servers if the model yields no grasp: they concatenate empty lists as tensors.
 NOTHING_FOUND = "expected Tensor as element"
 
 
 def gripper_poses(base_link_to_object: np.ndarray, base_link_z_m: float = 0.0) -> np.ndarray:
-    """Return ``gripper_to_object (N, 4, 4)`` in double precision, with exact rotations, from poses of a base link.
+    """Return ``gripper_to_object (N, 4, 4)`` in double precision with exact rotations, from poses of a base link.
 
-    The last row is set: both servers leave rounding in it. Raises ValueError for what is no rigid pose.
+    The last row is reset, because both servers leave rounding errors in it. Raises ValueError for poses that are not rigid.
     """
     poses = np.array(base_link_to_object, dtype=float)
     if poses.ndim != 3 or poses.shape[1:] != (4, 4):
@@ -59,7 +60,7 @@ def gripper_poses(base_link_to_object: np.ndarray, base_link_z_m: float = 0.0) -
 
 
 def point_cloud(request: GraspRequest, count: int) -> np.ndarray:
-    """Sample the object's surface: points ``(count, 3) float32`` m in the object frame, the same for the same seed."""
+    """Sample the object's surface: points ``(count, 3) float32`` in m in the object frame, deterministic for a seed."""
     points, _, _ = sample_surface(request.solid, count, np.random.default_rng(request.seed))
     return points.astype(np.float32)
 
@@ -71,10 +72,10 @@ def ask_for_proposals(
     gripper: ParallelGripper,
     base_link_z_m: float = 0.0,
 ) -> GraspProposals:
-    """Return the grasps that a server answers, best first and at most as many as asked for; none where it finds none.
+    """Return the grasps in a server's answer, best first, at most ``max_proposals``; an empty result if it finds none.
 
-    Widths are where the open pads, closed, would meet the object; the full opening where there is nothing between them.
-    Raises what ``GraspServer.ask`` does, and BadReply for grasps that cannot be used.
+    Widths are the distances of the contacts when the pads close, or the full opening if nothing is between them. Raises the
+    errors of ``GraspServer.ask``, and BadReply for unusable grasps.
     """
     try:
         answer = server.ask(question)

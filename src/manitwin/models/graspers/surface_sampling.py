@@ -1,4 +1,4 @@
-"""The built-in graspers that sample the surface: antipodal pairs for parallel jaws, and suction cups. No weights, no GPU."""
+"""Built-in graspers that sample the surface: antipodal pairs for parallel grippers, and suction cups; no weights, no GPU."""
 
 from __future__ import annotations
 
@@ -14,21 +14,22 @@ from manitwin.robots.grippers.gripper import of_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.robots.grippers.suction import SuctionGripper
 
-POOL = 20_000  # surface samples to choose starting points from; as many as the paper takes for its candidates
-FOCUS_SPREAD_M, FOCUS_WEIGHT = 0.02, 8.0  # starting points lie denser around the selected points ...
+POOL = 20_000  # surface samples from which starting points are drawn; the paper's number of candidate points
+FOCUS_SPREAD_M, FOCUS_WEIGHT = 0.02, 8.0  # starting points are denser around the selected points ...
 CENTER_SPREAD, CENTER_WEIGHT = 0.2, 2.0  # ... and around the centre of mass (as a share of the diagonal)
-FEW = 16  # up to so many points a search over all of them is faster than a tree
-ROLLS = 8  # approach directions for each pair
-CONE_SAFETY = 1.5  # the friction cone is narrowed by this: contacts are patches, and hulls are not the surface
+FEW = 16  # up to this many points, brute force is faster than a k-d tree
+ROLLS = 8  # approach directions per pair
+CONE_SAFETY = (
+    1.5  # the friction coefficient is divided by this, because contacts are patches and hulls differ from the surface
+)
 MIN_WIDTH_M = 0.0005
-CLEARANCE_M = 0.0005  # between open finger and object, on each side
-MAX_DEPTH_OFFSET_M = 0.007  # the middle of the pair stays on pads of 18.5 mm
-# The score falls to one half at this lever: measured on 1,799 trials of 18 objects, where grasps beyond 80 mm held in
-# 47 %.
+CLEARANCE_M = 0.0005  # between open finger and object on each side
+MAX_DEPTH_OFFSET_M = 0.007  # keeps the midpoint of the pair on pads of 18.5 mm
+# Lever arm at which the score falls to one half, from 1,799 trials of 18 objects: grasps beyond 80 mm held in 47 % of them.
 HALF_LEVER_M, LEVER_SLOPE_M = 0.08, 0.02
-CUP_ROLLS = 2  # angles of the tool about the approach, for each point
+CUP_ROLLS = 2  # rotations of the tool about the approach axis per point
 CUP_HALF_LEVER_M, CUP_LEVER_SLOPE_M = 0.04, 0.02
-"""The lever at which the score of a cup is one half: a lip of 15 mm then carries half of the vacuum's force."""
+"""Lever arm at which the score of a cup is one half, and its slope; a lip of 15 mm then bears half of the vacuum force."""
 
 
 def starting_points(request: GraspRequest, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -43,7 +44,7 @@ def starting_points(request: GraspRequest, count: int, rng: np.random.Generator)
 
 
 def _density(request: GraspRequest, points: np.ndarray) -> np.ndarray:
-    """Return the relative probability ``(N,)`` of drawing each surface point; zero where it is out of reach."""
+    """Return the relative probability ``(N,)`` of drawing each surface point; zero beyond ``within_m`` of the focus points."""
     weight, reached = np.ones(len(points)), np.ones(len(points), bool)
     if len(request.focus_points_m):
         distance = _to_nearest_m(points, request.focus_points_m)
@@ -57,7 +58,7 @@ def _density(request: GraspRequest, points: np.ndarray) -> np.ndarray:
 
 
 def _to_nearest_m(points: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return how far each of the points ``(N, 3)`` is from the nearest of the others ``(M, 3)``, ``(N,)``."""
+    """Return the distance ``(N,)`` of each of ``points (N, 3)`` to the nearest of ``others (M, 3)``."""
     if len(others) > FEW:
         return np.asarray(cKDTree(others).query(points)[0])
     x, y, z = points.T.copy()
@@ -76,9 +77,9 @@ class AntipodalGrasper:
     rounds: int | None = None
 
     def propose(self, request: GraspRequest) -> GraspProposals:
-        """Return up to ``max_proposals`` grasps, the best first yet spread out; none where no pair fits between the fingers.
+        """Return up to ``max_proposals`` grasps in random order; none if no pair fits between the fingers.
 
-        Scores are the product of how well the contacts face each other and how near the closing axis passes the centre
+        The score is the product of how well the contacts face each other and how close the closing axis passes to the centre
         of mass.
         """
         rng = np.random.default_rng(request.seed)
@@ -115,7 +116,7 @@ def _score(pairs: AntipodalPairs, center_of_mass_m: np.ndarray, friction: float)
 
 
 class SuctionGrasper:
-    """Propose cups on surface points, pointing against the surface's normal as the lip finds it."""
+    """Propose suction grasps on surface points, approaching along the inward normal of the plane in which the lip rests."""
 
     name = "suction"
     model: str | None = None
@@ -123,13 +124,13 @@ class SuctionGrasper:
     rounds: int | None = None
 
     def propose(self, request: GraspRequest) -> GraspProposals:
-        """Return ``max_proposals`` grasps; the score falls with the lever of the centre of mass about the lip."""
+        """Return up to ``max_proposals`` grasps in random order; the score decreases with the lever arm of the centre of mass."""
         cup = of_kind(request.gripper, SuctionGripper)
         rng = np.random.default_rng(request.seed)
         points, normals = starting_points(request, max(1, request.max_proposals // CUP_ROLLS), rng)
         rolls = rng.uniform(0, 2 * np.pi, (len(points), CUP_ROLLS))
         first = _frames(cup, points, -normals, rolls[:, 0])
-        # one normal of a scanned surface is noise: where the lip seals, its plane tells the direction
+        # a single normal of a scanned surface is noisy, so the plane of the lip's contacts gives the direction
         inward = seal(cup, first, request.surface).inward
         poses = np.concatenate([_frames(cup, points, inward, rolls[:, number]) for number in range(CUP_ROLLS)])
         count = len(poses)
@@ -140,7 +141,7 @@ class SuctionGrasper:
 
 
 def _frames(cup: SuctionGripper, points_m: np.ndarray, inward: np.ndarray, roll_rad: np.ndarray) -> np.ndarray:
-    """Return grasps ``(N, 4, 4)`` whose lips are centred on points, approaching along ``inward (N, 3)``."""
+    """Return grasp poses ``(N, 4, 4)`` whose lips are centred on points and approach along ``inward (N, 3)``."""
     first, second = tangents(inward)
     x = np.cos(roll_rad)[:, None] * first + np.sin(roll_rad)[:, None] * second
     poses = np.tile(np.eye(4), (len(points_m), 1, 1))

@@ -1,8 +1,8 @@
-"""One question to a server of ZeroMQ: what a REQ socket says and hears on the wire, within a deadline and a number of bytes.
+"""Minimal ZeroMQ client: one request of a REQ socket and its answer, within a deadline and a size limit.
 
-ZMTP 3.0 (https://rfc.zeromq.org/spec/23/) with the mechanism NULL, which servers of 3.1 speak too. libzmq itself bounds each
-frame of an answer (ZMQ_MAXMSGSIZE) but not how many there are: a peer that sends frames without end fills the memory of the
-process until the time is over (measured: 70 MB a second). Here all frames together have the limit.
+It implements ZMTP 3.0 (https://rfc.zeromq.org/spec/23/) with the mechanism NULL, which servers of version 3.1 also support.
+libzmq limits the size of each frame of an answer (ZMQ_MAXMSGSIZE) but not their number, so a peer that sends endless frames
+fills the memory until the timeout (measured: 70 MB per second). Here the limit applies to the sum of all frames.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ RETRY_S = 0.05
 
 
 class NotZmtp(Exception):
-    """What came is not of the protocol, or more than is read; the message is for a person."""
+    """The peer violates the protocol or exceeds the size limit; the message is meant for the user."""
 
 
 class NotConnected(Exception):
-    """Nothing of the question has left this machine; the message says why."""
+    """No connection could be made, so nothing was sent; the message says why."""
 
 
 def ask(url: str, question: bytes, *, connect_s: float, timeout_s: float, max_bytes: int) -> bytes:
-    """Send a message to the REP or ROUTER socket at ``tcp://HOST:PORT`` and return the message that it answers.
+    """Send a message to the REP or ROUTER socket at ``tcp://HOST:PORT`` and return its answer.
 
-    Raises NotConnected, TimeoutError after ``timeout_s`` in all, OSError for a connection that is cut, and NotZmtp for another
+    Raises NotConnected; TimeoutError after ``timeout_s`` in total; OSError for a lost connection; and NotZmtp for another
     protocol, an answer of several parts, or one of more than ``max_bytes``.
     """
     until = time.monotonic() + timeout_s
@@ -47,7 +47,7 @@ def ask(url: str, question: bytes, *, connect_s: float, timeout_s: float, max_by
 
 
 def _connected(url: str, timeout_s: float) -> socket.socket:
-    """Connect; a server that is being started again is waited for, as libzmq does."""
+    """Connect, with retries until the timeout, like libzmq, so that a restarting server is waited for."""
     parts = urlsplit(url)
     host, port, until = parts.hostname or "", parts.port or 0, time.monotonic() + timeout_s
     failure = "no address"
@@ -90,7 +90,7 @@ class _Peer:
         self._write(head + body)
 
     def answer(self) -> bytes:
-        """Return the one part of the message that comes after its empty delimiter; heartbeats are answered."""
+        """Return the single part of the message after the empty delimiter frame; heartbeats are answered."""
         parts: list[tuple[int, bytes]] = []
         while not parts or parts[-1][0] & MORE:
             flags, body = self._frame()
@@ -112,7 +112,7 @@ class _Peer:
         return flags, self._read(length)
 
     def _read(self, length: int) -> bytes:
-        self._left -= length + 1  # also frames of nothing end
+        self._left -= length + 1  # counts empty frames too
         if self._left < 0:
             raise NotZmtp(f"its answer has more than {self._max} bytes")
         data = bytearray()

@@ -1,4 +1,4 @@
-"""Tell the object in a photo from its background, without weights."""
+"""Photo matting: separate the object in a photo from its background, with built-in models that need no download."""
 
 from manitwin.models.matting.matte import Matte, matte_photo
 

@@ -1,4 +1,4 @@
-"""The background of a photo as a few smooth colour surfaces seen along its border, and each pixel's distance from them."""
+"""Background model of a photo: a few smooth colour surfaces fitted to its border, and each pixel's distance from them."""
 
 from __future__ import annotations
 
@@ -11,19 +11,25 @@ import numpy as np
 FIT_SIDE_PX = 128
 MAX_SURFACES = 3
 BORDER_SHARE = 0.04
-MIN_SHADE, MAX_SHADE = 0.25, 0.985  # ratio of reflected light: darker is no shadow of a lit scene, lighter is none
-NEUTRAL = 0.08  # spread of the channels' ratios in a shadow of one light
-NOISE_FLOOR_LAB = 0.5  # a quantised 8-bit channel: a perfectly flat border still has this much doubt
+MIN_SHADE, MAX_SHADE = 0.25, 0.985  # ratio of reflected light of a shadow in a lit scene
+NEUTRAL = 0.08  # spread of the channels' ratios in a shadow with one light source
+NOISE_FLOOR_LAB = 0.5  # quantization noise of an 8-bit channel, present even on a perfectly flat border
 
 
 @dataclass(frozen=True)
 class Background:
-    """A background model and what it says of the photo's pixels.
+    """Background model and its comparison with the pixels of the photo.
 
-    ``lab (H, W, 3)`` CIE L*a*b*; ``expected (H, W, 3)`` the background's colour at each pixel; ``residual`` their
-    difference; ``distance (H, W)`` Mahalanobis distance from the background, fine (about one pixel wide);
-    ``coarse_distance`` the same of the blurred photo; ``noise_lab`` the background's spread; ``unexplained`` the share of
-    the border that no surface explains; ``border`` the mask of the border ring; ``seam`` where two surfaces meet.
+    - ``lab (H, W, 3)``: the photo in CIE L*a*b*
+    - ``expected (H, W, 3)``: the background colour at each pixel
+    - ``residual (H, W, 3)``: the photo, slightly blurred, minus ``expected``
+    - ``distance (H, W)``: Mahalanobis distance from the background at fine scale (about one pixel)
+    - ``coarse_distance (H, W)``: the same for the blurred photo
+    - ``noise_lab``: spread of the background in L*a*b* units
+    - ``unexplained``: share of the border that no surface explains
+    - ``surfaces``: number of surfaces
+    - ``border (H, W)``: mask of the border ring
+    - ``seam (H, W)``: mask of the lines where two surfaces meet
     """
 
     lab: np.ndarray
@@ -39,40 +45,40 @@ class Background:
 
     @cached_property
     def light_ratio(self) -> np.ndarray:
-        """Each pixel's linear light (H, W, 3) over that of the expected background."""
+        """Linear light (H, W, 3) of each pixel over that of the expected background."""
         smooth = np.clip(cv2.cvtColor(cv2.GaussianBlur(self.lab, (0, 0), 0.8), cv2.COLOR_LAB2RGB), 0, 1)
         expected = np.clip(cv2.cvtColor(self.expected, cv2.COLOR_LAB2RGB), 0, 1)
         return np.asarray((cv2.pow(smooth, 2.2) + 2e-3) / (cv2.pow(expected, 2.2) + 2e-3))
 
     @cached_property
     def light(self) -> np.ndarray:
-        """Each pixel's light (H, W) over that of the expected background, the mean of its ``light_ratio``."""
+        """Mean over the channels of ``light_ratio`` (H, W)."""
         return total(self.light_ratio) / 3
 
     @cached_property
     def tint(self) -> np.ndarray:
-        """How far each pixel's ``light_ratio`` (H, W) is from an even one, over its ``light``."""
+        """Deviation (H, W) of each pixel's ``light_ratio`` from an equal ratio in all channels, relative to ``light``."""
         return np.asarray(length(self.light_ratio / self.light[..., None] - 1) / np.sqrt(3))
 
     @cached_property
     def shade(self) -> np.ndarray:
-        """Where a photo (H, W) has the background's colour, darkened without tint."""
+        """Mask (H, W) of pixels with the background's colour, darkened without tint."""
         return (self.light > MIN_SHADE) & (self.light < MAX_SHADE) & (self.tint < NEUTRAL)
 
 
 def total(vectors: np.ndarray) -> np.ndarray:
-    """Return the sum (...) of the components of vectors (..., 3), the same as numpy's, five times as fast."""
+    """Return the sum (...) over the components of vectors (..., 3); five times as fast as ``numpy.sum``."""
     return np.asarray(vectors[..., 0] + vectors[..., 1] + vectors[..., 2])
 
 
 def length(vectors: np.ndarray) -> np.ndarray:
-    """Return the length (H, W) of vectors (H, W, 3), four times as fast as numpy's."""
+    """Return the length (H, W) of vectors (H, W, 3); four times as fast as ``numpy.linalg.norm``."""
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
 def border_ring(height: int, width: int) -> np.ndarray:
-    """Return the mask (H, W) of the outer 4 % of an image, at least three pixels."""
+    """Return the mask (H, W) of the outer 4 % of an image, at least three pixels wide."""
     ring = np.zeros((height, width), bool)
     thickness = max(3, round(BORDER_SHARE * max(height, width)))
     ring[:thickness] = ring[-thickness:] = True
@@ -81,7 +87,7 @@ def border_ring(height: int, width: int) -> np.ndarray:
 
 
 def connected_to(mask: np.ndarray, seed: np.ndarray) -> np.ndarray:
-    """Return the 4-connected parts of ``mask`` that hold a pixel of ``seed``."""
+    """Return the 4-connected components of ``mask`` that contain a pixel of ``seed``."""
     _, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)
     reached = np.unique(labels[seed & mask])
     return np.isin(labels, reached[reached > 0])
@@ -90,8 +96,8 @@ def connected_to(mask: np.ndarray, seed: np.ndarray) -> np.ndarray:
 def model_background(rgb: np.ndarray) -> Background:
     """Fit the background of ``rgb`` (H, W, 3) uint8 sRGB.
 
-    Up to three cubic colour surfaces in L*a*b*, each grown from the densest colour left on the border: light that falls
-    off, a vignette and a wall that meets a table are background, not object.
+    Up to three cubic colour surfaces in L*a*b* are grown, each from the most frequent border colour not yet explained. They
+    model light falloff, vignetting and a wall that meets a table as background.
     """
     lab = cv2.cvtColor(rgb.astype(np.float32) / 255, cv2.COLOR_RGB2LAB)
     height, width = lab.shape[:2]
@@ -107,12 +113,12 @@ def model_background(rgb: np.ndarray) -> Background:
 
 
 def _surface(height: int, width: int, coefficients: np.ndarray, degree: int) -> np.ndarray:
-    """Return the colours (H, W, 3) float32 of a surface, term by term: all terms of a picture of 1024 pixels are 60 MB."""
+    """Evaluate a colour surface (H, W, 3) float32, term by term: all terms of a 1024 px picture at once would take 60 MB."""
     x, y = _axis(width), _axis(height)[:, None]
     channels = np.zeros((3, height, width))
     for (i, j), coefficient in zip(_powers(degree), coefficients, strict=True):
         term = x**i * y**j
-        for channel, factor in zip(channels, coefficient, strict=True):  # one by one: three times as fast
+        for channel, factor in zip(channels, coefficient, strict=True):  # a loop over channels is three times as fast
             channel += term * factor
     return np.ascontiguousarray(np.moveaxis(channels, 0, 2), np.float32)
 
@@ -152,13 +158,13 @@ def _fit_surfaces(lab: np.ndarray) -> tuple[list[tuple[np.ndarray, int]], float]
 def _grow_surface(
     colours: np.ndarray, left: np.ndarray, shape: tuple[int, int], bases: dict[int, np.ndarray]
 ) -> tuple[np.ndarray, int, np.ndarray]:
-    """Grow one surface from the densest border colour: fit, take in what is connected and explained, raise the degree.
+    """Grow one surface from the most frequent border colour: fit, add connected pixels that it explains, raise the degree.
 
-    ``bases`` are the terms of the surfaces (H * W, K) by degree.
+    ``bases`` holds the polynomial terms (H * W, K) by degree. Returns coefficients, degree and each pixel's distance.
     """
     ring_colours = colours[left]
     modes = ring_colours[:: max(1, len(ring_colours) // 200)]
-    weights = np.array([0.5, 1.0, 1.0])  # lightness varies along a background more than colour does
+    weights = np.array([0.5, 1.0, 1.0])  # lightness varies more than colour along a background
     near = total((ring_colours[:, None] - modes[None]) ** 2 * weights) < 49
     start = modes[near.sum(0).argmax()]
     used = left & (total((colours - start) ** 2 * weights) < 100)
@@ -217,7 +223,7 @@ def _mahalanobis(residual: np.ndarray, covariance: np.ndarray) -> np.ndarray:
 def _explain_seams(
     lab: np.ndarray, surfaces: list[np.ndarray], fine: np.ndarray, coarse: np.ndarray, noise: float, border: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Take the mixed colours of a line where two surfaces meet for background."""
+    """Classify the mixed colours along a line where two surfaces meet as background; return both distances and the seam mask."""
     smooth = cv2.GaussianBlur(lab, (0, 0), 0.8)
     plain = connected_to(fine < 3.5, border)
     seam = np.zeros(plain.shape, bool)

@@ -1,8 +1,8 @@
-"""How likely a mask is right: a logistic function of its scores and of how far the opinions agree, fitted on composites.
+"""Probability that a mask is right: logistic regression on its scores and on the agreement of the opinions.
 
-Every feature is such that more is better, and no weight is negative, so that no doubt can make a mask more likely.
-``benchmarks/matting_belief.py`` fits the weights on composites whose masks are known (their calibration part); a mask is right
-where one whole thing is in the picture and the intersection over union with its truth is above 0.95.
+For every feature a larger value is better and no weight is negative, so a doubt never raises the probability.
+``benchmarks/matting_belief.py`` fits the weights on the calibration part of a set of composites with known masks. A mask
+counts as right if the picture shows one whole object and the intersection over union with the true mask exceeds 0.95.
 """
 
 from __future__ import annotations
@@ -21,34 +21,36 @@ from manitwin.models.matting.outline import eroded
 
 WEIGHTS_FILE = "belief.json"
 LEAST = 0.02
-"""Scores below this count as this: their logarithm is taken."""
+"""Lower bound of a score before its logarithm is taken."""
 SCORES = (
     *("on_edges", "crisp", "separable", "complete", "uncut", "stable", "whole", "plain", "outermost"),
     *("sharply_bounded", "unshaded", "solid", "thick"),
 )
-"""Features that are the logarithms of a mask's scores (``MatteScores``)."""
+"""Features that are logarithms of a mask's scores (``MatteScores``)."""
 OPINIONS = ("network_alike", "network_sharp", "network_within", "network_beyond", "colours", "rival")
-"""Features that compare the mask with what a network, the colours and the next best mask say."""
+"""Features that compare the mask with the network, the colour model and the next best mask."""
 BULKY = 18.75
-"""Pixels of area for each pixel of outline, in the photo: from here on an outline that is off by a fraction of a pixel costs next
-to no intersection over union."""
+"""Pixels of area per pixel of outline, in the photo.
+
+Above this, an outline error of a fraction of a pixel hardly lowers the intersection over union.
+"""
 MOST_SOFT_PX = 8.0
-"""Unsure pixels of a network across the outline, in pixels of the photo: wider is no larger doubt."""
+"""Upper bound of the width, in pixels of the photo, of the band along the outline in which the network is uncertain."""
 MOST_MISJUDGED = 0.05
-"""Of a mask's area: a cut-out that may be wrong of so much of the thing is not believed, whatever else speaks for it."""
+"""Share of a mask's area; a mask that may be wrong about that much of the object is rejected whatever its other features are."""
 LEAST_DIFFERENCE = 0.005
-"""A share of the mask's area: opinions that differ by less count as alike; beyond, each doubling adds as much doubt."""
+"""Share of the mask's area; smaller differences count as agreement. Beyond it each doubling adds the same amount of doubt."""
 FEATURES = (*SCORES, *OPINIONS, "kept", "bulk", "made_by_rules")
 BEST = np.zeros(len(FEATURES))
-"""The best value of each feature; that of ``made_by_rules`` is never a doubt."""
+"""Best value of each feature; that of ``made_by_rules`` never counts as a doubt."""
 WHOLE = np.array([name == "whole" for name in FEATURES])
-"""Selects the feature that doubts a mask beside which other pieces lie."""
+"""Index mask of the feature ``whole``, which is low if the mask has other pieces."""
 
 
 def features(candidate: Candidate, others: list[Candidate], share: np.ndarray) -> np.ndarray:
-    """Return the features (F,) of a candidate beside the ``others``, given a network's ``share`` of object (any size).
+    """Return the features (F,) of a candidate, compared with the ``others`` and a network's foreground probability ``share``.
 
-    Of the others only the one that is most like the candidate counts.
+    ``share`` may have any size. Of the other candidates only the one most similar to this candidate counts.
     """
     mask = candidate.found.mask
     share = at_size(share, mask.shape)
@@ -76,30 +78,27 @@ def features(candidate: Candidate, others: list[Candidate], share: np.ndarray) -
 
 
 def _difference(share: float) -> float:
-    """Return the doubt that a difference is, which is a share of the mask's area: 0 for none, growing with its logarithm."""
+    """Return the doubt of a difference given as a share of the mask's area: 0 for none, growing with its logarithm."""
     return float(np.log1p(min(share, 1.0) / LEAST_DIFFERENCE))
 
 
 def probability(values: np.ndarray) -> float:
-    """Return how likely a mask with these ``features`` is right, in [0, 1].
-
-    The fitted doubts count, and those of ``unfitted``.
-    """
+    """Return the probability in [0, 1] that a mask with these ``features`` is right: the fitted model times ``unfitted``."""
     bias, weights = _weights()
     return float(unfitted(values) / (1 + np.exp(-np.clip(bias + weights @ values, -30, 30))))
 
 
 def unfitted(values: np.ndarray) -> float:
-    """Return the factor in [0, 1] by which two further doubts lower the probability.
+    """Return the factor in [0, 1] of two doubts that are too rare in the composites to be fitted.
 
-    Composites show them too seldom for a fit: a part in focus that may be lost or a hole that may be filled (``kept``), and
-    ground that may be seen through the mask (``solid``).
+    They are ``kept`` (a part in focus may be lost, or a hole filled) and ``solid`` (background may be visible through the
+    mask).
     """
     return float((1 + values[FEATURES.index("kept")]) * np.exp(values[FEATURES.index("solid")]))
 
 
 def doubts_of(values: np.ndarray) -> dict[str, float]:
-    """Return what each of the ``features`` but ``made_by_rules`` costs a mask, in log-odds, against its best value."""
+    """Return the cost in log-odds of each feature except ``made_by_rules``, compared with the feature's best value."""
     _, weights = _weights()
     doubts = dict(zip(FEATURES[:-1], (weights * (BEST - values))[:-1].tolist(), strict=True))
     doubts["kept"] -= float(np.log(max(1 + values[FEATURES.index("kept")], LEAST)))

@@ -1,4 +1,4 @@
-"""The masks that a photo's matte is chosen from: that of the built-in rules, and those of one to three networks."""
+"""Candidate masks of a photo: that of the built-in rules, those of one to three networks, and a union of two."""
 
 from __future__ import annotations
 
@@ -15,30 +15,37 @@ from manitwin.models.matting.outline import dilated, eroded, opened
 from manitwin.models.matting.segmentation import MOSTLY_NARROW, Segmentation, without_specks
 
 Maker = Literal["rules", "network", "second_network", "built_in_network", "both"]
-"""``network`` and ``second_network`` are those that a person named; where none is, ``network`` is the built-in one. ``both``
-is what the first network found and the parts in focus that rules found besides: no opinion of its own."""
+"""Source of a candidate mask.
+
+``network`` and ``second_network`` are networks that the user named; if the user named none, ``network`` is the built-in
+network. ``both`` is the first network's mask plus parts in focus that only the rules found; it is not an independent opinion.
+"""
 AGREEING = 0.98
-"""Likeness of two masks beyond which rules and a network have found the same thing."""
+"""Similarity of two masks above which the rules and a network have found the same object."""
 SURE = 0.9
-"""Share of object of a pixel that a network calls certain; below one less that, it is certain of the ground."""
+"""Foreground probability above which a network is certain of the object; below 1 - ``SURE`` it is certain of the background."""
 ENCLOSING = 0.2
-"""Share of object of an outline that encloses something, though the network be unsure of it."""
+"""Foreground probability of pixels that can enclose a region, although the network is uncertain of them."""
 LEAST_PIXELS = 30
 LEAST_ADDED = 0.003
-"""Of a network's mask: what rules add beyond that makes a mask of its own."""
+"""Share of a network's mask; if the rules add more than that, the union becomes a candidate of its own."""
 MARGIN_PX = 3
 SURELY_GROUND, MOST_CERTAIN_OF_SHADE = 0.1, 0.3
-"""Mean share of object of a piece, and how much of it has a colour that is not the ground's in shade: of 39 pieces in focus that
-rules find and the network does not, in calibration pictures, 35 are ground, 26 of these below both, and none of the others."""
+"""Limits below which a piece is background in shade.
+
+They are the piece's mean foreground probability, and the share of its pixels whose colour is certainly not that of shaded
+background. In the calibration pictures the rules find 39 pieces in focus that the network does not. Of these 35 are
+background; 26 of the 35 and none of the other 4 are below both limits.
+"""
 UNLIKE_GROUND = 4.0
-"""``Background.distance`` below which nine in ten pixels of the photo's border are."""
+"""``Background.distance`` that nine in ten border pixels of a photo stay below."""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A mask that may be the object, with its scores on the photo; ``maker`` says who found it.
+    """Candidate mask of the object with its scores.
 
-    ``zoom`` is the photo's size over the mask's.
+    ``maker`` is its source, ``zoom`` the size of the photo over that of the mask.
     """
 
     maker: Maker
@@ -48,20 +55,20 @@ class Candidate:
 
     @property
     def by_network(self) -> bool:
-        """Whether a network found it, or most of it."""
+        """Whether a network found all or most of the mask."""
         return self.maker != "rules"
 
     @property
     def independent(self) -> bool:
-        """Whether it is an opinion of its own."""
+        """Whether the mask is an opinion of its own."""
         return self.maker != "both"
 
 
 def candidates(found: Segmentation, shares: Sequence[np.ndarray], *, zoom: float) -> list[Candidate]:
-    """Return the masks to choose from, given what the rules ``found`` and each network's share of object (any size) in [0, 1].
+    """Return the candidate masks, given what the rules ``found`` and the foreground probability in [0, 1] of each network.
 
-    ``shares`` has one to three, those of the ``network_makers``; ``zoom`` is the photo's size over the mask's. None of the
-    masks is empty or the whole picture.
+    ``shares`` has one to three arrays of any size, in the order of ``network_makers``; ``zoom`` is the size of the photo over
+    that of the mask. Empty masks and masks that cover the whole picture are left out.
     """
     masks: list[tuple[Maker, Segmentation]] = [("rules", found)]
     for maker, share in zip(network_makers(len(shares)), shares, strict=True):
@@ -82,7 +89,7 @@ def candidates(found: Segmentation, shares: Sequence[np.ndarray], *, zoom: float
 
 
 def network_makers(count: int) -> tuple[Maker, ...]:
-    """Return what ``count`` networks are called, of which the last is the built-in one."""
+    """Return the maker names of ``count`` networks, of which the last is the built-in one."""
     named: tuple[Maker, ...] = ("network", "second_network")
     return named[:1] if count == 1 else (*named[: count - 1], "built_in_network")
 
@@ -92,12 +99,13 @@ def _has_outline(mask: np.ndarray) -> bool:
 
 
 def completed(share: np.ndarray, found: Segmentation, *, exact: bool = False) -> np.ndarray:
-    """Return a network's share of object (any size) at the size of the mask that the rules ``found``, filled within its outline.
+    """Return a network's foreground probability at the size of the rules' mask, with large plain regions of the object filled.
 
-    A large plain or printed surface tells a network little, so what it leaves out within its own outline, as far as that is
-    ``ENCLOSING``, is object where the rules say so and the colours are neither the ground's nor its shade's. What is seen
-    through a hole has the ground's colours, and stays out. On an ``exact`` ground, of one digital colour, what has such
-    colours is no ground wherever it is, and no outline of the network's has to enclose it: it may see nothing of an apple.
+    A network may miss a large plain or printed surface. Pixels inside its outline, where that has at least probability
+    ``ENCLOSING``, are set to 1 if the rules call them object and their colour is certainly neither the background's nor its
+    shade's. Background visible through a hole has the background's colours and is not filled. On an ``exact`` background of
+    one digital colour such pixels are object wherever they are, without an enclosing outline, since the network may miss the
+    whole object.
     """
     share = at_size(share, found.mask.shape)
     within = eroded(found.mask if exact else ndimage.binary_fill_holes(share > ENCLOSING), 2)
@@ -106,30 +114,37 @@ def completed(share: np.ndarray, found: Segmentation, *, exact: bool = False) ->
 
 
 def network_mask(share: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Return what a network calls more object than ground, at a ``shape`` (H, W), without specks; empty of next to nothing."""
+    """Return the pixels with foreground probability above 0.5 at a ``shape`` (H, W), without specks.
+
+    The mask is empty if there are fewer than ``LEAST_PIXELS``.
+    """
     mask = at_size(share, shape) > 0.5
     return without_specks(mask) if mask.sum() >= LEAST_PIXELS else np.zeros(shape, bool)
 
 
 def at_size(share: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Return a network's share of object, scaled to a mask's ``shape`` (H, W)."""
+    """Scale a network's foreground probability to a mask's ``shape`` (H, W)."""
     return np.asarray(cv2.resize(share, shape[::-1], interpolation=cv2.INTER_AREA))
 
 
 def alike(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the overlap of two masks but for slivers along their outlines: 1 less what differs, as a share of both."""
+    """Return the similarity of two masks in [0, 1]: 1 minus the area that differs over the area of the union.
+
+    Differences that are thin slivers along the outlines do not count.
+    """
     both = int((one | other).sum())
     return float(np.clip(1 - opened(one ^ other, 2).sum() / both, 0, 1)) if both else 0.0
 
 
 def misjudged(candidate: Candidate, others: list[Candidate], share: np.ndarray) -> float:
-    """Return the area, by the candidate's own, of what others see otherwise and what has an outline in focus all around.
+    """Return the area that other masks judge differently and whose outline is in focus, as a share of the candidate's area.
 
-    That is a piece that they have and the candidate lacks, or a hole of theirs that it fills. A shadow's edge is soft, and
-    ground has none: such a piece is a part of the thing, a grey blade or a dark tip, and such a hole the loop of scissors.
-    Where rules and a network have found the same, what a third sees alone is outvoted. What runs out of the picture and does
-    not touch the candidate is ground: a joint of boards, a table's edge; and so is what looks like shade to colours and to the
-    network's ``share`` (any size): the sharp shadow under a knife.
+    Such a region is a piece that another mask has and the candidate lacks, or a hole of another mask that the candidate
+    fills. A shadow's edge is soft and bare background has no edge, so such a piece is a part of the object (a grey blade, a
+    dark tip) and such a hole is real (the loop of scissors). If the rules and a network agree on a mask, other masks are
+    outvoted. Two kinds of pieces are background and do not count: those that reach the image frame without touching the
+    candidate (a joint of boards, a table's edge), and those that look like shade both by colour and to the network's
+    ``share`` of any size (the sharp shadow under a knife).
     """
     found = candidate.found
     shade = _shade(found, share)
@@ -156,11 +171,11 @@ def misjudged(candidate: Candidate, others: list[Candidate], share: np.ndarray) 
 
 
 def lost_parts(mask: np.ndarray, found: Segmentation, share: np.ndarray) -> np.ndarray:
-    """Return the pieces of another ``mask`` (H, W) that ``found`` lacks and that are parts of the thing.
+    """Return the pieces of another ``mask`` (H, W) that ``found`` lacks and that are parts of the object.
 
-    What has an outline in focus, where it is no part of what was found, is a part, a grey blade or a dark tip. What lies within
-    and has not the ground's colour is no hole, but a part too. What runs out of the picture is no part of a whole thing, and
-    what looks like shade to colours and to a network's ``share`` (any size) is none either.
+    A piece is a part if its free outline is in focus (a grey blade, a dark tip), or if it lies inside and does not have the
+    background's colour. Pieces that reach the image frame, and pieces that look like shade by colour and to the network's
+    ``share`` (any size), are not parts.
     """
     lost, shade = np.zeros(mask.shape, bool), _shade(found, share)
     near_narrow, free = dilated(found.narrow, 3), ~dilated(found.mask, 3)
@@ -175,7 +190,7 @@ def lost_parts(mask: np.ndarray, found: Segmentation, share: np.ndarray) -> np.n
 
 
 def _shade(found: Segmentation, share: np.ndarray) -> Callable[[tuple[slice, slice], np.ndarray], bool]:
-    """Return what tells whether a piece in its box is darker than the ground, of no other colour, and no object to a network."""
+    """Return a predicate that tells whether a piece in its box is shaded background: darker, of the same colour, and no object."""
     seen, certain = at_size(share, found.mask.shape), found.colours.certain
     darker = found.background.light < 1
 
@@ -187,18 +202,18 @@ def _shade(found: Segmentation, share: np.ndarray) -> Callable[[tuple[slice, sli
 
 
 def _at_frame(box: tuple[slice, slice], shape: tuple[int, ...]) -> bool:
-    """Tell whether the ``_pieces`` box around a piece of a mask (H, W) reaches the picture's frame."""
+    """Tell whether the box around a piece of a mask (H, W), from ``_pieces``, reaches the image frame."""
     return any(side.start <= 0 or side.stop >= size for side, size in zip(box, shape, strict=True))
 
 
 def _in_focus(piece: np.ndarray, free: np.ndarray, near_narrow: np.ndarray) -> bool:
-    """Tell whether the outline of a piece (H, W), where it is ``free``, is mostly near narrow edges."""
+    """Tell whether the outline of a piece (H, W), where it is ``free``, lies mostly near narrow edges."""
     outline = piece & ~eroded(piece, 1) & free
     return bool(outline.any() and near_narrow[outline].mean() > MOSTLY_NARROW)
 
 
 def _pieces(mask: np.ndarray) -> Iterator[tuple[tuple[slice, slice], np.ndarray]]:
-    """Yield the box around each 4-connected piece of a mask (H, W), and the piece in it."""
+    """Yield the box around each 4-connected piece of a mask (H, W), and the piece's mask in that box."""
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
     for index in range(1, count):
         left, top, width, height, _ = stats[index]
@@ -209,10 +224,11 @@ def _pieces(mask: np.ndarray) -> Iterator[tuple[tuple[slice, slice], np.ndarray]
 
 
 def doubts(share: np.ndarray, mask: np.ndarray) -> tuple[float, float, float]:
-    """Return how unsure a network's ``share`` (H, W) is, and how much it says against a mask within and beyond it.
+    """Return how uncertain a network is and how much it objects to a mask: (unsure, within, beyond) as shares of the mask's area.
 
-    Each as a share of the mask's area: pixels between certain object and certain ground; ground within, object beyond, both but
-    for a rim of two pixels.
+    ``share`` (H, W) is the network's foreground probability. ``unsure`` counts pixels between certain object and certain
+    background, ``within`` sums background probability inside the mask and ``beyond`` foreground probability outside, both
+    without a rim of two pixels.
     """
     area = max(int(mask.sum()), 1)
     unsure = float(((share > 1 - SURE) & (share < SURE)).sum() / area)

@@ -1,4 +1,4 @@
-"""Why a cut-out is not believed, in words, and what to do about it."""
+"""Messages that explain why a mask is not accepted, and what the user can do about it."""
 
 from __future__ import annotations
 
@@ -35,25 +35,25 @@ CAUSES = {
     "network_sharp": "one way of looking is not sure where it ends",
     "colours": "colours alone do not tell a part of it from the background",
 }
-"""By score or feature; of equally low scores the first is told."""
+"""Message for each score or feature. Of equally low scores the first in this order is reported."""
 OR_MASK = "give a mask of it (--mask) or an image with an alpha channel"
 REMEDY = f"photograph it whole on a plain surface of another colour, or {OR_MASK}"
 CROP = "say where it is (--box) or crop that away if it is another thing, or give a mask of it (--mask)"
 THIN = ("bulk", "thick")
 HOLES = "or parts of it with the background's colour are taken for holes"
 BULKIER = 2.0
-"""Times the area for its outline that a mask has with its holes filled where these are what makes it thin."""
+"""A mask is thin because of its holes if filling them multiplies its area per outline pixel by more than this factor."""
 AGAINST = ("network_beyond", "network_within")
 ALIKE = 0.9
-"""Likeness of two masks from which on the opinions agree on what the thing is, and differ about a part of it at most."""
+"""Similarity of two masks from which on they show the same object and differ at most in a part of it."""
 FILLING = 0.8
-"""Of the picture's longer side: a thing of that length cannot be taken much closer."""
+"""Share of the picture's longer side; an object of that length cannot be photographed from much closer."""
 
 
 def told(candidate: Candidate, features: np.ndarray) -> str:
-    """Return why a mask with these ``features`` (F,) is not believed, and what to do about it.
+    """Return why a mask with these ``features`` (F,) is not accepted, followed by the remedy.
 
-    A frame that things run across is a cause of its own only where it is too cluttered or cuts the thing itself.
+    Edges that cross the image frame are reported only if the scene is too cluttered or the frame cuts the object itself.
     """
     cause = frame_cause(candidate.found.background, candidate.found.gradient)
     if cause is None or (cause == "uncut" and candidate.scores.uncut >= LOW_SCORE):
@@ -66,10 +66,11 @@ def told(candidate: Candidate, features: np.ndarray) -> str:
 
 
 def cause_of(features: np.ndarray, scores: MatteScores) -> str:
-    """Return which of ``CAUSES`` costs a mask with these ``features`` (F,) the most of its confidence.
+    """Return the key of ``CAUSES`` that costs a mask with these ``features`` (F,) the most confidence.
 
-    Where it is that the opinions differ, it is the lowest score, since that tells why they may. Where none is low, it is
-    ``stable`` if they differ about what the thing is, else what one of them says against the mask.
+    If that is a disagreement between opinions, the lowest score is returned instead, because it may explain the disagreement.
+    If no score is low, the result is ``stable`` where the opinions show different objects, else the network's objection to
+    the mask.
     """
     doubts = doubts_of(features)
     worst = max(doubts, key=lambda name: doubts[name])
@@ -86,23 +87,24 @@ def cause_of(features: np.ndarray, scores: MatteScores) -> str:
 
 
 def _likeness(features: np.ndarray) -> float:
-    """Return how like a mask with these ``features`` what the network or, if that is less, another mask shows is, in [0, 1]."""
+    """Return the lower of a mask's similarities in [0, 1] to the network's mask and to the best rival, from its ``features``."""
     most = -min(features[FEATURES.index(name)] for name in ("network_alike", "rival"))
     return float(1 - LEAST_DIFFERENCE * np.expm1(most))
 
 
 def _is_beside(mask: np.ndarray) -> bool:
-    """Tell whether the border of the picture cuts pieces of a mask (H, W), and not the largest, which is the thing."""
+    """Tell whether the image border cuts pieces of a mask (H, W) but not the largest one, which is the object."""
     border, thing = border_of(mask.shape), largest_piece(mask)
     return bool((mask & border).any() and not (thing & border).any())
 
 
 def _is_thin_by_its_holes(mask: np.ndarray) -> bool:
-    """Tell whether a mask (H, W) is far bulkier once its holes are filled: a bracelet, or a bottle as pale as its ground."""
+    """Tell whether filling the holes of a mask (H, W) makes it much bulkier: a bracelet, or a bottle as pale as its background."""
     return _bulk_px(np.asarray(binary_fill_holes(mask))) > BULKIER * _bulk_px(mask)
 
 
 def _bulk_px(mask: np.ndarray) -> float:
+    """Return the area of a mask per pixel of its outline."""
     return float(mask.sum() / max(int((mask & ~eroded(mask, 1)).sum()), 1))
 
 

@@ -1,4 +1,4 @@
-"""The confidence in a mask, measured on the photo that it was cut from."""
+"""Quality scores of a mask, measured on the photo from which it was cut."""
 
 from __future__ import annotations
 
@@ -15,27 +15,32 @@ from manitwin.models.matting.outline import dilated, disk, eroded, opened
 from manitwin.models.matting.segmentation import Segmentation
 from manitwin.models.matting.shade_strips import shade_strips
 
-MOST_ZOOM = 1.6  # beyond that a photo's blur, not its pixels, says how fine its outlines are
-WIDER = 1.3  # than the photo's own blur: its edges differ by 1.2 times, as made photos show
-FRAME_EDGE = 5.0  # L*a*b* per pixel: an edge in focus of an object, not shading
+MOST_ZOOM = 1.6  # above this the blur of the photo, not its pixels, limits the resolution of outlines
+WIDER = 1.3  # times the blur of the photo; in synthetic photos edge widths differ by a factor of 1.2
+FRAME_EDGE = 5.0  # L*a*b* per pixel: the gradient of an object edge in focus; shading is flatter
 
 LOW_SCORE = 0.5
-"""A score below it is a doubt by itself."""
+"""A score below this is a doubt by itself."""
 
 
 @dataclass(frozen=True)
 class MatteScores:
-    """Each in [0, 1]; 1 is best.
+    """Scores of a mask, each in [0, 1]; 1 is best.
 
-    ``on_edges`` share of the outline that lies on an edge of the photo; ``crisp`` how sharp it is against the object's own
-    strong edges; ``separable`` how well the colours just inside and just outside the outline differ from the background's
-    (Youden's J); ``complete`` nothing else stands out of the background; ``uncut`` how little of it the image border cuts;
-    ``stable`` agreement of two independent opinions, or how well the mask explains every edge in focus; ``whole`` little lies
-    outside the largest connected part; ``plain`` how uniform the background is; ``outermost`` share of the outline with no edge
-    beyond it, in what passes for shade, that is nearly as sharp; ``sharply_bounded`` how little of it is as soft as a shadow's
-    edge with shade inside; ``unshaded`` how little along it has the ground's own tint, dimmed, where the rest has other
-    colours; ``solid`` how little of it, enclosed by the rest, has the ground's own tint: a hole may be filled; ``thick`` how
-    small its outline is against its area: a third of a pixel off all around is 5 % of a thin thing.
+    - ``on_edges``: share of the outline that lies on an edge of the photo
+    - ``crisp``: sharpness of the outline relative to the object's own strong edges
+    - ``separable``: how well colours just inside and just outside the outline differ from the background's (Youden's J)
+    - ``complete``: nothing else stands out of the background
+    - ``uncut``: how little of the mask the image border cuts
+    - ``stable``: agreement of two independent opinions, or how well the mask explains all edges in focus
+    - ``whole``: share of the mask in its largest connected piece
+    - ``plain``: uniformity of the background
+    - ``outermost``: share of the outline without an edge of similar sharpness beyond it in what is classified as shade
+    - ``sharply_bounded``: how little of the outline is as soft as a shadow's edge with shade inside
+    - ``unshaded``: how little area along the outline has the background's tint, dimmed, where the rest has other colours
+    - ``solid``: how little enclosed area has the background's tint; a low score means that a hole may be filled
+    - ``thick``: how short the outline is relative to the area; for a thin object an error of a third of a pixel is 5 % of its
+      area
     """
 
     on_edges: float
@@ -54,12 +59,12 @@ class MatteScores:
 
     @property
     def of_one_whole(self) -> bool:
-        """Whether nothing speaks against one whole thing: that it falls apart, others stand beside it, or the frame cuts it."""
+        """Whether the mask shows one whole object: one connected piece, no other objects, not cut by the frame."""
         return min(self.complete, self.whole, self.uncut) >= LOW_SCORE
 
 
 def score(segmentation: Segmentation, *, zoom: float = 1.0, share: np.ndarray | None = None) -> MatteScores:
-    """Score a mask that is not empty; ``zoom`` is the photo's size over the mask's, ``share`` as for ``ground_inside``."""
+    """Score a non-empty mask; ``zoom`` is the size of the photo over that of the mask, ``share`` is as in ``ground_inside``."""
     mask, background = segmentation.mask, segmentation.background
     outline = mask & ~eroded(mask, 1)
     border = border_of(mask.shape)
@@ -71,7 +76,7 @@ def score(segmentation: Segmentation, *, zoom: float = 1.0, share: np.ndarray | 
     inside = mask & ~eroded(mask, reach)
     gap = max(
         4, round(0.03 * max(mask.shape))
-    )  # light bounced off the object, and a coarse JPEG, tint what is next to it
+    )  # skip pixels tinted by light bounced off the object or by coarse JPEG compression
     outside = dilated(mask, reach + gap) & ~dilated(mask, gap) & ~segmentation.shadow & ~background.shade
     hit = float((background.distance[inside] > 4).mean())
     false = float((background.distance[outside] > 4).mean()) if outside.sum() > 0.5 * outline.sum() else 0.0
@@ -79,7 +84,7 @@ def score(segmentation: Segmentation, *, zoom: float = 1.0, share: np.ndarray | 
     areas = stats[1:, cv2.CC_STAT_AREA]
     strips = shade_strips(background, mask, segmentation.gradient)
     outlined, beyond = _in_focus(segmentation, outline)
-    # two opinions differ, and one has all edges in focus for its outline and leaves none beside it
+    # although two opinions differ, the mask is settled if its outline has all edges in focus and none lie beside it
     settled = _ramp(outlined, 0.92, 0.99) * _ramp(-beyond, -0.3, -0.05)
     return MatteScores(
         on_edges=_ramp(on_edges, 0.4, 0.9),
@@ -101,24 +106,24 @@ def score(segmentation: Segmentation, *, zoom: float = 1.0, share: np.ndarray | 
 
 
 def border_of(shape: tuple[int, ...]) -> np.ndarray:
-    """Return which pixels (H, W) of a picture are its outermost two."""
+    """Return a mask (H, W) of the outermost two pixels of a picture."""
     border = np.ones(shape, bool)
     border[2:-2, 2:-2] = False
     return border
 
 
 def frame_cause(background: Background, gradient: np.ndarray) -> str | None:
-    """Return what sharp edges across the image's frame mean: ``uncut`` an object cut off, ``plain`` a cluttered scene.
+    """Interpret sharp edges that cross the image frame: ``uncut`` for an object that is cut off, ``plain`` for a cluttered scene.
 
-    None where the frame has no more of them than a wall that meets a table. A frame nearly half of which has one colour
-    shows a plain background, and what interrupts it is cut off.
+    Returns None if the frame has no more such edges than a wall that meets a table produces (fewer than four crossings). If
+    more than 40 % of the frame has one colour, the background is plain and the edges belong to an object that is cut off.
     """
     lab = cv2.GaussianBlur(background.lab, (0, 0), 1.5)
     colours, steepest = _along_frame(lab), _along_frame(gradient)
     crossings = int((np.diff((steepest > FRAME_EDGE).astype(int)) == 1).sum())
     if crossings < 4:
         return None
-    weights = np.array([0.5, 1.0, 1.0])  # lightness varies along a background more than colour does
+    weights = np.array([0.5, 1.0, 1.0])  # lightness varies more than colour along a background
     near = [np.linalg.norm((colours - colour) * weights, axis=1) < 8 for colour in colours[::8]]
     return "uncut" if max(float(same.mean()) for same in near) > 0.4 else "plain"
 
@@ -129,10 +134,10 @@ def _along_frame(picture: np.ndarray) -> np.ndarray:
 
 
 def _overshadowed(segmentation: Segmentation, outline: np.ndarray) -> float:
-    """Return the share of the outline that has an edge beyond it, in the shade beside it, at least 0.7 times as sharp.
+    """Return the share of the outline with an edge beyond it, in the adjacent shade, that is at least 0.7 times as sharp.
 
-    A shadow's own edge is softer than the outline of what casts it, so a sharp one is the rim of a grey or clear part. A
-    shadow with a visible edge was judged by more than that, and does not count.
+    A shadow's edge is softer than the outline of the object that casts it, so a sharp edge there is the rim of a grey or
+    transparent part. Shadows with a visible edge (``hard``) have been tested by other criteria and do not count.
     """
     mask, gradient = segmentation.mask, segmentation.gradient
     distance, nearest = ndimage.distance_transform_edt(~mask, return_indices=True)
@@ -145,10 +150,10 @@ def _overshadowed(segmentation: Segmentation, outline: np.ndarray) -> float:
 
 
 def _softly_bounded(segmentation: Segmentation, outline: np.ndarray) -> float:
-    """Return the share of the outline where a penumbra, not an edge, leads to the background's colour, dimmed.
+    """Return the share of the outline where a penumbra instead of an edge leads to the dimmed background colour.
 
-    That is the outline of a shadow: seen on a grey object, where nothing else tells the shadow that hangs on it. The sharper
-    quarter of the outline says how wide the photo's own blur is.
+    This is the outline of a shadow. On a grey object nothing else tells an attached shadow from the object. The 25th
+    percentile of the edge width along the outline estimates the blur of the photo.
     """
     inner = eroded(segmentation.mask, 5)
     if not inner.any():
@@ -165,14 +170,14 @@ def _softly_bounded(segmentation: Segmentation, outline: np.ndarray) -> float:
 
 
 def _in_focus(segmentation: Segmentation, outline: np.ndarray) -> tuple[float, float]:
-    """Return the share of the outline on narrow edges, and how many of those lie beside the mask, as a share of the outline."""
+    """Return the share of the outline on narrow edges, and the narrow edge pixels beside the mask over the outline's length."""
     mask, narrow = segmentation.mask, segmentation.narrow
     beside = dilated(mask, round(0.1 * max(mask.shape))) & ~dilated(mask, 6)
     return float(dilated(narrow, 3)[outline].mean()), float((narrow & beside).sum() / outline.sum())
 
 
 def _left_over(segmentation: Segmentation) -> float:
-    """Return the area of coherent things outside the mask: no background and no shadow, or a shadow with drawing in it."""
+    """Return the area of other objects outside the mask: neither background nor shadow, or edges inside a shadow."""
     background = segmentation.background
     away = ~dilated(segmentation.mask, 5) & ~background.seam
     limit = max(5.0, 1.5 * float(np.percentile(background.coarse_distance[background.border], 98)))
@@ -182,14 +187,17 @@ def _left_over(segmentation: Segmentation) -> float:
     edges = cv2.dilate(segmentation.gradient, disk(2))[segmentation.mask]
     sharp = max(1.6 * segmentation.edge_threshold, 0.15 * float(np.percentile(edges, 90)))
     drawn = away & eroded(segmentation.shadow, 4) & (segmentation.gradient > sharp)
-    things &= ~connected_to(things, background.border)  # light that the model missed comes in from the border
+    # regions connected to the border are lighting that the background model missed
+    things &= ~connected_to(things, background.border)
     return float(things.sum() + 3 * drawn.sum())
 
 
 def _longest(mask: np.ndarray) -> int:
+    """Return the longer side of a mask's bounding box in pixels."""
     rows, columns = np.nonzero(mask)
     return int(max(np.ptp(rows), np.ptp(columns))) + 1
 
 
 def _ramp(value: float, worst: float, best: float) -> float:
+    """Map ``value`` linearly to [0, 1], from ``worst`` to ``best``, with clipping."""
     return float(np.clip((value - worst) / (best - worst), 0, 1))

@@ -1,7 +1,8 @@
-"""What a network says of a ground of one digital colour, onto which somebody laid what was cut out of a photo.
+"""Correction of a network's output on a background of one digital colour, onto which an object was pasted.
 
-Networks learn from photographed grounds, and are unsure of one without any grain, most of all of black: they see a haze of object
-all over it. The frame of such a picture is ground, so that what a network says there is how unsure it is of that ground.
+Networks are trained on photographed backgrounds and are uncertain about one without grain, most of all about black: they
+return a haze of low foreground probability all over it. The frame of such a picture is background, so the output there
+measures the haze.
 """
 
 from __future__ import annotations
@@ -10,21 +11,21 @@ import cv2
 import numpy as np
 
 LIKE_GROUND = 4.0
-"""Levels from the ground's digital colour within which a pixel has it: JPEG's own noise beside an outline is off by more."""
+"""Maximum deviation in 8-bit levels from the background colour; JPEG noise beside an outline exceeds it."""
 FRAME = 0.02
-"""Of the longer side: as wide is the frame that is known for ground."""
+"""Width of the frame that is known to be background, as a share of the longer side."""
 USUAL = 95.0
-"""Percentile of what a network says of the frame's ground: what reaches beyond is a thing that nearly touches it."""
+"""Percentile of the network's output on the frame; higher values belong to an object that nearly touches the frame."""
 MOST_HAZE = 0.3
-"""Share of object: a network that is surer of the frame sees something there."""
+"""Upper bound of the haze; a higher foreground probability on the frame is an actual detection."""
 
 
 def without_haze(share: np.ndarray, rgb: np.ndarray, colour: np.ndarray) -> np.ndarray:
-    """Return a network's share of object (h, w) without what it says of all of an exact ground alike.
+    """Subtract the haze over an exact background from a network's foreground probability (h, w).
 
-    ``rgb (H, W, 3) uint8`` is the picture, of the same proportions, ``colour (3,)`` that of its ground. Where the picture has
-    that colour, the share that is usual of the frame is taken off; what is said of a place by itself, such as a dark part of a
-    thing on black, stays a doubt. Elsewhere the share is as it was.
+    ``rgb (H, W, 3) uint8`` is the picture, of the same proportions, and ``colour (3,)`` that of its background. Where the
+    picture has that colour, the usual value on the frame is subtracted; local detections, such as a dark part of an object on
+    black, remain. Elsewhere the probability is unchanged.
     """
     seen = cv2.resize(rgb, share.shape[::-1], interpolation=cv2.INTER_AREA).astype(np.float32)
     ground = np.abs(seen - colour.astype(np.float32)).max(axis=2) <= LIKE_GROUND

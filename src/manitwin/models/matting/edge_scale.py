@@ -1,4 +1,4 @@
-"""How wide the edges of a photo are blurred: an outline in focus is as narrow as the lens makes it, a penumbra is wider."""
+"""Blur width of the edges in a photo: an outline in focus is as narrow as the lens allows, a penumbra is wider."""
 
 from __future__ import annotations
 
@@ -8,20 +8,22 @@ import numpy as np
 from manitwin.models.matting.outline import disk, gradient_magnitude
 
 FINE_PX, COARSE_PX = 1.0, 2.5
-SHARPEST_PX = 0.9  # at working size: a resampled photo's own edges are at least about as wide
+SHARPEST_PX = 0.9  # at working size: minimum width of the edges of a resampled photo
 WIDER = 1.25
-"""Times the width of the photo's own edges, from which on an edge is a penumbra: a photo's own differ by 1.1 times, penumbras of
-made photos are 1.2 to 1.6 times as wide."""
-LEAST_STEP = 1.5  # L*a*b* per pixel: less is a JPEG's blocks and ringing
-LEAST_LENGTH = 0.06  # pixels of an edge against the longer side: shorter ones are ringing beside a strong edge
+"""Ratio to the width of the photo's own edges above which an edge is a penumbra.
+
+Widths of a photo's own edges differ by a factor of 1.1; penumbras in synthetic photos are 1.2 to 1.6 times as wide.
+"""
+LEAST_STEP = 1.5  # L*a*b* per pixel: smaller gradients are JPEG blocks and ringing
+LEAST_LENGTH = 0.06  # edge pixels over the longer side: shorter edges are ringing beside a strong edge
 
 
 def edge_scale(lab: np.ndarray) -> np.ndarray:
-    """Return the width (H, W) of the blur of the edges in ``lab`` (H, W, 3) L*a*b*, a standard deviation in pixels.
+    """Return the blur width (H, W) of the edges in ``lab`` (H, W, 3) L*a*b*, as a standard deviation in pixels.
 
-    A step blurred by s0 has the gradient D / sqrt(2 pi (s0^2 + s^2)) under a filter of width s, so its gradients at two widths
-    give s0 whatever its height D (local scale by derivatives at several scales: Elder and Zucker 1998). Between edges, where
-    there is next to no gradient, the width means nothing.
+    A step of height D blurred by s0 has the gradient D / sqrt(2 pi (s0^2 + s^2)) under a filter of width s, so the gradients
+    at two filter widths give s0 independently of D (local scale from derivatives at several scales: Elder and Zucker 1998).
+    Where there is almost no gradient, the width is meaningless.
     """
     fine, coarse = (cv2.dilate(gradient_magnitude(lab, width), disk(1)) for width in (FINE_PX, COARSE_PX))
     squared = np.maximum((fine / np.maximum(coarse, 1e-4)) ** 2, 1 + 1e-3)
@@ -29,10 +31,10 @@ def edge_scale(lab: np.ndarray) -> np.ndarray:
 
 
 def narrow_edges(gradient: np.ndarray, scale_px: np.ndarray, least: float, near: np.ndarray) -> np.ndarray:
-    """Return the edges (H, W) steeper than ``least`` L*a*b* per pixel that are about as narrow as the strongest ``near`` a thing.
+    """Return the edges (H, W) steeper than ``least`` L*a*b* per pixel that are about as narrow as the object's strongest ones.
 
-    Short pieces are left out. The others are in focus: outlines, or drawing on a surface, but no penumbra, no light that is
-    thrown back, and nothing far behind.
+    ``near`` is the mask of the object and its surroundings. Short edges are left out. Narrow edges are in focus: outlines or
+    surface markings, but not penumbras, bounced light or a distant background.
     """
     edge = gradient > max(least, LEAST_STEP)
     strong = near & edge

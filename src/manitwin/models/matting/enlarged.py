@@ -1,4 +1,4 @@
-"""Small photos at working size: outlines drawn finer than their pixels, colours as sharp as their light."""
+"""Upsampling of small photos to working size, with chroma sharpened along luma edges."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ EPSILON = 1e-4
 
 
 def enlarged(rgb: np.ndarray, side_px: int) -> np.ndarray:
-    """Return a photo (H, W, 3) uint8 sRGB, its longer side at least ``side_px``; a larger one is returned as it is.
+    """Scale a photo (H, W, 3) uint8 sRGB up to a longer side of ``side_px``; a larger photo is returned unchanged.
 
-    JPEG keeps colours at half the resolution (4:2:0), in blocks of 16 pixels, which a small photo shows as colours that run over
-    its edges: before it is enlarged, colours follow the edges of its light.
+    JPEG stores chroma at half resolution (4:2:0) in blocks of 16 pixels, so in a small photo colours bleed over edges. Before
+    enlargement the chroma is therefore filtered along the luma edges.
     """
     scale = side_px / max(rgb.shape[:2])
     if scale <= 1:
@@ -24,7 +24,7 @@ def enlarged(rgb: np.ndarray, side_px: int) -> np.ndarray:
 
 
 def colours_along_light(rgb: np.ndarray) -> np.ndarray:
-    """Return a photo (H, W, 3) uint8 whose colour difference channels follow the edges of its luma."""
+    """Return a photo (H, W, 3) uint8 whose chroma channels follow the edges of its luma."""
     channels = cv2.cvtColor(rgb, cv2.COLOR_RGB2YCrCb).astype(np.float32) / 255
     luma = channels[..., 0].copy()
     for channel in (1, 2):

@@ -1,7 +1,7 @@
-"""A doubtful cut-out whose outline is that of the thing that the photo is said to show: a second, independent opinion.
+"""Acceptance of a doubtful mask whose outline matches the template of the named object: an independent second opinion.
 
-With a shadow taken for a part, a part left out or a hole filled a mask hardly has the outline of a template. A shape does not
-tell whether one whole thing is in the picture: there the scores decide.
+A mask that includes a shadow, lacks a part or fills a hole hardly ever has the outline of a template. The shape does not tell
+whether the picture shows one whole object; that is left to the scores.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from manitwin.models.matting.candidates import AGREEING, alike
 from manitwin.models.matting.study import Judged, Study, drawn
 
 Explains = Callable[[np.ndarray], bool]
-"""Tells of a cut-out ``rgba (H, W, 4) uint8`` whether it has the outline of the thing that it is said to be."""
+"""Predicate on a cut-out ``rgba (H, W, 4) uint8``: whether it has the outline of the object that the photo is said to show."""
 
 
 def explained_first(
     rgb: np.ndarray, study: Study, explains: Explains, *, min_confidence: float, working_side_px: int = 512
 ) -> Study:
-    """Return the study of a photo ``rgb (H, W, 3) uint8`` with a candidate first that a shape ``explains``.
+    """Return the study of a photo ``rgb (H, W, 3) uint8`` with a candidate first whose outline ``explains`` confirms.
 
-    The likeliest is asked first, and none that would not reach ``min_confidence`` even so, or that may be no whole thing; where
-    none is explained, the study is returned as it is.
+    Candidates are tested in order of confidence. Those that would not reach ``min_confidence`` even if confirmed, and those
+    that may not be one whole object, are not tested. If no candidate is confirmed, the study is returned unchanged.
     """
     asked: list[Judged] = []
     for each in study.judged:

@@ -1,4 +1,4 @@
-"""The outline of a rough mask, drawn at a photo's own resolution."""
+"""Refinement of a rough mask's outline at the resolution of the photo."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from manitwin.models.matting.outline_network import share_near_outline
 
 BAND_PX = 2
-"""How far off the outline may be, in pixels of the rough mask."""
+"""Maximum error of the outline, in pixels of the rough mask."""
 
 
 def fine_outline(rgb: np.ndarray, mask: np.ndarray) -> np.ndarray:
@@ -22,12 +22,12 @@ def fine_outline(rgb: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 def band_px(shape: tuple[int, ...], rough_shape: tuple[int, ...]) -> int:
-    """Return how far off an outline may be in a picture of a ``shape`` (H, W, ...), whose mask has a ``rough_shape``."""
+    """Return the maximum error of the outline in pixels of a picture of ``shape`` (H, W, ...), whose mask has ``rough_shape``."""
     return max(BAND_PX, round(BAND_PX * max(shape[:2]) / max(rough_shape)))
 
 
 def _small(mask: np.ndarray, band: int) -> np.ndarray:
-    """Return the pieces of a mask (H, W) that are smaller than the band is wide each way: noise along the outline."""
+    """Return the pieces of a mask (H, W) smaller than a square of twice the band's width, which are noise along the outline."""
     _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
     small = stats[:, cv2.CC_STAT_AREA] < (2 * band) ** 2
     small[0] = False

@@ -1,4 +1,4 @@
-"""An outline that a person drew roughly, moved onto the edges of the photo near it."""
+"""Refinement of an outline that a user drew roughly: it is moved onto nearby edges of the photo."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from manitwin.models.matting.outline import dilated, eroded
 
 WORKING_SIDE_PX = 640
 BAND_SHARE, LEAST_BAND_PX = 0.03, 4
-"""How far an outline moves at most: this share of the thing's diagonal in the picture, or so many pixels."""
+"""Maximum displacement of the outline, as a share of the diagonal of the mask's bounding box, and its lower bound in pixels."""
 NEAR_BANDS = 4
-"""So many bands of ground around the thing are looked at: what lies farther says nothing of the ground beside it."""
+"""Width, in bands, of the background around the object that is used; pixels farther away are not representative of it."""
 ITERATIONS = 4
 
 
 def fit_outline(rgb: np.ndarray, mask: np.ndarray, *, seed: int = 0) -> np.ndarray:
     """Return ``mask (H, W) bool`` with its outline on edges of ``rgb (H, W, 3) uint8``: GrabCut (Rother et al. 2004) in a band.
 
-    What lies deeper within the mask than the band is wide is the thing, what lies farther outside is none. A mask that is empty
-    or has no ground around it is returned as it is.
+    Pixels deeper inside the mask than the band's width are fixed as object, pixels farther outside as background. A mask that
+    is empty or has no background around it is returned unchanged.
     """
     if not mask.any():
         return mask

@@ -1,4 +1,4 @@
-"""Ground that may be seen inside a mask: through a loop, a handle or a slot."""
+"""Detection of background that may be visible inside a mask: through a loop, a handle or a slot."""
 
 from __future__ import annotations
 
@@ -8,24 +8,29 @@ import numpy as np
 from manitwin.models.matting.background import Background, length
 from manitwin.models.matting.outline import dilated, disk, eroded, holds
 
-LEAST_LIGHT, MOST_LIGHT = 0.3, 1.03  # the ground in shade or light, over the ground around the thing
+LEAST_LIGHT, MOST_LIGHT = 0.3, 1.03
+"""Light of enclosed background, in shade or not, over that of the background around the object."""
 SAME_TINT = 0.025
-"""Spread of the channels' ratios; ground seen through loops and slots of composites has 0.007 to 0.022."""
-SAME_CHROMA = 1.6  # L*a*b*, besides the ground's noise
-RIM = 3.5  # L*a*b*: the least step to what surrounds it, along four fifths of its rim
+"""Spread of the channels' ratios; background visible through loops and slots of composites has 0.007 to 0.022."""
+SAME_CHROMA = 1.6  # L*a*b*, in addition to the background's noise
+RIM = 3.5  # L*a*b*: minimum step to the surrounding pixels, along four fifths of the rim
 RIM_PX = 3
-MOST_HELD = 0.04  # of its area: a place that encloses more that is not its own is a label with print
+MOST_HELD = 0.04  # of a region's area: a region that encloses more than this is a label with print
 LEAST_SHARE = 1e-3
-CERTAIN, UNEVEN = 0.9, 0.05  # share of object, spread of light: ten such places in composites were all of the thing
+CERTAIN, UNEVEN = (
+    0.9,
+    0.05,
+)  # foreground probability, spread of light: ten of ten such regions in composites were object
 
 
 def ground_inside(
     background: Background, mask: np.ndarray, gradient: np.ndarray, threshold: float, share: np.ndarray | None = None
 ) -> float:
-    """Return the share of ``mask`` (H, W) bool that the rest of it encloses and that has the ground's tint, in light or shade.
+    """Return the share of ``mask`` (H, W) bool that the rest encloses and that has the background's tint, in light or shade.
 
-    Such a place may be a hole, or a grey part of a thing on a grey ground; as nobody can tell, it is doubted. One of which all
-    networks are sure (``share`` (H, W) of object, the least of theirs) and that is lit too unevenly for ground is the thing.
+    Such a region may be a hole, or a grey part of an object on a grey background; since the photo does not tell which, it is
+    a doubt. A region is the object and does not count if all networks are certain of it (``share`` (H, W), the minimum of
+    their foreground probabilities) and its light is too uneven for background.
     """
     light, tint = background.light, background.tint
     same = (light > LEAST_LIGHT) & (light < MOST_LIGHT) & (tint < 4 * SAME_TINT)

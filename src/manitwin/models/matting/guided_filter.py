@@ -1,4 +1,4 @@
-"""The guided filter: values that follow the edges of a guide (He, Sun, Tang 2010, eq. 5, 6 and 8, grey guide)."""
+"""Guided image filter with a grey guide (He, Sun, Tang 2010, eq. 5, 6 and 8)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 
 
 def guided_filter(guide: np.ndarray, values: np.ndarray, radius_px: int, epsilon: float) -> np.ndarray:
-    """Return ``values (H, W) float32`` as local linear functions of ``guide (H, W) float32`` in windows of a radius.
+    """Filter ``values (H, W) float32`` as local linear functions of ``guide (H, W) float32`` in windows of ``radius_px``.
 
     Edges of the guide weaker than the square root of ``epsilon``, in the guide's unit, are smoothed over.
     """

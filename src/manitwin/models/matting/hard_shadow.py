@@ -1,4 +1,4 @@
-"""Hard cast shadows: strips beside an object that the soft flood stops at, told from grey parts by how they are bounded."""
+"""Hard cast shadows: strips beside an object at which the soft flood stops, told from grey parts by their boundaries."""
 
 from __future__ import annotations
 
@@ -13,24 +13,27 @@ from manitwin.models.matting.background import MAX_SHADE, Background, length
 from manitwin.models.matting.outline import dilated, disk, eroded, opened
 from manitwin.models.matting.shadow import falls_inward
 
-MIN_LIGHT = 0.10  # of the background's light: deeper than that nothing is left to tell colours by
-TINT, CERTAIN_TINT = 0.10, 0.20  # spread of the channels' ratios: a shadow's at most, and more than any shadow's
-BOUNCE = 0.35  # of the object's tint: as much of its own colour it throws into its shadow
-LEAST_ATTACHED, MOST_ATTACHED = 0.35, 0.65  # share of the rim that lies on the object: half, for a strip beside it
-STRONGER = 1.1  # the object's edge against the shadow's edge towards the light
-PENUMBRA_PX = 1.5  # a perfect edge is 1.05 wide under the gradient's blur, and a light of some extent widens a shadow's
+MIN_LIGHT = 0.10  # of the background's light: darker pixels carry no colour information
+TINT, CERTAIN_TINT = 0.10, 0.20  # spread of the channels' ratios: maximum of a shadow, and more than any shadow has
+BOUNCE = 0.35  # share of the object's tint that it may reflect into its shadow
+LEAST_ATTACHED, MOST_ATTACHED = 0.35, 0.65  # share of the rim that lies on the object; a strip beside it has about half
+STRONGER = 1.1  # minimum ratio of the object's edge to the shadow's edge towards the light
+PENUMBRA_PX = (
+    1.5  # a perfect edge is 1.05 px wide under the gradient's blur; an extended light source widens a shadow's edge
+)
 ALL_NARROW = 0.9
-"""Of the edge towards the light: near its foot a shadow is as sharp as a thing, a thing is so all along."""
-LEAST_PIXELS = 5e-5  # of the picture: smaller strips than this are left to the graph cut
-STEEPNESS = 5.0  # an edge as strong as ``edge`` costs exp(-5) of what flat ground costs
-FLAT_COST = 10_000  # capacities are whole numbers
+"""Share of the edge towards the light. A shadow is as sharp as an object near its foot only, an object all along."""
+LEAST_PIXELS = 5e-5  # of the picture: smaller strips are left to the graph cut
+STEEPNESS = 5.0  # cutting an edge as strong as ``edge`` costs exp(-5) of the cost on flat background
+FLAT_COST = 10_000  # capacities are integers
 
 
 @dataclass(frozen=True)
 class _Evidence:
-    """Measures of a region: shares, edges in L*a*b* per pixel, and the width of the edge towards the light in pixels.
+    """Measurements of a region: shares, edges in L*a*b* per pixel, and the width of the edge towards the light in pixels.
 
-    ``narrow`` is the share of that edge that is as narrow as the photo's own edges.
+    ``narrow`` is the share of that edge that is as narrow as the photo's own edges. ``loose`` is the area that would be
+    disconnected from the object if the region were removed, relative to the region.
     """
 
     attached: float
@@ -46,10 +49,10 @@ class _Evidence:
 def hard_shadow(background: Background, solid: np.ndarray, gradient: np.ndarray, narrow: np.ndarray) -> np.ndarray:
     """Return the parts (H, W) of ``solid`` that are a cast shadow with a visible edge.
 
-    A minimum cut parts the outside from what has other colours than a shadow. What the outside gets of ``solid`` is shadow
-    where it has the background's colour dimmed, lies along the object, ends there at a stronger edge than towards the
-    light, and where the light falls off over more than a sharp edge's width and goes on falling. Grey parts of an object have
-    a sharp outline, or lie apart, or hold lights and pieces of it.
+    A minimum cut separates the outside from pixels whose colours are no shadow's. A region of ``solid`` on the outside's part
+    is shadow if it has the dimmed background colour, lies along the object, has a stronger edge towards the object than
+    towards the light, has an edge towards the light that is wider than a sharp edge, and keeps getting darker inward. Grey
+    parts of an object have a sharp outline, or lie apart, or contain highlights and pieces of the object.
     """
     found = np.zeros(solid.shape, bool)
     ratio, light = background.light_ratio, background.light
@@ -75,7 +78,7 @@ def hard_shadow(background: Background, solid: np.ndarray, gradient: np.ndarray,
 
 
 def edge_width_px(depth: np.ndarray, steepest: np.ndarray) -> np.ndarray:
-    """Return the standard deviation of the Gaussian that blurs a step of ``depth`` to a gradient of ``steepest``."""
+    """Return the standard deviation in pixels of the Gaussian that blurs a step of ``depth`` to the gradient ``steepest``."""
     return np.asarray(depth / (np.sqrt(2 * np.pi) * np.maximum(steepest, 1e-6)))
 
 
@@ -92,9 +95,10 @@ def _is_shadow(evidence: _Evidence) -> bool:
 
 
 def _tint(ratio: np.ndarray, light: np.ndarray, solid: np.ndarray) -> np.ndarray:
-    """Return how far the light (H, W) of each pixel is from that of the background, dimmed evenly.
+    """Return the deviation (H, W) of each pixel's light from that of the evenly dimmed background.
 
-    What goes towards the object's own tint may be light that it throws into its shadow: ``BOUNCE`` of it counts as ``TINT``.
+    A deviation towards the object's own tint may be light reflected into the shadow: ``BOUNCE`` of the object's tint counts
+    as ``TINT``.
     """
     even = light[..., None]
     left = (ratio - even) / np.maximum(even, 0.3) / np.sqrt(3)
@@ -140,7 +144,10 @@ def _evidence(
 
 
 def _loose_share(solid: np.ndarray, region: np.ndarray) -> float:
-    """Return how much comes off ``solid`` where ``region`` goes, as a share of it; all where it is the greater part."""
+    """Return the area that removing ``region`` disconnects from ``solid``, over the area of the region.
+
+    It is 1 if the region is the greater part of ``solid``.
+    """
     if 2 * region.sum() > solid.sum():
         return 1.0
     before, _ = cv2.connectedComponents(solid.astype(np.uint8), connectivity=4)
@@ -150,10 +157,10 @@ def _loose_share(solid: np.ndarray, region: np.ndarray) -> float:
 
 
 def cut_along_edges(outside: np.ndarray, inside: np.ndarray, gradient: np.ndarray, edge: float) -> np.ndarray:
-    """Return what ``outside`` gets of the pixels (H, W) that are neither, when both are parted where it costs least.
+    """Assign the undecided pixels (H, W) to ``outside`` or ``inside`` by a minimum cut; return those that go to ``outside``.
 
-    A cut between two pixels costs exp(-5 g / edge) of their gradient g (Boykov and Jolly 2001, without colours), so it runs
-    along the edges that are strongest on the whole, and a weak spot in one does not let the other side through.
+    A cut between two pixels costs exp(-5 g / edge) of their gradient g (Boykov and Jolly 2001, without colour terms), so it
+    follows the strongest edges overall, and a weak spot in an edge does not let the other side through.
     """
     free = ~outside & ~inside
     node = np.where(outside, 0, 1)
@@ -168,7 +175,7 @@ def cut_along_edges(outside: np.ndarray, inside: np.ndarray, gradient: np.ndarra
     pairs, cost = np.concatenate(ends, axis=1), np.round(np.concatenate(costs))
     both = np.concatenate([pairs, pairs[::-1]], axis=1)
     size = 2 + int(free.sum())
-    # entries of one pair add up: a pixel may touch a terminal on several sides
+    # entries of the same pair are summed: a pixel may touch a terminal on several sides
     graph = coo_matrix((np.concatenate([cost, cost]), both), shape=(size, size)).tocsr().astype(np.int32)
     left = graph - maximum_flow(graph, 0, 1).flow
     left.eliminate_zeros()

@@ -1,7 +1,8 @@
-"""Mattes of a network that a person has added or names, beside the built-in one, run by OpenCV on the CPU.
+"""Matting networks that the user adds or names, in addition to the built-in one, run by OpenCV on the CPU.
 
-Networks for salient objects and dichotomous segmentation have one picture as input and the share of object of each pixel as
-first output: U2-Net (320 px), IS-Net (1024 px), BiRefNet (1024 px, its output before the logistic function).
+Supported are networks for salient object detection and dichotomous segmentation that take one picture and return the
+foreground probability of each pixel as first output: U2-Net (320 px), IS-Net (1024 px), BiRefNet (1024 px, with logits as
+output).
 """
 
 from __future__ import annotations
@@ -28,18 +29,21 @@ SCALINGS: dict[Scaling, tuple[np.ndarray, np.ndarray]] = {
     "half": (np.full(3, 128, np.float32), np.full(3, 256, np.float32)),
     "imagenet": (np.array([123.675, 116.28, 103.53], np.float32), np.array([58.395, 57.12, 57.375], np.float32)),
 }
-"""Mean and divisor of 8-bit RGB: of IS-Net, and of U2-Net and BiRefNet (the statistics of ImageNet)."""
+"""Mean and divisor of 8-bit RGB: ``half`` for IS-Net, ``imagenet`` (ImageNet statistics) for U2-Net and BiRefNet."""
 LEAST_SIDE_PX, MOST_SIDE_PX, USUAL_SIDE_PX = 64, 2048, 1024
 LIMITS = Limits(seconds=300.0, memory_bytes=12 << 30)
 SUFFIX = ".onnx"
 NONE = "none"
 MOST_NETWORKS = 2
-"""That a person may name: of two it is asked whether they see the same."""
+"""Maximum number of networks that the user may name; of two, the agreement is evaluated."""
 
 
 @dataclass(frozen=True)
 class Network:
-    """A network as it was named: ``file`` of that ``sha256``; its ``source`` and ``licence`` go into provenance."""
+    """A matting network in an ONNX ``file`` with this ``sha256``; ``source`` and ``licence`` are recorded as provenance.
+
+    ``side_px`` is the height and width of its input.
+    """
 
     name: str
     file: Path
@@ -51,14 +55,14 @@ class Network:
 
     @property
     def model(self) -> str:
-        """What a twin's provenance calls it."""
+        """Name of the network in a twin's provenance."""
         return f"{self.name} sha256:{self.sha256[:12]}"
 
 
 def find_networks(names: str) -> tuple[Network, ...]:
-    """Return the networks of names by commas, ``MOST_NETWORKS`` at most; raises UsageError as ``find_network``.
+    """Return the networks of a comma-separated list of names, at most ``MOST_NETWORKS``; ``none`` stands for no network.
 
-    ``none`` stands for no network.
+    Raises UsageError as ``find_network``, and for too many or repeated networks.
     """
     said = [name.strip() for name in names.split(",")]
     if said == [NONE]:
@@ -76,7 +80,7 @@ def find_networks(names: str) -> tuple[Network, ...]:
 
 @lru_cache(maxsize=4)
 def find_network(name: str) -> Network:
-    """Return a network by the name of added weights, or an ONNX file; raises UsageError for one that is not there or none."""
+    """Return a network by the name of added weights or the path of an ONNX file; raises UsageError if there is none."""
     if name.endswith(SUFFIX):
         path = Path(name)
         content = read_bytes(path, MAX_ONNX_BYTES, UsageError, name=name)
@@ -101,7 +105,7 @@ def _network(name: str, file: Path, content: bytes, *, source: str, licence: str
 
 
 def _input_size(parsed: OnnxFile, called: str) -> tuple[int, int]:
-    """Return height and width of the one picture that a network takes."""
+    """Return height and width of the single picture that a network takes; raises UsageError for other inputs."""
     remedy = "give a matting network such as U2-Net, IS-Net or BiRefNet: one picture in, one mask out"
     if len(parsed.inputs) != 1 or len(parsed.inputs[0].shape) != 4 or parsed.inputs[0].shape[1] not in (3, None):
         shapes = ", ".join(str(tensor.shape) for tensor in parsed.inputs[:4])
@@ -117,7 +121,7 @@ def _input_size(parsed: OnnxFile, called: str) -> tuple[int, int]:
 
 
 def require_working(network: Network) -> None:
-    """Run a network once in a process of its own; raises UsageError where it cannot be run, hangs, or ends the process."""
+    """Run a network once in a subprocess; raises UsageError if it cannot be run, hangs, or crashes the process."""
     grey = np.full((64, 64, 3), 128, np.uint8)
     try:
         run_isolated("manitwin.models.matting.learned:learned_alpha", network, grey, limits=LIMITS)
@@ -127,9 +131,9 @@ def require_working(network: Network) -> None:
 
 
 def learned_alpha(network: Network, rgb: np.ndarray) -> np.ndarray:
-    """Return the share of object (H, W) float32 in [0, 1] of each pixel of ``rgb`` (H, W, 3) uint8.
+    """Return a network's foreground probability (H, W) float32 in [0, 1] for ``rgb`` (H, W, 3) uint8.
 
-    Raises BadReply where OpenCV cannot run the network or its answer is no mask.
+    Raises BadReply if OpenCV cannot run the network or its output is not a mask.
     """
     net = _loaded(network.file, network.sha256)
     mean, divisor = SCALINGS[network.scaling]
@@ -144,7 +148,7 @@ def learned_alpha(network: Network, rgb: np.ndarray) -> np.ndarray:
     mask = np.squeeze(answer)
     if mask.ndim != 2 or min(mask.shape) < 8 or not np.isfinite(mask).all():
         raise BadReply(f"{network.name}: its answer of shape {answer.shape} is not a mask; give another network")
-    if mask.min() < -0.01 or mask.max() > 1.01:  # before the logistic function
+    if mask.min() < -0.01 or mask.max() > 1.01:  # logits
         mask = np.asarray(1 / (1 + np.exp(-np.clip(mask, -30, 30))), np.float32)
     return np.asarray(np.clip(cv2.resize(mask, rgb.shape[1::-1], interpolation=cv2.INTER_LINEAR), 0, 1))
 

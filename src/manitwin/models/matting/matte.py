@@ -1,4 +1,4 @@
-"""The matte of a photo: which pixels are the object, how that was found, and how far it can be believed."""
+"""Matting of a photo: the object's alpha mask, the method that produced it, and its confidence."""
 
 from __future__ import annotations
 
@@ -24,24 +24,30 @@ from manitwin.models.matting.trimmed import trimmed_margin
 
 TRANSPARENT_SHARE = 0.02
 MIXED_PX = 4
-"""From what is opaque, as far as an outline may be mixed with what was behind it."""
+"""Distance in pixels from opaque pixels within which colours may be mixed with the former background."""
 SHADOW_AWAY, SHADOW_SHARE = 0.01, 0.005
-"""Of the longer side, and of the thing's area: of 25 rendered things without a shadow at most 0.0036 lies so far away."""
+"""Limits for a reported cast shadow: distance from the object as a share of the longer side, and area as a share of the object's.
+
+In 25 rendered objects without a shadow, at most 0.0036 of the object's area was classified as shadow at that distance.
+"""
 LEFT_OUT_SHARE = 0.002
-"""Of what an alpha channel shows: less is dust."""
+"""Share of the visible alpha mask; smaller discarded pieces are dust and are not reported."""
 TRIMMED = "the image border touches the object, which is taken to end there: the photo was trimmed to it"
 MIN_CONFIDENCE = MattingConfig().min_confidence
 MOST_BOXES = 6
-"""Of the boxes of separate objects, so many are told."""
-LIKELY = 0.5  # that pieces are things: the photo is rejected in any case, and that is the cause
+"""Maximum number of object boxes that the rejection message lists."""
+LIKELY = (
+    0.5  # minimum probability that separate pieces are objects; the photo is rejected anyway, this selects the reason
+)
 
 
 @dataclass(frozen=True)
 class Matte:
-    """``rgba (H, W, 4) uint8``, alpha 255 on the object; ``confidence`` in [0, 1]; ``scores`` say where it comes from.
+    """Alpha matte of a photo.
 
-    ``confidence`` is how likely the cut-out is right (``belief``); ``agreement`` is that of each opinion with the matte, in
-    [0, 1], by the opinion's name.
+    ``rgba (H, W, 4) uint8`` has alpha 255 on the object. ``confidence`` in [0, 1] is the estimated probability that the mask
+    is right (see ``belief``), ``scores`` are the measurements behind it, and ``agreement`` is the agreement in [0, 1] of each
+    opinion with the mask, by the opinion's name.
     """
 
     rgba: np.ndarray
@@ -53,7 +59,7 @@ class Matte:
 
 
 class DoubtedCutOut(Rejected):
-    """The decision not to believe a cut-out; ``matte`` is what it would have been."""
+    """Rejection of a mask whose confidence is too low; ``matte`` is the rejected matte."""
 
     def __init__(self, reason: str, detail: str, matte: Matte):
         super().__init__(reason, detail, "generate")
@@ -75,18 +81,20 @@ def matte_photo(
     explains: Explains | None = None,
     window_px: PixelBox | None = None,
 ) -> Matte:
-    """Find the object in ``image`` (H, W, 3 or 4) uint8 upright sRGB; ``name`` is used in messages only.
+    """Segment the object in ``image`` (H, W, 3 or 4) uint8, upright sRGB; ``name`` is used in messages only.
 
-    A real alpha channel (more than 2 % transparent) is believed. Else two ways of looking each propose a mask: rules (smooth
-    surfaces grown from the border, flooded up to the photo's edges, and colours) and the built-in network, and one of the
-    ``networks``; two of them are asked only where nothing is believed without them. The likeliest is taken, by its scores and
-    by how far opinions agree with it: ``flat_border`` is the rules' where smooth surfaces explain the border, ``grabcut`` the
-    rules' where they do not, ``network`` a network's. Where none is believed and ``explains`` is given, one that it explains
-    may be (``explained_first``). ``window_px`` is what of the whole photo ``image`` shows, in its pixels: with it separate
-    objects are told with their boxes there.
+    An alpha channel with more than 2 % transparent pixels is used as given. Otherwise candidate masks come from two sources.
+    The rules model the background as smooth surfaces grown from the border, flood it up to the edges of the photo, and
+    compare colours. The networks are the built-in one and those in ``networks``; two additional networks are evaluated only
+    if no candidate is accepted without them. The candidate with the highest confidence is chosen, by its scores and its
+    agreement with the other opinions. ``method`` is ``network`` for a mask that a network produced. For a mask of the rules
+    it is ``flat_border`` where smooth surfaces explain the border, else ``grabcut``. If no candidate reaches
+    ``min_confidence`` and ``explains`` is given, a candidate whose outline it confirms may be accepted (``explained_first``).
+    ``window_px`` is the box of the whole photo that ``image`` shows, in pixels of the photo; if given, the message about
+    separate objects lists their boxes in the photo.
 
-    Raises Rejected: ``no_object``, ``several_objects``, ``low_confidence_matte``, naming cause and remedy; DoubtedCutOut where
-    something was cut out.
+    Raises Rejected with reason ``no_object``, ``several_objects`` or ``low_confidence_matte``, naming cause and remedy; the
+    subclass DoubtedCutOut if a mask was found.
     """
     if image.shape[2] == 4 and (image[..., 3] < 250).mean() > TRANSPARENT_SHARE:
         return _given_matte(image, name, min_area_share, second_object_share, window_px)
@@ -111,7 +119,7 @@ def matte_photo(
 
 
 def _matte_of(rgb: np.ndarray, study: Study) -> Matte:
-    """Return the likeliest matte of a study that found something."""
+    """Return the matte of the best candidate of a study that has at least one."""
     chosen = study.judged[0]
     return Matte(
         rgba=np.dstack([rgb, study.alpha]),
@@ -132,7 +140,7 @@ def decided(
     second_object_share: float = 0.12,
     window_px: PixelBox | None = None,
 ) -> Judged:
-    """Return the candidate of a study that is believed; raises Rejected as ``matte_photo`` where none is."""
+    """Return the accepted candidate of a study; raises Rejected as ``matte_photo`` if none is accepted."""
     if not study.judged or study.judged[0].candidate.found.mask.mean() < min_area_share:
         if not study.plain:
             raise Rejected(
@@ -152,18 +160,19 @@ def _given_matte(
     if mask.mean() < min_area_share:
         raise Rejected("no_object", f"{name}: its alpha channel is empty; export it with the object opaque", "generate")
     _reject_several(name, mask, second_object_share, window_px)
-    # specular pixels that a cut-out tool took for background are holes
+    # a cut-out tool may remove specular highlights, which leaves small holes in the mask
     closed = largest_piece(without_small_holes(mask))
     alpha = np.where(closed & ~mask, 255, np.where(dilated(closed, 2), image[..., 3], 0)).astype(np.uint8)
-    # what a file keeps under transparent pixels is anything, and along an outline it is mixed with a background: the nearest
-    # opaque colour takes its place; what is half transparent over an area (a glass) has its own
+    # Colours under transparent pixels are arbitrary, and those along the outline are mixed with the former background: both are
+    # replaced by the nearest opaque colour. Half-transparent areas farther inside, such as glass, keep their colours.
     opaque = image[..., 3] >= 250
     away_px, nearest = ndimage.distance_transform_edt(~opaque if opaque.any() else ~mask, return_indices=True)
     replaced = (away_px <= MIXED_PX) | ~mask
     colours = np.where(replaced[..., None], image[nearest[0], nearest[1], :3], image[..., :3])
     findings = []
     sides = [mask[0], mask[-1], mask[:, 0], mask[:, -1]]
-    if np.concatenate(sides).mean() > 0.02 and not all(side.any() for side in sides):  # trimmed to it, it touches all
+    # an image trimmed to the object touches all sides
+    if np.concatenate(sides).mean() > 0.02 and not all(side.any() for side in sides):
         findings.append("the image border cuts the object")
     if (mask & ~closed).sum() > LEFT_OUT_SHARE * mask.sum():
         findings.append("small separate pieces were left out")
@@ -171,7 +180,7 @@ def _given_matte(
 
 
 def _rounded_down(confidence: float) -> float:
-    """Return a confidence in hundredths that is shown beside a limit that it does not reach."""
+    """Round a confidence down to hundredths, so that it is not displayed as equal to a limit that it misses."""
     return math.floor(100 * confidence) / 100
 
 
@@ -208,7 +217,7 @@ def _reject_several(name: str, mask: np.ndarray, second_object_share: float, win
 
 
 def _in_photo(piece: np.ndarray, shape: tuple[int, ...], window_px: PixelBox) -> str:
-    """Return the box of a piece in the photo's pixels; ``piece`` is x, y, width and height in a mask of this ``shape``."""
+    """Return the box of a piece in pixels of the photo, as text; ``piece`` is x, y, width and height in a mask of this ``shape``."""
     left, top, right, bottom = window_px
     x, y, width, height = (float(piece[i]) for i in range(4))
     scale = shape[1] / (right - left), shape[0] / (bottom - top)
@@ -231,13 +240,16 @@ def _findings(chosen: Judged) -> list[str]:
 
 
 def _trimmed(rgb: np.ndarray, alpha: np.ndarray) -> list[str]:
-    """Return the finding on a thing that is taken to end where its photo does."""
+    """Return the finding that the photo was trimmed to the object, if it was."""
     touches = bool((alpha > 127)[border_of(alpha.shape)].any())
     return [TRIMMED] if touches and trimmed_margin(rgb) is not None else []
 
 
 def _has_cast_shadow(shadow: np.ndarray, mask: np.ndarray) -> bool:
-    """Tell whether a shadow reaches away from a thing, both ``(H, W) bool``: a blurred edge is as dark as one."""
+    """Tell whether ``shadow`` extends away from the object ``mask``, both ``(H, W) bool``.
+
+    Pixels close to the outline do not count, since a blurred edge is as dark as a shadow.
+    """
     away_px = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
     reaching = shadow & (away_px > SHADOW_AWAY * max(mask.shape))
     return bool(reaching.sum() > SHADOW_SHARE * mask.sum())

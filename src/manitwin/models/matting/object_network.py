@@ -1,10 +1,11 @@
-"""The built-in network that tells a thing from its ground: two decoders of the project's own over EfficientNet-Lite0's features.
+"""Built-in segmentation network: two decoders trained for this project on the features of EfficientNet-Lite0.
 
-The encoder knows real photos (ImageNet) and is not trained further; the decoders (feature pyramids, Lin et al. 2017, of 0.28
-million weights) learned from composites that ``benchmarks/train_object_network.py`` draws of templates, the second from more
-varied ones: it keeps parts of the ground's colour and leaves hard shadows, and may take a dark part for a shadow where the first
-does not. The network looks twice: at the whole picture, then at the thing with its surroundings, larger; and it does so at two
-sizes and mirrored. The mean of all errs less than each, and is unsure where they differ.
+The encoder was trained on real photos (ImageNet) and is not trained further. The decoders (feature pyramids, Lin et al. 2017,
+with 0.28 million weights) were trained on composites that ``benchmarks/train_object_network.py`` renders from templates. The
+second decoder saw more varied composites: it keeps parts in the background's colour and removes hard shadows, but may take a
+dark part for a shadow where the first does not. The network is applied twice, to the whole picture and to an enlarged crop
+around the object, at two sizes and mirrored. The mean of all outputs has a smaller error than each, and is uncertain where
+they differ.
 """
 
 from __future__ import annotations
@@ -24,36 +25,36 @@ from manitwin.models.classifiers.efficientnet_lite import NAME as ENCODER
 
 NAME = "object-network"
 WEIGHTS_FILES = ("object_network.npz", "object_network_varied.npz")
-"""Of the decoders."""
+"""Files of the decoders' weights."""
 SIDE_PX = 288
-"""Of the pictures that the decoder learned from."""
+"""Side of the decoders' training pictures in pixels."""
 WAYS = ((288, False), (384, False), (384, True))
-"""To look: the picture's side in pixels, and whether it is mirrored."""
+"""Passes over a picture: its side in pixels, and whether it is mirrored."""
 BLOCKS = (0, 2, 4, 10, 15)
-"""Of the encoder, after which the picture is 1/2, 1/4, 1/8, 1/16 and 1/32 as large."""
+"""Blocks of the encoder after which the feature maps have 1/2, 1/4, 1/8, 1/16 and 1/32 of the input size."""
 MIXES = 2
-"""Convolutions at each size but the smallest."""
+"""Convolutions at each scale except the smallest."""
 MARGIN = 0.2
-"""Of a thing's longer side: the surroundings that the second look takes in."""
+"""Margin around the object in the second pass, as a share of its longer side."""
 CLOSER = 1.25
-"""Times as large, or a second look is not worth it."""
+"""Minimum enlargement for which a second pass is made."""
 LEAST_SHARE = 0.5
 LEAST_PIXELS = 16
 
 
 def object_share(rgb: np.ndarray) -> np.ndarray:
-    """Return the share of object (H, W) float32 in [0, 1] of each pixel of ``rgb`` (H, W, 3) uint8 sRGB.
+    """Return the foreground probability (H, W) float32 in [0, 1] of each pixel of ``rgb`` (H, W, 3) uint8 sRGB.
 
-    It is the mean of all ``WAYS`` to look. Raises Unavailable without the encoder's weights.
+    It is the mean over all ``WAYS``. Raises Unavailable without the encoder's weights.
     """
-    # with what it has computed it takes 85 MB, made anew of its content it takes 0.02 CPU-s
+    # not cached: a network with its buffers takes 85 MB, parsing it takes 0.02 CPU-s
     network = cv2.dnn.readNetFromONNX(np.frombuffer(_content(), np.uint8))
     looks = [in_two_looks(rgb, partial(_seen, network, side_px=side, mirrored=mirrored)) for side, mirrored in WAYS]
     return np.asarray(np.mean(looks, axis=0), np.float32)
 
 
 def in_two_looks(rgb: np.ndarray, look: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """Return what ``look`` says of a picture, (H, W) in [0, 1], of a small thing's surroundings by a second, closer look."""
+    """Evaluate ``look`` on a picture and, for a small object, again on an enlarged crop around it; return (H, W) in [0, 1]."""
     share = look(rgb)
     rows, columns = np.nonzero(share > LEAST_SHARE)
     if len(rows) < LEAST_PIXELS:
@@ -82,18 +83,18 @@ def _seen(network: cv2.dnn.Net, rgb: np.ndarray, side_px: int, mirrored: bool) -
 
 @cache
 def _content() -> bytes:
-    """Return the network for pictures of any size, as ONNX; kept, 16 MB, for it takes 0.1 CPU-s to make."""
+    """Return the network as ONNX, for pictures of any size; cached (16 MB), because it takes 0.1 CPU-s to build."""
     return network_bytes(load_weights(), [decoder_weights(name) for name in WEIGHTS_FILES])
 
 
 def built_in_model() -> str:
-    """Return what a twin's provenance calls the network: its files by their digests."""
+    """Return the name of the network in a twin's provenance, with the digests of its files."""
     decoders = "+".join(hashlib.sha256(_decoder_file(name)).hexdigest()[:12] for name in WEIGHTS_FILES)
     return f"{NAME} sha256:{decoders} over {ENCODER} sha256:{WEIGHTS_SHA256[:12]}"
 
 
 def decoder_weights(name: str) -> dict[str, np.ndarray]:
-    """Return the weights of one of the ``WEIGHTS_FILES``, float16, by the names of its layers."""
+    """Return the weights of one of the ``WEIGHTS_FILES``, float16, by layer name."""
     with np.load(io.BytesIO(_decoder_file(name))) as arrays:
         return dict(arrays)
 
@@ -103,9 +104,9 @@ def _decoder_file(name: str) -> bytes:
 
 
 def network_bytes(encoder: dict[str, np.ndarray], decoders: Sequence[dict[str, np.ndarray]]) -> bytes:
-    """Return encoder and decoders as ONNX: input ``(1, 3, S, S)`` as the encoder's, output the mean share of object.
+    """Return encoder and decoders as ONNX: input ``(1, 3, S, S)`` as the encoder's, output the mean foreground probability.
 
-    The file states S as ``SIDE_PX``; OpenCV takes any multiple of 32.
+    The file declares S as ``SIDE_PX``; OpenCV accepts any multiple of 32.
     """
     graph, values = trunk(encoder, SIDE_PX)
     shares = [_decoded(graph, values, decoder, f"decoder{place}") for place, decoder in enumerate(decoders)]
@@ -118,7 +119,7 @@ def network_bytes(encoder: dict[str, np.ndarray], decoders: Sequence[dict[str, n
 
 
 def _decoded(graph: OnnxGraph, values: dict[str, str], decoder: dict[str, np.ndarray], prefix: str) -> str:
-    """Add a decoder over the encoder's ``values`` to the graph; return the name of its share of object."""
+    """Add a decoder over the encoder's ``values`` to the graph; return the name of its output, the foreground probability."""
 
     def convolved(name: str, value: str, *, active: bool = True) -> str:
         kernel = decoder[f"{name}.weight"].astype(np.float32)

@@ -1,4 +1,4 @@
-"""Edges of a photo, and the flood of its background up to them."""
+"""Morphology, image edges, and flooding of the background up to the edges."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import numpy as np
 
 from manitwin.models.matting.background import Background, connected_to, total
 
-BY_ROWS_FROM_PX = 6  # of a disk's radius: a larger one is applied row by row, sixteen times as fast at 60
-OBJECT_DISTANCE = 6.0  # of a border pixel's Mahalanobis distance: what the background's fit takes for explained
+BY_ROWS_FROM_PX = 6  # disks of at least this radius are applied row by row, sixteen times as fast at radius 60
+OBJECT_DISTANCE = 6.0  # Mahalanobis distance up to which the background model explains a border pixel
 
 
 def disk(radius: int) -> np.ndarray:
@@ -24,17 +24,21 @@ def dilated(mask: np.ndarray, radius: int) -> np.ndarray:
 
 
 def eroded(mask: np.ndarray, radius: int) -> np.ndarray:
-    """Erode a mask by a disk; what lies beyond the picture takes nothing away."""
+    """Erode a mask by a disk; pixels beyond the image frame do not erode it."""
     return ~dilated(~mask, radius)
 
 
 def opened(mask: np.ndarray, radius: int) -> np.ndarray:
-    """Open a mask by a disk: drop what is thinner than it."""
+    """Open a mask by a disk, which removes parts thinner than the disk."""
     return dilated(eroded(mask, radius), radius)
 
 
 def _dilated_by_rows(mask: np.ndarray, radius: int) -> np.ndarray:
-    """Dilate a mask (H, W) uint8 by a disk: by each of its rows, which grow towards its middle, moved to where that row is."""
+    """Dilate a mask (H, W) uint8 by a disk, row by row of the disk.
+
+    The rows of a disk grow towards its centre, so each horizontal dilation extends the previous one and is shifted to its
+    row.
+    """
     found, wider, reach, height = np.zeros_like(mask), mask, 0, len(mask)
     reaches = (disk(radius)[: radius + 1].sum(axis=1).astype(int) - 1) // 2
     for off, row_reach in zip(range(radius, -1, -1), reaches, strict=True):
@@ -48,7 +52,7 @@ def _dilated_by_rows(mask: np.ndarray, radius: int) -> np.ndarray:
 
 
 def without_small_holes(mask: np.ndarray) -> np.ndarray:
-    """Fill holes of less than 0.2 % of a mask."""
+    """Fill holes smaller than 0.2 % of a mask."""
     _, labels, stats, _ = cv2.connectedComponentsWithStats((~mask).astype(np.uint8), connectivity=4)
     small = stats[:, cv2.CC_STAT_AREA] < 2e-3 * mask.sum()
     small[0] = False
@@ -56,7 +60,7 @@ def without_small_holes(mask: np.ndarray) -> np.ndarray:
 
 
 def holds(region: np.ndarray) -> int:
-    """Return how many pixels a region (H, W) encloses that are not its own."""
+    """Return the number of pixels that a region (H, W) encloses without containing them."""
     height, width = region.shape
     padded = np.zeros((height + 2, width + 2), np.uint8)
     padded[1:-1, 1:-1] = region
@@ -65,7 +69,7 @@ def holds(region: np.ndarray) -> int:
 
 
 def gradient_magnitude(lab: np.ndarray, blur_px: float = 1.0) -> np.ndarray:
-    """Return the colour gradient (H, W) in L*a*b* units per pixel."""
+    """Return the magnitude of the colour gradient (H, W) in L*a*b* units per pixel."""
     smooth = cv2.GaussianBlur(lab, (0, 0), blur_px)
     squares = np.zeros(lab.shape[:2], np.float32)
     for axis in ((1, 0), (0, 1)):
@@ -74,9 +78,9 @@ def gradient_magnitude(lab: np.ndarray, blur_px: float = 1.0) -> np.ndarray:
 
 
 def edge_threshold(background: Background, gradient: np.ndarray) -> float:
-    """Return the gradient that the background's own texture hardly ever reaches (97th percentile of the border).
+    """Return the gradient that the background's own texture rarely reaches (97th percentile of the border).
 
-    What no surface explains there, and its rim, is an object near the frame, not texture.
+    Border pixels that no surface explains, with their rim, are an object near the frame and do not count as texture.
     """
     texture = background.border & ~dilated(background.border & (background.coarse_distance > OBJECT_DISTANCE), 3)
     if texture.sum() < 0.5 * background.border.sum():
@@ -85,7 +89,7 @@ def edge_threshold(background: Background, gradient: np.ndarray) -> float:
 
 
 def edges(background: Background, gradient: np.ndarray, threshold: float) -> np.ndarray:
-    """Return edges with hysteresis (Canny 1986): weak ones count where they hang on a strong one."""
+    """Return edges with hysteresis (Canny 1986): weak edge pixels count if they are connected to a strong one."""
     weak = gradient > threshold
     count, labels = cv2.connectedComponents(weak.astype(np.uint8), connectivity=8)
     strong = np.zeros(count, bool)
@@ -97,7 +101,8 @@ def edges(background: Background, gradient: np.ndarray, threshold: float) -> np.
 def flood(free: np.ndarray, seed: np.ndarray, ball_px: int, regrow_px: int) -> np.ndarray:
     """Flood ``free`` from ``seed`` with a ball that cannot pass gaps narrower than itself, then fill up to the walls.
 
-    The picture goes on beyond its frame as it ends there: the ball enters between an object and the frame beside it.
+    The picture is extended beyond its frame with its border values, so that the ball can enter between an object and the
+    frame.
     """
     free, seed = (np.pad(mask, ball_px + 1, mode="edge") for mask in (free, seed))
     roomy = ~dilated(~free, ball_px)

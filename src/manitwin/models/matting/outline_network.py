@@ -1,9 +1,9 @@
-"""How likely each pixel near a rough outline is object: a small network over patches around it.
+"""Outline refinement: a small network over patches estimates the object probability of each pixel near a rough outline.
 
-A patch shows, at two sizes, the rough mask and the colours as they lie between those on both sides of the outline, so that the
-network sees an edge whatever its colours are. It is a perceptron of two hidden layers, which learned from composites of the
-project's own (``benchmarks/train_outline_network.py``) where edges lie that lenses blur, cameras sharpen and JPEG smears, and
-that a narrow shadow is none.
+A patch contains, at two scales, the rough mask and the colours relative to those on both sides of the outline, so that the
+network sees an edge independently of its colours. The network is a perceptron with two hidden layers. It was trained on
+composites (``benchmarks/train_outline_network.py``) to locate edges that lenses blur, cameras sharpen and JPEG smears, and to
+ignore narrow shadows.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from manitwin.models.matting.background import length
 
 WEIGHTS_FILE = "outline_network.npz"
 NEAR_PX, AROUND_PX, STEP_PX = 11, 9, 3
-"""Sides of the two patches, odd, and how many pixels one of the second's is wide."""
+"""Side lengths (odd) in pixels of the fine patch and in cells of the coarse patch, and the side of a coarse cell in pixels."""
 VALUES = 5
-"""Of each pixel of a patch; one more, the contrast of both sides, is asked where the patch is."""
+"""Values per patch pixel; one more, the contrast of both sides, is given once per patch."""
 AT_ONCE = 1024
 ROWS_AT_ONCE = 64
-"""Patches and rows that are worked on at a time: all of a photo of 2048 pixels would take 200 MB."""
+"""Number of patches and of rows processed at a time; a whole photo of 2048 px would take 200 MB."""
 LEAST_SHARE = 1e-3
-"""Of a square, that pixels must fill for their mean to count."""
+"""Minimum share of a square that must be filled with pixels for their mean to count."""
 LEAST_CONTRAST_LAB = 5.0
 COLOUR_LAB, LIGHT_LAB, CONTRAST_LAB = 20.0, 25.0, 40.0
-"""That count as one to the network."""
+"""Scales in L*a*b* units that map to 1 in the network's input."""
 
 
 def share_near_outline(rgb: np.ndarray, mask: np.ndarray, band_px: int) -> np.ndarray:
-    """Return how likely each pixel (H, W) of ``rgb`` (H, W, 3) uint8 is object, in [0, 1], by a rough ``mask`` (any size).
+    """Return the object probability (H, W) in [0, 1] of each pixel of ``rgb`` (H, W, 3) uint8, near the outline of a rough mask.
 
-    Pixels more than ``band_px`` and one from the mask's outline stay as they are.
+    ``mask`` may have any size. Pixels more than ``band_px`` + 1 from its outline keep the mask's value.
     """
     height, width = rgb.shape[:2]
     rough = cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
@@ -66,10 +66,10 @@ def share_near_outline(rgb: np.ndarray, mask: np.ndarray, band_px: int) -> np.nd
 
 
 class _Spread:
-    """Colours that hold at many pixels, of which only those are kept that some pixel of a picture asks for."""
+    """Colours propagated from source pixels to other pixels; only sources that a requested pixel refers to are stored."""
 
     def __init__(self, nearest: np.ndarray, asked: np.ndarray):
-        """Take which place of the flattened picture is ``nearest (H, W)`` int32 to each pixel, and which pixels ask (H, W)."""
+        """Take the flat index ``nearest (H, W)`` int32 of each pixel's source, and the mask ``asked (H, W)`` of requested pixels."""
         wanted = nearest[asked]
         used = np.zeros(nearest.size, bool)
         used[wanted] = True
@@ -79,25 +79,25 @@ class _Spread:
         self._colours = np.zeros((len(self._places), 3), np.float32)
 
     def take(self, colours: np.ndarray, top: int) -> None:
-        """Keep what is asked for of the ``colours (R, W, 3)`` of the rows from ``top`` on."""
+        """Store the requested ``colours (R, W, 3)`` of the rows from ``top`` on."""
         width = self._which.shape[1]
         first, end = np.searchsorted(self._places, (top * width, (top + len(colours)) * width))
         self._colours[first:end] = colours.reshape(-1, 3)[self._places[first:end] - top * width]
 
     def rows(self, top: int, end: int) -> np.ndarray:
-        """Return the colours (R, W, 3) of the rows from ``top`` to ``end``; any where none was asked for."""
+        """Return the colours (R, W, 3) of the rows from ``top`` to ``end``; arbitrary where none was requested."""
         return self._colours[self._which[top:end]]
 
 
 class BothSides:
-    """The colours on both sides of a rough outline, of which the values that patches show are made, some rows at a time.
+    """Colours on both sides of a rough outline, and the patch values derived from them, computed some rows at a time.
 
-    ``near (H, W)`` are the pixels that the outline may run through. The object's colour is that of the nearest pixels well
-    inside, the ground's the mean just outside.
+    ``near (H, W)`` marks the pixels through which the outline may run. The object's colour is that of the nearest pixels well
+    inside, the background's colour is the mean just outside.
     """
 
     def __init__(self, rgb: np.ndarray, rough: np.ndarray, band_px: int):
-        """Take a picture (H, W, 3) uint8, its mask (H, W) float32 at that size, and how far off its outline may be."""
+        """Take a picture (H, W, 3) uint8, its mask (H, W) float32 at that size, and the maximum error of the outline in pixels."""
         self.rough, self._rgb, self._band_px = rough, rgb, band_px
         self.near, inner, outer = _where(rough > 0.5, band_px)
         self._told_apart = bool(inner.any() and outer.any())
@@ -114,9 +114,9 @@ class BothSides:
             self._beyond.take(self._mean_of(outer, beyond_px, top, end), top)
 
     def _mean_of(self, used: np.ndarray, side_px: int, top: int, end: int) -> np.ndarray:
-        """Return the mean colour (R, W, 3) of the ``used`` pixels (H, W) in a square around each of some rows.
+        """Return the mean colour (R, W, 3) of ``used`` pixels (H, W) in a square around each pixel of rows ``top`` to ``end``.
 
-        They are those from ``top`` to ``end``. It is near black where there are no such pixels.
+        The result is near black where the square contains no used pixel.
         """
         first = max(0, top - side_px // 2)
         some = used[first : end + side_px // 2]
@@ -126,7 +126,7 @@ class BothSides:
         return np.asarray(total[top - first :][: end - top])
 
     def _lab(self, top: int, end: int) -> np.ndarray:
-        """Return the colours (R, W, 3) float32 of the rows from ``top`` to ``end`` in L*a*b*."""
+        """Return the L*a*b* colours (R, W, 3) float32 of the rows from ``top`` to ``end``."""
         scaled = self._rgb[top:end].astype(np.float32)
         scaled /= 255
         return cv2.cvtColor(scaled, cv2.COLOR_RGB2LAB)
@@ -134,9 +134,9 @@ class BothSides:
     def values(self, top: int, end: int) -> np.ndarray:
         """Return the values (R, W, VALUES + 1) float32 of the rows from ``top`` to ``end``.
 
-        The mask; where the colour lies on the way from the ground's to the object's, and how far beside it; how much lighter it
-        is than the ground, and how far from its hue and chroma; the contrast of both. Each is shifted to lie around zero, as
-        perceptrons want it.
+        They are the mask; the position of the colour on the line from the background's to the object's colour, and its
+        distance from that line; its lightness relative to the background, and its distance from the background in hue and
+        chroma; and the contrast of both sides. Each is shifted to be centred near zero, as a perceptron expects.
         """
         values = np.zeros((end - top, self.rough.shape[1], VALUES + 1), np.float32)
         values[..., 0] = self.rough[top:end] - 0.5
@@ -160,8 +160,10 @@ class BothSides:
 
 @dataclass(frozen=True)
 class PatchWindows:
-    """What patches are cut from, each a view: ``pixels (H, W, VALUES, NEAR_PX, NEAR_PX)``, ``around (H, W, VALUES, AROUND_PX,
-    AROUND_PX)`` and ``contrast (H, W)``, by the pixel in their middle."""
+    """Sliding windows from which patches are cut, as views indexed by the centre pixel.
+
+    ``pixels (H, W, VALUES, NEAR_PX, NEAR_PX)``, ``around (H, W, VALUES, AROUND_PX, AROUND_PX)`` and ``contrast (H, W)``.
+    """
 
     pixels: np.ndarray
     around: np.ndarray
@@ -192,8 +194,8 @@ def windows_of(values: np.ndarray, top: int, end: int) -> PatchWindows:
 def patches(windows: PatchWindows, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Return the patches (N, F) float32 around pixels.
 
-    First ``(VALUES, NEAR_PX, NEAR_PX)`` pixels, then ``(VALUES, AROUND_PX, AROUND_PX)`` means of ``STEP_PX`` squares, then the
-    contrast.
+    F is the concatenation of ``(VALUES, NEAR_PX, NEAR_PX)`` pixels, ``(VALUES, AROUND_PX, AROUND_PX)`` means of ``STEP_PX``
+    squares, and the contrast.
     """
     count = len(rows)
     return np.concatenate(
@@ -207,18 +209,18 @@ def patches(windows: PatchWindows, rows: np.ndarray, columns: np.ndarray) -> np.
 
 
 def _windows(padded: np.ndarray, side_px: int) -> np.ndarray:
-    """Return the windows (H, W, K, side, side) of a picture (H', W', K), whose rows lie together in memory."""
+    """Return the windows (H, W, K, side, side) of a picture (H', W', K), with the rows of each window contiguous in memory."""
     by_value = np.ascontiguousarray(np.moveaxis(padded, 2, 0))
     return np.moveaxis(sliding_window_view(by_value, (side_px, side_px), axis=(1, 2)), 0, 2)
 
 
 def outline_model() -> str:
-    """Return what a twin's provenance calls the network: its file by its digest."""
+    """Return the name of the network in a twin's provenance, with the digest of its file."""
     return f"outline-network sha256:{hashlib.sha256(_weights_file()).hexdigest()[:12]}"
 
 
 def _answers(given: np.ndarray) -> np.ndarray:
-    """Return how likely the pixel in the middle of each of the ``patches`` (N, F) is object, (N,) in [0, 1]."""
+    """Evaluate the network: return the object probability (N,) in [0, 1] of the centre pixel of each of the ``patches`` (N, F)."""
     layers = _layers()
     for weight, bias in layers[:-1]:
         given = np.maximum(given @ weight + bias, 0)
@@ -241,12 +243,12 @@ def _weights_file() -> bytes:
 
 
 def _share_of(used: np.ndarray, side_px: int) -> np.ndarray:
-    """Return the share (H, W) float32 of ``used`` pixels in a square around each."""
+    """Return the share (H, W) float32 of ``used`` pixels in a square around each pixel."""
     return np.asarray(cv2.blur(used.astype(np.float32), (side_px, side_px)))
 
 
 def _where(solid: np.ndarray, band_px: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return which pixels (H, W) the outline of a mask may run through, which are well inside it, and which are just outside."""
+    """Return the masks (H, W) of pixels near the outline, well inside the object, and just outside it."""
     depth = cv2.distanceTransform(solid.astype(np.uint8), cv2.DIST_L2, 5)
     away = cv2.distanceTransform((~solid).astype(np.uint8), cv2.DIST_L2, 5)
     near = (depth <= band_px + 1) & (away <= band_px + 1)
@@ -258,13 +260,13 @@ def _where(solid: np.ndarray, band_px: int) -> tuple[np.ndarray, np.ndarray, np.
 
 
 def _nearest(used: np.ndarray) -> np.ndarray:
-    """Return for each pixel which of the ``used`` (H, W) is nearest, by its place (H, W) int32 in the flattened picture."""
+    """Return for each pixel the flat index (H, W) int32 of the nearest pixel of ``used`` (H, W)."""
     row, column = ndimage.distance_transform_edt(~used, return_distances=False, return_indices=True)
     row *= used.shape[1]
     row += column
-    return row.copy()  # and not both
+    return row.copy()  # frees the array of columns
 
 
 def _sum(products: np.ndarray) -> np.ndarray:
-    """Return the sum (H, W) of three channels (H, W, 3), without numpy's slow reduction of a short axis."""
+    """Return the sum (H, W) over three channels (H, W, 3), avoiding numpy's slow reduction of a short axis."""
     return np.asarray(products[..., 0] + products[..., 1] + products[..., 2])

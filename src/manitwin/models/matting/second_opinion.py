@@ -1,8 +1,8 @@
-"""A second opinion on what is the object: by colours alone, from another start, at a coarser scale.
+"""Second opinion on the object mask, from colours alone, with another initialization and at a coarser scale.
 
-It shares no model with ``segmentation``: mixtures of Gaussians of the photo's own colours (GrabCut: Rother, Kolmogorov,
-Blake 2004) in place of smooth surfaces and a flood, and a background's colours in shade as further colours of it in place of
-tests of their edges. So the two are wrong in different places.
+It shares no model with ``segmentation``: Gaussian mixtures of the photo's own colours (GrabCut: Rother, Kolmogorov, Blake
+2004) replace smooth surfaces and flooding, and shaded versions of the background's colours replace tests of shadow edges. The
+two methods therefore fail in different places.
 """
 
 from __future__ import annotations
@@ -17,33 +17,37 @@ from manitwin.models.matting.background import border_ring, length
 from manitwin.models.matting.outline import dilated, eroded
 
 SIDE_PX = 288
-SHADES = (0.82, 0.64, 0.46)  # of the background's linear light: what shadows of a lit scene leave
-CLOSER = 1.3  # times as fine, or a second look is not worth it
-MARGIN = 0.15  # of a thing's longer side: the surroundings that are looked at again
-BLURRED_PX = 4  # at ``SIDE_PX``: how far off the first look's outline may be
+SHADES = (0.82, 0.64, 0.46)  # shares of the background's linear light that remain in shadows of a lit scene
+CLOSER = 1.3  # minimum gain in resolution for a second pass
+MARGIN = 0.15  # of the object's longer side: margin around it in the second pass
+BLURRED_PX = 4  # at ``SIDE_PX``: maximum error of the first pass's outline
 LEAST_PIXELS = 30
-SECTORS, LEAST_SECTORS = 32, 5  # of the directions from the picture's middle
+SECTORS, LEAST_SECTORS = 32, 5  # sectors of directions from the picture's centre
 NEAR_LAB = 9.0
 ROUNDS = 3
-WEIGHTS = np.array([0.6, 1, 1], np.float32)  # of L*a*b*: lightness varies along a background more than colour does
-LEAST_FAR_LAB, MOST_FAR_LAB = 4.0, 9.0  # from all colours of the border: what the cut takes for an object at first
+WEIGHTS = np.array([0.6, 1, 1], np.float32)  # of L*a*b*: lightness varies more than colour along a background
+LEAST_FAR_LAB, MOST_FAR_LAB = 4.0, 9.0  # distance from all border colours at which a pixel starts as object
 TEXTURES = 5.0
 MOST_SAMPLES = 4000
 
 
 @dataclass(frozen=True)
 class Bracket:
-    """Masks (H, W): ``certain`` has colours that neither the background has nor its shade; ``possible`` all but its own."""
+    """Lower and upper bound of the object mask, each (H, W).
+
+    ``certain`` has colours of neither the background nor its shade; ``possible`` has all colours but the background's own.
+    """
 
     certain: np.ndarray
     possible: np.ndarray
 
 
 def colour_opinion(rgb: np.ndarray) -> Bracket:
-    """Return what colours alone say of ``rgb`` (H, W, 3) uint8, cut at ``SIDE_PX``, of a small thing's surroundings again.
+    """Segment ``rgb`` (H, W, 3) uint8 by colour alone at ``SIDE_PX``, and again at a finer scale around a small object.
 
-    The first look says what the object is, the second where its outline runs. With the shades of the border's colours as
-    background, shadows go, and grey parts of an object with them; without them both stay. The object is between the two.
+    The first pass finds the object, the second refines its outline. With shades of the border's colours as background,
+    shadows are removed, and so are grey parts of the object; without the shades both stay. The object lies between the two
+    results.
     """
     far = _seen(rgb, SIDE_PX, None)
     box = _around(far.possible)
@@ -61,13 +65,13 @@ def colour_opinion(rgb: np.ndarray) -> Bracket:
 
 
 def _redrawn(far: np.ndarray, near: np.ndarray, band_px: int) -> np.ndarray:
-    """Return the mask (H, W) of the first look with the outline of the closer one, where that is within a band of its own."""
+    """Return the mask (H, W) of the first pass, replaced by that of the finer pass within a band along its outline."""
     along = dilated(far, band_px) & ~eroded(far, band_px)
     return np.asarray(np.where(along, near, far))
 
 
 def _around(mask: np.ndarray) -> tuple[slice, slice] | None:
-    """Return the rows and columns of a mask (H, W) with a margin; None of an empty one."""
+    """Return the row and column slices around a mask (H, W) with a margin; None for an empty mask."""
     rows, columns = np.nonzero(mask)
     if not len(rows):
         return None
@@ -79,7 +83,7 @@ def _around(mask: np.ndarray) -> tuple[slice, slice] | None:
 
 
 def _seen(rgb: np.ndarray, side_px: int, box: tuple[slice, slice] | None) -> Bracket:
-    """Return what colours say of ``rgb`` at a size, of nothing but a ``box`` of it where one is given."""
+    """Segment ``rgb`` by colour at a given scale, only within ``box`` if it is given."""
     scale = min(1.0, side_px / max(rgb.shape[:2]))
     small = cv2.resize(rgb, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     small = cv2.bilateralFilter(small, 5, 18, 2)
@@ -106,7 +110,7 @@ def _seen(rgb: np.ndarray, side_px: int, box: tuple[slice, slice] | None) -> Bra
 
 
 def _flattened(lab: np.ndarray, ring: np.ndarray) -> np.ndarray:
-    """Return L*a*b* (H, W, 3) less what a quadratic fitted to the border explains: light that falls off."""
+    """Return L*a*b* (H, W, 3) minus the lighting gradient that a quadratic fitted to the border explains."""
     y, x = np.mgrid[-1 : 1 : lab.shape[0] * 1j, -1 : 1 : lab.shape[1] * 1j]
     basis = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], -1)
     used = ring
@@ -120,7 +124,10 @@ def _flattened(lab: np.ndarray, ring: np.ndarray) -> np.ndarray:
 
 
 def _colours_of_background(lab: np.ndarray, ring: np.ndarray) -> np.ndarray:
-    """Return the colours (N, 3) of the border that are seen on much of it, or are near such: an object that touches it is not."""
+    """Return the border colours (N, 3) that are seen in many directions, or are near such colours.
+
+    This excludes the colours of an object that touches the border.
+    """
     rows, columns = np.nonzero(ring)
     centre = (np.array(ring.shape) - 1) / 2
     bearing = np.arctan2((rows - centre[0]) / ring.shape[0], (columns - centre[1]) / ring.shape[1])
@@ -137,7 +144,10 @@ def _colours_of_background(lab: np.ndarray, ring: np.ndarray) -> np.ndarray:
 
 
 def _distinct(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distinct rows (M, 3) of ``cells`` (N, 3) int64, sorted, and the number (N,) of each; none is beyond +-2^19."""
+    """Return the distinct rows (M, 3) of ``cells`` (N, 3) int64, sorted, and the index (N,) of each cell's row.
+
+    Values must lie within +-2^19.
+    """
     half, bits = 1 << 19, 20
     keys, at = np.unique(
         ((cells[:, 0] + half) << 2 * bits) + ((cells[:, 1] + half) << bits) + cells[:, 2] + half, return_inverse=True
@@ -147,13 +157,13 @@ def _distinct(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _cut(lab: np.ndarray, ring: np.ndarray, known: np.ndarray, far_lab: float) -> np.ndarray:
-    """Cut what is far from the ``known`` colours (N, 3) of the background; returns its mask (H, W) float32."""
+    """Segment pixels farther than ``far_lab`` from the ``known`` background colours (N, 3); return the mask (H, W) float32."""
     far = _distance_from(known, lab)
     labels = np.where(far > far_lab, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
     labels[ring & (far < 2 * far_lab)] = cv2.GC_BGD
     if (labels == cv2.GC_PR_FGD).sum() < LEAST_PIXELS or not (labels == cv2.GC_BGD).any():
         return np.zeros(lab.shape[:2], np.float32)
-    # rows below the picture teach the cut the shades of the background; one of them is all that touches it
+    # rows appended below the picture add the known colours to the background model; only the first touches the picture
     width = lab.shape[1]
     rows = int(np.ceil(len(known) / width))
     lesson = np.resize(known, (rows * width, 3)).reshape(rows, width, 3)
@@ -166,13 +176,13 @@ def _cut(lab: np.ndarray, ring: np.ndarray, known: np.ndarray, far_lab: float) -
 
 
 def _shaded(lab: np.ndarray, share: float) -> np.ndarray:
-    """Return colours in a share of the light: the cube root of each tristimulus value scales (CIE 1976)."""
+    """Return L*a*b* colours in a share of the light: the cube root of each tristimulus value scales (CIE 1976)."""
     root = share ** (1 / 3)
     return np.asarray(lab * root - np.array([16 * (1 - root), 0, 0], np.float32), np.float32)
 
 
 def _distance_from(known: np.ndarray, lab: np.ndarray) -> np.ndarray:
-    """Return how far each pixel (H, W) is from the nearest of the ``known`` colours, in L*a*b* with less weight on L*."""
+    """Return the distance (H, W) of each pixel to the nearest of the ``known`` colours, in L*a*b* with less weight on L*."""
     samples, pixels = known * WEIGHTS, lab * WEIGHTS
     cells, inverse = _distinct(np.rint(samples / 2).astype(np.int64))
     counts = np.bincount(inverse)

@@ -1,4 +1,4 @@
-"""The object's mask: everything that the flooded background leaves, less shadows and gaps, cut along its edges."""
+"""Rule-based segmentation of the object: everything but the flooded background, without shadows and gaps, cut along image edges."""
 
 from __future__ import annotations
 
@@ -25,19 +25,20 @@ from manitwin.models.matting.second_opinion import Bracket, colour_opinion
 from manitwin.models.matting.shade_strips import shade_strips
 from manitwin.models.matting.shadow import cast_shadow, gaps
 
-SAME = 0.97  # agreement beyond which there is nothing to settle
-BLIND = 0.6  # share of the first opinion's object that colours must know of
+SAME = 0.97  # agreement above which the masks are not reconciled
+BLIND = 0.6  # minimum share of the first mask that the colour model calls possible
 CUT_MARGIN_PX = 16
-MOSTLY_NARROW = 0.7  # of an outline: what is in focus all around is a thing's
-BALL_SHARE = 0.010  # of the longer side: gaps in an outline narrower than twice this do not let the flood in
+MOSTLY_NARROW = 0.7  # share of an outline on narrow edges: an outline in focus all around belongs to an object
+BALL_SHARE = 0.010  # of the longer side: the flood does not pass gaps in an outline narrower than twice this
 
 
 @dataclass(frozen=True)
 class Segmentation:
-    """A mask (H, W) at working resolution, and what it was made from; ``hard`` is the part of ``shadow`` with an edge.
+    """Mask (H, W) at working resolution, with the intermediate results that produced it.
 
-    ``agreement`` is how far the opinion by surfaces and flood agrees with what both opinions make together; ``narrow`` are the
-    edges in focus (``narrow_edges``).
+    ``gradient`` is the colour gradient and ``edge_threshold`` its limit for edges. ``hard`` is the part of ``shadow`` with a
+    visible edge. ``agreement`` in [0, 1] is the agreement of the surface-and-flood mask with the reconciled mask, ``colours``
+    the colour opinion, and ``narrow`` are the edges in focus (``narrow_edges``).
     """
 
     mask: np.ndarray
@@ -52,12 +53,12 @@ class Segmentation:
 
     @property
     def known_to_colours(self) -> float:
-        """The share of the mask that colours alone call possible."""
+        """Share of the mask that the colour model alone calls possible."""
         return float((self.mask & dilated(self.colours.possible, 2)).sum() / max(int(self.mask.sum()), 1))
 
 
 def segment(rgb: np.ndarray) -> Segmentation:
-    """Segment the object in ``rgb`` (H, W, 3) uint8, working size (about 512 px)."""
+    """Segment the object in ``rgb`` (H, W, 3) uint8 at working size (about 512 px)."""
     background = model_background(rgb)
     gradient = gradient_magnitude(background.lab)
     threshold = edge_threshold(background, gradient)
@@ -66,10 +67,10 @@ def segment(rgb: np.ndarray) -> Segmentation:
     frame = np.zeros(walls.shape, bool)
     frame[[0, -1]] = frame[:, [0, -1]] = True
     candidate = ~flood(~walls, frame, ball_px=ball, regrow_px=ball + 2)
-    # strips too narrow for the ball, such as between a table's edge and a shadow's: no wall, and the background's colour
+    # strips of background colour without edges that are too narrow for the ball, e.g. between a table's edge and a shadow's
     plain = ~walls & (background.distance < 2.5)
     candidate &= ~flood(~candidate | plain, ~candidate, ball_px=2, regrow_px=4)
-    candidate &= ~background.seam | opened(candidate, 2 * ball)  # what is left of a seam is a thin line
+    candidate &= ~background.seam | opened(candidate, 2 * ball)  # remainders of a seam are thin lines
     narrow = narrow_edges(gradient, edge_scale(background.lab), 1.6 * threshold, dilated(candidate, 2))
     shadow = cast_shadow(background, candidate, gradient, threshold, narrow)
     seen_through = gaps(background, candidate & ~shadow, gradient, threshold)
@@ -94,12 +95,13 @@ def segment(rgb: np.ndarray) -> Segmentation:
 
 
 def reconciled(first: np.ndarray, colours: Bracket, shadow: np.ndarray, narrow: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return the mask that two opinions make together, and how far they agree on it, in [0, 1].
+    """Combine two opinions into one mask; return it with their agreement in [0, 1].
 
-    What has certainly other colours than the background belongs to it, what cannot have does not; between the two the first
-    decides, and of its ``shadow``, which light of another colour may tint: there colours only lower the agreement. Where they
-    tell most of the first's object from nothing, they are blind, and it stands alone with agreement 0. What colours take out
-    within the object stays, and lowers the agreement: only ``gaps`` tells a hole from a label of the background's colours.
+    Pixels whose colour certainly differs from the background are added, and pixels whose colour cannot differ are removed;
+    between the two bounds the first mask decides. In the ``shadow`` of the first opinion, which coloured light may tint,
+    colours add nothing and only lower the agreement. If the colour model calls less than ``BLIND`` of the first mask
+    possible, the first mask is returned with agreement 0. Regions that colours remove inside the object stay and lower the
+    agreement, because only ``gaps`` tells a hole from a label in the background's colours.
     """
     if not first.any():
         return colours.certain & ~shadow, 0.0
@@ -115,9 +117,10 @@ def reconciled(first: np.ndarray, colours: Bracket, shadow: np.ndarray, narrow: 
 
 
 def _open_to_outside(regions: np.ndarray, solid: np.ndarray, near_narrow: np.ndarray) -> np.ndarray:
-    """Return those ``regions`` of ``solid`` that reach its outline, and not along narrow edges there.
+    """Return those ``regions`` of ``solid`` that reach its outline where the outline is not mostly on narrow edges.
 
-    A label of the background's colours lies within a thing, and a cap of them has an outline in focus, as no shadow has.
+    A label in the background's colours lies inside the object, and a cap in these colours has an outline in focus; a shadow
+    has neither.
     """
     count, labels, stats, _ = cv2.connectedComponentsWithStats(regions.astype(np.uint8), connectivity=4)
     kept = np.zeros(regions.shape, bool)
@@ -138,10 +141,11 @@ def _away(mask: np.ndarray) -> np.ndarray:
 def _graph_cut(
     background: Background, solid: np.ndarray, shadow: np.ndarray, *, core_px: int, doubt: float, seed: int
 ) -> np.ndarray:
-    """Cut along the edges near the outline (GrabCut: Rother, Kolmogorov, Blake 2004) on the residual colours.
+    """Refine the outline with GrabCut (Rother, Kolmogorov, Blake 2004) on the colour residuals.
 
-    Only pixels within ``core_px`` of the outline can still change sides, or four times that where they are nearer than
-    ``doubt`` to the background; those start there. A known ``shadow`` is background and teaches its shades, but for its rim.
+    Only pixels within ``core_px`` of the outline can change sides, or within four times that if their distance to the
+    background is less than ``doubt``; those start as background. A known ``shadow`` without its rim is fixed as background,
+    so that its colours are learned as background.
     """
     if not solid.any():
         return solid
@@ -155,10 +159,10 @@ def _graph_cut(
     labels[eroded(shadow, 1)] = cv2.GC_BGD
     if not ((labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)).any():
         return np.zeros(solid.shape, bool)
-    # residuals amplified: the background becomes one tight cluster at mid-grey whatever the light does
+    # amplified residuals: the background becomes one tight cluster at mid-grey, independent of the lighting
     image = np.clip(128 + 3 * background.residual * [0.7, 1, 1], 0, 255).astype(np.uint8)
     cv2.setRNGSeed(seed)
-    box = _around(labels != cv2.GC_BGD, CUT_MARGIN_PX)  # far background says nothing that the near one does not
+    box = _around(labels != cv2.GC_BGD, CUT_MARGIN_PX)  # distant background adds no information
     near = labels[box]
     cv2.grabCut(
         np.ascontiguousarray(image[box]),
@@ -175,9 +179,9 @@ def _graph_cut(
 
 
 def _around(mask: np.ndarray, margin_px: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rows and columns, as an index, that are at most a margin from one with something of ``mask`` in it.
+    """Return an index of the rows and columns within a margin of any row or column that ``mask`` touches.
 
-    Between things that lie far apart some are left out: a graph takes 200 bytes a pixel.
+    Rows and columns between distant pieces are left out to save memory: the graph takes 200 bytes a pixel.
     """
     reach = np.ones(2 * margin_px + 1)
     near = [ndimage.binary_dilation(mask.any(axis), reach) for axis in (1, 0)]
@@ -185,11 +189,11 @@ def _around(mask: np.ndarray, margin_px: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def to_half_contrast(background: Background, mask: np.ndarray, band_px: int = 8) -> np.ndarray:
-    """Take the outline back to where a pixel is half object.
+    """Move the outline inward to where a pixel is half object.
 
-    The background B is known and the object's colour F is that of the nearest pixel well inside, so the share of the object is
-    alpha = (I - B) . (F - B) / |F - B|^2, the compositing equation (Porter and Duff 1984) solved for alpha. Only a
-    band along the outline can go, from outside inward.
+    The background colour B is known, and the object's colour F is that of the nearest pixel well inside. The share of the
+    object is alpha = (I - B) . (F - B) / |F - B|^2, the compositing equation (Porter and Duff 1984) solved for alpha. Only
+    pixels within ``band_px`` of the outline can be removed, from outside inward.
     """
     depth = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
     thickest = cv2.dilate(depth, np.ones((2 * band_px + 1, 2 * band_px + 1), np.uint8))
@@ -201,7 +205,7 @@ def to_half_contrast(background: Background, mask: np.ndarray, band_px: int = 8)
     own = residual[nearest[0], nearest[1]]
     share = total(residual * own) / np.maximum(total(own**2), 1e-6)
     visible = length(own) > 8 * max(background.noise_lab, 0.5)
-    # a mixture lies between B and F; a rim of another colour does not, and stays
+    # a mixed pixel lies on the line between B and F; a rim of another colour does not and is kept
     off_line = length(residual - share[..., None] * own)
     mixed = off_line < 0.12 * length(own) + 4 * max(background.noise_lab, 0.5)
     thin = mask & ~inner & visible & mixed & (share < 0.5)
@@ -212,6 +216,7 @@ def to_half_contrast(background: Background, mask: np.ndarray, band_px: int = 8)
 
 
 def without_specks(mask: np.ndarray) -> np.ndarray:
+    """Remove pieces below 0.05 % of the picture or 2 % of the largest piece, and fill small holes."""
     _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     areas = stats[:, cv2.CC_STAT_AREA].copy()
     areas[0] = 0

@@ -1,4 +1,4 @@
-"""Strips of an outline that have the ground's own tint, dimmed: the shadow of a thing of other colours, or a grey part of it."""
+"""Strips along an outline with the background's tint, dimmed: the shadow of a coloured object, or a grey part of it."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from manitwin.models.matting.hard_shadow import LEAST_ATTACHED, MOST_ATTACHED, e
 from manitwin.models.matting.outline import dilated, disk, eroded, opened
 from manitwin.models.matting.shadow import falls_inward
 
-MOST_LIGHT = 0.95  # of the ground's: paler is the mixed rim of anything
-MOST_TINT = 0.12  # spread of the channels' ratios: what other lights add to a shadow
+MOST_LIGHT = 0.95  # of the background's light: lighter pixels are mixed rims
+MOST_TINT = 0.12  # spread of the channels' ratios that other light sources add to a shadow
 OWN_TINT, OWN_TIMES = 0.15, 2.2
-"""The thing's own tint at the least, by itself and over that of the strip (3 to 9 times on made shadows)."""
-LEAST_CORE = 0.4  # of the mask: a thing mostly of the ground's tint tells nothing
-MOST_DEPTH = 0.3  # of the core's: a strip, not a half of the thing
+"""Minimum tint of the object, absolute and relative to the strip's (3 to 9 times in synthetic shadows)."""
+LEAST_CORE = 0.4  # of the mask: an object mostly of the background's tint gives no evidence
+MOST_DEPTH = 0.3  # of the core's depth: thicker regions are no strips
 LEAST_SHARE = 0.003  # of the mask
-LEAST_EDGE, LEAST_WIDTH_PX, LEAST_FALLING = 1.05, 1.15, 0.95  # one perfect edge is 1.05 px wide
-WIDER = 1.2  # than the thing's own outline, which is as wide as the photo's blur
+LEAST_EDGE, LEAST_WIDTH_PX, LEAST_FALLING = 1.05, 1.15, 0.95  # a perfect edge is 1.05 px wide
+WIDER = 1.2  # times the width of the object's outline, which is the blur of the photo
 
 
 @dataclass(frozen=True)
 class Strips:
-    """Masks (H, W): ``shadow`` has a penumbra towards the light, ``doubtful`` an outline as sharp as the thing's own."""
+    """Masks (H, W): ``shadow`` ends in a penumbra towards the light, ``doubtful`` in an outline as sharp as the object's own."""
 
     shadow: np.ndarray
     doubtful: np.ndarray
@@ -35,10 +35,10 @@ class Strips:
 def shade_strips(background: Background, mask: np.ndarray, gradient: np.ndarray) -> Strips:
     """Return the strips along the outline of ``mask`` (H, W) that are shadow by their colour, or may be.
 
-    A thing whose tint is far from the ground's has a strip of just that tint beside it, dimmed, as long as what casts it: ended
-    there by a stronger edge than towards the light, which only falls on the way in. A grey part of a coloured thing has an
-    outline as sharp as the thing's, as has the shadow of a very small lamp, or is attached by its end. (``hard_shadow`` tells
-    what has no such colours by its penumbra.)
+    If the object's tint is far from the background's, a shadow is a strip of the background's tint, dimmed, along the object.
+    Its edge towards the object is stronger than its edge towards the light, and its light only falls on the way in. A grey
+    part of a coloured object has an outline as sharp as the object's, as has the shadow of a very small lamp; or it is
+    attached at its end only. (``hard_shadow`` finds shadows by their penumbra where colours do not help.)
     """
     light, tint = background.light, background.tint
     strips = opened(mask & (light > MIN_SHADE) & (light < MOST_LIGHT) & (tint < MOST_TINT), 1)
@@ -78,7 +78,7 @@ def shade_strips(background: Background, mask: np.ndarray, gradient: np.ndarray)
 
 
 def _outline_width_px(contrast: np.ndarray, mask: np.ndarray, sharp: np.ndarray, strips: np.ndarray) -> float:
-    """Return how wide the blur of the outline of ``mask`` is away from ``strips``."""
+    """Return the blur width in pixels of the outline of ``mask`` away from ``strips``."""
     inner = eroded(mask, 4)
     outline = mask & ~eroded(mask, 1) & ~dilated(strips, 8)
     if not outline.any() or not inner.any():

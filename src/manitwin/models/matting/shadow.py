@@ -1,4 +1,4 @@
-"""Cast shadows and gaps: what lies between an object's silhouette and the background, and is background."""
+"""Removal of soft cast shadows and of gaps through which the background is visible from a candidate mask."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from scipy import ndimage
 from manitwin.models.matting.background import MAX_SHADE, MIN_SHADE, NEUTRAL, Background, length, total
 from manitwin.models.matting.outline import dilated, disk, eroded, flood, holds, opened
 
-MAX_PENUMBRA = 3.5  # L*a*b* units per pixel at working size; cast shadows of the studied photos have 1.5 to 3.3
-MOST_HELD = 0.04  # of a gap: what encloses a print is a label
-CLEARLY = 2.5  # times what a gap's colour is off the background's: its rim is off by as much at least
-SHADED_TINT = 0.03  # spread of the channels' ratios; of ground seen through made loops 0.007 to 0.022
-SHADED_SLOPE = 1.5  # L*a*b* per pixel: half the steepest of a shadow without an edge
-MOSTLY_NARROW = 0.6  # of a region's outline: drawing within a shadow does not go all around
-WALL_PX = 12  # as far about a gap its wall is looked for
-RISE = 0.05  # of the background's light: what shading and noise add on a way into a shadow
-TINTED = 0.25  # the same where a second, coloured light fills the shadow
+MAX_PENUMBRA = 3.5  # L*a*b* units per pixel at working size; cast shadows in sample photos have 1.5 to 3.3
+MOST_HELD = 0.04  # of a gap's area: a region that encloses more than this is a label with print
+CLEARLY = 2.5  # minimum deviation of a gap's rim from the background, relative to that of the gap's colour
+SHADED_TINT = 0.03  # spread of the channels' ratios; background seen through synthetic loops has 0.007 to 0.022
+SHADED_SLOPE = 1.5  # L*a*b* per pixel: half the steepest gradient of a shadow without an edge
+MOSTLY_NARROW = 0.6  # of a region's outline: texture within a shadow does not surround it
+WALL_PX = 12  # search radius around a gap for its wall
+RISE = 0.05  # of the background's light: rise by shading and noise on a path into a shadow
+TINTED = 0.25  # maximum tint of a shadow that a second, coloured light fills
 
 
 def cast_shadow(
@@ -25,10 +25,10 @@ def cast_shadow(
 ) -> np.ndarray:
     """Return the part of ``candidate`` that is a soft shadow, or the faint glow of light bounced off the object.
 
-    It is darker than the background and reached from outside without crossing an edge that is sharp against those of
-    what cannot be a shadow: a third as sharp where the chroma stays (up to the tint of light bounced off the object), an
-    eighth where several lights tint the shadow. A glow differs from the background by less than 15 % of what the object does.
-    Neither is bounded by an edge that is as ``narrow`` as the photo's own: a pale cap or a grey handle is.
+    A shadow is darker than the background, and it is reached from outside without crossing a sharp edge. The limit is
+    relative to the edges of pixels that are certainly object: a third where the chroma stays (up to the tint of bounced
+    light), an eighth where several lights tint the shadow. A glow differs from the background by less than 15 % of the
+    object's contrast. Neither is bounded by edges as ``narrow`` as the photo's own, as a pale cap or a grey handle is.
     """
     ratio, darkening = background.light_ratio, background.light
     tint = ratio / darkening[..., None] - 1
@@ -41,7 +41,7 @@ def cast_shadow(
     softest = gradient < max(threshold, 0.12 * edge)
     soft = (plain & (gradient < max(threshold, min(0.3 * edge, MAX_PENUMBRA)))) | ((tinted < TINTED) & softest)
     outside = ~candidate
-    lit = dilated(shady, 3) & (background.distance < 3.5) & dilated(outside, 4)  # the outer flank of a penumbra
+    lit = dilated(shady, 3) & (background.distance < 3.5) & dilated(outside, 4)  # outer flank of a penumbra
     contrast = length(background.residual)
     faint = contrast < 0.15 * (np.median(contrast[certain]) if certain.any() else 0.0)
     glow = faint & softest
@@ -51,7 +51,7 @@ def cast_shadow(
 
 
 def _bounded(regions: np.ndarray, outside: np.ndarray, narrow: np.ndarray) -> np.ndarray:
-    """Return those ``regions`` that have mostly ``narrow`` edges towards the ``outside``."""
+    """Return those ``regions`` whose outline towards the ``outside`` lies mostly on ``narrow`` edges."""
     near_narrow = dilated(narrow, 3)
     count, labels = cv2.connectedComponents(regions.astype(np.uint8), connectivity=4)
     found = np.zeros(regions.shape, bool)
@@ -64,10 +64,11 @@ def _bounded(regions: np.ndarray, outside: np.ndarray, narrow: np.ndarray) -> np
 
 
 def falls_inward(light: np.ndarray, outside: np.ndarray) -> np.ndarray:
-    """Return where ``light`` (H, W) only falls on some way in from ``outside``, up to ``RISE``.
+    """Return where ``light`` (H, W) decreases monotonically, within ``RISE``, along some path from ``outside``.
 
-    A cast shadow is darkest where it meets what casts it. What is lighter again behind a dark line is an object: its rim,
-    or the near wall of a transparent one. Grey reconstruction by dilation (Vincent 1993) gives the best way's darkest pixel.
+    A cast shadow is darkest where it meets the object. A region that is lighter again behind a dark line is object: its rim,
+    or the near wall of a transparent one. Grey-scale reconstruction by dilation (Vincent 1993) gives the darkest pixel of the
+    best path.
     """
     smooth = cv2.GaussianBlur(light, (0, 0), 1.0).astype(np.float32)
     rows, columns = np.nonzero(~outside)
@@ -88,7 +89,7 @@ def falls_inward(light: np.ndarray, outside: np.ndarray) -> np.ndarray:
 
 
 def _without_bounce(tint: np.ndarray, object_ratio: np.ndarray) -> np.ndarray:
-    """Return the size of a tint less what goes towards the object's own tint."""
+    """Return the magnitude of a tint without its component towards the object's own tint."""
     left = tint
     if len(object_ratio):
         own = np.median(object_ratio, axis=0)
@@ -101,7 +102,7 @@ def _without_bounce(tint: np.ndarray, object_ratio: np.ndarray) -> np.ndarray:
 
 
 def _object_edge(certain: np.ndarray, candidate: np.ndarray, gradient: np.ndarray) -> float:
-    """Return the typical edge of what is certainly no shadow."""
+    """Return the typical gradient along the edge of pixels that are certainly no shadow."""
     if certain.sum() > 0.15 * candidate.sum():
         rim = dilated(certain, 3) & ~eroded(certain, 3)
         return float(np.median(cv2.dilate(gradient, np.ones((7, 7), np.uint8))[rim]))
@@ -109,10 +110,10 @@ def _object_edge(certain: np.ndarray, candidate: np.ndarray, gradient: np.ndarra
 
 
 def gaps(background: Background, candidate: np.ndarray, gradient: np.ndarray, threshold: float) -> np.ndarray:
-    """Return enclosed regions through which the background is seen: the hole of a ring, the eye of a handle.
+    """Return enclosed regions through which the background is visible, such as the hole of a ring or the eye of a handle.
 
-    Such a region has the expected colour, or that colour evenly shaded, no more drawing than the border has (or no more than a
-    shadow of the ground's own tint), and a rim that differs from both clearly.
+    Such a region has the expected background colour, possibly evenly shaded; no more texture than the border (or than a
+    shadow with the background's tint); and a rim that clearly differs from both.
     """
     shade, tint = background.light, background.tint
     even = (shade > 0.45) & (shade < MAX_SHADE) & (tint < 0.12)
@@ -150,16 +151,16 @@ def gaps(background: Background, candidate: np.ndarray, gradient: np.ndarray, th
         ):
             found[box] |= part
     see_through = even | (background.distance < 4)
-    for _ in range(6):  # up to the rim's own edge
+    for _ in range(6):  # grow to the edge of the rim
         found |= dilated(found, 1) & see_through & candidate
     return found
 
 
 def _walled(lab: np.ndarray, outside: np.ndarray, region: np.ndarray, noise_lab: float) -> bool:
-    """Return whether colours that are no mixture of a region's own and the background's beside it surround the region.
+    """Tell whether a region is surrounded by colours that are no mixture of its own colour and that of the background beside it.
 
-    Through a ring the ground is seen with the ring between it and the ground around; a grey body, or one that the surfaces took
-    for ground, has nothing but its own blurred edge there, whose colours go straight from its own to the background's.
+    A true gap is separated from the outer background by the object. A grey body, or a body that the colour surfaces took for
+    background, has only its own blurred edge there, whose colours lie on the line between its own and the background's.
     """
     rows, columns = np.nonzero(region)
     box = np.s_[

@@ -1,4 +1,4 @@
-"""What is found in a photo and how likely each mask is right, before anything is decided."""
+"""Candidate masks of a photo, each with its probability of being right, before one is accepted or rejected."""
 
 from __future__ import annotations
 
@@ -29,18 +29,20 @@ from manitwin.models.matting.trimmed import exact_ground, with_margin
 
 PLAIN_NOISE_LAB = 4.0
 EXPLAINED_ODDS = 12.0
-"""How many times likelier a doubtful mask that is right has the outline of its template than one that is wrong: of such masks of
-composites and made photos 17 of 29 that are right have it, and 2 of 43 that are not."""
+"""Odds ratio for a doubtful mask whose outline matches its template: right masks against wrong ones.
+
+Among doubtful masks of composites and synthetic photos, 17 of 29 right ones match their template and 2 of 43 wrong ones do.
+"""
 AGREED_ODDS = 3.0
-"""How many times likelier a doubtful mask of one whole thing that is right is seen by both of two named networks."""
+"""Odds ratio for a doubtful mask of one whole object that both of two user-named networks find."""
 
 
 @dataclass(frozen=True)
 class Judged:
-    """A candidate with its ``features``.
+    """A candidate mask with its ``features``.
 
-    ``is_explained``: its outline is that of the thing that it is said to be; ``is_agreed``: two networks that a person named
-    both see it, and nothing speaks against one whole thing, which they do not tell.
+    ``is_explained``: its outline matches the template of the object that the photo is said to show. ``is_agreed``: two
+    user-named networks both find it, and its scores indicate one whole object, which the networks cannot tell.
     """
 
     candidate: Candidate
@@ -50,28 +52,29 @@ class Judged:
 
     @property
     def by_itself(self) -> float:
-        """How likely the candidate is right by what the photo shows."""
+        """Probability that the candidate is right, from the photo alone."""
         return probability(self.features)
 
     @property
     def confidence(self) -> float:
-        """How likely the candidate is right."""
+        """Probability that the candidate is right, with the odds of explanation and agreement."""
         odds = (EXPLAINED_ODDS if self.is_explained else 1.0) * (AGREED_ODDS if self.is_agreed else 1.0)
         return odds * self.by_itself / (odds * self.by_itself + 1 - self.by_itself)
 
     @property
     def of_pieces(self) -> float:
-        """How likely it is that what was found is no background, be it one piece or several."""
+        """Probability that the mask contains no background, whether it has one piece or several."""
         return probability(np.where(WHOLE, 0.0, self.features))
 
 
 @dataclass(frozen=True)
 class Study:
-    """What was found in a photo before anything is decided.
+    """Analysis of a photo before a mask is accepted.
 
-    ``found`` is that of the rules, ``judged`` every candidate, the likeliest first, ``alpha (H, W) uint8`` the first at the
-    photo's size, empty where there is none, ``shares`` (h, w) what each of the ``network_makers`` says, filled within its
-    outline. Masks and shares of a photo that was trimmed to the thing are those of the photo ``with_margin``.
+    ``found`` is the segmentation by the rules. ``judged`` has all candidates, the most probable first. ``alpha (H, W) uint8``
+    is the first candidate at the size of the photo, empty if there is no candidate. ``shares`` (h, w) are the foreground
+    probabilities of the ``network_makers``, completed inside their outlines. For a photo that was trimmed to the object,
+    masks and shares refer to the photo ``with_margin``.
     """
 
     found: Segmentation
@@ -81,18 +84,18 @@ class Study:
 
     @property
     def confidence(self) -> float:
-        """The confidence in ``alpha``, 0 where nothing was found."""
+        """Confidence in ``alpha``, 0 if there is no candidate."""
         return self.judged[0].confidence if self.judged else 0.0
 
     @property
     def plain(self) -> bool:
-        """Whether smooth surfaces explain the border."""
+        """Whether smooth surfaces explain the border of the photo."""
         background = self.found.background
         return background.noise_lab < PLAIN_NOISE_LAB and background.unexplained < 0.05
 
     @property
     def agreement(self) -> dict[str, float]:
-        """The agreement of each opinion with the mask, by the opinion's name."""
+        """Agreement of each opinion with the best mask, by the opinion's name."""
         chosen = self.judged[0].candidate.found
         said = {
             "rules": alike(chosen.mask, self.found.mask),
@@ -104,10 +107,10 @@ class Study:
 
 
 def study_photo(rgb: np.ndarray, *, working_side_px: int = 512, networks: Sequence[Network] = ()) -> Study:
-    """Find the object in ``rgb`` (H, W, 3) uint8 upright sRGB and judge what was found; nothing is rejected here.
+    """Find and score candidate masks in ``rgb`` (H, W, 3) uint8, upright sRGB; nothing is rejected here.
 
-    ``networks``, two at most, are asked besides the built-in one. Raises Unavailable without the built-in network's weights,
-    BadReply where a given one cannot be run.
+    ``networks``, at most two, are evaluated in addition to the built-in one. Raises Unavailable without the built-in
+    network's weights, BadReply if a given network cannot be run.
     """
     found, judged, shares = judged_candidates(rgb, working_side_px=working_side_px, networks=networks)
     if not judged:
@@ -119,9 +122,10 @@ def study_photo(rgb: np.ndarray, *, working_side_px: int = 512, networks: Sequen
 def study_in_turn(
     rgb: np.ndarray, networks: Sequence[Network], *, min_confidence: float, working_side_px: int = 512
 ) -> Study:
-    """Study a photo as ``study_photo``: one of the ``networks`` is asked at once, two only where nothing is believed without.
+    """Study a photo as ``study_photo``, but evaluate two additional ``networks`` only if no mask is accepted without them.
 
-    Thin tools that are believed without them two networks often see differently, and would doubt.
+    A single additional network is always evaluated. Two networks often disagree about thin tools that are accepted without
+    them, and would lower their confidence.
     """
     if len(networks) < 2:
         return study_photo(rgb, working_side_px=working_side_px, networks=networks)
@@ -134,10 +138,11 @@ def study_in_turn(
 def judged_candidates(
     rgb: np.ndarray, *, working_side_px: int = 512, networks: Sequence[Network] = ()
 ) -> tuple[Segmentation, list[Judged], list[np.ndarray]]:
-    """Return what the rules found, every candidate with its features, and each network's share of object, as ``study_photo``.
+    """Return the rules' segmentation, all candidates with their features, and each network's foreground probability.
 
-    Of two networks the one counts that speaks better for a candidate, of three the second best: two must speak for it. A photo
-    smaller than ``working_side_px`` is ``enlarged``, one that was trimmed to the thing is seen ``with_margin``.
+    Arguments and errors are those of ``study_photo``. Each candidate is compared with every network; the best comparison
+    counts for one or two networks and the second best for three, so that two of three must support it. A photo smaller than
+    ``working_side_px`` is ``enlarged``, a photo that was trimmed to the object is extended (``with_margin``).
     """
     exact = exact_ground(rgb)
     rgb, _ = with_margin(rgb)
@@ -145,7 +150,7 @@ def judged_candidates(
     rgb = enlarged(rgb, working_side_px)
     found = segment(_scaled(rgb, working_side_px))
     if _longest_side(found.mask) < 0.5 * max(found.mask.shape) and max(rgb.shape[:2]) > 1.2 * working_side_px:
-        found = segment(_scaled(rgb, 2 * working_side_px))  # a small thing is looked at again, closer
+        found = segment(_scaled(rgb, 2 * working_side_px))  # segment a small object again at twice the resolution
     asked = (*networks, None)
     shares = [network_share(rgb, max(found.mask.shape), each) for each in asked]
     if exact is not None:
@@ -166,13 +171,16 @@ def judged_candidates(
 
 
 def _seen_alike(shares: Sequence[np.ndarray], shape: tuple[int, ...]) -> np.ndarray | None:
-    """Return the mask (H, W) that two networks see alike, given their shares of object; None where they differ or are not two."""
+    """Return the mask (H, W) on which exactly two networks agree, given their foreground probabilities; otherwise None."""
     masks = [network_mask(share, shape) for share in shares]
     return masks[0] if len(masks) == 2 and alike(*masks) > AGREEING else None
 
 
 def network_share(rgb: np.ndarray, side_px: int, network: Network | None) -> np.ndarray:
-    """Return the share of object (h, w) of each pixel of ``rgb``, at most ``side_px`` large, as a network has it."""
+    """Return a network's foreground probability (h, w) for ``rgb``, scaled down to at most ``side_px``.
+
+    None stands for the built-in network. A user-named network sees the picture at its own input size if that is larger.
+    """
     if network is None:
         return object_share(_scaled(rgb, side_px))
     return in_two_looks(_scaled(rgb, max(side_px, *network.side_px)), lambda seen: learned_alpha(network, seen))
@@ -181,12 +189,12 @@ def network_share(rgb: np.ndarray, side_px: int, network: Network | None) -> np.
 def drawn(rgb: np.ndarray, mask: np.ndarray, working_side_px: int = 512) -> np.ndarray:
     """Return the largest piece of a mask (any size) as alpha (H, W) uint8 at the size of ``rgb``, with a soft outline.
 
-    The mask is that of the photo ``with_margin``.
+    The mask refers to the photo ``with_margin``; the margin is cut off again.
     """
     wider, margin_px = with_margin(rgb)
     seen = enlarged(wider, working_side_px)
     alpha = fine_outline(seen, largest_piece(mask))
-    if max(seen.shape[:2]) <= 2 * working_side_px:  # of larger photos the first look is finer than is needed
+    if max(seen.shape[:2]) <= 2 * working_side_px:  # the first pass is fine enough for larger photos
         alpha = fine_outline(seen, alpha > 127)
     alpha = alpha if seen is wider else cv2.resize(alpha, wider.shape[1::-1], interpolation=cv2.INTER_AREA)
     return np.ascontiguousarray(alpha[margin_px : margin_px + rgb.shape[0], margin_px : margin_px + rgb.shape[1]])
@@ -203,6 +211,6 @@ def _longest_side(mask: np.ndarray) -> int:
 
 
 def largest_piece(mask: np.ndarray) -> np.ndarray:
-    """Return the largest connected piece of a mask that is not empty."""
+    """Return the largest connected piece of a non-empty mask."""
     _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     return labels == 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax())

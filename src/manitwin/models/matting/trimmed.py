@@ -1,7 +1,7 @@
-"""Photos that were trimmed to the thing: pictures of shops, on one pure colour, whose edges lie where the thing ends.
+"""Detection of photos that were trimmed to the object: product pictures on one pure colour whose frame touches the object.
 
-A thing that ends at the frame looks cut off by it, and next to nothing of the ground is left to tell it from. Where the ground is
-of one colour to the level, as no photographed surface is, it goes on the same beyond the frame.
+An object that ends at the frame looks cut off, and hardly any background is left to compare with it. If the background has
+exactly one pixel value, as no photographed surface has, it can be extended beyond the frame.
 """
 
 from __future__ import annotations
@@ -9,29 +9,37 @@ from __future__ import annotations
 import numpy as np
 
 MARGIN = 0.08
-"""Of the longer side: what is given to every side."""
+"""Width of the margin added to every side, as a share of the longer side."""
 MOST_DEVIATION = 2.0
-"""Levels by which half of the frame's ground may be off its colour: JPEG's own noise. A wall in a photo is off by 4 and more."""
+"""Maximum median deviation of the frame's background from its colour, in 8-bit levels.
+
+JPEG noise stays below it; a wall in a photo deviates by 4 or more.
+"""
 EXACT_SHARE = 0.75
-"""Of the frame's ground, within ``MOST_DEVIATION``: where half is, a quarter is off by 4 and more in even light of a camera, and
-by none where somebody filled it."""
+"""Share of the frame's background within ``MOST_DEVIATION`` for an exact colour.
+
+In evenly lit photos with half of it within, a quarter deviates by 4 or more; on a digitally filled background none does.
+"""
 OF_GROUND, LEAST_GROUND = 24.0, 0.5
-"""Levels from the ground's colour within which a pixel is ground, and how much of the frame has to be."""
+"""Maximum deviation in 8-bit levels of a background pixel from the background colour, and the minimum share of such pixels."""
 NEAR = 0.02
-"""Of the longer side: what ends so near to a side was trimmed there."""
+"""Share of the longer side; an object that ends this near to a side was trimmed there."""
 CLOSE, WHITE = 0.06, 250.0
-"""Of the longer side: what leaves more on every side has ground enough. What touches none is given more on white alone, onto
-which shops cut things out; light that falls off over another colour need not go on."""
+"""A gap of more than ``CLOSE`` of the longer side on every side leaves enough background.
+
+An object that touches no side gets a margin only on white, since shops place cut-outs on white; light falloff over another
+colour need not continue beyond the frame.
+"""
 MOST_CONTACT = 0.5
-"""Of a thing's extent along a side: a thing that was trimmed bends away from the frame, what is cut off runs across it."""
+"""Share of the object's extent along a side that touches it: a trimmed object curves away, one that is cut off runs across it."""
 FRAME_PX = 2
 
 
 def trimmed_margin(rgb: np.ndarray) -> tuple[int, np.ndarray] | None:
-    """Return the margin (px) that was trimmed off a photo ``rgb (H, W, 3) uint8``, and its colour ``(3,) uint8``; else None.
+    """Return the margin (px) to restore around a trimmed photo ``rgb (H, W, 3) uint8``, and its colour ``(3,) uint8``; else None.
 
-    It was where the thing ends near a side of a white picture, and touches none; near two opposite sides, and touches none with
-    most of its extent; or near all four.
+    A photo counts as trimmed if the object ends near a side of a white picture and touches no side; or ends near two opposite
+    sides and touches none with most of its extent; or ends near all four.
     """
     height, width = rgb.shape[:2]
     if (colour := _ground_of_frame(rgb, 0.5)) is None:
@@ -59,12 +67,18 @@ def trimmed_margin(rgb: np.ndarray) -> tuple[int, np.ndarray] | None:
 
 
 def exact_ground(rgb: np.ndarray) -> np.ndarray | None:
-    """Return the one digital colour ``(3,) float32`` that the ground of ``rgb (H, W, 3) uint8`` has, by its frame; else None."""
+    """Return the one digital colour ``(3,) float32`` of the background of ``rgb (H, W, 3) uint8``; None if it has several.
+
+    The frame of the picture decides.
+    """
     return _ground_of_frame(rgb, EXACT_SHARE)
 
 
 def _ground_of_frame(rgb: np.ndarray, share: float) -> np.ndarray | None:
-    """Return the colour ``(3,) float32`` of a frame that is mostly ground, a ``share`` of it next to that; else None."""
+    """Return the colour ``(3,) float32`` of a frame that is mostly background; else None.
+
+    A ``share`` of the background pixels must be within ``MOST_DEVIATION`` of that colour.
+    """
     if min(rgb.shape[:2]) <= 4 * FRAME_PX:
         return None
     ring = np.concatenate([side.reshape(-1, 3) for side in _sides(rgb)]).astype(np.float32)
@@ -77,9 +91,9 @@ def _ground_of_frame(rgb: np.ndarray, share: float) -> np.ndarray | None:
 
 
 def with_margin(rgb: np.ndarray) -> tuple[np.ndarray, int]:
-    """Return a photo ``rgb (H, W, 3) uint8`` with the margin that was trimmed off it on every side, and that margin in pixels.
+    """Return a photo ``rgb (H, W, 3) uint8`` with the trimmed margin restored on every side, and the margin in pixels.
 
-    It is the photo itself, and 0, where it was not trimmed.
+    A photo that was not trimmed is returned unchanged, with margin 0.
     """
     found = trimmed_margin(rgb)
     if found is None:
@@ -93,6 +107,6 @@ def with_margin(rgb: np.ndarray) -> tuple[np.ndarray, int]:
 
 
 def _sides(picture: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return a picture's outermost rows and columns, top, bottom, left and right, each ``(FRAME_PX, n, ...)``."""
+    """Return the outermost rows and columns of a picture (top, bottom, left, right), each ``(FRAME_PX, n, ...)``."""
     across = np.swapaxes(picture, 0, 1)
     return picture[:FRAME_PX], picture[-FRAME_PX:], across[:FRAME_PX], across[-FRAME_PX:]

@@ -1,1 +1,1 @@
-"""Estimators of a known thing's pose in a picture that the user has: FoundationPose, MegaPose and others behind one protocol."""
+"""Estimators of the 6-DoF pose of a known object in a picture: FoundationPose, MegaPose and others behind one protocol."""

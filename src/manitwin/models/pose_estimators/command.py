@@ -1,4 +1,4 @@
-"""An estimator that is a program of the user's: it reads a folder and writes a JSON file.
+"""A pose estimator that is a user program: it reads a folder and writes a JSON file.
 
 ``command:PROGRAM ARGUMENT...`` is split as a POSIX shell would split it, but no shell runs it. Placeholders: ``{request}``, a
 folder with ``request.json`` and the files that it names, and ``{out}``, the JSON file to write.
@@ -31,10 +31,10 @@ _TAIL_CHARACTERS = 200
 
 
 class CommandEstimator:
-    """Run a program on each question, with the variables of the environment that generators' programs are given."""
+    """Run a program for each request, with the environment variables that programs of generators receive."""
 
     def __init__(self, command: str, timeout_s: float):
-        """Take a command line; raises ConfigError for one that lacks ``{request}`` or ``{out}``."""
+        """Take a command line; raises ConfigError if it lacks ``{request}`` or ``{out}``."""
         self.spec, self._timeout_s = f"command:{command}", timeout_s
         try:
             self._words = shlex.split(command)
@@ -47,9 +47,9 @@ class CommandEstimator:
             raise ConfigError("command: it needs {request} and {out}; give command:PROGRAM {request} {out}")
 
     def guess(self, request: PoseRequest) -> PoseGuesses:
-        """Write the question, run the program to its end, and read what it wrote.
+        """Write the request, run the program to its end, and read its answer.
 
-        Raises Unavailable where it is not there, fails or takes too long, BadReply where it writes no answer.
+        Raises Unavailable if the program is missing, fails or takes too long, BadReply if it writes no valid answer.
         """
         if shutil.which(self._words[0]) is None:
             raise Unavailable(f"command: there is no program {self._words[0]!r}; install it, or give its path")
@@ -74,9 +74,9 @@ class CommandEstimator:
                 stdout=output,
                 stderr=errors,
                 env=passed(os.environ, ()),
-                start_new_session=True,  # a Ctrl-C is for this process; the supervisor learns of it by the pipe
+                start_new_session=True,  # Ctrl-C reaches only this process; the supervisor notices by the pipe
             )
-        # leaving this block closes the pipe, and the supervisor ends the program
+        # leaving this block closes the pipe, upon which the supervisor ends the program
         with process:
             try:
                 status = process.wait(self._timeout_s)

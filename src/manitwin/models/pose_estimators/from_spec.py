@@ -1,4 +1,4 @@
-"""The estimator that a person names: ``command:...``, or a server's address."""
+"""Creation of the pose estimator that the user names: ``command:...``, or a server's address."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from manitwin.models.pose_estimators.served import ServedEstimator
 
 
 def pose_estimator(spec: str, services: ServicesConfig) -> PoseEstimator:
-    """Return the estimator of a spec; raises ConfigError for what names none."""
+    """Return the estimator that a spec names; raises ConfigError for an invalid spec."""
     kind, colon, rest = spec.partition(":")
     if kind == "command" and colon:
         return CommandEstimator(rest, services.timeout_s)

@@ -1,11 +1,18 @@
-"""What an estimator of poses is asked, and how it answers: one JSON document and files, by a folder or over HTTP.
+"""Protocol of pose estimators: one JSON document and files, exchanged in a folder or over HTTP.
 
-The document of a question (``request.json``, or the body of a POST) has ``protocol``, ``name``, ``seed``, ``most_poses``,
-``camera`` (``fx``, ``fy``, ``cx``, ``cy``, ``width``, ``height``; pixels' centres are whole numbers, as OpenCV has it),
-``depth_unit_m``, ``diameter_m``, ``symmetries`` (4 x 4 motions of the object frame after which the shape is where it was) and
-``files``, a name each: ``mesh`` (PLY, metres, object frame), ``visual`` (the textured GLB, Y-up as glTF has it: its (x, y, z) is
-(x, -z, y) of the object frame), ``depth`` (PNG of 16 bits, 0 unknown), ``mask`` and ``rgb`` (null: no colours). The answer has
-``model``, what answered, and ``poses``, the best first: ``object_to_camera`` (4 x 4, metres; camera: x right, y down, z ahead).
+The document of a request (``request.json``, or the body of a POST) has
+
+- ``protocol``, ``name``, ``seed``, ``most_poses``
+- ``camera``: ``fx``, ``fy``, ``cx``, ``cy``, ``width``, ``height`` in pixels; pixel centres have integer coordinates, as in
+  OpenCV
+- ``depth_unit_m``, ``diameter_m``
+- ``symmetries``: 4 x 4 transforms of the object frame that map the shape to itself
+- ``files``: names of the files ``mesh`` (PLY, metres, object frame), ``visual`` (the textured GLB, Y-up as in glTF: its (x,
+  y, z)
+  is (x, -z, y) of the object frame), ``depth`` (16-bit PNG, 0 unknown), ``mask`` and ``rgb`` (null: no colours)
+
+The answer has ``model``, the name of the model, and ``poses``, the best first, each with ``object_to_camera`` (4 x 4, metres;
+camera frame: x right, y down, z forward).
 """
 
 from __future__ import annotations
@@ -23,12 +30,12 @@ PROTOCOL = "manitwin.pose/1"
 MOST_POSES = 16
 MOST_M = 100.0
 MOST_SKEW = 1e-2
-"""Rotations of networks in 32 bits are off by 1e-6; what is off by more is no rotation."""
+"""Maximum deviation of a matrix from a rotation. Rotations computed by networks in 32 bits deviate by 1e-6."""
 
 
 @dataclass(frozen=True)
 class PoseRequest:
-    """A question: its document, and the content of each of its files by name."""
+    """A request: its document, and the content of each of its files by name."""
 
     document: dict[str, Any]
     files: Mapping[str, bytes]
@@ -36,24 +43,24 @@ class PoseRequest:
 
 @dataclass(frozen=True)
 class PoseGuesses:
-    """Poses ``object_to_camera (K, 4, 4)``, m, the best first; ``model`` is what answered."""
+    """Poses ``object_to_camera (K, 4, 4)`` in m, the best first; ``model`` is the name of the model."""
 
     poses: np.ndarray
     model: str
 
 
 class PoseEstimator(Protocol):
-    """The protocol of an estimator: ``spec`` is how it was named."""
+    """Protocol of a pose estimator; ``spec`` is the spec that created it."""
 
     spec: str
 
     def guess(self, request: PoseRequest) -> PoseGuesses:
-        """Answer a question; raises a BackendError where it does not, or not as the protocol has it."""
+        """Estimate poses; raises a BackendError if there is no answer, or one that violates the protocol."""
         ...
 
 
 def parse_guesses(answer: Any, who: str) -> PoseGuesses:
-    """Read an answer without trust; raises BadReply naming ``who``. Rotations are made exact."""
+    """Parse and validate an untrusted answer; raises BadReply naming ``who``. Rotations are orthonormalized."""
     told = answer if isinstance(answer, dict) else {}
     model, poses = told.get("model"), told.get("poses")
     if (

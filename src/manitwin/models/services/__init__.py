@@ -1,1 +1,1 @@
-"""Reaching services over HTTP: keys, retries, and what their errors mean."""
+"""Clients of HTTP services: keys, retries, limits, and translation of service errors."""

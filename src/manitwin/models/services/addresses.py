@@ -1,7 +1,8 @@
-"""Addresses behind a server's name, and which of them may be connected to.
+"""IP addresses behind a server's name, and the check which of them may be connected to.
 
-A link or a redirect comes from a server, so it may name what only this machine can reach (OWASP, "Server Side Request Forgery
-Prevention Cheat Sheet"). A name is looked up once; every address that it has is checked, and only those are connected to.
+A link or a redirect comes from a server, so it may name an address that only this machine can reach (OWASP, "Server Side
+Request Forgery Prevention Cheat Sheet"). A name is resolved once; every address is checked, and only checked addresses are
+connected to.
 """
 
 from __future__ import annotations
@@ -11,26 +12,26 @@ import threading
 from dataclasses import dataclass
 from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address
 
-# of IPv4 through a translator (RFC 6052): the last 32 bits are the address that is reached
+# IPv4 through a translator (RFC 6052): the last 32 bits are the IPv4 address
 _NAT64 = IPv6Network("64:ff9b::/96")
 _LOOPBACK = ("127.0.0.1", "::1")
-# for protocols, and for relays of 6to4, which are no more (RFC 6890, RFC 7526): ipaddress knows them in parts
+# protocol assignments and deprecated 6to4 relays (RFC 6890, RFC 7526), which ipaddress covers only partly
 _OF_PROTOCOLS = (IPv4Network("192.0.0.0/24"), IPv4Network("192.88.99.0/24"))
 
 
 class ForbiddenAddress(Exception):
-    """A name that leads where nobody but this machine, or its network, may go."""
+    """A name resolves to an address of this machine or its network, which may not be connected to."""
 
 
 class UnknownName(OSError):
-    """A name without an address, or one that is not found in time."""
+    """A name has no address, or is not resolved in time."""
 
 
 @dataclass(frozen=True)
 class Reach:
-    """The servers that may be connected to: the one at ``host`` and ``port``, wherever that is, and public ones.
+    """The servers that may be connected to: the configured one at ``host`` and ``port``, at any address, and public ones.
 
-    ``on_this_machine``: its name has to be a loopback address, as it says.
+    With ``on_this_machine`` the configured server's name must resolve to a loopback address.
     """
 
     host: str
@@ -38,11 +39,11 @@ class Reach:
     on_this_machine: bool = False
 
     def is_own(self, host: str, port: int) -> bool:
-        """Tell whether this is the server that was configured."""
+        """Tell whether host and port are those of the configured server."""
         return (host.lower(), port) == (self.host.lower(), self.port)
 
     def checked(self, host: str, port: int, addresses: list[str]) -> list[str]:
-        """Return the addresses of a name; raises ForbiddenAddress where one of them may not be connected to."""
+        """Return the addresses of a name; raises ForbiddenAddress if one of them may not be connected to."""
         for address in addresses:
             if self.is_own(host, port):
                 if self.on_this_machine and not ip_address(_without_zone(address)).is_loopback:
@@ -55,10 +56,10 @@ class Reach:
 
 
 def is_public(address: str) -> bool:
-    """Tell whether an address is one of the public internet.
+    """Tell whether an address belongs to the public internet.
 
-    Not loopback, private, shared, link-local, multicast, unspecified or reserved (the registries of RFC 6890), nor one that
-    carries such an address inside (NAT64; 6to4 is no longer in use, RFC 7526).
+    Loopback, private, shared, link-local, multicast, unspecified and reserved addresses (the registries of RFC 6890) do not,
+    nor do addresses that embed such an address (NAT64), nor 6to4, which is no longer in use (RFC 7526).
     """
     ip = ip_address(_without_zone(address))
     if isinstance(ip, IPv6Address):
@@ -80,10 +81,10 @@ def _without_zone(address: str) -> str:
 
 
 def addresses_of(host: str, port: int, timeout_s: float) -> list[str]:
-    """Return the addresses of a name, in the order of the system; raises UnknownName.
+    """Return the addresses of a name in the system's order; raises UnknownName.
 
-    The system's own resolver has no time limit: it is asked in a thread, which is left behind where it does not answer.
-    ``localhost`` is this machine even where the system does not know it (RFC 6761, section 6.3: a machine without /etc/hosts).
+    The system's resolver has no time limit, so it runs in a thread that is abandoned if it does not answer in time.
+    ``localhost`` is this machine even if the system cannot resolve it (RFC 6761, section 6.3; e.g. without /etc/hosts).
     """
     found: list[str] = []
     why: list[str] = ["no answer from the name service"]

@@ -1,4 +1,4 @@
-"""Bodies of answers: decoded in bounded pieces, read as JSON of a bounded number of parts, without the key."""
+"""Bodies of HTTP answers: decompressed in bounded pieces, and parsed as JSON of bounded size with the key removed."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from manitwin.formats.json_file import parse_json
 from manitwin.models.services.keys import without_key
 
 PIECE_BYTES = 1 << 20
-MOST_PARTS = 2_000_000  # of a JSON answer: what a part takes in memory is bounded (100 bytes or so), not what it is in
-MOST_LEVELS = 100  # of nesting: what reads an answer may go through it by recursion
+MOST_PARTS = 2_000_000  # values of a JSON answer: bounds the memory after parsing, about 100 bytes per value
+MOST_LEVELS = 100  # levels of nesting: code that reads an answer may be recursive
 _HALF_CHARACTER = re.compile(rb"\\u[dD][89a-fA-F]")
 
 
 class TooLarge(Exception):
-    """A body of more bytes than are read."""
+    """A body exceeds the size limit."""
 
 
 def pieces(answer: httpx2.Response, max_bytes: int) -> Iterator[bytes]:
-    """Return the body of an answer that is being received, decoded, in pieces of at most 1 MiB.
+    """Yield the decompressed body of an answer while it is received, in pieces of at most 1 MiB.
 
-    The limit holds for what is sent and for what that unpacks to. Raises TooLarge, and httpx2.DecodingError for what is not
-    in its encoding: none, gzip or deflate, once.
+    The limit applies both to the received and to the decompressed bytes. Raises TooLarge, and httpx2.DecodingError for a body
+    that is not in its declared encoding; supported are none, gzip and deflate, applied once.
     """
     announced = answer.headers.get("Content-Length", "")
     if announced.isdecimal() and int(announced) > max_bytes:
@@ -51,7 +51,7 @@ class _Plain:
 
 
 class _Zipped:
-    """Unpack gzip or zlib (RFC 1952, RFC 1950), never more than a piece at a time."""
+    """Decompress gzip or zlib (RFC 1952, RFC 1950), at most one piece at a time."""
 
     def __init__(self) -> None:
         self._unpacker = zlib.decompressobj(zlib.MAX_WBITS | 32)
@@ -82,13 +82,13 @@ def whole_body(answer: httpx2.Response, max_bytes: int) -> bytes:
 
 
 class NotJson(Exception):
-    """A body that is no JSON, or is JSON that no answer is."""
+    """A body is not JSON, or exceeds the limits of parsed answers."""
 
 
 def parsed(data: bytes, key: str | None) -> Any:
-    """Return the value of a JSON answer, in which the key stands nowhere and every text can be written as UTF-8.
+    """Return the value of a JSON answer, with the key removed and all strings valid as UTF-8.
 
-    Raises NotJson, also for numbers that are not finite, for more than MOST_LEVELS levels and for more than MOST_PARTS parts.
+    Raises NotJson, also for non-finite numbers, more than MOST_LEVELS levels or more than MOST_PARTS values.
     """
     if sum(map(data.count, (b",", b"[", b"{"))) > MOST_PARTS:
         raise NotJson(f"more than {MOST_PARTS} parts")
@@ -100,13 +100,13 @@ def parsed(data: bytes, key: str | None) -> Any:
         return value
     text = json.dumps(value, ensure_ascii=False)
     clean = without_key(text, key)
-    if halved:  # half of a pair of UTF-16: no text
+    if halved:  # lone UTF-16 surrogates are not valid text
         clean = clean.encode("utf-8", "replace").decode()
     return value if clean == text else json.loads(clean)
 
 
 def levels(value: Any) -> int:
-    """Return how deep a value is nested, or MOST_LEVELS + 1 where that is deeper."""
+    """Return the nesting depth of a value, at most MOST_LEVELS + 1."""
     level, depth = [value], 0
     while level and depth <= MOST_LEVELS:
         inner = [part.values() if isinstance(part, dict) else part for part in level if isinstance(part, dict | list)]

@@ -1,4 +1,4 @@
-"""Connections of one request: a deadline for all of it, checked addresses, proxies by CONNECT only."""
+"""HTTP transport for one request: a deadline for the whole request, checked addresses, proxies through CONNECT only."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from manitwin.errors import ConfigError
 from manitwin.models.services.addresses import Reach, UnknownName, addresses_of
 
 MAX_CONNECT_S = 30.0
-LONGEST_STEP_S = 86_400.0  # a socket takes no endless one
+LONGEST_STEP_S = 86_400.0  # sockets do not accept an infinite timeout
 _NO_WHOLE_ANSWER = "no whole answer within {:.4g} s"
 
 
 class Deadline:
-    """The time that a request may take from the first look-up of a name to the last byte; ``extend`` gives it more."""
+    """Time limit of a request, from resolving the name to the last byte; ``extend`` adds time."""
 
     def __init__(self, seconds: float, clock: Callable[[], float] = time.monotonic):
         self._clock, self.seconds = clock, seconds
         self._until = clock() + seconds
 
     def extend(self, seconds: float) -> None:
-        """Give the request so many seconds more."""
+        """Add seconds to the time limit."""
         self.seconds += seconds
         self._until += seconds
 
     def left_s(self, at_most: float | None = None, over: type[Exception] = httpcore2.ReadTimeout) -> float:
-        """Return the seconds that are left for one step; raises ``over`` where there are none."""
+        """Return the seconds left for one step, at most ``at_most``; raises ``over`` if none are left."""
         left = self._until - self._clock()
         if left <= 0:
             raise over(self.over)
@@ -42,15 +42,15 @@ class Deadline:
 
     @property
     def over(self) -> str:
-        """What is wrong with a request that is not done by then."""
+        """Message for a request that exceeds the deadline."""
         return _NO_WHOLE_ANSWER.format(self.seconds)
 
 
 class GuardedTransport(httpx2.BaseTransport):
-    """Connect where ``reach`` allows, within ``deadline``, and through a proxy of the environment only for https.
+    """Transport that connects only where ``reach`` allows, within ``deadline``, and uses the environment's proxy only for https.
 
-    A proxy is asked to CONNECT: it sees the name of the server and nothing of the request. Plain http goes to servers
-    directly, so that no proxy reads it.
+    A proxy gets a CONNECT request, so it sees the name of the server and nothing else. Plain http bypasses proxies, so that
+    no proxy reads it.
     """
 
     def __init__(self, reach: Reach, deadline: Deadline):
@@ -104,7 +104,7 @@ class GuardedTransport(httpx2.BaseTransport):
         )
 
     def _check_for_proxy(self, host: str, port: int) -> None:
-        """Check a name that a proxy will connect to, as far as it is known here: behind some proxies no name is."""
+        """Check the addresses of a name that a proxy will connect to, if it can be resolved here; behind some proxies it cannot."""
         try:
             addresses = addresses_of(host, port, self._deadline.left_s(MAX_CONNECT_S, httpcore2.ConnectTimeout))
         except UnknownName:
@@ -151,7 +151,7 @@ class _Stream(httpcore2.NetworkStream):
 
     def write(self, buffer: bytes, timeout: float | None = None) -> None:
         view = memoryview(buffer)
-        while view:  # in pieces: each has what is left of the time, not all of it anew
+        while view:  # in pieces, so that each gets only the remaining time
             self._inner.write(bytes(view[:65536]), self._deadline.left_s(timeout))
             view = view[65536:]
 
@@ -182,9 +182,9 @@ class _Body(httpx2.SyncByteStream):
 
 
 def proxy_for(url: httpx2.URL) -> httpx2.URL | None:
-    """Return the proxy that the environment names for an https address; None where it names none, and for plain http.
+    """Return the proxy that the environment names for an https address; None for plain http or without a proxy.
 
-    Raises ConfigError, which does not show it, for one that cannot be used.
+    Raises ConfigError for an unusable proxy, without showing it.
     """
     if url.scheme != "https" or proxy_bypass(url.host):
         return None
@@ -209,7 +209,7 @@ def _port_of(url: httpx2.URL) -> int:
 
 @contextmanager
 def _as_httpx(deadline: Deadline) -> Iterator[None]:
-    """Raise what httpcore does as the same error of httpx, which has a class of the same name; broken HTTP likewise."""
+    """Translate errors of httpcore, and parser errors, into the httpx errors of the same name."""
     try:
         yield
     except (httpcore2.ConnectTimeout, httpcore2.ConnectError) as error:
@@ -219,7 +219,7 @@ def _as_httpx(deadline: Deadline) -> Iterator[None]:
         failure = getattr(httpx2, type(error).__name__)(deadline.over)
     except (httpcore2.NetworkError, httpcore2.ProtocolError, httpcore2.ProxyError, httpcore2.UnsupportedProtocol) as e:
         failure = getattr(httpx2, type(e).__name__)(str(e))
-    except (ValueError, LookupError, ArithmeticError) as error:  # what the parser below makes of what is no HTTP
+    except (ValueError, LookupError, ArithmeticError) as error:  # raised by the HTTP parser for invalid input
         failure = httpx2.RemoteProtocolError(f"its answer is not HTTP ({type(error).__name__})")
     else:
         return
@@ -228,5 +228,5 @@ def _as_httpx(deadline: Deadline) -> Iterator[None]:
 
 @cache
 def _tls() -> ssl.SSLContext:
-    """Return the certificates that are trusted; reading them takes 34 ms, more than a request on this machine."""
+    """Return the SSL context with trusted certificates; cached, because loading takes 34 ms, more than a local request."""
     return httpx2.create_ssl_context()

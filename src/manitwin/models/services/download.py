@@ -1,4 +1,4 @@
-"""Fetch a finished file from wherever its link leads, without a key."""
+"""Download of a finished file from its link, without sending a key."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from manitwin.models.services.refusal import Gone
 
 MAX_FILE_BYTES = 1 << 30
 MAX_REDIRECTS = 5
-LEAST_BYTES_PER_S = 1 << 20  # beside the time of any request: a gigabyte may take a quarter of an hour
+LEAST_BYTES_PER_S = 1 << 20  # minimum rate that extends the deadline; at this rate a gigabyte takes 17 minutes
 LONGEST_ADDRESS = 8192
 EXPIRED = (401, 403, 404, 410)
 
@@ -32,10 +32,11 @@ def download_file(
     schemes: Set[str],
     deadline: Deadline,
 ) -> tuple[BackendError | None, bool]:
-    """Write what ``url`` leads to at ``to``; return the error or None, and whether trying again may help.
+    """Download ``url`` to the file ``to``; return the error or None, and whether a retry may help.
 
-    Redirects are followed within ``schemes``, never from https to http, and where the client may connect. ``deadline`` is
-    extended by what has come (LEAST_BYTES_PER_S). Nothing is left at ``to`` after an error.
+    Redirects are followed within ``schemes``, never from https to http, and only to addresses that the client may connect to.
+    ``deadline`` is extended in proportion to the received bytes (LEAST_BYTES_PER_S). No file is left at ``to`` after an
+    error.
     """
     part = to.with_name(f"{to.name}.part")
     try:
@@ -44,7 +45,8 @@ def download_file(
             part.replace(to)
         return error, again
     except httpx2.RequestError as failure:
-        if part.exists() and isinstance(failure, httpx2.ReadTimeout):  # it answers, but the rest does not come
+        # the server answers, but the rest of the file does not arrive
+        if part.exists() and isinstance(failure, httpx2.ReadTimeout):
             return BadReply(
                 f"{name}: its file downloads too slowly ({failure}); run it again, or raise services.timeout_s"
             ), True
@@ -79,7 +81,7 @@ def _fetched(
         try:
             url = urljoin(url, location)
         except ValueError:
-            url = location  # no address at all: refused above
+            url = location  # not a valid address: refused in the next iteration
         if scheme == "https":
             schemes = {"https"}
     return BadReply(f"{name}: the link to its file redirects more than {MAX_REDIRECTS} times"), False

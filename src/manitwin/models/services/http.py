@@ -1,4 +1,4 @@
-"""A vendor's JSON API over HTTP: the key goes to its host only, a job is never paid for twice by a retry."""
+"""Client of a vendor's JSON API: the key is sent to its host only, and retries never pay for a job twice."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ MAX_ANSWER_BYTES = 16 << 20
 _SHOWN_BYTES = 4_000
 _WORDS = 10_000
 
-# the connection was never made: nothing of the request has left this machine
+# no connection was made, so nothing was sent
 _NOT_SENT = (
     httpx2.ConnectError,
     httpx2.ConnectTimeout,
@@ -44,9 +44,9 @@ _NOT_SENT = (
     httpx2.PoolTimeout,
     httpx2.UnsupportedProtocol,
 )
-# what says that a request may be made again, whatever it was: the server has not taken it
+# statuses that say that the server did not accept the request, so any request may be repeated
 _NOT_TAKEN = (429, 503)
-# a gateway waited in vain for what stands behind it; 500 and 502 say that the work was not done
+# a gateway timed out waiting for the server behind it; with 500 and 502 the work was not done
 _ANSWER_LOST = (504,)
 
 
@@ -61,16 +61,17 @@ class FormFile:
 
 
 class HttpService:
-    """A vendor's API below ``base_url``.
+    """Client of a vendor's API below ``base_url``.
 
-    ``authorization`` are the headers that hold the key; they go to this host and no other, and show nowhere. ``refusal`` reads
-    the vendor's error bodies; ``remedy`` is what a person does about a refused key. Errors: AccessDenied, RateLimited,
-    Unavailable, Gone (a BadReply: 404 and 410) and BadReply. A request is retried ``services.retries`` times after 429 and
-    5xx and where no answer came; one that ``pays`` only where it surely was not taken (no connection, 429, 503). Where it
-    may have been taken (no answer, 504, an answer that cannot be read) that raises Unanswered (an Unavailable).
+    ``authorization`` are the headers with the key; they are sent to this host only and never displayed. ``refusal`` parses
+    the vendor's error bodies; ``remedy`` is the advice for a refused key. Errors are AccessDenied, RateLimited, Unavailable,
+    Gone (a BadReply for 404 and 410) and BadReply. A request is retried ``services.retries`` times after 429, 5xx or a
+    missing answer. A request that ``pays`` is retried only if it was certainly not accepted (no connection, 429, 503); if it
+    may have been accepted (no answer, 504, an unreadable answer), Unanswered (an Unavailable) is raised.
 
-    A request ends within ``services.timeout_s``, from the look-up of the name to the last byte; an answer has at most
-    ``max_bytes``, unpacked. No redirect is followed. What a server says is shown as one short line without the key.
+    A request ends within ``services.timeout_s``, from resolving the name to the last byte; an answer has at most
+    ``max_bytes`` after decompression. Redirects are not followed. Messages of the server are shown as one short line without
+    the key.
     """
 
     def __init__(
@@ -99,11 +100,11 @@ class HttpService:
         return f"HttpService({self.name!r}, {self.base_url!r})"
 
     def get_json(self, path: str, *, max_bytes: int | None = None) -> dict[str, Any]:
-        """Return the JSON object at ``path`` (below the base URL, or a whole address on the same host)."""
+        """Return the JSON object at ``path`` (below the base URL, or a full address on the same host)."""
         return self._object(self.ask("GET", path, max_bytes=max_bytes))
 
     def get_list(self, path: str) -> list[Any]:
-        """Return the JSON list at ``path``."""
+        """Return the JSON list at ``path``; raises BadReply for another value."""
         value = self._value(self.ask("GET", path))
         if not isinstance(value, list):
             raise self.unreadable("list")
@@ -112,13 +113,13 @@ class HttpService:
     def post_json(
         self, path: str, body: Mapping[str, Any], *, pays: bool = False, max_bytes: int | None = None
     ) -> dict[str, Any]:
-        """Post JSON and return the JSON object that comes back."""
+        """Post JSON and return the JSON object of the answer."""
         return self._object(self.ask("POST", path, body=body, pays=pays, max_bytes=max_bytes), pays)
 
     def post_form(
         self, path: str, fields: Mapping[str, str], files: Sequence[FormFile] = (), *, pays: bool = False
     ) -> dict[str, Any]:
-        """Post a ``multipart/form-data`` form and return the JSON object that comes back."""
+        """Post a ``multipart/form-data`` form and return the JSON object of the answer."""
         return self._object(self.ask("POST", path, fields=fields, files=files, pays=pays), pays)
 
     def ask(
@@ -132,15 +133,15 @@ class HttpService:
         pays: bool = False,
         max_bytes: int | None = None,
     ) -> bytes:
-        """Send a request and return the bytes of its answer, retried as the class says.
+        """Send a request and return the body of its answer, with the retries of the class.
 
-        At most ``max_bytes`` of them, MAX_ANSWER_BYTES by itself.
+        The body has at most ``max_bytes``, by default MAX_ANSWER_BYTES.
         """
         content: dict[str, Any] = {}
         if body is not None:
             content["json"] = dict(body)
         if fields is not None:
-            # a part without a file name is a plain field; this keeps a form without files multipart
+            # a part without file name is a plain field; this keeps a form without files multipart
             parts: list[tuple[str, Any]] = [(name, (None, value)) for name, value in fields.items()]
             content["files"] = parts + [(f.field, (f.filename, f.content, f.mime)) for f in files]
         url = self._address(path)
@@ -155,11 +156,11 @@ class HttpService:
         *,
         fresh_url: Callable[[], str] | None = None,
     ) -> None:
-        """Write a finished file to ``to``, asked for without any key; a partial file is removed.
+        """Download a finished file to ``to``, without sending a key; a partial file is removed.
 
         A link that is no longer valid (401, 403, 404, 410) is replaced once by ``fresh_url()``. Raises BadReply for a file
-        that is empty, cut short or larger than ``max_bytes``, and for an address that is not https (or http, of a server
-        that is reached by http itself); Unavailable where its server does not answer.
+        that is empty, truncated or larger than ``max_bytes``, and for an address that is not https (http is allowed if
+        ``base_url`` is http); Unavailable if the file's server does not answer.
         """
         for again in (True, False):
             try:
@@ -172,11 +173,11 @@ class HttpService:
                 return
 
     def said(self, text: str) -> str:
-        """Return what the service said, as one line without the key."""
+        """Return a message of the service as one line without the key."""
         return redacted(text, self._key)
 
     def unreadable(self, what: str, pays: bool = False) -> ManiTwinError:
-        """Return the error for an answer that lacks ``what``; of one that ``pays`` the job may have been taken."""
+        """Return the error for an answer without ``what``; for a request that ``pays``, the job may have been accepted."""
         if pays:
             return Unanswered(
                 f"{self.name}: its answer to a submit has no {what}; it is unknown whether the service accepted the job"
@@ -203,7 +204,7 @@ class HttpService:
                 data = whole_body(response, max_bytes)
         except _NOT_SENT as error:
             return FailedRequest(self._silent(error, False), again=True)
-        except httpx2.RequestError as error:  # timeouts, connections cut, broken HTTP
+        except httpx2.RequestError as error:  # timeouts, lost connections, invalid HTTP
             return FailedRequest(self._silent(error, pays), again=not pays)
         except TooLarge:
             return FailedRequest(self.unreadable(f"end within {max_bytes} bytes", pays), again=False)
@@ -242,13 +243,14 @@ class HttpService:
         return b"" if error is None else FailedRequest(error, again)
 
     def _client(self, deadline: Deadline) -> httpx2.Client:
-        # one connection a request: one kept open may be closed by the server just as a job is submitted, and then
-        # nobody knows whether it was taken
+        # One connection per request: the server may close a connection that is kept open just as a job is submitted, and then
+        # it is unknown whether the job was accepted.
         timeout_s = self._services.timeout_s
         return httpx2.Client(
             transport=GuardedTransport(self._reach, deadline),
             timeout=httpx2.Timeout(timeout_s, connect=min(timeout_s, MAX_CONNECT_S)),
-            # a length that is announced is then that of the content; what is packed all the same is unpacked within bounds
+            # asks for uncompressed bodies, so that Content-Length is the size; compressed ones are still decompressed within
+            # limits
             headers={"Accept-Encoding": "identity"},
             follow_redirects=False,
             trust_env=False,
@@ -278,15 +280,16 @@ class HttpService:
 
 
 def _note_rehearsal(response: httpx2.Response) -> None:
-    """Note an answer of a rehearsal server (``manitwin fake``) by its header."""
+    """Note that an answer comes from a rehearsal server (``manitwin fake``), by its header."""
     if REHEARSAL_MARK in response.headers:
         note_rehearsal()
 
 
 def origin(url: str) -> tuple[str, str, int] | None:
-    """Return scheme, host and port of an address as a request to it takes them; None for what is no address of a server.
+    """Return scheme, host and port of an address as a request uses them; None if it is not an address of a server.
 
-    None also where others would read another host out of it: with a user or password, with spaces or backslashes.
+    None is also returned for addresses in which other parsers would read another host: with a user or password, spaces or
+    backslashes.
     """
     try:
         own, other = httpx2.URL(url), urlsplit(url)

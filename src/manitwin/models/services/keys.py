@@ -1,4 +1,4 @@
-"""Keys of services: from the environment, sent to the service and nowhere else."""
+"""API keys: read from the environment, and sent only to their service."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from manitwin.formats.printable import printable_line
 
 ADDRESS = re.compile(r"(?:^|@)([A-Za-z][A-Za-z0-9+.-]*://.*)$")
 _BARE_HOST = re.compile(r"@((?:localhost|\d{1,3}(?:\.\d{1,3}){3}|[\w-]+(?:\.[\w-]+)*:\d+)(?:[:/].*)?)$")
-"""A server's address that lacks its scheme: without it, it would count as part of a model's name."""
+"""A server's address without scheme, which would otherwise be taken for part of a model name."""
 SCHEMES = ("http", "https", "tcp")
 _EXAMPLE = "one such as http://localhost:8000/v1, or tcp://localhost:5556 of a grasp server"
-HOST = re.compile(r"[\w.:%-]+")  # names, also of other alphabets, and IPv4 and IPv6 addresses
+HOST = re.compile(r"[\w.:%-]+")  # names in any alphabet, and IPv4 and IPv6 addresses
 LOCAL_HOSTS = frozenset({"localhost", "127.0.0.1", "::1"})
-"""The names of this machine's loopback; others that resolve to it (127.0.0.2, 2130706433, localhost.example) are not taken."""
+"""Accepted names of the loopback interface; others (127.0.0.2, 2130706433, localhost.example) are not accepted."""
 MESSAGE_CHARACTERS = 300
-TELLING_CHARACTERS = 16  # a key of fewer may be a word ("none", "rehearsal-key"): an answer may say it by itself
-_READ_CHARACTERS = 10_000  # of what a server says, before the key is looked for in it
+TELLING_CHARACTERS = 16  # a shorter key may be a word ("none", "rehearsal-key") that answers contain by chance
+_READ_CHARACTERS = 10_000  # characters of a server message that are searched for the key
 
 
 def is_local(url: str) -> bool:
-    """Tell whether a server is on this machine: it needs no key, and costs nothing."""
+    """Tell whether a server is on this machine, so that it needs no key and costs nothing."""
     return urlsplit(url).hostname in LOCAL_HOSTS
 
 
 def split_url(argument: str) -> tuple[str, str | None]:
-    """Return what stands before ``@scheme://`` and the URL, each possibly missing; raises ConfigError for a bad URL."""
+    """Split an argument into the part before ``@scheme://`` and the URL, both optional; raises ConfigError for an invalid URL."""
     found = ADDRESS.search(argument)
     if found is None and (bare := _BARE_HOST.search(argument)) is not None:
         raise ConfigError(f"{bare[1]!r} is not the URL of a server; give its scheme too, such as http://{bare[1]}")
@@ -40,7 +40,7 @@ def split_url(argument: str) -> tuple[str, str | None]:
 
 
 def _checked(url: str) -> str:
-    if "@" in url.partition("://")[2].partition("/")[0]:  # first of all: what comes after shows the URL
+    if "@" in url.partition("://")[2].partition("/")[0]:  # checked first, because later messages show the URL
         raise ConfigError("the URL of a server contains a user name or password; pass keys in the environment only")
     try:
         parts = urlsplit(url)
@@ -59,10 +59,11 @@ def _checked(url: str) -> str:
 
 
 def key_from_environment(names: Sequence[str], url: str, what: str, *, own_server: bool = False) -> str | None:
-    """Return the first key that is set, having checked that it may go to ``url``.
+    """Return the first key that is set, after checking that it may be sent to ``url``.
 
-    None for a server on this machine without one, and for one of the user's (``own_server``) that is reached by plain http,
-    where a key could not go. Raises ConfigError naming the variables where a key is missing, or may not be sent.
+    Returns None without a key for a server on this machine, and for the user's own server (``own_server``) at a plain http
+    address, where a key could not be sent. Otherwise raises ConfigError, naming the variables, if the key is missing or may
+    not be sent.
     """
     for name in names:
         if os.environ.get(name):
@@ -74,9 +75,9 @@ def key_from_environment(names: Sequence[str], url: str, what: str, *, own_serve
 
 
 def check_key(key: str | None, url: str, name: str) -> None:
-    """Check a key and where it would go: over https only, or to this machine by its own name.
+    """Check a key and its destination: keys are sent over https only, or to this machine by its own name.
 
-    Raises ConfigError, in which the key does not appear; ``name`` is what the key, or its service, is called.
+    Raises ConfigError, which does not show the key; ``name`` is the name of the key or its service.
     """
     if key is None:
         return
@@ -90,14 +91,14 @@ def check_key(key: str | None, url: str, name: str) -> None:
 
 
 def bearer(key: str | None) -> dict[str, str]:
-    """Return the header that most services take a key in; none without a key."""
+    """Return the Authorization header with the key as bearer token; no header without a key."""
     return {"Authorization": f"Bearer {key}"} if key else {}
 
 
 def redacted(text: str, key: str | None) -> str:
-    """Return what a server said as one line of at most 300 characters, without the key and without control characters.
+    """Return a server's message as one line of at most 300 characters, without the key and without control characters.
 
-    What is longer ends with three dots.
+    A longer message is truncated and ends with three dots.
     """
     line = " ".join(text[:_READ_CHARACTERS].split())
     line = printable_line(_spelled(key).sub("***", line) if key else line)
@@ -105,13 +106,13 @@ def redacted(text: str, key: str | None) -> str:
 
 
 def without_key(text: str, key: str | None) -> str:
-    """Return a text of any length without the key, if that is long enough not to be a word."""
+    """Return a text of any length without the key, unless the key is so short that it may be a word."""
     return _spelled(key).sub("***", text) if key and len(key) >= TELLING_CHARACTERS else text
 
 
 @lru_cache(maxsize=8)
 def _spelled(key: str) -> re.Pattern[str]:
-    """Return what finds a key as it is, or as URLs, HTML, JSON (also in JSON) and base 64 write it, in any case."""
+    """Return a pattern that matches a key verbatim or escaped for URLs, HTML, JSON (also nested) or base64, in any case."""
     each = "".join(rf"(?:{re.escape(c)}|%{ord(c):02x}|\\{{1,8}}u00{ord(c):02x}|\\{{1,8}}{re.escape(c)})" for c in key)
     whole = {html.escape(key), base64.b64encode(key.encode()).decode().rstrip("=")}
     return re.compile("|".join([each, *map(re.escape, sorted(whole))]), re.IGNORECASE)

@@ -1,4 +1,4 @@
-"""A service's refusals as errors of this package, and retries."""
+"""Translation of a service's refusals into errors of this package, and retries."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manitwin.config import ServicesConfig
 from manitwin.errors import AccessDenied, BadReply, ManiTwinError, RateLimited, Rejected, Unavailable
 
 FIRST_WAIT_S = 1.0
-LONGEST_RETRY_AFTER_S = 86_400.0  # who asks for more is not waited for by anybody
+LONGEST_RETRY_AFTER_S = 86_400.0  # upper bound of a Retry-After header; nobody waits that long
 MOST_RETRY_AFTER_CHARACTERS = 64
 _DEEPEST_WORDS = 4
 
@@ -22,11 +22,11 @@ Kind = Literal["denied", "busy", "down", "gone", "input", "bad"]
 
 
 class Gone(BadReply):
-    """A service no longer has, or does not know, what it is asked for: a job, a file."""
+    """The service does not know, or no longer has, the requested job or file."""
 
 
 class NotTaken(BadReply):
-    """A request that a service does not understand (400, 422); ``words`` are what it says of it, without the key."""
+    """The service does not accept the request (400, 422); ``words`` is its message without the key."""
 
     def __init__(self, message: str, words: str = ""):
         super().__init__(message)
@@ -37,15 +37,15 @@ class NotTaken(BadReply):
 
 
 class Unanswered(Unavailable):
-    """A request that may have been taken and paid for, whose answer was lost."""
+    """A request may have been accepted and paid for, but its answer was lost."""
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """A vendor's refusal in its own words.
+    """A vendor's refusal with its message.
 
-    ``kind``: ``denied`` (key or credit), ``busy`` (come back later), ``down`` (its own fault), ``gone`` (not known or no longer
-    there), ``input`` (it will not work on this picture or text), ``bad`` (anything else).
+    ``kind``: ``denied`` (key or credit), ``busy`` (retry later), ``down`` (server error), ``gone`` (unknown or no longer
+    available), ``input`` (this picture or text is refused), ``bad`` (anything else).
     """
 
     message: str
@@ -54,9 +54,9 @@ class Refusal:
 
 @dataclass(frozen=True)
 class FailedRequest:
-    """A request that came to nothing: whether it may be made again, and after how long where the server says so.
+    """A failed request: whether it may be repeated, and after how long if the server says so.
 
-    ``error`` is raised where it may not, or no tries are left.
+    ``error`` is raised if it may not be repeated or no retries are left.
     """
 
     error: ManiTwinError
@@ -67,10 +67,10 @@ class FailedRequest:
 def until_answered(
     attempt: Callable[[], AnswerT | FailedRequest], services: ServicesConfig, sleep: Callable[[float], None]
 ) -> AnswerT:
-    """Return the answer of the first attempt that has one; raises the last failure's error.
+    """Return the answer of the first successful attempt; raises the error of the last failure.
 
-    There are ``services.retries`` retries, with pauses that double from 1 s or are what the server asks for; a server that
-    asks for more than ``services.longest_wait_s`` is not waited for.
+    There are ``services.retries`` retries, with pauses that double from 1 s or are given by the server; if the server asks
+    for more than ``services.longest_wait_s``, the error is raised at once.
     """
     pause = FIRST_WAIT_S
     for left in range(services.retries, -1, -1):
@@ -87,14 +87,14 @@ def until_answered(
 
 
 def refusal_by_status(status: int, body: Any) -> Refusal | None:
-    """Read a refusal by its HTTP status (RFC 9110, section 15), and its words wherever JSON APIs put them; None for 2xx."""
+    """Parse a refusal by its HTTP status (RFC 9110, section 15), with the message from the usual fields; None below 400."""
     if status < 400:
         return None
     return Refusal(words_of(body) or f"HTTP {status}", kind_of_status(status))
 
 
 def kind_of_status(status: int) -> Kind:
-    """Return the kind of refusal that an HTTP status is."""
+    """Return the kind of refusal of an HTTP status."""
     if status in (401, 402, 403):
         return "denied"
     if status in (404, 410):
@@ -105,7 +105,10 @@ def kind_of_status(status: int) -> Kind:
 
 
 def words_of(body: Any, deepest: int = _DEEPEST_WORDS) -> str:
-    """Return the message of an error body: ``message``, ``error``, ``detail`` or ``text``, nested or not."""
+    """Return the message of an error body: the texts of ``error``, ``message``, ``msg``, ``detail``, ``text``, ``suggestion``.
+
+    Nested values are searched to a limited depth.
+    """
     if isinstance(body, str):
         return body
     if deepest == 0:
@@ -120,7 +123,7 @@ def words_of(body: Any, deepest: int = _DEEPEST_WORDS) -> str:
 
 
 def error_for(name: str, refusal: Refusal, status: int | None, remedy: str, after_s: float | None) -> ManiTwinError:
-    """Return the error that a refusal is; ``remedy`` is for a refused key."""
+    """Return the error for a refusal; ``remedy`` is the advice for a refused key."""
     said = f" (HTTP {status})" if status is not None and refusal.message != f"HTTP {status}" else ""
     what = f"{name}: {refusal.message}{said}"
     if refusal.kind == "denied":
@@ -137,9 +140,9 @@ def error_for(name: str, refusal: Refusal, status: int | None, remedy: str, afte
 
 
 def retry_after_s(value: str | None) -> float | None:
-    """Read a Retry-After header, seconds or a date (RFC 9110, section 10.2.3); None without one that can be read.
+    """Parse a Retry-After header, seconds or a date (RFC 9110, section 10.2.3); None if it is missing or unreadable.
 
-    At most a day: it stands for all that is too long to wait.
+    The result is at most one day.
     """
     if value is None or len(value) > MOST_RETRY_AFTER_CHARACTERS:
         return None
@@ -148,6 +151,6 @@ def retry_after_s(value: str | None) -> float | None:
         return min(float(value), LONGEST_RETRY_AFTER_S)
     try:
         left = (parsedate_to_datetime(value).astimezone(UTC) - datetime.now(UTC)).total_seconds()
-    except (ValueError, TypeError, IndexError, OverflowError, OSError):  # dates before or after all calendars
+    except (ValueError, TypeError, IndexError, OverflowError, OSError):  # dates outside the range of datetime
         return None
     return min(max(left, 0.0), LONGEST_RETRY_AFTER_S)

@@ -1,1 +1,1 @@
-"""Models that draw a picture of a text, behind the protocol of generators: submit, poll, fetch."""
+"""Text-to-image models, behind the protocol of generators: submit, poll, fetch."""

@@ -1,4 +1,4 @@
-"""Choose who draws pictures by what a person writes."""
+"""Selection of the text-to-image model that the user names."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ KINDS = ("command", "fal", "openai")
 
 
 def choose_text_to_image(spec: str, config: BuildConfig, answers: Path) -> Generator:
-    """Return who ``command:PROGRAM {text} {out}``, ``fal[:ENDPOINT]`` or ``openai:MODEL[@URL]`` names.
+    """Return the model named by ``command:PROGRAM {text} {out}``, ``fal[:ENDPOINT]`` or ``openai:MODEL[@URL]``.
 
-    ``answers`` is the folder for answers that are pictures themselves. Raises UsageError for another kind, ConfigError for what
-    is wrong with the rest.
+    ``answers`` is the folder that stores answers which contain the picture itself. Raises UsageError for another kind,
+    ConfigError for errors in the rest of the spec.
     """
     kind, _, argument = spec.partition(":")
     if kind == "command":

@@ -1,4 +1,4 @@
-"""A text-to-image model as a program: ``command:PROGRAM {text} {out}``."""
+"""A text-to-image model as a user program: ``command:PROGRAM {text} {out}``."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from manitwin.models.generators.command import CommandGenerator
 
 
 class CommandPictures(CommandGenerator):
-    """Run a program that draws a text into ``{out}`` (PNG); as ``CommandGenerator``, without ``{image}``."""
+    """Run a program that draws a text into ``{out}`` (PNG); like ``CommandGenerator``, without ``{image}``."""
 
     written_name = "picture.png"
 
@@ -20,6 +20,6 @@ class CommandPictures(CommandGenerator):
             raise ConfigError("command: a picture is drawn from {text} alone; leave out {image}")
 
     def check(self, made: Path) -> None:
-        """Raise BadReply where there is nothing; whether it is a picture is looked at as with any other."""
+        """Raise BadReply if the file is missing; its content is checked later, as for any other model."""
         if not made.is_file():
             raise BadReply("command: the program ended well but wrote nothing to {out}; check its arguments")

@@ -1,6 +1,6 @@
 """Any text-to-image endpoint behind fal's queue.
 
-Contract of the queue: ``generators.fal``. Endpoints of pictures take ``prompt`` and ``seed`` and answer with ``images``, a list
+API of the queue: ``generators.fal``. Endpoints for pictures take ``prompt`` and ``seed`` and answer with ``images``, a list
 of objects with ``url`` and ``content_type`` (https://fal.ai/models/fal-ai/flux/dev/api). Not verified with a key.
 """
 
@@ -15,19 +15,19 @@ DEFAULT = "fal-ai/flux/dev"
 
 
 class FalPictures(FalGenerator):
-    """Have an endpoint of fal draw a text; ``generate.options`` are added to its input. Prices are not listed here."""
+    """Draw a text with an endpoint of fal; ``generate.options`` are added to its input. No prices are listed."""
 
     default_model = DEFAULT
     written_name, made = "picture.png", "picture"
 
     @staticmethod
     def taken_by(endpoint: str) -> Endpoint:
-        """Return that an endpoint takes a text and a seed."""
+        """Return the input description of any endpoint: a text and a seed."""
         return Endpoint(None, prompt=True, seeds=2**31)
 
     @staticmethod
     def first_address(result: Any) -> str | None:
-        """Return the address of the first picture: of ``images``, or of ``image`` where there is one alone."""
+        """Return the address of the first picture: of ``images``, or of ``image`` if there is only one."""
         if not isinstance(result, Mapping):
             return None
         images = result.get("images")

@@ -1,8 +1,8 @@
 """An OpenAI-compatible images endpoint: ``POST /images/generations``.
 
-Contract: https://platform.openai.com/docs/api-reference/images/create (``model``, ``prompt``, ``n``; the answer has ``data``, a
-list of objects with ``b64_json`` or ``url``). It answers with the picture itself, so the answer is kept as a file before the job
-has a name: a crash between does not pay twice. Not verified with a key.
+API: https://platform.openai.com/docs/api-reference/images/create (``model``, ``prompt``, ``n``; the answer has ``data``, a
+list of objects with ``b64_json`` or ``url``). The answer contains the picture itself, so it is stored in a file before
+``submit`` returns the job id; after a crash in between, the job is not paid for twice. Not verified with a key.
 """
 
 from __future__ import annotations
@@ -30,7 +30,10 @@ _LARGEST_ANSWER = 64 << 20
 
 
 class OpenAiPictures:
-    """Have a model draw a text; ``generate.options`` (``size``, say) are added to what is asked; ``answers`` is for answers."""
+    """Draw a text with an images endpoint.
+
+    ``generate.options`` (such as ``size``) are added to the request; ``answers`` is the folder that stores the answers.
+    """
 
     name = "openai"
     needs: Resource = "generator"
@@ -71,7 +74,7 @@ class OpenAiPictures:
         )
 
     def submit(self, request: GenerationRequest) -> str:
-        """Ask for a picture, keep the answer, and return the name that it is kept under."""
+        """Request a picture, store it, and return its digest as job id."""
         if not request.text:
             raise Unsupported("openai: a picture is drawn from a text alone; give a text")
         body = {"model": self.model, "prompt": request.text, "n": 1} | self._options
@@ -87,13 +90,13 @@ class OpenAiPictures:
         return job_id
 
     def poll(self, job_id: str) -> JobState:
-        """Return that the picture is there; raises Gone where its file is not."""
+        """Return done if the picture's file exists; raises Gone otherwise."""
         if not (self._answers / job_id).is_file():
             raise Gone("openai: the answer that was kept is gone; it is asked again")
         return JobState("done")
 
     def fetch(self, job_id: str, folder: Path) -> Generated:
-        """Write the picture below ``folder``."""
+        """Write the picture into ``folder``."""
         path = folder / "picture.png"
         write_bytes_atomically(path, (self._answers / job_id).read_bytes())
         return Generated(path, self.model, {"model": self.model})

@@ -1,4 +1,4 @@
-"""What a picture must be to stand for a photo."""
+"""Validation of a generated picture that is used like a photo."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from manitwin.errors import InputError
 from manitwin.formats.image_file import read_image
 
 _PLAIN = 2.0
-"""Standard deviation of 8-bit values: a blank picture, or the black one that some services give for a refused prompt."""
+"""Standard deviation of 8-bit values below which a picture is blank, e.g. a black one returned for a refused prompt."""
 
 
 def picture_flaw(path: Path) -> str | None:
-    """Return why a picture cannot be used, None where it can: it is read as a photo is, and shows something."""
+    """Return why a picture cannot be used, None if it can: it must be readable as a photo and not be blank."""
     try:
         pixels = read_image(path, max_side_px=256).pixels[..., :3]
     except InputError as error:

@@ -1,1 +1,1 @@
-"""Asking a vision-language model one question with pictures, and getting an answer of a given form."""
+"""Vision-language models: ask one question with pictures, and get an answer in a given JSON schema."""

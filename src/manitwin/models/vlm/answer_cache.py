@@ -1,4 +1,4 @@
-"""Answers kept on disk by what was asked: what was paid for once is not paid for again."""
+"""Disk cache of answers by question, so that no answer is paid for twice."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ _MAX_BYTES = 16 << 20
 
 
 def default_folder() -> Path:
-    """Return ``$XDG_CACHE_HOME/manitwin/vlm``, ``~/.cache`` by default (XDG Base Directory Specification)."""
+    """Return ``$XDG_CACHE_HOME/manitwin/vlm``, by default under ``~/.cache`` (XDG Base Directory Specification)."""
     return cache_home() / "vlm"
 
 
 class Cached(Around):
-    """A chat model that is asked each question once.
+    """A chat client with a disk cache of answers.
 
-    An answer is kept under the question, its turns and what else ``decides`` it: server, model and settings. Several
-    processes may use one folder: files appear whole, and the last of equal ones stays. A kept answer charges nothing, and one
-    of a rehearsal says so again; a file that cannot be read is asked for again and replaced.
+    The cache key covers the question, its turns and what else ``decides`` the answer: server, model and settings. Several
+    processes may share a folder: files are written atomically, and the last of concurrent answers is kept. A cached answer
+    costs nothing; one of a rehearsal is marked as such again. An unreadable file is replaced by asking again.
     """
 
     def __init__(self, inner: ChatClient, folder: Path):
@@ -41,7 +41,7 @@ class Cached(Around):
         return f"Cached({self.inner!r}, {str(self.folder)!r})"
 
     def ask(self, question: Question, turns: tuple[Turn, ...] = ()) -> Reply:
-        """Answer a question from the folder, or ask and keep the answer."""
+        """Return the cached answer to a question, or ask and cache the answer."""
         path = self._path(question, turns)
         kept = _read(path)
         if kept is None:
@@ -49,7 +49,7 @@ class Cached(Around):
                 reply = self.inner.ask(question, turns)
             try:
                 _write(path, reply, bill.rehearsed)
-            except OSError as error:  # the answer is there, and paid for
+            except OSError as error:  # the answer was received and paid for, so this is not an error
                 RUN.warning(
                     "%s: the answer is not kept (%s); look at the folder and the disk", path, error.strerror or error
                 )
@@ -60,7 +60,7 @@ class Cached(Around):
         return reply
 
     def forget(self, question: Question, turns: tuple[Turn, ...] = ()) -> None:
-        """Drop the answer to a question: it will be asked again."""
+        """Delete the cached answer to a question, so that it is asked again."""
         self._path(question, turns).unlink(missing_ok=True)
 
     def _path(self, question: Question, turns: tuple[Turn, ...]) -> Path:
@@ -74,7 +74,7 @@ def _read(path: Path) -> tuple[Reply, bool] | None:
         return None
     try:
         kept = read_json_object(path, BadReply, limit_bytes=_MAX_BYTES)
-    except BadReply:  # cut by a crash of the machine, or altered: as good as none
+    except BadReply:  # truncated by a crash or altered: treated as missing
         return None
     text, model, tokens = kept.get("text"), kept.get("model"), kept.get("tokens")
     counts = isinstance(tokens, list) and len(tokens) == 2 and all(type(n) is int and 0 <= n < 10**12 for n in tokens)

@@ -1,8 +1,8 @@
-"""A chat model behind the Messages API: Anthropic, and vLLM, which serves the same at ``/v1/messages``.
+"""Client of the Messages API: Anthropic, and vLLM, which serves the same API at ``/v1/messages``.
 
-Contract: https://docs.claude.com/en/api/messages and https://docs.claude.com/en/api/errors; the form of the answer is
-``output_config.format`` (https://platform.claude.com/docs/en/build-with-claude/structured-outputs). Pictures are
-``image/png``, one of the four types that it reads (https://docs.claude.com/en/docs/vision).
+API: https://docs.claude.com/en/api/messages and https://docs.claude.com/en/api/errors; the schema of the answer is
+``output_config.format`` (https://platform.claude.com/docs/en/build-with-claude/structured-outputs). Pictures are sent as
+``image/png``, one of the four supported types (https://docs.claude.com/en/docs/vision).
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from manitwin.models.vlm.protocol import Picture, Question, Reply, Turn, Usage
 
 ANTHROPIC_URL = "https://api.anthropic.com"
 VERSION = "2023-06-01"
-# an empty account answers as an invalid request: https://github.com/anthropics/claude-code/issues/66314
+# an account without credit gets an invalid-request error: https://github.com/anthropics/claude-code/issues/66314
 _OUT_OF_CREDIT = re.compile(r"credit balance is too low|reached your specified .* usage limits")
 
 
 def _key_headers(base_url: str, key: str | None) -> dict[str, str]:
-    """Return the headers that hold the key: servers of others that speak this protocol (vLLM) read the common one alone."""
+    """Return the headers with the key; other servers with this API (vLLM) read only the Authorization header."""
     if key is None:
         return {}
     own = {"x-api-key": key}
@@ -38,12 +38,12 @@ def _key_headers(base_url: str, key: str | None) -> dict[str, str]:
 
 
 class AnthropicMessages(ServedChat):
-    """Ask one model at one server.
+    """Chat with one model at one server.
 
-    Where the server refuses ``output_config`` the schema is told in words instead, and ``temperature`` is left out where it
-    is refused (as by Opus 4.7 and later, https://github.com/anomalyco/models.dev/pull/1468); both from then on. Errors and
-    charges are those of ``OpenAiChat``. There is no seed: votes are told apart by what is asked. Raises ConfigError for a
-    temperature above 1.
+    If the server refuses ``output_config``, the schema is given in the instructions instead; if it refuses ``temperature``
+    (as Opus 4.7 and later do, https://github.com/anomalyco/models.dev/pull/1468), that is left out; both for all later
+    requests. Errors and charges are those of ``OpenAiChat``. The API has no seed: votes differ by what is asked. Raises
+    ConfigError for a temperature above 1.
     """
 
     name = "anthropic"
@@ -88,7 +88,7 @@ class AnthropicMessages(ServedChat):
 
     def _does_without(self, complaint: str) -> bool:
         words = complaint.lower()
-        # a schema that it refuses is another matter: that is this package's fault, and to be seen
+        # a refused schema is an error of this package and must be reported
         if "format.schema:" in words:
             return False
         if self._temperature_taken and "temperature" in words:
@@ -142,7 +142,7 @@ class AnthropicMessages(ServedChat):
 
 
 def anthropic_refusal(status: int, body: Any) -> Refusal | None:
-    """Read an error body ``{"type": "error", "error": {"type", "message"}}``; None for 2xx."""
+    """Parse an error body ``{"type": "error", "error": {"type", "message"}}``; None for 2xx."""
     refusal = refusal_by_status(status, body)
     error = body.get("error") if isinstance(body, dict) else None
     kind = error.get("type") if isinstance(error, dict) else None
@@ -161,7 +161,7 @@ def _block(part: str | Picture) -> dict[str, Any]:
 def _usage(counted: Any) -> Usage | None:
     if not isinstance(counted, dict):
         return None
-    # tokens of a prompt cache are counted apart, or not at all; this package asks for none
+    # tokens of a prompt cache are counted separately, if at all; this package does not use one
     cached = [counted.get(f"cache_{kind}_input_tokens") for kind in ("creation", "read")]
     read = [counted_tokens(count) for count in (counted.get("input_tokens"), *(count or 0 for count in cached))]
     written, whole = counted_tokens(counted.get("output_tokens")), [count for count in read if count is not None]

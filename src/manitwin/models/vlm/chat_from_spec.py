@@ -1,4 +1,4 @@
-"""Chat models from what stands after the colon of a spec: ``MODEL``, ``MODEL@URL``, or a recorded file."""
+"""Creation of chat clients from the argument of a spec: ``MODEL``, ``MODEL@URL``, or a recorded file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from manitwin.models.vlm.client import ChatClient
 from manitwin.models.vlm.openai_chat import OPENAI_URL, OpenAiChat
 from manitwin.models.vlm.replay import Recorded, Replay
 
-# a vendor's key is for the vendor's host; any other server has a variable of its own, so that it never sees those
+# a vendor's key is sent to the vendor's host only; other servers have a separate variable
 KEY_OF_HOST = {
     "api.openai.com": "OPENAI_API_KEY",
     "api.anthropic.com": "ANTHROPIC_API_KEY",
@@ -26,9 +26,9 @@ NO_CHAT = "none"
 
 
 def chat_of(spec: str, use: str) -> ChatClient | None:
-    """Return the model of a whole spec (``openai:MODEL@URL``), None for ``none``; ``use`` says what it is to do.
+    """Return the chat client of a whole spec (``openai:MODEL@URL``), None for ``none``; ``use`` is its purpose, for messages.
 
-    Raises ConfigError for a spec that names no model, and as ``openai_from_spec``.
+    Raises ConfigError for a spec that names no model, and the errors of ``openai_from_spec``.
     """
     name, _, argument = spec.partition(":")
     made = {"openai": openai_from_spec, "anthropic": anthropic_from_spec, "replay": replay_from_spec}
@@ -40,20 +40,21 @@ def chat_of(spec: str, use: str) -> ChatClient | None:
 
 
 def openai_from_spec(argument: str, config: BuildConfig) -> ChatClient:
-    """Return the model of ``MODEL`` or ``MODEL@URL`` behind the chat completions API.
+    """Return the client of ``MODEL`` or ``MODEL@URL`` for the chat completions API.
 
-    Cached (``services.cache``) and recorded (``services.record``). Raises ConfigError without a model, a key or a price.
+    It is cached (``services.cache``) and recorded (``services.record``) as the settings say. Raises ConfigError without a
+    model, key or price.
     """
     return _served(OpenAiChat, argument, OPENAI_URL, config)
 
 
 def anthropic_from_spec(argument: str, config: BuildConfig) -> ChatClient:
-    """Return the model of ``MODEL`` or ``MODEL@URL`` behind the Messages API; else as ``openai_from_spec``."""
+    """Return the client of ``MODEL`` or ``MODEL@URL`` for the Messages API; otherwise like ``openai_from_spec``."""
     return _served(AnthropicMessages, argument, ANTHROPIC_URL, config)
 
 
 def replay_from_spec(argument: str, config: BuildConfig) -> ChatClient:
-    """Return the answers recorded in a file. Raises ConfigError for one that is no record."""
+    """Return a client that replays the answers recorded in a file; raises ConfigError for an invalid record."""
     if not argument:
         raise ConfigError("replay needs the file of recorded answers: replay:answers.jsonl")
     return Replay(Path(argument))

@@ -1,4 +1,4 @@
-"""Chat clients: chat models with a price, and with what decides their answers."""
+"""Chat clients: chat models with a price and an identity that determines their answers."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from manitwin.models.vlm.prices import TokenPrice, token_price
 from manitwin.models.vlm.protocol import ChatModel, Question, Reply, Turn, Usage
 
 MOST_TOKENS = 100_000_000
-"""More than any question or answer has: what a server counts beyond is no count."""
+"""Upper bound of plausible token counts; larger counts of a server are ignored."""
 MOST_CHARACTERS = 1 << 20
-"""Of an answer that is read; ``vlm.max_tokens`` of 4,096 make about 16,000."""
+"""Maximum length of an answer; a ``vlm.max_tokens`` of 4,096 gives about 16,000 characters."""
 
 
 def counted_tokens(value: Any) -> int | None:
-    """Return the tokens that a server counted; None for what is no count (negative, a text, more than MOST_TOKENS)."""
+    """Return a token count of a server if it is a plausible integer, else None."""
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MOST_TOKENS:
         return None
     return value
 
 
 class ChatClient(ChatModel, Protocol):
-    """A chat model whose cost can be told before it is asked.
+    """A chat model whose cost is known before it is asked.
 
-    ``price`` is what its tokens cost. ``decides`` names what else than the question decides an answer (server, model and
-    settings; never a key): two clients that agree in it may share answers.
+    ``price`` is the price of its tokens. ``decides`` holds what, besides the question, determines an answer (server, model
+    and settings; never a key): two clients with equal values may share answers.
     """
 
     @property
@@ -40,7 +40,7 @@ class ChatClient(ChatModel, Protocol):
 
 
 class ServedChat:
-    """A chat model at one server; ``key_name`` is the variable of the environment that its key was in."""
+    """Base class of a chat model at one server; ``key_name`` is the environment variable of its key."""
 
     name: str
 
@@ -55,13 +55,13 @@ class ServedChat:
 
     @property
     def decides(self) -> Mapping[str, str | float | None]:
-        """The server, the model and the settings that decide an answer besides the question."""
+        """Server, model and settings, which besides the question determine an answer."""
         settings = {"max_tokens": self._settings.max_tokens, "temperature": self._settings.temperature}
         return {"protocol": self.name, "server": self.base_url, "model": self.model, **settings}
 
 
 class Around:
-    """A chat client around another one, which it is like but for how it answers."""
+    """Base class of a chat client that wraps another one."""
 
     def __init__(self, inner: ChatClient):
         self.inner = inner
@@ -69,27 +69,27 @@ class Around:
 
     @property
     def price(self) -> TokenPrice:
-        """The price of tokens, where they have to be paid."""
+        """Price of tokens that have to be paid."""
         return self.inner.price
 
     @property
     def decides(self) -> Mapping[str, str | float | None]:
-        """The server, the model and the settings that decide an answer besides the question."""
+        """Server, model and settings, which besides the question determine an answer."""
         return self.inner.decides
 
 
 @runtime_checkable
 class Forgetful(Protocol):
-    """A chat model that keeps answers, and can drop one that turned out to be of no use."""
+    """A chat model that stores answers and can delete one that proved useless."""
 
     def forget(self, question: Question, turns: tuple[Turn, ...] = ()) -> None:
-        """Drop the answer to a question: it will be asked again."""
+        """Delete the stored answer to a question, so that it is asked again."""
         ...
 
 
 @dataclass(frozen=True)
 class Completion:
-    """A server's report of what a model wrote, with its tokens; ``fault`` says why it is no answer."""
+    """A server's completion with its token usage; ``fault`` says why it is not a usable answer."""
 
     text: str
     usage: Usage
@@ -97,7 +97,7 @@ class Completion:
     fault: str | None = None
 
     def paid(self, price: TokenPrice, who: str) -> Reply:
-        """Charge for it, and return it as an answer; raises BadReply, charged all the same, where it is none."""
+        """Charge for the completion and return it as an answer; raises BadReply, after charging, if it is not usable."""
         charge(price.usd(self.usage))
         if self.fault is None and not self.text.strip():
             raise BadReply(f"{who}: its answer is empty; ask again, or choose another model")

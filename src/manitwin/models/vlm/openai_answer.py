@@ -1,4 +1,4 @@
-"""What a chat completions server sends back: the text of an answer, why it is none, and what a person does about a refusal."""
+"""Parsing of answers of a chat completions server, and remedies for its refusals."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NOT_THERE = "check the model's name, and the address: that of most servers ends 
 
 
 def text_of(content: Any) -> str | None:
-    """Return the text of a message's content, which is one or a list of parts (Mistral's); None for what is neither."""
+    """Return the text of a message's content, a string or a list of parts (Mistral); None for another form."""
     if content is None or isinstance(content, str):
         return content or ""
     if not isinstance(content, list) or not all(isinstance(part, dict) for part in content):
@@ -22,13 +22,13 @@ def text_of(content: Any) -> str | None:
 
 
 def only_thought(message: Mapping[str, Any], text: str) -> bool:
-    """Tell whether a model thought and said nothing: vLLM and others send its thinking beside an answer that is empty."""
+    """Tell whether a model returned only its reasoning: vLLM and others return reasoning beside an empty answer."""
     thoughts = [message.get(name) for name in ("reasoning_content", "reasoning")]
     return not text.strip() and any(isinstance(each, str) and each.strip() for each in thoughts)
 
 
 def remedy_of(words: str) -> str | None:
-    """Return what a person does about a request that a server does not take, by its words; None where they say nothing known."""
+    """Return the remedy for a refused request by the server's message; None for an unknown message."""
     if _CONTEXT.search(words):
         return "serve it with a longer context, or ask with smaller pictures (vlm.picture_px)"
     return "choose a model that sees pictures" if _PICTURES.search(words) else None

@@ -1,4 +1,4 @@
-"""A chat model behind the chat completions API: OpenAI, vLLM, SGLang, Ollama, llama.cpp, LM Studio, Gemini's own of it."""
+"""Client of the chat completions API: OpenAI, vLLM, SGLang, Ollama, llama.cpp, LM Studio, and Gemini's compatible endpoint."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from manitwin.models.vlm.prices import estimated_usage
 from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage
 
 OPENAI_URL = "https://api.openai.com/v1"
-# what OpenAI's own client reads them from: a key that belongs to several needs them, and no other server is told
+# variables of OpenAI's own client; a key with several organizations or projects needs them, and no other server gets them
 _OF_OPENAI = {"OpenAI-Organization": "OPENAI_ORG_ID", "OpenAI-Project": "OPENAI_PROJECT_ID"}
-# an account without credit: a 429 whose type, and mostly code, is the first one, as in
+# an account without credit gets a 429 whose type, and mostly code, is the first one, as in
 # https://github.com/OpenHands/OpenHands/issues/998; the others are unverified
 OUT_OF_CREDIT = ("insufficient_quota", "billing_hard_limit_reached", "billing_not_active")
 
 
 class OpenAiChat(ServedChat):
-    """Ask one model at one server.
+    """Chat with one model at one server.
 
-    A field that the server refuses is left out from then on (``dialect``). Raises AccessDenied; RateLimited after
-    ``services.retries`` waits, or at once where it asks for more than ``services.longest_wait_s``; Unavailable after as many
-    tries again; BadReply. Tokens are charged as the server counts them, also for an answer that cannot be used; what an
-    answer cost that was lost on the way is not known, and not charged. The key goes to ``base_url`` only, by https or on this
-    machine, and shows nowhere.
+    A field that the server refuses is left out of all later requests (``dialect``). Raises AccessDenied; RateLimited after
+    ``services.retries`` waits, or at once if the server asks for more than ``services.longest_wait_s``; Unavailable after as
+    many retries; BadReply. Tokens are charged as the server counts them, also for an unusable answer; the cost of an answer
+    that was lost in transit is unknown and not charged. The key is sent to ``base_url`` only, over https or on this machine,
+    and never displayed.
     """
 
     name = "openai"
@@ -61,7 +61,7 @@ class OpenAiChat(ServedChat):
             refusal=openai_refusal,
             sleep=sleep,
         )
-        # models that reason know the newer name only, servers of others may know the older one only
+        # reasoning models accept only the newer name, other vendors' servers may accept only the older one
         order = 1 if base_url == OPENAI_URL else -1
         self.dialect = Dialect(length_fields=("max_completion_tokens", "max_tokens")[::order])
 
@@ -93,9 +93,10 @@ class OpenAiChat(ServedChat):
         )
 
     def _completion(self, answer: dict[str, Any], question: Question) -> Completion:
-        """Read an answer (https://platform.openai.com/docs/api-reference/chat/object).
+        """Parse an answer (https://platform.openai.com/docs/api-reference/chat/object).
 
-        Tokens are estimated where the server counts none (``estimated_usage``). Raises BadReply for one of another form.
+        Tokens are estimated (``estimated_usage``) if the server does not count them. Raises BadReply for an answer of another
+        form.
         """
         choices = answer.get("choices")
         choice = choices[0] if isinstance(choices, list) and choices else None
@@ -131,7 +132,7 @@ def _headers_of_openai() -> dict[str, str]:
 
 
 def openai_refusal(status: int, body: Any) -> Refusal | None:
-    """Read an error body ``{"error": {"message", "type", "param", "code"}}``; None for 2xx."""
+    """Parse an error body ``{"error": {"message", "type", "param", "code"}}``; None for 2xx."""
     refusal = refusal_by_status(status, body)
     error = body.get("error") if isinstance(body, dict) else None
     said = [error.get("code"), error.get("type")] if isinstance(error, dict) else []

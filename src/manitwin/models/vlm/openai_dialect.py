@@ -1,8 +1,8 @@
-"""Differences between servers of the chat completions API, learned from what they refuse.
+"""Differences between servers of the chat completions API, learned from their refusals.
 
-Every server takes the request of https://platform.openai.com/docs/api-reference/chat/create, each with gaps of its own: models
-that reason take no ``max_tokens`` and only their own temperature; Ollama knows ``max_tokens`` alone
-(https://docs.ollama.com/api/openai-compatibility); some know no ``response_format``, or only ``json_object``.
+Every server accepts most of https://platform.openai.com/docs/api-reference/chat/create: reasoning models accept no
+``max_tokens`` and only their own temperature; Ollama accepts only ``max_tokens``
+(https://docs.ollama.com/api/openai-compatibility); some accept no ``response_format``, or only ``json_object``.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 from manitwin.models.vlm.protocol import Picture, Question, Turn
 
-# how servers say that a field is not theirs: OpenAI, vLLM and other pydantic servers, Gemini, transformers serve
+# messages about an unsupported field: OpenAI, vLLM and other pydantic servers, Gemini, transformers serve
 _NOT_TAKEN = re.compile(
     r"unsupported|not support|not available|unknown|unrecogni[sz]ed|unexpected|extra inputs|not permitted|not allowed"
     r"|cannot find field|invalid parameter|invalid value|supported values|only the default|deprecated"
@@ -25,7 +25,7 @@ _FORMATS: tuple[Literal["json_schema", "json_object", "prompt"], ...] = ("json_s
 
 @dataclass(frozen=True)
 class Dialect:
-    """The fields that a server takes, as far as it has said: ``format`` is how it is told the form of the answer."""
+    """Fields that a server accepts, as far as known; ``format`` is how the form of the answer is specified."""
 
     format: Literal["json_schema", "json_object", "prompt"] = "json_schema"
     length_fields: tuple[str, ...] = ("max_tokens", "max_completion_tokens")
@@ -33,7 +33,7 @@ class Dialect:
     seed: bool = True
 
     def without(self, complaint: str) -> Dialect | None:
-        """Return the dialect without what a server refuses in these words; None where they name nothing to do without."""
+        """Return the dialect without the field that a complaint refuses; None if it names no field that can be left out."""
         words = complaint.lower()
         if not _NOT_TAKEN.search(words) or "invalid schema" in words:
             return None
@@ -59,9 +59,9 @@ def request_body(
 ) -> dict[str, Any]:
     """Return the body of a chat completions request.
 
-    The schema stands in the instructions too: a server that only constrains the answer by it shows the model neither
-    descriptions nor limits (https://docs.ollama.com/capabilities/structured-outputs advises it). ``seed`` is the question's
-    vote.
+    The schema is also part of the instructions, because a server that only constrains decoding with it does not show the
+    model its descriptions and limits (as https://docs.ollama.com/capabilities/structured-outputs advises). ``seed`` is the
+    question's vote.
     """
     body: dict[str, Any] = {"model": model, "messages": messages(question, turns)}
     body[dialect.length_fields[0]] = max_tokens
@@ -78,7 +78,7 @@ def request_body(
 
 
 def messages(question: Question, turns: tuple[Turn, ...]) -> list[dict[str, Any]]:
-    """Return the messages of a question and the turns after it; pictures go as data URLs, in full detail."""
+    """Return the messages of a question and the turns after it; pictures are data URLs in full detail."""
     return [
         {"role": "system", "content": instructions_with_schema(question)},
         {"role": "user", "content": [_content(part) for part in question.parts]},
@@ -87,14 +87,14 @@ def messages(question: Question, turns: tuple[Turn, ...]) -> list[dict[str, Any]
 
 
 def instructions_with_schema(question: Question) -> str:
-    """Return the instructions of a question, and in words of what form its answer is to be."""
+    """Return the instructions of a question, followed by the JSON schema of its answer."""
     schema = json.dumps(titled_schema(question), ensure_ascii=False)
     form = "Answer with one JSON object that follows this JSON schema, and nothing else:"
     return f"{question.instructions}\n\n{form}\n{schema}"
 
 
 def titled_schema(question: Question) -> dict[str, Any]:
-    """Return the schema of a question's answer with the question's name, for where nothing else names it."""
+    """Return the schema of a question's answer with the question's name as title, for APIs that name it nowhere else."""
     return {"title": question.name, **question.schema}
 
 

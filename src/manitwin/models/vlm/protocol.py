@@ -1,4 +1,4 @@
-"""Questions to a vision-language model, and its replies."""
+"""Protocol of chat models: questions with pictures to a vision-language model, and its replies."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from typing import Any, Literal, Protocol
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture of a question, as PNG."""
+    """A picture in a question, as PNG."""
 
     png: bytes
 
 
 @dataclass(frozen=True)
 class Question:
-    """One question: standing ``instructions``, then text and pictures in order, and the JSON schema of the answer.
+    """A question: system ``instructions``, text and pictures in order, and the JSON schema of the answer.
 
-    ``name`` names the schema (``[a-z_]+``). ``vote`` tells equal questions apart that are to be asked independently.
+    ``name`` is the name of the schema (``[a-z_]+``). ``vote`` distinguishes equal questions that are asked independently.
     """
 
     name: str
@@ -31,7 +31,7 @@ class Question:
 
 @dataclass(frozen=True)
 class Turn:
-    """A turn after the question: what was answered, or what was wrong with that."""
+    """A turn after the question: an answer, or a correction of it."""
 
     role: Literal["assistant", "user"]
     text: str
@@ -39,7 +39,7 @@ class Turn:
 
 @dataclass(frozen=True)
 class Usage:
-    """Tokens read and written, as the server counts them."""
+    """Input and output tokens, as counted by the server."""
 
     input_tokens: int
     output_tokens: int
@@ -47,7 +47,7 @@ class Usage:
 
 @dataclass(frozen=True)
 class Reply:
-    """The text that a model wrote; ``model`` is the server's own name of what answered."""
+    """The text of an answer; ``model`` is the server's name of the model."""
 
     text: str
     usage: Usage
@@ -55,9 +55,9 @@ class Reply:
 
 
 class ChatModel(Protocol):
-    """A model that answers questions.
+    """Protocol of a model that answers questions.
 
-    Raises AccessDenied, RateLimited, Unavailable, or BadReply for an answer that was cut, refused or empty.
+    ``ask`` raises AccessDenied, RateLimited, Unavailable, or BadReply for an answer that is truncated, refused or empty.
     """
 
     name: str
@@ -69,7 +69,7 @@ class ChatModel(Protocol):
 
 
 def question_digest(question: Question, turns: tuple[Turn, ...] = ()) -> str:
-    """Return the SHA-256 of a question and the turns after it: instructions, texts, pictures, schema in its order, vote."""
+    """Return the SHA-256 of a question and the turns after it: name, instructions, texts, pictures, ordered schema, and vote."""
     said: list[Any] = [question.name, question.instructions, question.schema, question.vote]
     said.append([part if isinstance(part, str) else {"png": sha256(part.png).hexdigest()} for part in question.parts])
     said.append([[turn.role, turn.text] for turn in turns])

@@ -1,8 +1,8 @@
-"""Recording what a model answers, and answering from such a record: a run repeated without a server or a key.
+"""Recording of a model's answers and replay from the record: a run can be repeated without a server or a key.
 
 A record is JSON Lines: ``{"question", "key", "model", "text", "answered_by", "tokens": [read, written]}``. ``key`` is the
-digest of all that was asked, ``model`` the same in all lines. Of two lines with one key the later one counts. What a
-rehearsal answered has ``"rehearsal": true`` as well, and is a rehearsal whenever it is replayed.
+digest of the question and its turns; ``model`` is the same in all lines. Of two lines with the same key the later one counts.
+An answer of a rehearsal also has ``"rehearsal": true`` and counts as a rehearsal when replayed.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ _LONGEST_LINE = 16 << 20
 
 
 class Replay:
-    """Answer from a record; ``model`` is the one that was recorded.
+    """A chat model that answers from a record; ``model`` is the recorded model.
 
-    Raises ConfigError for a file that is no record of one model, BadReply for a question that is not in it.
+    Raises ConfigError for a file that is not a record of one model, BadReply for a question that is not recorded.
     """
 
     name = "replay"
@@ -61,11 +61,11 @@ class Replay:
 
     @property
     def decides(self) -> Mapping[str, str | float | None]:
-        """The recorded model, which decides an answer besides the question."""
+        """The recorded model, which besides the question determines an answer."""
         return {"protocol": self.name, "model": self.model}
 
     def ask(self, question: Question, turns: tuple[Turn, ...] = ()) -> Reply:
-        """Return the answer that was recorded."""
+        """Return the recorded answer."""
         key = question_digest(question, turns)
         reply = self._replies.get(key)
         if reply is None:
@@ -80,9 +80,9 @@ class Replay:
 
 
 class Recorded(Around):
-    """A chat model whose answers are added to a record, by any number of processes at once.
+    """A chat client whose answers are appended to a record, which any number of processes may share.
 
-    An answer that is there already is not added again. Raises ConfigError for a record of another model.
+    An answer that is already recorded is not appended again. Raises ConfigError for a record of another model.
     """
 
     def __init__(self, inner: ChatClient, path: Path):
@@ -103,7 +103,7 @@ class Recorded(Around):
         return reply
 
     def forget(self, question: Question, turns: tuple[Turn, ...] = ()) -> None:
-        """Let the model within forget; the record stays."""
+        """Delete the answer from the wrapped client's storage; the record is unchanged."""
         if isinstance(self.inner, Forgetful):
             self.inner.forget(question, turns)
 
@@ -122,11 +122,11 @@ class Recorded(Around):
             if (key, reply.text) in self._there:
                 return
             stream.seek(self._read_to)
-            stream.truncate()  # what a writer left unfinished that died
+            stream.truncate()  # removes an incomplete line of a writer that crashed
             stream.write(json.dumps(line).encode("ascii") + b"\n")
 
     def _read_on(self, stream: BinaryIO) -> None:
-        """Take in what was added since; the lock is held."""
+        """Read lines that were added since the last read; the lock must be held."""
         stream.seek(self._read_to)
         for line in _lines(stream, self.path):
             if line["model"] != self.model:
@@ -139,7 +139,7 @@ class Recorded(Around):
 
 @contextmanager
 def _locked(path: Path) -> Iterator[BinaryIO]:
-    """Open a record to read and to add to, for this process alone."""
+    """Open a record for reading and appending, with an exclusive lock."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if os.path.exists(path) and not os.path.isfile(path):
@@ -154,7 +154,7 @@ def _locked(path: Path) -> Iterator[BinaryIO]:
 
 
 def _lines(stream: BinaryIO, path: Path) -> Iterator[dict[str, Any]]:
-    """Yield the whole lines from here on; one without an end was cut by a crash, and is none."""
+    """Yield the complete lines from the current position; a last line without newline was truncated by a crash and is ignored."""
     number = 0
     while (line := stream.readline(_LONGEST_LINE + 1)).endswith(b"\n"):
         number += 1
@@ -167,7 +167,7 @@ def _lines(stream: BinaryIO, path: Path) -> Iterator[dict[str, Any]]:
 
 
 def _is_answer(value: Any) -> bool:
-    """Tell whether a value of a line is of the form that ``Recorded`` writes."""
+    """Tell whether the value of a line has the form that ``Recorded`` writes."""
     if not isinstance(value, dict) or not all(
         isinstance(value.get(name), str) for name in ("key", "model", "text", "answered_by")
     ):

@@ -1,10 +1,10 @@
-"""The JSON schema of an answer, within what the structured output of every server takes.
+"""JSON schema of an answer, restricted to what the structured output of all servers supports.
 
-OpenAI wants every property required and no other allowed, an object at the root, no ``allOf`` and no tuples; Anthropic takes no
-limits of numbers, texts and lists, and no recursion; both take ``enum`` and ``anyOf``
+OpenAI requires every property and allows no additional ones, requires an object at the root, and supports neither ``allOf``
+nor tuples. Anthropic supports no limits of numbers, strings and lists, and no recursion. Both support ``enum`` and ``anyOf``
 (https://platform.openai.com/docs/guides/structured-outputs,
-https://platform.claude.com/docs/en/build-with-claude/structured-outputs). So limits are said in descriptions, and held by
-validation afterwards.
+https://platform.claude.com/docs/en/build-with-claude/structured-outputs). Limits are therefore stated in descriptions and
+enforced by validation afterwards.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-# JSON Schema 2020-12, validation vocabulary: what each keyword says in words
+# descriptions of the keywords of JSON Schema 2020-12, validation vocabulary
 _LIMITS = {
     "minimum": "at least {}",
     "exclusiveMinimum": "more than {}",
@@ -32,9 +32,9 @@ _DROPPED = ("title", "default", "$defs", "examples", "discriminator")
 
 
 def strict_schema(answer: type[BaseModel]) -> dict[str, Any]:
-    """Return the schema of an answer: every property required, references put in place, limits in the descriptions.
+    """Return the schema of an answer with all properties required, references inlined, and limits stated in descriptions.
 
-    Raises TypeError for what cannot be said so: recursion, tuples, dictionaries of free keys.
+    Raises TypeError for unsupported types: recursion, tuples, dictionaries with arbitrary keys.
     """
     whole = answer.model_json_schema()
     return _strict(whole, whole.get("$defs", {}), ())

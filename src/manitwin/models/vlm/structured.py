@@ -1,4 +1,4 @@
-"""Asking for an answer of a given form: parsed leniently, validated strictly, asked once more for what is wrong with it."""
+"""Structured answers: parsed leniently, validated strictly, and asked for once more if something is wrong."""
 
 from __future__ import annotations
 
@@ -22,40 +22,42 @@ from manitwin.models.vlm.strict_schema import strict_schema
 
 T = TypeVar("T", bound=BaseModel)
 MAX_COMPLAINTS = 12
-MOST_STARTS = 1000  # braces of a text at which an object is looked for: each may be read to the end of the text in vain
-# models that think aloud put that before the answer: Qwen, DeepSeek
+MOST_STARTS = (
+    1000  # maximum number of braces at which an object is parsed, since each attempt may read to the end of the text
+)
+# reasoning models (Qwen, DeepSeek) write their reasoning before the answer
 _THINKING, _THOUGHT = "<think>", "</think>"
-# control characters, those that turn the direction of writing (Unicode's Bidi_Control), and halves of pairs of UTF-16
+# control characters, bidirectional controls (Unicode's Bidi_Control), and lone UTF-16 surrogates
 _CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff\ud800-\udfff]+")
 _FENCE = "```"
 _AFTER_FENCE = re.compile(r"[a-zA-Z]*[^\S\n]*\n")
 PROBE_PX = 256
 SHOWN_CHARACTERS = 80
 LONGEST_COMPLAINT = 240
-"""Characters that a person is shown of one; the model is told all of it."""
+"""Characters of an error that are shown to the user; the model gets all of it."""
 
 
 @dataclass(frozen=True)
 class Answered(Generic[T]):
-    """An answer of the right form, and what contradicts it still."""
+    """A valid answer, and the remaining findings about its content."""
 
     value: T
     findings: tuple[str, ...]
 
 
 def nothing_found(value: BaseModel) -> Sequence[str]:
-    """Find nothing wrong with an answer."""
+    """Report no findings about an answer."""
     return ()
 
 
 def ask(
     chat: ChatModel, question: Question, answer: type[T], examine: Callable[[T], Sequence[str]] = nothing_found
 ) -> Answered[T]:
-    """Ask a question and return its answer as an ``answer``.
+    """Ask a question and return its answer as an instance of ``answer``.
 
-    An answer that cannot be parsed or validated is asked for once more with the error; after that BadReply names what is
-    wrong. One that ``examine`` finds fault with is asked for once more with the findings; those that are left then are
-    returned, for the caller to decide. Raises what ``chat`` raises.
+    If the answer cannot be parsed or validated, the model is asked once more with the error; if that fails too, BadReply is
+    raised. If ``examine`` returns findings, the model is asked once more with them; findings about the second answer are
+    returned for the caller to decide. Raises the errors of ``chat``.
     """
     turns: tuple[Turn, ...] = ()
     repaired = examined = False
@@ -89,7 +91,7 @@ def ask(
 
 
 def complaints(error: ValueError) -> list[str]:
-    """Return what is wrong with an answer, one line each, the place first."""
+    """Return the errors of an answer, one line each, with the location first."""
     if not isinstance(error, ValidationError):
         return [str(error)]
     found = []
@@ -100,7 +102,7 @@ def complaints(error: ValueError) -> list[str]:
 
 
 def _without_the_middle(line: str) -> str:
-    """Return a complaint for a person: of a long one, which lists all that could be said, its place and what was said."""
+    """Shorten a long error for display to its beginning (the location) and its end (the actual value)."""
     half = LONGEST_COMPLAINT // 2
     return line if len(line) <= LONGEST_COMPLAINT else f"{line[:half]} ... {line[-half:]}"
 
@@ -110,18 +112,18 @@ def _listed(opening: str, lines: Sequence[str], closing: str) -> str:
 
 
 def _forget(chat: ChatModel, question: Question, turns: tuple[Turn, ...]) -> None:
-    # what was kept of a conversation that led nowhere would lead there again
+    # cached answers of a failed conversation would make it fail again
     if isinstance(chat, Forgetful):
         for length in range(0, len(turns) + 1, 2):
             chat.forget(question, turns[:length])
 
 
 def json_object_in(text: str) -> dict[str, Any]:
-    """Return the JSON object in a text: alone, in a code fence, or with words around it.
+    """Return the JSON object in a text: alone, in a code fence, or surrounded by words.
 
-    Control characters inside strings are taken (xgrammar lets them through under ``maxLength``) and become spaces: what a
-    model writes ends on terminals. Of several objects the last one counts: models correct themselves in that order. Raises
-    ValueError saying what is wrong. The time that it takes grows with the length of the text, whatever is in it.
+    Control characters inside strings are accepted (xgrammar permits them under ``maxLength``) and replaced by spaces, because
+    the text may be shown on a terminal. Of several objects the last one counts, since models correct themselves in that
+    order. Raises ValueError with the reason. The run time is bounded by the length of the text, whatever it contains.
     """
     found = _object_in(_without_thinking(text).strip())
     if levels(found) > MOST_LEVELS:
@@ -138,7 +140,7 @@ def _without_thinking(text: str) -> str:
 
 
 def _fenced(text: str) -> list[str]:
-    """Return what stands in code fences, in order."""
+    """Return the contents of code fences, in order."""
     found, at = [], 0
     while (start := text.find(_FENCE, at)) >= 0:
         head = _AFTER_FENCE.match(text, start + len(_FENCE))
@@ -217,7 +219,7 @@ class _Color(BaseModel):
 
 
 def probe_question() -> Question:
-    """Return the question: the color of a disc on white."""
+    """Return the test question: the color of a disc on white."""
     picture = Image.new("RGB", (PROBE_PX, PROBE_PX), "white")
     ImageDraw.Draw(picture).ellipse((64, 64, 192, 192), fill=(220, 30, 30))
     parts = (Picture(png_of(np.asarray(picture))), "Which color has the disc in this picture?")
@@ -225,9 +227,9 @@ def probe_question() -> Question:
 
 
 def probe(chat: ChatModel) -> str:
-    """Ask the question and return what works, as a short phrase; raises what ``chat`` raises.
+    """Ask the test question and return the result as a short phrase; raises the errors of ``chat``.
 
-    A wrong color is said, not raised: it is the model's eyesight, not its connection.
+    A wrong color is reported, not raised, because it says something about the model, not about the connection.
     """
     seen = ask(chat, probe_question(), _Color).value.color
     sight = "" if seen == "red" else f", but sees {seen} where red is"

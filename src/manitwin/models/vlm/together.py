@@ -1,4 +1,4 @@
-"""Several questions at once: each waits for its own answer, and all are paid for by the work that asked."""
+"""Concurrent questions: answers are collected in order, and costs are charged to the caller."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ T = TypeVar("T")
 
 
 def asked_together(questions: Sequence[Callable[[], T]]) -> list[T]:
-    """Ask in threads of their own; return the answers in the order of the questions.
+    """Ask questions in threads; return the answers in the order of the questions.
 
-    All are waited for, and what they cost is charged, before the first error is raised, in that order.
+    All answers are waited for, and their costs charged, before the first error (in that order) is raised.
     """
     if len(questions) == 1:
         return [questions[0]()]
@@ -34,7 +34,7 @@ def asked_together(questions: Sequence[Callable[[], T]]) -> list[T]:
 
 
 def _counted(question: Callable[[], T]) -> tuple[list[T], Exception | None, Bill]:
-    # a thread begins without the bill of the one that started it
+    # a new thread does not inherit the bill of its parent thread
     with counted() as bill:
         try:
             return [question()], None, bill

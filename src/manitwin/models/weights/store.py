@@ -1,4 +1,4 @@
-"""The folder of a person's weights: each an ONNX file named by its digest's begin, and a record beside it."""
+"""The user's folder of weights: ONNX files named by the start of their digests, with a record beside each."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from manitwin.formats.onnx_file import MAX_ONNX_BYTES
 from manitwin.models.weights.catalog import KNOWN_WEIGHTS, KnownWeights
 
 FOLDER = "MANITWIN_MODELS"
-"""The environment variable that names another folder."""
+"""Environment variable that names another folder."""
 
 
 @dataclass(frozen=True)
 class StoredWeights:
-    """The record of weights that were added: ``path`` of the file, ``licence`` as it was confirmed."""
+    """Record of added weights: ``path`` of the file, ``licence`` as the user confirmed it."""
 
     name: str
     path: Path
@@ -40,7 +40,7 @@ def weights_folder() -> Path:
 
 
 def store(weights: KnownWeights, content: bytes) -> StoredWeights:
-    """Write checked weights and their record, the record last; raises UsageError where the folder cannot be written."""
+    """Write verified weights and then their record; raises UsageError if the folder cannot be written."""
     folder = weights_folder()
     path = folder / f"{weights.name}-{weights.sha256[:12]}.onnx"
     record = {"file": path.name, "sha256": weights.sha256, "source": weights.source, "licence": weights.licence}
@@ -56,7 +56,7 @@ def store(weights: KnownWeights, content: bytes) -> StoredWeights:
 
 
 def stored(name: str) -> StoredWeights | None:
-    """Return the record of weights that were added, None where they were not; raises UsageError for a broken record."""
+    """Return the record of added weights, None if they were not added; raises UsageError for a broken record."""
     path = weights_folder() / f"{name}.json"
     if not path.exists():
         return None
@@ -70,7 +70,7 @@ def stored(name: str) -> StoredWeights | None:
 
 
 def read_stored(weights: StoredWeights) -> bytes:
-    """Return the bytes of added weights; raises UsageError where the file is gone or its digest another one."""
+    """Return the bytes of added weights; raises UsageError if the file is missing or has another digest."""
     content = read_bytes(weights.path, MAX_ONNX_BYTES, UsageError)
     if hashlib.sha256(content).hexdigest() != weights.sha256:
         raise UsageError(f"{weights.path}: not the file that was added (sha256); manitwin models add {weights.name}")
@@ -78,12 +78,12 @@ def read_stored(weights: StoredWeights) -> bytes:
 
 
 def all_weights() -> list[tuple[KnownWeights, StoredWeights | None]]:
-    """Return all known weights by name, each with its record where it was added."""
+    """Return all known weights by name, each with its record if it was added."""
     return [(KNOWN_WEIGHTS[name], stored(name)) for name in sorted(KNOWN_WEIGHTS)]
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all."""
+    """Write a file atomically."""
     descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".part")
     try:
         with os.fdopen(descriptor, "wb") as stream:
