@@ -78,7 +78,7 @@ def create(kind: str, spec: str, config: BuildConfig) -> Any:
 
 
 def _parts(spec: str) -> tuple[str, str]:
-    """Split a spec into name and argument; the argument starts with ``@`` if the spec has an address and no argument before it."""
+    """Split a spec into name and argument; the argument starts with ``@`` if it is only an address."""
     end = next((at for at, letter in enumerate(spec) if letter in ":@"), len(spec))
     return spec[:end], spec[end:].removeprefix(":")
 

@@ -1,1 +1,4 @@
-"""Annotators: category, mass and use of an object. A VLM's work in the paper; the built-in ``rules`` read priors and shape."""
+"""Annotators: category, physical properties and use of an object.
+
+The paper asks a VLM; the built-in ``rules`` use a table of priors and the geometry.
+"""

@@ -1,4 +1,4 @@
-"""Latin letters without their marks: a crème brûlée dish is found, and filed, as a creme brulee dish."""
+"""Removal of diacritics from Latin letters, so that a crème brûlée dish is found as a creme brulee dish."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ _WITHOUT_DECOMPOSITION = str.maketrans(
 
 
 def without_diacritics(text: str) -> str:
-    """Return a lower-case text with Latin letters in place of those with marks; other scripts stay as they are.
+    """Return a text in lower case with Latin letters without diacritics; other scripts are unchanged.
 
-    Letters are decomposed (Unicode's NFKD) and their combining marks dropped; those without a decomposition are spelt as
-    passports and addresses in ASCII do.
+    Letters are decomposed (Unicode NFKD) and combining marks removed; letters without a decomposition are transliterated as
+    in passports and ASCII addresses.
     """
     parts = unicodedata.normalize("NFKD", text.lower().translate(_WITHOUT_DECOMPOSITION))
     return unicodedata.normalize("NFC", "".join(c for c in parts if not 0x300 <= ord(c) <= 0x36F))

@@ -1,4 +1,4 @@
-"""An annotator that keeps what an imported asset gives, and asks another one for the rest."""
+"""Annotator that keeps the annotations of an imported asset, and asks another annotator for the rest."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ from manitwin.twin.record import Language
 from manitwin.twin.record_values import Estimate
 
 NEAR_M, NEAR_SHARE = 0.02, 0.1
-"""A candidate stands for a given point within 2 cm, or 10 % of the longest side: 42 candidates lie about so far apart."""
+"""Maximum distance of a candidate from a given point: 2 cm, or 10 % of the longest side, the usual spacing of 42 candidates."""
 
 FACING_KINDS = ("face", "button", "surface")
-"""Kinds of frames whose Z is the way out of the surface on which the point lies."""
+"""Kinds of frames whose Z axis is the outward normal of the surface on which the point lies."""
 OPPOSED = -0.1
-"""Cosine of a candidate's normal and that way: less, and the candidate is on the other side of the wall."""
+"""Cosine between a candidate's normal and that direction; a candidate below it is on the other side of the wall."""
 
 LEAST, MOST = {"functional": 2, "grasp": 2}, {"functional": 4, "grasp": 3}
-"""How many points an object has (paper: 2-4 functional and 2-3 grasp points)."""
+"""Minimum and maximum number of points of an object (paper: 2-4 functional and 2-3 grasp points)."""
 
 Point = TypeVar("Point", FunctionalPoint, GraspPoint)
 
 
 class GivenPoints:
-    """The given points of one object, snapped to candidates; what has no candidate near is a finding."""
+    """Given points of one object, snapped to candidates; a point without a candidate nearby is a finding."""
 
     def __init__(self, given: ImportRecord, request: PointsRequest):
         self._given, self._request = given, request
@@ -59,11 +59,11 @@ class GivenPoints:
         ]
 
     def enough(self) -> bool:
-        """Tell whether nobody else has to be asked."""
+        """Tell whether there are enough given points, so that no other annotator has to be asked."""
         return len(self._functional) >= LEAST["functional"] and len(self._grasp) >= LEAST["grasp"]
 
     def selection(self, others: SelectedPoints | None) -> SelectedPoints:
-        """Return the given points, filled up with others to as many as an object has at least."""
+        """Return the given points, filled up with others to the minimum number."""
         functional, grasp, findings = self._functional, self._grasp, self.findings
         spare = () if others is None else others.spare
         if others is not None:
@@ -73,7 +73,7 @@ class GivenPoints:
         return SelectedPoints(tuple(functional), tuple(grasp), tuple(findings), spare)
 
     def _snapped(self, kind: str, points: list[GivenPoint]) -> list[tuple[GivenPoint, int, float]]:
-        """Return each point with its candidate and the distance (m), no candidate twice."""
+        """Return each point with its candidate and the distance (m); no candidate is used twice."""
         snapped: list[tuple[GivenPoint, int, float]] = []
         taken: set[int] = set()
         for number, point in enumerate(points):
@@ -82,7 +82,7 @@ class GivenPoints:
             limit_m = self._limit_m
             if point.frame is not None and point.frame.kind in FACING_KINDS:
                 distances_m[self._request.normals @ _way_out(point.frame) < OPPOSED] = np.inf
-                limit_m = max(limit_m, point.frame.size_m)  # any place of the face is on it
+                limit_m = max(limit_m, point.frame.size_m)  # any place on the face is valid
             candidate = int(distances_m.argmin())
             if distances_m[candidate] > limit_m:
                 nearest = f"{distances_m[candidate] * 1000:.0f} mm" if np.isfinite(distances_m[candidate]) else "none"
@@ -101,7 +101,11 @@ class GivenPoints:
         return snapped
 
     def _distances(self, point: GivenPoint) -> np.ndarray:
-        """Return how far the candidates are; where fingers close, from the line between them: it ends on the surface."""
+        """Return the distances of the candidates (N,) in m.
+
+        For a point with a closing direction, the distance is that from the segment between the fingers, which ends on the
+        surface.
+        """
         offset = self._request.positions_m - np.array(point.position_m)
         if point.closing is not None:
             closing, half = np.array(point.closing), self._request.max_opening_m / 2
@@ -142,7 +146,7 @@ def _way_out(frame: FunctionalFrame) -> np.ndarray:
 
 
 def _filled(given: list[Point], others: tuple[Point, ...], least: int, letter: str) -> list[Point]:
-    """Return what is given and the first of the others, those last that are called the same: a second cap tells nothing."""
+    """Fill given points up to ``least`` with others, preferring labels that are not among the given ones."""
     filled, said = list(given), {point.label for point in given}
     for point in sorted(others, key=lambda point: point.label is not None and point.label in said):
         if len(filled) < least and point.candidate not in {kept.candidate for kept in given}:
@@ -151,11 +155,11 @@ def _filled(given: list[Point], others: tuple[Point, ...], least: int, letter: s
 
 
 class KeepsGiven:
-    """Answer with what is given of the subject (source ``imported:FORMAT``) and with the inner annotator's answers.
+    """Annotator that keeps the given properties of a subject (source ``imported:FORMAT``) and asks an inner one for the rest.
 
-    A given number has no interval: its low and high are the value, but of a friction whose surfaces differ. It is held
-    against what the inner annotator says, and what contradicts it is a finding; the plausibility checks of the physical stage
-    hold for it as for an estimate. For a subject of which nothing is given, the answers are the inner annotator's own.
+    A given number has no interval: low and high equal the value, except for a friction that varies over surfaces. It is
+    compared with the inner annotator's estimate, and a contradiction is a finding; the plausibility checks of the physical
+    stage apply as for an estimate. For a subject without given properties, all answers are the inner annotator's.
     """
 
     def __init__(self, inner: Annotator):
@@ -165,15 +169,15 @@ class KeepsGiven:
         self.picture_px = inner.picture_px
 
     def model_for(self, question: AnnotatorQuestion) -> str | None:
-        """Return what decides the inner annotator's answer; what is given is part of the twin's id."""
+        """Return the inner annotator's model; the given properties are part of the twin's id."""
         return self._inner.model_for(question)
 
     def expected_usd(self, question: AnnotatorQuestion) -> float:
-        """Return about what the inner annotator's answer costs."""
+        """Return the approximate cost of the inner annotator's answer."""
         return self._inner.expected_usd(question)
 
     def judge_quality(self, subject: Subject) -> QualityVerdict:
-        """Ask the inner annotator: no asset can say this of itself."""
+        """Ask the inner annotator, because no asset states its own quality."""
         return self._inner.judge_quality(subject)
 
     def estimate_physical(self, subject: Subject) -> PhysicalEstimates:
@@ -182,7 +186,7 @@ class KeepsGiven:
         return answer if given is None else _with_given(answer, given)
 
     def describe(self, subject: Subject, material: str, extents_m: np.ndarray) -> Language:
-        """Keep the given category and captions; the other words are the inner annotator's, who is told that category."""
+        """Keep the given category and captions; the inner annotator, which is told that category, supplies the other texts."""
         given = subject.given
         if given is None:
             return self._inner.describe(subject, material, extents_m)
@@ -199,7 +203,7 @@ class KeepsGiven:
         )
 
     def select_points(self, request: PointsRequest) -> SelectedPoints:
-        """Keep the given points at their nearest candidates; fill up with the inner annotator's."""
+        """Keep the given points at their nearest candidates; fill up with the inner annotator's points."""
         given = request.subject.given
         if given is None or not (given.functional_points or given.grasp_points):
             return self._inner.select_points(request)
@@ -209,7 +213,7 @@ class KeepsGiven:
         return points.selection(self._inner.select_points(request))
 
     def look_closer(self, request: PointsRequest, points: Sequence[FunctionalPoint]) -> CloserLook:
-        """Let the inner annotator look closer where it can; given points stay at their candidates."""
+        """Let the inner annotator refine the points if it can; given points stay at their candidates."""
         given = request.subject.given
         if not isinstance(self._inner, LooksCloser) or (given is not None and given.functional_points):
             return CloserLook()
@@ -228,7 +232,7 @@ def _with_given(answer: PhysicalEstimates, given: ImportRecord) -> PhysicalEstim
         same = given.friction_dynamic == given.friction_static
         dynamic = _within(given.friction_dynamic, given.friction_range if same else None, source)
     elif given.friction_static is not None and dynamic.value > static.value:
-        dynamic = exactly(static.value, source)  # nothing slides harder than it sticks
+        dynamic = exactly(static.value, source)  # dynamic friction does not exceed static friction
     if given.friction_static is None and static.value < dynamic.value:
         static = exactly(dynamic.value, source)
     mass_kg = answer.mass_kg if given.mass_kg is None else exactly(given.mass_kg, source)
@@ -245,7 +249,7 @@ def _with_given(answer: PhysicalEstimates, given: ImportRecord) -> PhysicalEstim
 
 
 def exactly(value: float, source: str) -> Estimate:
-    """Return a number that was given without an interval."""
+    """Return an estimate with a zero-width interval."""
     return Estimate(value=value, low=value, high=value, source=source)
 
 

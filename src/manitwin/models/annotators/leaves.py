@@ -1,4 +1,7 @@
-"""Flat things whose leaves are each modelled: what a book weighs lies between its covers, and not in the leaves of its mesh."""
+"""Volume of books and similar flat objects whose leaves are modelled one by one.
+
+The mass belongs to the volume between the covers, not to the leaves of the mesh.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +11,18 @@ from manitwin.geometry.boxes import oriented_bounding_box
 from manitwin.models.annotators.prior_records import Prior
 
 LEAST_BODIES = 6
-"""Two covers, a spine and a few leaves: a thing of one or two pieces is one whole mesh."""
+"""Minimum number of bodies (two covers, a spine and a few leaves); an object of one or two bodies is one solid mesh."""
 MOST_SHARE = 0.6
-"""Of the hull: a closed book that is one solid fills nearly all of it, one of a few dozen thin leaves a tenth to a third."""
+"""Maximum share of the hull's volume: a closed book that is one solid fills nearly all of it, thin leaves fill 0.1 to 0.33."""
 LEAST_BOXY = 0.75
-"""Of the box around it: an open book's hull holds mostly air."""
+"""Minimum share of the hull in the oriented bounding box; the hull of an open book contains mostly air."""
 
 
 def volume_with_leaves_m3(solid: trimesh.Trimesh, prior: Prior) -> float:
-    """Return the volume of a solid, or that of its hull where it is a closed flat thing of many separate leaves.
+    """Return the volume of a solid, or that of its convex hull for a closed flat object of many separate leaves.
 
-    Only of things with a front, a back and an edge that are full of one matter (``faced``): books, pads, packs of cards.
+    This applies only to objects with a front, a back and edges (``faced``) that are full of one material: books, pads, packs
+    of cards.
     """
     volume_m3 = float(solid.volume)
     if prior.parts != "faced" or prior.mass_distribution != "full":

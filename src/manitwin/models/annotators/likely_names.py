@@ -1,4 +1,4 @@
-"""How large and heavy a thing is that nobody has named, by what it may be: a mean over the likeliest names."""
+"""Usual size and density of an unnamed object: a mixture over its most probable names."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from manitwin.models.annotators.priors import unknown_prior
 from manitwin.twin.record_values import Estimate
 
 OF_LIKELY_NAMES = "prior:likeliest"
-"""The source of Estimates that are a mean over the names that a thing may have, and over anything else."""
+"""Source of estimates that are a mixture over an object's probable names and the unknown object."""
 _STANDARD_NORMAL_95 = 1.645
 _GRID = 2001
 
 
 @dataclass(frozen=True)
 class Usual:
-    """What is usual of a thing that has one of several names, or none of them."""
+    """Usual values of an object that has one of several names, or none of them."""
 
     longest_axis_m: Estimate
     bulk_density_kg_m3: Estimate
 
 
 def usual_of(likely: Sequence[tuple[str, float]]) -> Usual:
-    """Return what is usual of a thing with one of the ``likely`` names, each with its probability, or of anything with the rest.
+    """Return the usual values of an object with one of the ``likely`` names (name, probability); the rest is an unknown object.
 
-    A thing that a classifier cannot name is seldom far from its guesses in size: pliers are taken for a can opener. The value
-    is the mean of logarithms, the interval holds 90 % of the mixture. Source ``prior:likeliest``, or that of anything where
-    there is no name of the priors.
+    An object that a classifier cannot name usually has the size of its guesses: pliers are taken for a can opener. The value
+    is the mean of the logarithms, and the interval holds 90 % of the mixture. The source is ``prior:likeliest``, or that of
+    the unknown object if no name is in the priors.
     """
     anything = unknown_prior()
     known = [(prior, share) for name, share in likely if (prior := lookup(name)) is not None]
@@ -49,7 +49,7 @@ def usual_of(likely: Sequence[tuple[str, float]]) -> Usual:
 
 
 def _mixed(intervals: list[Interval], weights: np.ndarray) -> Interval:
-    """Return the mean and the 90 % interval of a mixture of log-normal halves, two for each interval; of one that one."""
+    """Return the mean and the 90 % interval of a mixture of two-sided log-normals; a single interval is returned unchanged."""
     if len(intervals) == 1:
         return intervals[0]
     weights = weights / weights.sum()

@@ -1,4 +1,4 @@
-"""What the commonest things are called in other languages: whole names, where English has no such thing."""
+"""Names of common objects in other languages: only whole names are looked up, after no English name was found."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _ARTICLES = {
 
 
 def category_abroad(name: str) -> str | None:
-    """Return the category that a whole name is in one of the table's languages, with or without an article; None for others."""
+    """Return the category with this whole name, with or without article, in one of the table's languages; else None."""
     return _index().get(folded(name))
 
 
 def folded(name: str) -> str:
-    """Return a name as it is compared: one width of letters, lower case, without marks on Latin letters, one space a gap."""
+    """Return a name in the form in which it is compared: NFKC, lower case, no diacritics on Latin letters, single spaces."""
     return " ".join(without_diacritics(unicodedata.normalize("NFKC", name)).replace("’", "'").split())
 
 

@@ -1,4 +1,4 @@
-"""What the parts of a surface are called: by whoever chose points on them, else by the prior of their thing."""
+"""Names of the parts of a surface: from the labels of points chosen on them, else from the prior of the object."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _FEATURES: dict[str, tuple[Feature, ...]] = {
     "tip": ("tip", "head", "edge", "top"),
     "end": ("handle_end", "handle", "base"),
 }
-"""By role, the features whose label in a prior is the name of the whole part, the best first."""
+"""For each part role, the features whose label in a prior names the whole part, the best first."""
 _WORDS: dict[str, frozenset[str]] = {
     "handle": frozenset(["handle", "handles", "grip", "grips", "shaft", "bow"]),
     "head": frozenset(
@@ -61,11 +61,11 @@ _WORDS: dict[str, frozenset[str]] = {
     "tip": frozenset(["tip", "cap", "jaw", "jaws", "stem", "head", "blade", "base", "end", "nozzle", "handle"]),
     "end": frozenset(["end", "handle", "handles", "grip", "seam", "bow", "base"]),
 }
-"""By role, the words of which a label has one where it names the whole part and no place on it."""
+"""For each part role, words that a label contains if it names the whole part instead of a place on it."""
 
 
 def roles_named(label: str, roles: Iterable[str]) -> list[str]:
-    """Return which of ``roles`` a label names ('blade and neck': head, neck); a word that may name several names none."""
+    """Return which of ``roles`` a label names ('blade and neck': head, neck); a word that fits several roles names none."""
     known, named = list(roles), []
     for word in re.findall(r"[a-z]+", label.lower()):
         meant = [word] if word in known else [role for role in known if word in _WORDS[role]]
@@ -74,10 +74,11 @@ def roles_named(label: str, roles: Iterable[str]) -> list[str]:
 
 
 def part_name(role: str, prior: Prior, labels_there: Iterable[str], shown: Iterable[str] = ()) -> str:
-    """Return what a part of a role is called; ``labels_there`` are those of the points that lie on it, in their order.
+    """Return the name of a part with a role; ``labels_there`` are the labels of the points on it, in order.
 
-    The prior's label stands where a point on the part has it, or no label there names the whole part. ``shown`` are the roles of
-    the thing: a shaft goes on to an end that is not told from it, and both ends of a rolling pin are handles.
+    The prior's label is used if a point on the part has it, or if no label there names the whole part. ``shown`` are the
+    roles found on the object: a shaft includes an end that is not a part of its own, and both ends of a rolling pin are
+    handles.
     """
     usual = _usual(role, prior, set(shown))
     said = [" ".join(label.lower().split()) for label in labels_there]
@@ -87,7 +88,7 @@ def part_name(role: str, prior: Prior, labels_there: Iterable[str], shown: Itera
 
 
 def _usual(role: str, prior: Prior, shown: set[str]) -> str:
-    """Return the prior's label of a part; its role where the prior has no label of the whole part."""
+    """Return the prior's label of a part, or its role if the prior has no label of the whole part."""
     by_feature = {part.feature: part.label for part in reversed(prior.functional)}
     features = _FEATURES.get(role, ())
     if role == "shaft":
@@ -98,4 +99,4 @@ def _usual(role: str, prior: Prior, shown: set[str]) -> str:
     if role == "end" and "shaft" in shown:
         labels = [label for label in labels if label != _usual("shaft", prior, shown)]
     usual = next(iter(labels), role)
-    return usual if _WORDS[role] & set(usual.lower().split()) else role  # finger rings are a place on the handle
+    return usual if _WORDS[role] & set(usual.lower().split()) else role  # e.g. finger rings are a place on the handle

@@ -1,8 +1,9 @@
-"""The light of a photo, read off the pale ground around its thing: what a camera saw is own colour times light, and sheen.
+"""Light of a photo, estimated from a pale background: the observed colour is object colour times light, plus sheen.
 
-A meter makes a white sheet grey, and a black thing on it shows the sheet's reflection: read as they are, a yellow thing's pixels
-are olive, a pink one's brown, a black one's dark grey. How bright the light is, is told by a ground whose matter is known: people
-lay things on paper, cloths and tables that are pale and hardly tinted. Of any other ground nothing is told.
+Exposure metering makes a white sheet grey, and a black object on it shows the sheet's reflection. Without correction, the
+pixels of a yellow object are olive, those of a pink one brown, and those of a black one dark grey. A background of known
+reflectance gives the brightness of the light: people place objects on pale paper, cloth and tables with little tint. For any
+other background the light stays unknown.
 """
 
 from __future__ import annotations
@@ -19,43 +20,45 @@ from manitwin.formats.meshes.textures import linear_to_srgb, srgb_to_linear
 from manitwin.models.annotators.surface_color import lab_from_srgb
 from manitwin.render.scene_lighting import LUMINANCE
 
-# chosen on one half of the categories of benchmarks/photo_colors.py, the sheen also with real photos in sight
-# (docs/measured/annotations.md)
-PALE_REFLECTANCE = 0.7  # of a pale ground: white paper has 0.85, a light grey table 0.5
+# Chosen on one half of the categories of benchmarks/photo_colors.py, the sheen also with regard to real photos
+# (docs/measured/annotations.md).
+PALE_REFLECTANCE = 0.7  # of a pale background: white paper has 0.85, a light grey table 0.5
 MOST_SHEEN = 0.02
-"""What a surface reflects of its surroundings, of white: 4 % at normal incidence (Fresnel, refractive index 1.5) of what is half
-as bright as white in the mean."""
-_DARKEST_PERCENT = 5.0  # of the thing's pixels: what is darker than the sheen has not that much of it
-_LEAST_LIGHTNESS = 50.0  # CIELAB L* of a ground that is taken for a pale one
-_MOST_CHROMA = 15.0  # CIELAB; a wooden table top has 22, and is no white sheet
-_RING_SHARE = (0.02, 0.10)  # of the longer side: beyond the contact shadow, and still in the thing's own light
+"""Reflection of the surroundings relative to white.
+
+It is 4 % at normal incidence (Fresnel, refractive index 1.5) of surroundings with a mean brightness of half that of white.
+"""
+_DARKEST_PERCENT = 5.0  # percentile of the object's pixels: a pixel cannot be darker than its sheen
+_LEAST_LIGHTNESS = 50.0  # minimum CIELAB L* of a pale background
+_MOST_CHROMA = 15.0  # CIELAB; a wooden table top has 22
+_RING_SHARE = (0.02, 0.10)  # of the longer side: beyond the contact shadow, but still in the same light as the object
 _SEEN_PX = 512
 _OPAQUE = 127
 
 
 @dataclass(frozen=True)
 class PhotoLight:
-    """How bright a photo is: ``white`` is the linear luminance in 0..1 of a white surface in the thing's light.
+    """Brightness of a photo: ``white`` is the linear luminance in [0, 1] of a white surface in the light of the object.
 
-    ``sheen`` is what the thing reflects of its surroundings and the lens spreads, as a share of white. The light's tint is left
-    alone: a ground's own tint is about as large as what a camera's white balance leaves.
+    ``sheen`` is the light from surface reflection and lens flare, relative to white. The tint of the light is not corrected,
+    because a background's own tint is about as large as the error of a camera's white balance.
     """
 
     white: float
     sheen: float
 
     def own_colors(self, srgb: np.ndarray) -> np.ndarray:
-        """Return the own colours ``(..., 3)`` sRGB in 0..1 of what the photo shows as ``srgb (..., 3)``."""
+        """Return the object colours ``(..., 3)`` sRGB in [0, 1] for the colours ``srgb (..., 3)`` of the photo."""
         return np.asarray(linear_to_srgb(np.clip(srgb_to_linear(srgb) / self.white - self.sheen, 0.0, 1.0)))
 
 
 def light_of_photo(rgba: np.ndarray) -> PhotoLight | None:
-    """Return the light of a photo ``(H, W, 4) uint8`` whose alpha is the thing; None where its ground does not tell it.
+    """Return the light of a photo ``(H, W, 4) uint8`` with the object's mask as alpha; None without a pale background.
 
-    The colours where alpha is 0 must be those of the photo.
+    Pixels with alpha 0 must have the colours of the photo.
     """
     scale = _SEEN_PX / max(rgba.shape[:2])
-    if scale < 1:  # colour by colour: premultiplied ones would darken the ground
+    if scale < 1:  # channels are resized separately; premultiplied alpha would darken the background
         rgba = np.asarray(cv2.resize(rgba, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA))
     thing = (rgba[..., 3] > 0).astype(np.uint8)
     near, far = (cv2.dilate(thing, _disc(share * max(thing.shape))) > 0 for share in _RING_SHARE)
@@ -73,7 +76,7 @@ def light_of_photo(rgba: np.ndarray) -> PhotoLight | None:
 
 
 def light_of_photos(paths: Iterable[Path]) -> PhotoLight | None:
-    """Return the mean light of cut-out photos (RGBA) of one thing; None where one of them does not tell it."""
+    """Return the mean light of matted photos (RGBA) of one object; None if it is unknown for one of them."""
     lights = [light_of_photo(np.asarray(Image.open(path).convert("RGBA"))) for path in paths]
     told = [light for light in lights if light is not None]
     if not told or len(told) < len(lights):

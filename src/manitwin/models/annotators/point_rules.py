@@ -1,7 +1,7 @@
-"""Choose functional and grasp points: the parts a prior names, found as geometry among the candidates.
+"""Rule-based selection of functional and grasp points: candidates at the geometric features of the parts that a prior names.
 
-Source: paper, "VLM-Based Point Selection": functional points carry a label, a description, a confidence and a
-rationale; grasp points lie where a hand holds well, by closeness to the centre of mass, surface geometry and use.
+Source: paper, "VLM-Based Point Selection": functional points have a label, a description, a confidence and a rationale; grasp
+points are chosen by distance to the centre of mass, surface geometry and use.
 """
 
 from __future__ import annotations
@@ -25,14 +25,16 @@ from manitwin.twin.point_records import FunctionalPoint, GraspPoint, GraspType
 MOST_FUNCTIONAL, MOST_GRASPS, LEAST = 4, 3, 2  # the paper: 2-4 functional and 2-3 grasp points
 MOST_SPARES = 3
 
-_WEAK = 0.2  # a place that no candidate reaches better than this is not there
-_LEVER_M = 0.08  # from the centre of mass: half as good; grasps held at 80 mm slip half of the time, measured in SAPIEN
-_FINGER_CLEARANCE_M = 0.004  # of the opening: the pads need some play on both sides
-_PINCH_M = 0.03  # matter between two fingertips: what is thicker is taken between the pads, with both fingers along it
-_UNSEEN = 0.3  # a candidate in no view can be chosen only where no seen one is near as good
-_TAKEN = 0.35  # a candidate that already stands for another part
-_BEHIND = -0.5  # cosine of normals on the two sides of a wall: a plate's base is no place on its surface
-_ELSEWHERE = 0.3  # a candidate that is not on the part that the place's label is the name of
+_WEAK = 0.2  # minimum score: below it the feature does not exist on the object
+_LEVER_M = (
+    0.08  # lever arm at which the weight is about half; grasps at 80 mm slip half of the time, measured in SAPIEN
+)
+_FINGER_CLEARANCE_M = 0.004  # of the opening: the pads need clearance on both sides
+_PINCH_M = 0.03  # maximum thickness of a pinch; thicker parts are held between the pads
+_UNSEEN = 0.3  # weight of a candidate that is visible in no view
+_TAKEN = 0.35  # weight of a candidate near one that represents another part
+_BEHIND = -0.5  # cosine of normals on the two sides of a wall: a plate's base is not on its upper surface
+_ELSEWHERE = 0.3  # weight of a candidate that is not on the part named by the label
 
 _GENERIC_FUNCTIONAL: tuple[Feature, ...] = ("top", "end", "base", "front")
 _GENERIC_GRASP: tuple[Feature, ...] = ("center", "side", "middle", "edge", "rim")
@@ -45,7 +47,7 @@ class _Choice:
 
 
 class PointSelection:
-    """One object's candidates, scored once and chosen from part by part."""
+    """Selection from one object's candidates, which are scored once, part by part."""
 
     def __init__(self, request: PointsRequest, prior: Prior | None):
         self.request = request
@@ -59,21 +61,21 @@ class PointSelection:
 
     @cached_property
     def points(self) -> SurfacePoints:
-        """The candidates with the thickness behind them."""
+        """The candidates with the thickness of the object behind them."""
         return surface_points(self.request.subject.solid, self.request.positions_m, self.request.normals)
 
     @cached_property
     def lever_m(self) -> np.ndarray:
-        """The distance (m) of each candidate from the centre of mass."""
+        """Distance (m) of each candidate from the centre of mass."""
         return np.linalg.norm(self.request.positions_m - self.request.center_of_mass_m, axis=1)
 
     def select(self) -> SelectedPoints:
-        """Return 2-4 functional and 2-3 grasp points, each at a candidate of its own within its kind."""
+        """Return 2-4 functional and 2-3 grasp points; within each kind every point has its own candidate."""
         grasp = self._grasps()
         return SelectedPoints(self._functional(), grasp, spare=self.spares([point.candidate for point in grasp]))
 
     def spares(self, taken: list[int]) -> tuple[GraspPoint, ...]:
-        """Return the next best grasp points where these candidates are taken: places not yet asked for, then second choices."""
+        """Return the next best grasp points without the candidates ``taken``: unused places first, then second choices."""
         weights, taken = self._seen() * self._fit() * self._closeness(), list(taken)
         found: list[GraspPoint] = []
         for part in (*self.prior.grasp, *_generic_grasps()):
@@ -91,14 +93,14 @@ class PointSelection:
 
     @cached_property
     def _parts(self) -> Membership | None:
-        """The parts of samples of the surface, then of the candidates, where the form tells them."""
+        """Part membership of surface samples followed by the candidates, if the shape determines parts."""
         if self.prior.parts is None:
             return None
         places = np.concatenate([self.shape.surface_m, self.request.positions_m])
         return membership(self.prior.parts, self.shape, places)
 
     def _on_own_part(self, feature: Feature) -> np.ndarray:
-        """Weight candidates by whether they are on the part that the label of a place is the name of."""
+        """Weight candidates by whether they lie on the part that the feature's label names."""
         label = next((part.label for part in self.prior.functional if part.feature == feature), None)
         if label is None or self._parts is None:
             return np.ones(len(self.request.positions_m))
@@ -110,7 +112,7 @@ class PointSelection:
     def _best(
         self, feature: Feature, weights: np.ndarray, taken: list[int], spread_m: float, *, through: bool = True
     ) -> _Choice | None:
-        """Return the best candidate for a feature, away from those taken, ``through`` thin walls too."""
+        """Return the best candidate for a feature, away from those ``taken``, also across thin walls if ``through``."""
         scores = feature_scores(feature, self.shape, self.points)
         if scores is None:
             return None
@@ -160,7 +162,7 @@ class PointSelection:
                 sides += [(part, choice.candidate)] if part.feature == "side" else []
         for part, index in sides[: MOST_GRASPS - len(found)]:
             other = self._best("side", weights * self._facing_away(index), taken, 0.0)
-            if other is not None:  # a hand may have to come from there
+            if other is not None:  # the approach may have to come from the other side
                 taken.append(other.candidate)
                 part = part.model_copy(update={"scenario": f"{part.scenario}, from the other side"})
                 found.append(self._grasp_point(len(found), part, other))
@@ -170,7 +172,7 @@ class PointSelection:
         return tuple(found)
 
     def _fit(self) -> np.ndarray:
-        """Weight candidates by whether the gripper opens wide enough for the matter behind them."""
+        """Weight candidates by whether the gripper opens wide enough for the thickness behind them."""
         room = self.request.max_opening_m - _FINGER_CLEARANCE_M
         return np.where(self.points.thickness_m <= room, 1.0, 0.2 * room / np.maximum(self.points.thickness_m, room))
 
@@ -182,7 +184,7 @@ class PointSelection:
         return 0.4 + 0.6 / (1 + (self.lever_m / _LEVER_M) ** 2)
 
     def _leftover(self, taken: list[int], count: int) -> list[int]:
-        """Return the candidates nearest to the centre of mass that nothing stands for yet."""
+        """Return the unused candidates nearest to the centre of mass."""
         return [int(i) for i in np.argsort(self.lever_m, kind="stable") if int(i) not in taken][: max(count, 0)]
 
     def _functional_point(self, number: int, part: FunctionalPart, choice: _Choice) -> FunctionalPoint:
@@ -208,12 +210,12 @@ class PointSelection:
         )
 
     def _type(self, part: GraspPart, i: int) -> GraspType:
-        """Return how a place is held: a pinch of what is too thick for fingertips is a parallel grasp."""
+        """Return the grasp type: a pinch of a part too thick for fingertips becomes a parallel-jaw grasp."""
         thick = self.points.thickness_m[i] > _PINCH_M
         return "parallel_jaw" if part.type == "pinch" and thick else part.type
 
     def _confidence(self, score: float) -> float:
-        """Return a confidence: a rule is never sure, so at most 0.9, and 0.5 where nobody said what the thing is."""
+        """Return a confidence: at most 0.9 for a rule, and 0.5 for an unnamed object."""
         return round((0.3 + 0.6 * score) * (1.0 if self.named else 0.55), 3)
 
     def _rationale(self, feature: Feature, i: int) -> str:
@@ -288,10 +290,10 @@ def _generic_grasps() -> tuple[GraspPart, ...]:
 
 
 def spare_grasp_points(request: PointsRequest, taken: list[int]) -> tuple[GraspPoint, ...]:
-    """Return grasp points by geometry alone, best first, at none of the candidates ``taken``."""
+    """Return grasp points from geometry alone, best first, at none of the candidates ``taken``."""
     return PointSelection(request, None).spares(taken)
 
 
 def select_points(request: PointsRequest, prior: Prior | None) -> SelectedPoints:
-    """Choose 2-4 functional and 2-3 grasp points; ``prior`` is None where nobody has said what the thing is."""
+    """Choose 2-4 functional and 2-3 grasp points; ``prior`` is None for an unnamed object."""
     return PointSelection(request, prior).select()

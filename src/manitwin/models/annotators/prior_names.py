@@ -1,4 +1,4 @@
-"""Find the prior of what a person calls a thing: by category or alias, in the singular, with words left out."""
+"""Lookup of the prior for an everyday name: by category or alias, in the singular, and with words left out."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from manitwin.models.annotators.prior_records import Prior
 from manitwin.models.annotators.priors import load_priors
 
 _BETWEEN_WORDS = r"(?:[^a-z0-9&+'.]|\.(?!\d)|(?<!\d)\.)+"
-"""A point between two digits is a number's own: 1.5 cm."""
+"""Word separators; a point between two digits is part of a number: 1.5 cm."""
 
 
 def normalised(name: str) -> str:
-    """Return a name in lower-case Latin letters without marks, punctuation, articles and what follows a comma or bracket."""
+    """Return a name in lower case without diacritics, punctuation, a leading article, or text after a comma or bracket."""
     head = re.split(r"[,(\[;:]", without_diacritics(name), maxsplit=1)[0]
     words = re.sub(_BETWEEN_WORDS, " ", head.replace("’", "'").replace("'s ", " ").replace("'", "")).split()
     return " ".join(words[1:] if words[:1] in (["a"], ["an"], ["the"]) and len(words) > 1 else words)
 
 
 def singulars(phrase: str) -> Iterator[str]:
-    """Yield the phrase, and what its last word may be the plural of."""
+    """Yield the phrase, and possible singulars of its last word."""
     yield phrase
     for plural, singular in (("ives", "ife"), ("ves", "f"), ("ies", "y"), ("oes", "o"), ("s", ""), ("es", "")):
         if phrase.endswith(plural) and len(phrase) > len(plural) + 1:
@@ -46,7 +46,7 @@ def _index() -> dict[str, Prior]:
 
 @cache
 def _written_together() -> dict[str, str]:
-    """The names of the index by their letters alone, but for those that more than one prior has."""
+    """Return the index names by their letters without spaces, except for those shared by more than one prior."""
     index = _index()
     found: dict[str, set[str]] = {}
     for name in index:
@@ -57,19 +57,19 @@ def _written_together() -> dict[str, str]:
 
 
 def named(name: str) -> Prior | None:
-    """Return the prior whose category or alias a name is, whole or in the plural; None where it is no such name."""
+    """Return the prior whose category or alias is this name, in the singular or plural; else None."""
     index = _index()
     return next((index[phrase] for phrase in singulars(normalised(name)) if phrase in index), None)
 
 
 def named_together(name: str) -> Prior | None:
-    """Return the prior of a name that is written as one word where its own is two, or None: a doorknob."""
+    """Return the prior of a name written as one word instead of two (a doorknob), or None."""
     together = _written_together()
     return next((named(together[each]) for each in singulars(normalised(name)) if each in together), None)
 
 
 def lookup(name: str | None) -> Prior | None:
-    """Find the prior of what a person calls a thing; None where the table has no such thing (``found_by``)."""
+    """Find the prior of an everyday name; None if the table has none (``found_by``)."""
     found = found_by(name)
     return None if found is None else found[0]
 
@@ -85,24 +85,26 @@ _NO_THING = re.compile(
 
 
 _IMITATIONS = {"toy": "toy", "plush": "stuffed toy", "stuffed": "stuffed toy"}
-"""What a thing is of which one word says that it is made after another: a toy elephant is a toy."""
+"""Words that say that an object imitates another one: a toy elephant is a toy."""
 _SMALL = frozenset({*_IMITATIONS, "doll", "dollhouse", "miniature"})
-"""What a chair or a table is called that is none: toys of things with the name alone, as of tools, have entries of their own."""
+"""Words that make a piece of furniture a toy (a doll's chair); toys of other objects, such as tools, have entries of their
+own."""
 _TOO_LARGE = "furniture"
-"""The domain of things that no hand holds, so that what is called a toy of one is a toy."""
+"""Domain of objects that are too large for a hand, so that a toy version is a toy."""
 
 
 def found_by(name: str | None) -> tuple[Prior, str] | None:
-    """Find the prior of what a person calls a thing, and the words, in the singular, by which it is found.
+    """Find the prior of an everyday name, and the words, in the singular, by which it was found.
 
-    Tried in order: the whole name, or an alias of it; the part before 'of', 'with', 'without', 'no', 'for', 'in', 'on' or 'from';
-    the whole again: each as it is, in the singular, and with words dropped from the front ('red coffee mugs' are coffee mugs,
-    which are mugs), and before its last word stands alone with words dropped between ('lego duplo brick' is a lego brick). The
-    last word decides what a thing is: a mug rack is no mug. Words are the same written together or apart: a 'waterbottle' is a
-    water bottle, and a 'tooth brush' a toothbrush before it is a brush. Where none is found, numbers, measures, colours and what
-    is printed on most packs say nothing at the end ('mug_1', 'cube 5 cm', 'pitcher blue' and 'juice smooth 500 ml' are a mug, a
-    cube, a pitcher and juice), and what is a toy of anything is a toy, as is a doll's chair. File names are never looked up:
-    they are not evidence. What English has no such thing for, and is the whole name of one in another language, is that.
+    The attempts, in order: the whole name or an alias; the part before 'of', 'with', 'without', 'no', 'for', 'in', 'on' or
+    'from'; the whole name again. Each is tried as it is, in the singular, and with words dropped from the front ('red coffee
+    mugs' are coffee mugs, which are mugs); before its last word is tried alone, words in between are dropped ('lego duplo
+    brick' is a lego brick). The last word decides: a mug rack is not a mug. Spelling with or without spaces is equivalent: a
+    'waterbottle' is a water bottle, and a 'tooth brush' a toothbrush rather than a brush. If nothing is found, numbers,
+    measures, colours and common package words at the end are ignored ('mug_1', 'cube 5 cm', 'pitcher blue' and 'juice smooth
+    500 ml' are a mug, a cube, a pitcher and juice), and a toy version of anything is a toy, as is a doll's chair. File names
+    are never looked up, since they are not evidence. A name without an English match is looked up as a whole in other
+    languages.
     """
     return (_found_in_english(name) or _found_abroad(name)) if name else None
 
@@ -129,7 +131,7 @@ def _found_in_english(name: str) -> tuple[Prior, str] | None:
             if candidate in index and index[candidate].category != "unknown":
                 small = index[candidate].domain == _TOO_LARGE and not _SMALL.isdisjoint(head[:-1])
                 return (index["toy"], " ".join(head)) if small else (index[candidate], candidate)
-    if ":" in name:  # then what stands before it is a collection: 'Practice: hand wheel valve'
+    if ":" in name:  # the text before a colon names a collection: 'Practice: hand wheel valve'
         behind = found_by(name.rpartition(":")[2])
         if behind is not None:
             return behind
@@ -138,13 +140,13 @@ def _found_in_english(name: str) -> tuple[Prior, str] | None:
 
 
 _OF_A_THING = frozenset({"part", "piece", "model", "mesh", "object", "asset"})
-"""Last words that say that a name is of a part, or of a file: of which thing, the word before may say."""
+"""Last words that refer to a part or a file; the word before may name the object."""
 
 
 def names_with(name: str) -> list[str]:
-    """Return the names that have the last word of a name which says anything, the shortest first.
+    """Return the names that contain the last meaningful word of a name, the shortest first.
 
-    Of 'beer' these are beer bottle, beer can and others, of 'gear part' gear.
+    For 'beer' these are beer bottle, beer can and others, for 'gear part' gear.
     """
     words = normalised(name).split()
     while words and (words[-1] in _OF_A_THING or _NO_THING.fullmatch(words[-1])):
@@ -155,7 +157,7 @@ def names_with(name: str) -> list[str]:
 
 
 def _words_dropped(head: list[str]) -> Iterator[list[str]]:
-    """Yield a name with words dropped between two that stay, the last of which is its noun; the most and the nearest first."""
+    """Yield a name with inner words dropped; the last word stays, and the variants with the most words come first."""
     *before, noun = head
     if len(before) > _MOST_WORDS_BEFORE:
         return
@@ -165,9 +167,9 @@ def _words_dropped(head: list[str]) -> Iterator[list[str]]:
 
 
 def word_for(prior: Prior, said: str) -> str:
-    """Return what a person calls a thing that was found by these words: a 'coffee mug' is a mug, a 'pan' no frying pan.
+    """Return the noun for an object that was found by these words: a 'coffee mug' is a mug, a 'pan' is not a frying pan.
 
-    What it is sold in, or a kind of, is called so where the words do not say it: 'ketchup' is a ketchup bottle, a 'granny smith'
+    Packages and varieties get their full name if the words do not contain it: 'ketchup' is a ketchup bottle, a 'granny smith'
     a granny smith apple.
     """
     words, category = said.split(), normalised(prior.category).split()
@@ -177,9 +179,10 @@ def word_for(prior: Prior, said: str) -> str:
     packed = next((name for name in whole if normalised(name).startswith(f"{said} ")), None)
     if packed is not None:
         return packed
-    return next((alias for alias in prior.aliases if normalised(alias) == said), said)  # a cook's knife as it is spelt
+    # keeps the spelling, e.g. of a cook's knife
+    return next((alias for alias in prior.aliases if normalised(alias) == said), said)
 
 
 def counter_of(prior: Prior, noun: str) -> str | None:
-    """Return what one of a prior's things is counted by, None where the noun says it: a bar of soap, but a soap bar."""
+    """Return the counter of a prior ('bar of' for soap), None if the noun already contains it: a soap bar."""
     return None if prior.counter is None or prior.counter.split()[0] in noun.split() else prior.counter

@@ -1,4 +1,4 @@
-"""What the priors' table says of a category of things: usual sizes and masses, matter, parts and how they are used."""
+"""Records of the priors' table: usual sizes and masses, materials, parts and uses of a category of objects."""
 
 from __future__ import annotations
 
@@ -16,20 +16,24 @@ if TYPE_CHECKING:
     from manitwin.geometry.parts.shape import Shape
 
 HEAVIEST_CONTENTS_KG_M3 = 2000.0
-"""Closed packages hold no more: sugar, sand and shampoo in a jar are below."""
+"""Upper bound of the bulk density of closed packages; sugar, sand and shampoo in a jar are below."""
 
 Distribution = Literal["full", "solid", "shell"]
-"""Full of its contents or of one matter; solid: the mesh is the matter itself; shell: hollow behind a closed skin."""
+"""Mass distribution.
+
+``full``: filled with its contents or of one material; ``solid``: the mesh is the material itself, including its walls;
+``shell``: hollow behind a closed skin.
+"""
 
 
 DEVIATIONS_ACROSS = 3.29
-"""Standard deviations between the ends of an interval that holds 90 % of a log-normal value."""
+"""Standard deviations between the ends of an interval that holds 90 % of a log-normal distribution."""
 LEAST_LOG_SPREAD = 0.02
-_UPWARD = 0.9  # cosine of an opening's axis and the vertical
+_UPWARD = 0.9  # cosine between an opening's axis and the vertical
 
 
 class Interval(Record):
-    """A usual value and the interval that nearly all (about 19 of 20) such things are in."""
+    """A typical value and the interval that contains nearly all (about 19 of 20) objects of the category."""
 
     low: Finite
     typical: Finite
@@ -43,16 +47,16 @@ class Interval(Record):
 
     @property
     def log_spread(self) -> float:
-        """The standard deviation of a value's natural logarithm, at least ``LEAST_LOG_SPREAD``."""
+        """Standard deviation of the value's natural logarithm, at least ``LEAST_LOG_SPREAD``."""
         return max(math.log(self.high / self.low) / DEVIATIONS_ACROSS, LEAST_LOG_SPREAD)
 
     @property
     def upper_log_spread(self) -> float:
-        """That of the values above the typical one alone."""
+        """The same for the values above the typical one only."""
         return max(2 * math.log(self.high / self.typical) / DEVIATIONS_ACROSS, LEAST_LOG_SPREAD)
 
     def estimate(self, source: str) -> Estimate:
-        """Return the typical value with the interval around it, said by ``source``."""
+        """Return the typical value with its interval as an estimate of ``source``."""
         return Estimate(value=self.typical, low=self.low, high=self.high, source=source)
 
 
@@ -66,7 +70,7 @@ LowTypicalHigh = Annotated[Interval, BeforeValidator(_interval_from_list)]
 
 
 class FunctionalPart(Record):
-    """A part with a use: ``feature`` says where it is, as geometry."""
+    """A part with a function; ``feature`` is the geometric feature that locates it."""
 
     label: str
     description: str
@@ -74,7 +78,7 @@ class FunctionalPart(Record):
 
 
 class GraspPart(Record):
-    """A place to hold such a thing, how, and for what."""
+    """A place to grasp the object: grasp type, purpose, and the geometric feature that locates it."""
 
     type: GraspType
     scenario: str
@@ -82,9 +86,9 @@ class GraspPart(Record):
 
 
 class Material(Record):
-    """Contact properties of a surface material; ``source`` says where they are from.
+    """Contact properties of a surface material; ``source`` is their origin.
 
-    ``wall_m`` is how thick walls of open ware are made of it; None where they are not.
+    ``wall_m`` is the usual wall thickness of open containers of this material; None if there are none.
     """
 
     friction_static: LowTypicalHigh
@@ -96,11 +100,11 @@ class Material(Record):
 
 
 class Form(Record):
-    """The shape, rest and parts that a family of categories shares; ``parts`` is the rule that tells them apart on a surface.
+    """Shape, resting pose and parts that a family of categories shares; ``parts`` is the rule that segments the surface.
 
-    ``level``: what stands has its long axis level, and is put on no end. ``often_stands``: laid down, but stands where its
-    file has it so. ``opens_aside``: its openings are in its sides and not its top.
-    ``vessel``: closed, and weighs what it holds: its bulk densities are from empty to full.
+    ``stands``: whether it is put down upright (None: either). ``level``: the long axis of a standing object is horizontal.
+    ``often_stands``: usually laid down, but stays upright if its file has it upright. ``opens_aside``: its openings are in
+    the sides, not the top. ``vessel``: closed and holding contents; its bulk densities range from empty to full.
     """
 
     shape: str
@@ -119,7 +123,7 @@ class Form(Record):
 
 
 class Places(Record):
-    """What is where on a thing: the parts of ``Form`` that another form may have of it."""
+    """The parts and places of an object, as far as another ``Form`` may replace them."""
 
     parts: PartRule | None
     functional: tuple[FunctionalPart, ...]
@@ -127,15 +131,19 @@ class Places(Record):
 
 
 class Prior(Form):
-    """The usual values of one category of things.
+    """Usual values of one category of objects.
 
-    ``longest_axis_m`` is that of the oriented box. ``bulk_density_kg_m3`` is mass per volume of a repaired scan, not of
-    the matter; None where a scan's volume says nothing of the mass. ``stands``: whether it is put down upright (None:
-    either). ``like`` is the category whose numbers it has for want of its own, ``kin_of`` that whose form it has. ``counter``
-    is what such things are counted by ('pair of'). ``part_materials`` are the materials of its parts by role, where they are
-    of unlike matter. ``measured`` names the published measurements; ``sources`` says where the rest is from.
-    ``with_handle`` are the places of such a thing from which a handle sticks out, where some have one, ``with_bail`` those of one
-    that a handle goes over; ``stated`` is the material that somebody has said it is of.
+    - ``longest_axis_m``: longest side of the oriented bounding box
+    - ``bulk_density_kg_m3``: mass per volume of a repaired scan, not of the material; None if a scan's volume does not
+      determine the mass
+    - ``like``: category whose numbers are used because there are none for this one
+    - ``kin_of``: category whose form is used
+    - ``counter``: word by which such objects are counted ('pair of')
+    - ``part_materials``: materials of the parts by role, if parts differ in material
+    - ``measured``: published measurements; ``sources``: origin of the other values
+    - ``with_handle``: places of the variant with a side handle, if there is one; ``with_bail``: of the variant with an
+      overhead handle
+    - ``stated``: material that the user has stated
     """
 
     category: str
@@ -161,9 +169,9 @@ class Prior(Form):
     stated: str | None = None
 
     def of_shape(self, shape: Shape) -> Prior:
-        """Return the prior with the places that a thing of this shape has.
+        """Return the prior with the places that an object of this shape has.
 
-        A tea cup or a basket may have a handle, or none; and a teapot whose lid is on has a lid where one without has an opening.
+        A tea cup or a basket may have a handle or not; a teapot with its lid on has a lid in place of the opening.
         """
         fitted, handle = self, shape.added_handle
         if handle is not None:
@@ -177,5 +185,5 @@ class Prior(Form):
 
     @property
     def source(self) -> str:
-        """The source of its Estimates: whose numbers they are, and of which stated material: 'prior:mug of steel'."""
+        """Source of its estimates: the category of the numbers and the stated material, as in 'prior:mug of steel'."""
         return f"prior:{self.like or self.category}{f' of {self.stated}' if self.stated else ''}"

@@ -1,8 +1,8 @@
-"""The priors: a table of usual sizes, masses, parts and uses of things by category.
+"""The priors: a table of usual sizes, masses, parts and uses of objects by category.
 
-The table is ``prior_tables/*.toml`` beside this module: ``materials.toml`` (friction, restitution), ``forms.toml`` (shape, parts
-and how they are used, shared by many categories), ``languages.toml`` (names in other languages) and one file a domain with the
-categories. docs/priors.md says how it was made.
+The table is ``prior_tables/*.toml`` beside this module: ``materials.toml`` (friction, restitution), ``forms.toml`` (shape,
+parts and uses that categories share), ``languages.toml`` (names in other languages) and one file per domain with the
+categories. docs/priors.md describes how it was made.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from manitwin.models.annotators.prior_records import Material, Prior
 
 TABLES = resources.files("manitwin.models.annotators") / "prior_tables"
 VOCABULARY_FILES = ("materials", "forms", "languages")
-"""The files of the folder that are not a domain."""
+"""Files of the folder that are not domains."""
 
 
 def _read(name: str) -> dict[str, Any]:
@@ -37,7 +37,7 @@ def load_materials() -> dict[str, Material]:
 
 
 def _worded(parts: list[dict[str, Any]], category: str) -> list[dict[str, Any]]:
-    """Put the category's name where a form's wording leaves room for it."""
+    """Insert the category's name into the wording of a form."""
     return [{key: value.replace("{object}", category) for key, value in part.items()} for part in parts]
 
 
@@ -59,7 +59,7 @@ def _prior(category: str, row: dict[str, Any], domain: str, defaults: dict[str, 
         "restitution": contact.restitution, **forms[form_name], **row,
     }  # fmt: skip
     if "functional" in row:
-        merged["parts"] = row.get("parts")  # places of its own: the form's rule is of others
+        merged["parts"] = row.get("parts")  # the form's part rule does not apply to places of the category's own
     own = {place["label"]: place for place in row.get("functional", ())}
     for key in ("with_handle", "with_bail"):
         form = merged.pop(key, None)
@@ -74,7 +74,7 @@ def _prior(category: str, row: dict[str, Any], domain: str, defaults: dict[str, 
 
 @cache
 def load_priors() -> dict[str, Prior]:
-    """Return all priors by category; raises ManiTwinError or ValidationError where the table contradicts itself."""
+    """Return all priors by category; raises ManiTwinError or ValidationError if the table is inconsistent."""
     forms = _read("forms")
     priors: dict[str, Prior] = {}
     for domain in _domains():
@@ -91,11 +91,11 @@ def load_priors() -> dict[str, Prior]:
 
 
 _NUMBERS = frozenset({"longest_axis_m", "mass_kg"})
-"""With both of these an entry below another one has its own numbers, and borrows none."""
+"""A kin entry with both of these has its own numbers and borrows none."""
 
 
 def _kin_row(category: str, row: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
-    """Return the row of a thing that is another one, but about as large and heavy: what it does not say is the category's."""
+    """Return the row of a kin category: values that it does not state are those of ``category``."""
     said = {key: value for key, value in row.items() if key not in ("aliases", "measured", "sources")}
     borrowed = {} if own.keys() >= _NUMBERS else {"sources": [f"as a {category}"], "like": category}
     return {**said, **borrowed, **own, "kin_of": category}
@@ -103,11 +103,11 @@ def _kin_row(category: str, row: dict[str, Any], own: dict[str, Any]) -> dict[st
 
 @cache
 def load_names_abroad() -> dict[str, dict[str, list[str]]]:
-    """Return what categories are called in other languages, by category and language (ISO 639-1)."""
+    """Return names of categories in other languages, by category and language (ISO 639-1)."""
     return _read("languages")
 
 
 @cache
 def unknown_prior() -> Prior:
-    """Return the prior of a thing nobody has named: wide intervals, source ``prior:unknown``."""
+    """Return the prior of an unnamed object: wide intervals, source ``prior:unknown``."""
     return load_priors()["unknown"]

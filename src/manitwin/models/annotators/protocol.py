@@ -1,4 +1,4 @@
-"""The protocol of an annotator: the four questions that the paper asks a VLM."""
+"""Protocol of an annotator: the four questions that the paper asks a VLM, with their answers."""
 
 from __future__ import annotations
 
@@ -24,15 +24,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Subject:
-    """The object as an annotator sees it.
+    """The object to annotate.
 
-    ``solid`` is the repaired watertight mesh and ``parts`` are the textured visual meshes, both in the object frame (Z-up),
-    metres as far as known: ``metric`` says whether the scale is declared or only guessed. ``views`` are eight pictures, and
-    ``cameras`` those that took them, in the same frame and unit as the meshes. ``given`` is what an imported asset says of
-    itself, in the same frame; None for every other input. ``known_as`` is what an earlier answer took it for, ``photos`` are the
-    photos that it was made of, cut out (RGBA), and ``size_estimated`` says that the metres are those of an estimate. ``likely``
-    are names that it may have, each with its probability, where nobody has said one and no guess was likely enough. They have
-    the colours of a photo as they are where they are ``photographed``; ``light`` is that photo's, None where it is not known.
+    - ``name``: name given by the user, or None
+    - ``solid``: repaired watertight mesh; ``parts``: textured visual meshes; both in the object frame (Z-up), in metres if
+      ``metric``
+    - ``metric``: whether the scale is declared; otherwise it is guessed
+    - ``views``: eight pictures; ``cameras``: their cameras, in the frame and unit of the meshes
+    - ``given``: annotations of an imported asset, in the same frame; None for other inputs
+    - ``known_as``: name that an earlier answer gave the object
+    - ``photos``: the matted photos (RGBA) from which the object was made
+    - ``size_estimated``: whether the metres come from an estimate
+    - ``likely``: candidate names with probabilities, if there is no name and no guess was probable enough
+    - ``photographed``: whether the meshes have the uncorrected colours of a photo; ``light``: the light of that photo, None
+      if unknown
     """
 
     name: str | None
@@ -53,7 +58,7 @@ class Subject:
 
 @dataclass(frozen=True)
 class QualityVerdict:
-    """The two criteria of the paper's gate; None means not judged, and never means passed."""
+    """Verdict on the two criteria of the paper's quality gate; None means not judged, not passed."""
 
     single_object: bool | None
     visual_quality: bool | None
@@ -62,14 +67,14 @@ class QualityVerdict:
 
 @dataclass(frozen=True)
 class PhysicalEstimates:
-    """An annotator's estimates of size, mass, friction and how the mass is spread.
+    """Estimates of size, mass, friction and mass distribution.
 
-    ``longest_axis_m`` is the longest extent of the object as it stands (None: keep the scale as it is). ``wall_thickness_m`` is
-    given for hollow things whose mesh is only an outer skin (None: the mesh is the solid matter, or full). ``mass_kg`` may be
-    None where only ``bulk_density_kg_m3`` (mass per volume of the repaired mesh) is known: one of both is given.
-    ``part_materials`` names a material of the priors by the role of a part, where parts are of unlike matter (None: not said).
-    ``findings`` are contradictions that remained when the annotator was asked again; None: its answers were not examined.
-    ``called`` is what it took the object for, where it looked; None: it did not.
+    - ``longest_axis_m``: longest extent of the object in its resting pose (None: keep the scale)
+    - ``mass_kg`` and ``bulk_density_kg_m3`` (mass per volume of the repaired mesh): at least one is given
+    - ``wall_thickness_m``: for hollow objects whose mesh is only the outer skin (None: the mesh is solid material, or full)
+    - ``part_materials``: material of the priors by part role, if parts differ in material (None: not stated)
+    - ``findings``: contradictions that remained after asking again; None if answers were not examined
+    - ``called``: name that the annotator gave the object from its pictures; None if it did not look
     """
 
     longest_axis_m: Estimate | None
@@ -87,7 +92,11 @@ class PhysicalEstimates:
 
 @dataclass(frozen=True)
 class PointsRequest:
-    """The numbered candidates, and pictures on which they are marked."""
+    """Numbered candidate points, and pictures in which they are marked.
+
+    ``positions_m`` and ``normals`` are ``(N, 3)`` in the object frame; ``visible`` has the indices of the candidates seen in
+    each view; ``max_opening_m`` is the widest opening of the grippers.
+    """
 
     subject: Subject
     positions_m: np.ndarray
@@ -105,9 +114,9 @@ class PointsRequest:
 
 @dataclass(frozen=True)
 class SelectedPoints:
-    """2-4 functional and 2-3 grasp points, each at a candidate; ``findings`` as those of ``PhysicalEstimates``.
+    """2-4 functional and 2-3 grasp points, each at a candidate; ``findings`` as in ``PhysicalEstimates``.
 
-    ``spare`` are the next best grasp points, best first: one of them takes the place of a point at which nothing holds.
+    ``spare`` are the next best grasp points, best first; they replace points at which no grasp holds.
     """
 
     functional: tuple[FunctionalPoint, ...]
@@ -118,7 +127,7 @@ class SelectedPoints:
 
 @dataclass(frozen=True)
 class CloserPlace:
-    """A place of the surface that a closer look has found: position and outward normal, ``(3,)`` each."""
+    """A place on the surface that a closer look has found: position and outward normal, ``(3,)`` each."""
 
     position_m: np.ndarray
     normal: np.ndarray
@@ -126,9 +135,9 @@ class CloserPlace:
 
 @dataclass(frozen=True)
 class CloserLook:
-    """What a look at functional points from nearby found, and the pictures ``(H, W, 3) uint8`` it was shown, by the points' ids.
+    """Result of a close-up look at functional points: improved places, and the pictures ``(H, W, 3) uint8`` shown, by point id.
 
-    A point that ``places`` does not name stays where it is.
+    A point that is not in ``places`` stays where it is.
     """
 
     places: Mapping[str, CloserPlace] = field(default_factory=dict)
@@ -140,9 +149,9 @@ AnnotatorQuestion = Literal["quality", "physical", "captions", "points"]
 
 
 class Annotator(Protocol):
-    """Answer the paper's four questions about an object. Raises BackendError where it cannot answer.
+    """Protocol of an annotator that answers the paper's four questions. Raises BackendError if it cannot answer.
 
-    ``picture_px`` is the side of the pictures that it reads best.
+    ``picture_px`` is the preferred side of its pictures in pixels.
     """
 
     name: str
@@ -150,11 +159,11 @@ class Annotator(Protocol):
     picture_px: int
 
     def model_for(self, question: AnnotatorQuestion) -> str | None:
-        """Return what decides the answer to a question besides the code: the model, and the prompt it is asked with."""
+        """Return what besides the code determines the answer to a question: the model and the prompt."""
         ...
 
     def expected_usd(self, question: AnnotatorQuestion) -> float:
-        """Return about what a question costs."""
+        """Return the approximate cost of a question in dollars."""
         ...
 
     def judge_quality(self, subject: Subject) -> QualityVerdict:
@@ -176,7 +185,7 @@ class Annotator(Protocol):
 
 @runtime_checkable
 class LooksCloser(Protocol):
-    """An annotator that looks at functional points once more, from nearby."""
+    """An annotator that refines functional points in close-up pictures."""
 
     def look_closer(self, request: PointsRequest, points: Sequence[FunctionalPoint]) -> CloserLook:
         """Return better places near the points, and the pictures that show them."""

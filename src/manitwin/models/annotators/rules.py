@@ -1,4 +1,4 @@
-"""The built-in annotator: rules over a table of priors and the mesh itself. Needs no weights, no key and no network."""
+"""The built-in annotator: rules over a table of priors and the mesh. It needs no weights, no key and no network."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ from manitwin.twin.record import Language
 from manitwin.twin.record_values import Estimate
 
 _SIZE_EXPONENT = 2.0
-"""Mass grows about with the square of the size in a category: larger things have relatively thinner walls."""
-_FILLED = 0.5  # of the volume of its hull: necks and waists of bottles leave 0.7 and more of it
-_SAME_SIZE_SPREAD = 0.6  # of the category's spread of mass that is left among things of one size
+"""Within a category mass grows with about the square of the size, because larger objects have relatively thinner walls."""
+_FILLED = 0.5  # of the volume of the convex hull; bottles with necks and waists fill 0.7 and more of it
+_SAME_SIZE_SPREAD = 0.6  # share of the category's log spread of mass that remains among objects of the same size
 
 
 class RulesAnnotator:
-    """Answer the paper's four questions from what is usually true of a thing of this name, and from its geometry.
+    """Answer the paper's four questions from the priors of the object's name and from its geometry.
 
-    What a picture alone shows is not judged. Without a name, the answers are wide and say so.
+    Visual quality is not judged. Without a name the intervals are wide, and the texts say so.
     """
 
     name = "rules"
     needs: Resource = "cpu"
-    picture_px = 512  # nobody but people looks at them
+    picture_px = 512  # the rules do not use pictures
 
     def model_for(self, question: AnnotatorQuestion) -> str | None:
         """Return None: there is no model."""
@@ -53,7 +53,7 @@ class RulesAnnotator:
         return 0.0
 
     def judge_quality(self, subject: Subject) -> QualityVerdict:
-        """Judge nothing: rules cannot see."""
+        """Judge nothing: rules do not use pictures."""
         return QualityVerdict(None, None, "rules do not look at pictures")
 
     def estimate_physical(self, subject: Subject) -> PhysicalEstimates:
@@ -61,16 +61,16 @@ class RulesAnnotator:
         return estimate_physical(subject, prior_of_subject(subject))
 
     def describe(self, subject: Subject, material: str, extents_m: np.ndarray) -> Language:
-        """Describe the object in words: colour and size as measured, the rest from the prior and the shape."""
+        """Describe the object: colour and size as measured, the rest from the prior and the shape."""
         return describe(subject, prior_of_subject(subject), material, extents_m)
 
     def select_points(self, request: PointsRequest) -> SelectedPoints:
-        """Choose functional and grasp points: the prior's parts, found as geometry."""
+        """Choose functional and grasp points: the prior's parts, located by geometric features."""
         return select_points(request, lookup(request.subject.name))
 
 
 def prior_of_subject(subject: Subject) -> Prior | None:
-    """Return the prior of what a thing is called, of the material that its name says, or that a template has made it of."""
+    """Return the prior of the object's name, in the material stated by the name or used by the template that built it."""
     given = subject.given
     look = look_of_words(given.material) if given is not None and given.made_of_parts else None
     prior = lookup(subject.name)
@@ -78,7 +78,7 @@ def prior_of_subject(subject: Subject) -> Prior | None:
 
 
 def estimate_physical(subject: Subject, prior: Prior | None) -> PhysicalEstimates:
-    """Return what the prior and the mesh say; ``prior`` is None where nobody has said what the thing is."""
+    """Return the estimates from the prior and the mesh; ``prior`` is None for an unnamed object."""
     density: Estimate | None
     bulk: Interval | None = None
     if prior is None:
@@ -115,12 +115,12 @@ def estimate_physical(subject: Subject, prior: Prior | None) -> PhysicalEstimate
 
 
 def _is_filled(solid: trimesh.Trimesh) -> bool:
-    """Tell whether a vessel's volume is that of its outside: one that is modelled with its walls is an empty one."""
+    """Tell whether the mesh of a vessel is its outer surface; a mesh with walls is that of an empty vessel."""
     return float(solid.volume) > _FILLED * float(solid.convex_hull.volume)
 
 
 def density_of_wall(prior: Prior, subject: Subject) -> Interval | None:
-    """Return the bulk density that the wall of a mesh in metres says, of the stated material or of those that are usual."""
+    """Return the bulk density that the wall thickness of a mesh in metres indicates, for the stated or the usual materials."""
     if prior.stated is None:
         return density_by_wall(prior, subject.solid, subject.seed)
     return density_as_stated(prior, MATERIALS[prior.stated].density_kg_m3, subject.solid, subject.seed)
@@ -129,14 +129,14 @@ def density_of_wall(prior: Prior, subject: Subject) -> Interval | None:
 def _mass(
     prior: Prior, bulk: Interval | None, longest_m: float, volume_m3: float, size_spread: float, full: bool
 ) -> Estimate:
-    """Combine what such a thing of this size weighs with ``bulk`` density times volume, the narrower one counting more.
+    """Combine the usual mass at this size with ``bulk`` density times volume, weighted by their precision.
 
-    Both are taken as log-normal. A volume is as unsure as the size that it was scaled by, ``size_spread`` in natural logs, three
-    times over (0: the size is known). The answer stays in the category's interval; its own interval is what the volume leaves
-    open, and reaches at least as far beyond the answer as both together are unsure: an answer at its end is not sure of itself.
-    By a guessed size it is also no denser and no lighter than such things are, which a thing of unusual proportions would be.
-    ``full``: it is what a full vessel weighs; the lower halves of the intervals, which are of vessels that are not full, say
-    nothing of which of the two is narrower.
+    Both are treated as log-normal. ``size_spread`` is the log standard deviation of a guessed size, which the volume
+    multiplies by three (0: the size is known). The result stays in the category's interval. Its own interval is that of the
+    volume estimate, and extends at least as far from the result as the combined uncertainty. With a guessed size the density
+    also stays within its usual interval, which an object of unusual proportions would violate. ``full``: the result is the
+    mass of a full vessel; the lower halves of the intervals, which come from partly filled vessels, are ignored for the
+    weights.
     """
     by_size = _scaled(prior.mass_kg, (longest_m / prior.longest_axis_m.typical) ** _SIZE_EXPONENT)
     if bulk is None:
@@ -157,9 +157,9 @@ def _mass(
 
 
 def _mass_spread(spread_at_size: float, spread_at_volume: float, size_spread: float) -> float:
-    """Return how unsure the combined mass is, in natural logs.
+    """Return the log standard deviation of the combined mass.
 
-    A wrong size moves both opinions the same way: the one with its square, the other with its cube.
+    A wrong size shifts both estimates in the same direction, one with its square and the other with its cube.
     """
     weights = np.array([spread_at_size**-2, spread_at_volume**-2])
     exponent = float(weights @ [_SIZE_EXPONENT, 3.0] / weights.sum())
@@ -167,7 +167,7 @@ def _mass_spread(spread_at_size: float, spread_at_volume: float, size_spread: fl
 
 
 def _unknown_mass(density_kg_m3: Estimate | None, volume_m3: float) -> Estimate:
-    """Return any usual bulk density times the volume: all that can be said of a thing that nobody has named."""
+    """Return the usual bulk density times the volume, the only estimate for an unnamed object."""
     assert density_kg_m3 is not None
     value, low, high = (each * volume_m3 for each in (density_kg_m3.value, density_kg_m3.low, density_kg_m3.high))
     return Estimate(value=value, low=low, high=high, source=density_kg_m3.source)
@@ -178,9 +178,10 @@ def _scaled(interval: Interval, factor: float) -> Interval:
 
 
 def _clamped(value: float, open_to: Interval, category: Interval, source: str) -> Estimate:
-    """Keep ``value`` in the category's interval, and of that interval what is left open around it.
+    """Clamp ``value`` to the category's interval, and its interval to the overlap of ``open_to`` and the category's.
 
-    Where it has to be moved, size and volume are not those of such a thing: it may weigh what is usual of it, or what they say.
+    If the value is moved, size and volume are unusual for the category; the interval then includes both the typical mass and
+    the original value.
     """
     kept = min(max(value, category.low), category.high)
     low, high = max(category.low, open_to.low), min(category.high, open_to.high)
@@ -190,7 +191,7 @@ def _clamped(value: float, open_to: Interval, category: Interval, source: str) -
 
 
 def _wall_thickness(subject: Subject, prior: Prior, scale: float) -> float | None:
-    """Return the wall of a thing hollow behind a closed skin, None where the mesh is the matter itself or full."""
+    """Return the wall thickness of an object that is hollow behind a closed skin; None if the mesh is solid material or full."""
     if prior.mass_distribution != "shell" or prior.wall_thickness_m is None:
         return None
     thickness_m = scale * median_thickness(subject.solid, subject.seed)

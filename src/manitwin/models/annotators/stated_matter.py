@@ -1,8 +1,9 @@
-"""A material that a name says: a steel mug is what the priors say of a mug, but of steel.
+"""Priors adapted to a material stated in the name: a steel mug has the prior of a mug, but of steel.
 
-The words are those of texts (``generators/templates/looks.py``). What such things weigh goes with the material: mass per volume
-as the densities, but a scan swells thin walls more than thick ones; mass at a size as density times the wall that ware of either
-material usually has (``prior_tables/materials.toml``), or, of what need not be a wall, anything from that to the density alone.
+The words are those of texts (``generators/templates/looks.py``). The usual masses are scaled with the material. Mass per
+volume scales with the density, where a scan thickens thin walls more than thick ones. Mass at a given size scales with
+density times the usual wall thickness of the materials (``prior_tables/materials.toml``); for objects that need not be walls,
+with anything between that and the density alone.
 """
 
 from __future__ import annotations
@@ -22,16 +23,16 @@ from manitwin.models.generators.templates.looks import MATERIALS, SAID_OF, Look
 from manitwin.models.generators.templates.matter import is_composite, is_food, looks_in, surfaces_of
 
 USUAL_WALL_M = 0.003
-"""The wall of open ware in materials that list none: silicone, cardboard, leather."""
+"""Wall thickness of open containers in materials that list none: silicone, cardboard, leather."""
 OF_ONE_MATTER = 0.5
-"""Mass per volume over the density of the material, below which a thing counts as hollow."""
+"""Ratio of bulk density to material density below which an object counts as hollow."""
 IMITATION = (0.08, 0.4, 1.0)
-"""Mass per volume over the density of its matter: imitations of food are hollow or solid (YCB 010 to 018: 0.05 to 0.45)."""
+"""Ratio of bulk density to material density for imitations of food, hollow or solid (YCB 010 to 018: 0.05 to 0.45)."""
 _LIGHTEST_KG_M3 = 10.0
 
 
 def prior_as_named(name: str | None) -> Prior | None:
-    """Return the prior of what a person calls a thing, of the material that the name says; None where there is none."""
+    """Return the prior of an everyday name in the material that the name states; None if the name is unknown."""
     found = found_by(name)
     if found is None or name is None:
         return None
@@ -41,9 +42,9 @@ def prior_as_named(name: str | None) -> Prior | None:
 
 
 def prior_of(prior: Prior, look: Look) -> Prior:
-    """Return a prior as it is of another material than such things usually are; itself where they are of it anyway.
+    """Return a prior in another material than usual; the prior itself if the material is the usual one.
 
-    Where such things have parts of unlike materials, the first part is of the new one, an unknown share of the mass.
+    If such objects have parts of different materials, the first part, an unknown share of the mass, gets the new material.
     """
     said = SAID_OF.get(look.material, look.material)
     if is_composite(prior):
@@ -68,7 +69,7 @@ def prior_of(prior: Prior, look: Look) -> Prior:
 
 
 def look_of_words(material: str | None) -> Look | None:
-    """Return the look of a twin's words for its material; None for several materials, and for none that is known."""
+    """Return the look for a twin's material in words; None for several materials or an unknown one."""
     if material is None:
         return None
     of_words = {said: name for name, said in SAID_OF.items()}
@@ -76,7 +77,7 @@ def look_of_words(material: str | None) -> Look | None:
 
 
 def _look_in(name: str, called: str, prior: Prior) -> Look | None:
-    """Return the material that a name says before, in or behind the words for the thing; None for none, and for several."""
+    """Return the material that a name states before, within or after the words for the object; None for none or several."""
     words = re.sub(
         r"[^a-z0-9,]+", " ", without_diacritics(name).replace("\u2019", "").replace("'", "").replace(",", " , ")
     ).split()
@@ -88,12 +89,12 @@ def _look_in(name: str, called: str, prior: Prior) -> Look | None:
     try:
         said = materials_said(words[:begin], words[begin:end], words[end:], prior)
     except UsageError:
-        return None  # steel and wood: nobody knows which is meant
+        return None  # ambiguous, e.g. steel and wood
     return said[0] if len(set(said)) == 1 else None
 
 
 def _weighed(prior: Prior, look: Look) -> tuple[tuple[float, float, float], Interval | None]:
-    """Return the factors (low, typical, high) of the mass of such things of one size, and their bulk density."""
+    """Return the factors (low, typical, high) on the mass at a given size, and the bulk density."""
     usual, bulk = looks_in(prior.material), prior.bulk_density_kg_m3
     if is_food(prior) and bulk is not None:
         low, typical, high = (share * look.density_kg_m3 for share in IMITATION)
@@ -116,14 +117,14 @@ def _weighed(prior: Prior, look: Look) -> tuple[tuple[float, float, float], Inte
 
 
 def _holds(prior: Prior, density_kg_m3: float) -> bool:
-    """Tell whether the mass of such things is that of their contents rather than of their material."""
+    """Tell whether the mass of such objects comes mostly from their contents instead of their material."""
     bulk = prior.bulk_density_kg_m3
     light = bulk is not None and bulk.typical < OF_ONE_MATTER * density_kg_m3
     return prior.vessel or (prior.mass_distribution == "full" and light)
 
 
 def _as_swollen(bulk: Interval, density_kg_m3: float, look: Look, wall_m: float) -> Interval:
-    """Return the bulk density of scans in another material, whose walls a scan swells the less the thicker they are."""
+    """Return the bulk density of scans in another material; a scan thickens thick walls relatively less."""
     ends = []
     for value in (bulk.low, bulk.typical, bulk.high):
         full = min(value / density_kg_m3, 1.0)
@@ -134,7 +135,7 @@ def _as_swollen(bulk: Interval, density_kg_m3: float, look: Look, wall_m: float)
 
 
 def _with_one_part_of(prior: Prior, look: Look, said: str) -> Prior:
-    """Return a prior of things with parts of unlike matter, the first of which is of another one."""
+    """Return a prior of objects with parts of different materials, with another material for the first one."""
     first = looks_in(re.split(r" and | with ", prior.material)[0])
     if not first or first[0].surface != prior.surface:
         return prior

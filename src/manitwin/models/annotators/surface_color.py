@@ -1,4 +1,4 @@
-"""Measured and named colours of a thing's surface: by area, in CIELAB; texture images hold much that no face shows."""
+"""Measurement and naming of surface colours in CIELAB, by visible area: texture images contain regions that no face uses."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from manitwin.formats.meshes.textures import linear_to_srgb, material_of, uv_of
 from manitwin.geometry.openness import open_share
 from manitwin.geometry.sampling import sample_surface
 
-# (name, sRGB hex). Several shades share a name. Names and regions follow the ISCC-NBS centroid colours (Kelly and Judd
-# 1955, level 2) and the basic colour terms of Berlin and Kay 1969; the shades are chosen by eye within those regions. Black and
-# dark grey are the centroids 267 and 266: between them lies L* 25, the Munsell value 2.5 at which ISCC-NBS parts the two. The
-# last six pinks are the yellowish pinks (25, 26, 28 to 30, 32), which people call pink, salmon, coral or peach; the greyish one
-# (32) has a little more chroma here and brownish pink and yellowish grey (33, 93) are beige, since cloth and stone were pink. The
-# paler oranges are 53 and 52: crusts of bread and buns were pink and tan.
+# (name, sRGB hex). Several shades share a name. Names and regions follow the ISCC-NBS centroid colours (Kelly and Judd 1955,
+# level 2) and the basic colour terms of Berlin and Kay 1969; the shades are chosen by eye within those regions. Black and dark
+# grey are the centroids 267 and 266: between them lies L* 25, the Munsell value 2.5 at which ISCC-NBS separates the two. The
+# last six pinks are the yellowish pinks (25, 26, 28 to 30, 32), commonly called pink, salmon, coral or peach; the greyish one
+# (32) has slightly more chroma here, and brownish pink and yellowish grey (33, 93) are beige, because cloth and stone were
+# named pink otherwise. The paler oranges are 53 and 52, because crusts of bread and buns were named pink and tan otherwise.
 _SHADES: tuple[tuple[str, str], ...] = (
     ("blue", "0a18f0"), ("blue", "1e3cbe"), ("dark blue", "0a0a8c"), ("dark red", "8c0808"),
     ("black", "0a0a0a"), ("black", "222222"), ("dark grey", "555555"),
@@ -48,18 +48,18 @@ _FAMILIES: dict[str, str] = {
        for shade in ("dark", "light")},
     "grey-blue": "blue", "grey-green": "green", "yellow-green": "green", "grey-brown": "brown", "tan": "beige",
 }  # fmt: skip
-"""Of shades that are one colour to a person who names an object by it: the colour."""
+"""Colour family of shades that people do not distinguish when they name an object by its colour."""
 _NEUTRAL = frozenset({"black", "dark grey", "grey", "light grey", "white"})
 _TELLING = (
     1 / 3
 )  # of the largest neutral colour's share: a colour of that much comes first, a red box with white letters is red
 _METALLIC = 0.5
 _GOLDEN_HUE_RAD, _GOLDEN_CHROMA = (np.deg2rad(75.0), np.deg2rad(97.0)), (29.0, 50.0)
-"""CIELAB hue and chroma of gold and brass in photos, however dark (docs/measured/annotations.md).
+"""CIELAB hue and chroma of gold and brass in photos, at any lightness (docs/measured/annotations.md).
 
 Brown paint has less hue, olive paint more, and yellow paint more chroma.
 """
-_YELLOW_HUE_RAD = np.deg2rad(78.0)  # of CIELAB: between the centres of orange (70) and yellow (86)
+_YELLOW_HUE_RAD = np.deg2rad(78.0)  # CIELAB hue between the centres of orange (70) and yellow (86)
 
 _WHITE_D65 = np.array([0.95047, 1.0, 1.08883])
 _LINEAR_SRGB_TO_XYZ = np.array(  # IEC 61966-2-1
@@ -70,23 +70,23 @@ _NAMES = [name for name, _ in _SHADES]
 UNTEXTURED = "unknown color (untextured)"
 _SAMPLES = 3000
 _CLUSTERS = 8
-_SAME_COLOR = 16.0  # CIELAB distance under which clusters are shades of one colour
-_NEAR = 25.0  # CIELAB distance of shades that one may be taken for the other: dark grey and black, white and light grey
-_LIGHTNESS = 0.5  # how much a difference in lightness counts of one in tint
-_LEAST_OPEN = 1 / 3  # of the surroundings: the bottom of a mug sees less, and hardly anybody sees it
+_SAME_COLOR = 16.0  # CIELAB distance below which clusters are shades of one colour
+_NEAR = 25.0  # CIELAB distance of shades that are easily confused: dark grey and black, white and light grey
+_LIGHTNESS = 0.5  # weight of a difference in lightness relative to one in chromaticity
+_LEAST_OPEN = 1 / 3  # minimum open share of the surroundings; the bottom of a mug has less and is hardly visible
 _LEAST_SEEN = (
     1 / 50
 )  # of the samples: a book whose leaves are each modelled shows a twentieth; inside out, hardly any is seen
-_LEAST_SHARE = 0.12  # of the surface, to be named beside the main colour
+_LEAST_SHARE = 0.12  # minimum share of the surface of a colour named besides the main one
 _MOST_NAMES = 3
-_MOST_OF = 2 / 3  # of a family's share: it is called as its member of that much
-# Base colours that readers and modelling tools write where nobody has chosen one: white (glTF 2.0, 5.22.2) and the grey
-# of 0.8 (the default Kd of OBJ material libraries and of Blender).
+_MOST_OF = 2 / 3  # minimum share of a family for its largest member to give the name
+# Default base colours of readers and modelling tools: white (glTF 2.0, 5.22.2) and the grey of 0.8 (default Kd of OBJ material
+# libraries and of Blender).
 _DEFAULT_COLORS = ((255, 255, 255), (204, 204, 204))
 
 
 def lab_from_srgb(rgb: np.ndarray) -> np.ndarray:
-    """Convert sRGB ``(..., 3)`` in 0..1 to CIELAB (D65). Source: IEC 61966-2-1 and CIE 15:2004, 8.2.1."""
+    """Convert sRGB ``(..., 3)`` in [0, 1] to CIELAB (D65). Source: IEC 61966-2-1 and CIE 15:2004, 8.2.1."""
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     xyz = linear @ _LINEAR_SRGB_TO_XYZ.T / _WHITE_D65
     cube = np.where(xyz > (6 / 29) ** 3, np.cbrt(xyz), xyz / (3 * (6 / 29) ** 2) + 4 / 29)
@@ -102,9 +102,10 @@ _LAB = lab_from_srgb(np.array([_srgb_from_hex(shade) for _, shade in _SHADES]))
 
 
 def color_name(lab: np.ndarray, *, metallic: bool = True, metal_in_a_photo: bool = False) -> str:
-    """Return the everyday name of a CIELAB colour ``(3,)``; only what is ``metallic`` is gold.
+    """Return the everyday name of a CIELAB colour ``(3,)``; gold is used only for ``metallic`` colours.
 
-    How bright metal is in a photo is told by what it reflects: then hue and chroma alone make it gold.
+    The lightness of metal in a photo depends on its reflections, so with ``metal_in_a_photo`` hue and chroma alone decide on
+    gold.
     """
     hue_rad, chroma = np.arctan2(lab[2], lab[1]), np.hypot(lab[1], lab[2])
     (least_rad, most_rad), (least, most) = _GOLDEN_HUE_RAD, _GOLDEN_CHROMA
@@ -117,11 +118,11 @@ def color_name(lab: np.ndarray, *, metallic: bool = True, metal_in_a_photo: bool
 
 
 def are_near(name: str, other: str) -> bool:
-    """Tell whether two colour names are shades of one colour, or have shades that lie near each other in CIELAB."""
+    """Tell whether two colour names are of one family, or have shades that are close in CIELAB."""
     if _family(name) == _family(other):
         return True
     one, two = (_LAB[[each == color for each in _NAMES]] for color in (name, other))
-    if not len(one) or not len(two):  # a name without shades of its own: nothing says that it is far
+    if not len(one) or not len(two):  # a name without shades of its own cannot be compared
         return True
     return bool(np.linalg.norm(one[:, None] - two[None], axis=-1).min() < _NEAR)
 
@@ -145,13 +146,13 @@ def measure_colors(
     *,
     metal_in_a_photo: bool = False,
 ) -> list[ColorShare]:
-    """Return up to three named colours, as people order them; empty where nothing gives the surface a colour.
+    """Return up to three named colours in the order in which people name them; empty if the surface has no colours.
 
-    The largest comes first, but a colour that tells things apart before black, grey and white that are not much more.
-    A default white or grey counts beside parts that have colours: whoever chose those left it so, and it is seen.
-    ``parts`` are visual parts with PBR materials. Colours are the base colours; ``own_colors`` turns those of a photo's
-    pixels (sRGB ``(N, 3)`` in 0..1) into the matter's own, where the photo's light is known. ``metal_in_a_photo``: they are
-    those of a photo of something that is all metal.
+    The largest colour comes first, except that a chromatic colour precedes black, grey and white unless these are much
+    larger. A default white or grey counts if other parts have colours, because it was then left on purpose and is visible.
+    ``parts`` are visual parts with PBR materials; their base colours are used. ``own_colors`` converts the colours of a
+    photo's pixels (sRGB ``(N, 3)`` in [0, 1]) to the object's own, if the light of the photo is known. ``metal_in_a_photo``
+    tells that the colours are those of a photographed all-metal object.
     """
     colored = list(parts) if any(_has_color(part) for part in parts) else []
     areas = np.array([part.area for part in colored])
@@ -167,7 +168,7 @@ def measure_colors(
 
 
 def seen_from_outside(mesh: trimesh.Trimesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Return whether each surface point ``(N, 3)`` can well be seen from outside; True for all where hardly any can."""
+    """Return a mask (N,) of the surface points ``(N, 3)`` that are well visible from outside; all True if hardly any are."""
     seen = open_share(mesh, points, normals) >= _LEAST_OPEN
     return seen if seen.mean() >= _LEAST_SEEN else np.ones(len(points), dtype=bool)
 
@@ -189,19 +190,19 @@ def _has_color(part: trimesh.Trimesh) -> bool:
 def _base_colors(
     part: trimesh.Trimesh, count: int, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the base colour (sRGB in 0..1), place and outward normal, ``(count, 3)`` each, spread evenly over the part."""
+    """Sample a part uniformly; return base colours (sRGB in [0, 1]), positions and outward normals, ``(count, 3)`` each."""
     points, normals, faces = sample_surface(part, count, rng)
     return base_colors_at(part, faces, points), points, normals
 
 
 def base_colors_at(part: trimesh.Trimesh, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return the base colour (sRGB in 0..1) ``(N, 3)`` of a part at points ``(N, 3)`` of its faces ``(N,)``."""
+    """Return the base colours ``(N, 3)`` (sRGB in [0, 1]) of a part at points ``(N, 3)`` on its faces ``(N,)``."""
     material, uv = material_of(part), uv_of(part)
-    factor = np.asarray(material.baseColorFactor, dtype=float)[:3] / 255  # linear, as glTF has it
+    factor = np.asarray(material.baseColorFactor, dtype=float)[:3] / 255  # linear, as in glTF
     if material.baseColorTexture is None or uv is None:
         return np.repeat(linear_to_srgb(factor)[None], len(points), axis=0)
     corners = trimesh.triangles.points_to_barycentric(part.triangles[faces], points)
-    corners = np.nan_to_num(corners, nan=1 / 3)  # of a face without area any corner will do
+    corners = np.nan_to_num(corners, nan=1 / 3)  # any corner is valid for a degenerate face
     at = np.einsum("ni,nij->nj", corners, uv[part.faces[faces]])
     image = np.asarray(material.baseColorTexture.convert("RGB"))
     height, width = image.shape[:2]
@@ -213,9 +214,10 @@ def base_colors_at(part: trimesh.Trimesh, faces: np.ndarray, points: np.ndarray)
 
 
 def named_colors(lab: np.ndarray, metallic: bool, *, metal_in_a_photo: bool = False) -> list[ColorShare]:
-    """Return up to three named colours of what a camera saw of a surface at places ``(N, 3)`` CIELAB, as people order them.
+    """Return up to three named colours of observed surface colours ``(N, 3)`` in CIELAB, in the order in which people name them.
 
-    Places that one matter may show under more or less light are one matter: a scan's texture holds the light of its capture.
+    Colours that one material may have under different light are merged, because the texture of a scan contains the light of
+    its capture.
     """
     centers, labels = _merged(*_k_means(lab))
     shares: dict[str, float] = {}
@@ -227,7 +229,7 @@ def named_colors(lab: np.ndarray, metallic: bool, *, metal_in_a_photo: bool = Fa
 
 
 def _by_family(shares: dict[str, float]) -> dict[str, float]:
-    """Join shades that are one colour to a person, called as the one that is most of it; a shade alone keeps its name."""
+    """Join shades of one family under the name of its dominant shade; a single shade keeps its name."""
     members: dict[str, list[str]] = {}
     for name in shares:
         members.setdefault(_FAMILIES.get(name, name), []).append(name)
@@ -246,7 +248,7 @@ def _ranked(shares: dict[str, float]) -> list[ColorShare]:
 
 
 def _k_means(lab: np.ndarray, rounds: int = 15) -> tuple[np.ndarray, np.ndarray]:
-    """Cluster colours ``(N, 3)``: Lloyd's k-means from far-apart starts, so that equal input gives equal clusters."""
+    """Cluster colours ``(N, 3)`` with Lloyd's k-means from farthest-point starts, which is deterministic."""
     centers = [np.median(lab, axis=0)]
     distance = _apart(lab, centers[0])
     while len(centers) < _CLUSTERS and distance.max() > _SAME_COLOR / 2:
@@ -261,10 +263,10 @@ def _k_means(lab: np.ndarray, rounds: int = 15) -> tuple[np.ndarray, np.ndarray]
 
 
 def _apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return how far colours ``(..., 3)`` are from being one matter's under more and less light.
+    """Return the distance of colours ``(..., 3)`` from being one material's under different light.
 
-    Light scales XYZ, and so a* and b* with L* + 16 (CIE 15:2004, 8.2.1): they are compared as under the light of the
-    darker one. Lightness counts half, as for acceptability in CMC(2:1) (Clarke, McDonald, Rigg 1984).
+    Light scales XYZ, and thereby a* and b* in proportion to L* + 16 (CIE 15:2004, 8.2.1): both colours are compared as under
+    the light of the darker one. Lightness counts half, as for acceptability in CMC(2:1) (Clarke, McDonald, Rigg 1984).
     """
     light_one, light_other = one[..., :1] + 16, other[..., :1] + 16
     darker = np.minimum(light_one, light_other)

@@ -1,7 +1,7 @@
-"""Walls: how thick a mesh is, whether it is a closed skin, and what its wall tells of its matter: nobody moulds plastic thick.
+"""Wall thickness of a mesh: whether the mesh is a closed outer skin, and which materials and densities its wall indicates.
 
-Such things as containers and cups are made of plastic, clay or sheet metal, whose densities differ by a factor of eight, but so
-do the walls that they are made with.
+Containers and cups are made of plastic, clay or sheet metal, whose densities differ by a factor of eight, but so do the usual
+thicknesses of their walls: plastic is not moulded thick.
 """
 
 from __future__ import annotations
@@ -18,32 +18,34 @@ from manitwin.models.annotators.prior_records import DEVIATIONS_ACROSS, Interval
 from manitwin.models.annotators.priors import load_materials
 
 METALS = ("steel", "aluminium")
-"""What a prior means that says metal."""
+"""Materials that a prior's word "metal" stands for."""
 HOLLOW_WHERE_THICK = (*METALS, "plastic")
-"""What thick walls of open ware are made of as two skins, as nobody presses sheet or moulds plastic so thick."""
-MEASURED_SPREAD = 0.25  # natural logs: how far a scan's median thickness and volume are off those of the thing
-LEAST_SHARE = 0.05  # a material that is less likely than this is left out of an interval that is meant to hold 90 %
-_SKIN_FACTOR = 3.0  # a mesh this many times thicker than the wall of such a thing is a closed outer skin
-_LEAST_SKIN_M = 0.008  # thicker in the median than both walls of any thin-walled thing (measured: 5 mm at most)
+"""Materials whose thick open walls consist of two skins, since neither sheet metal nor moulded plastic is that thick."""
+MEASURED_SPREAD = 0.25  # natural log: error of a scan's median thickness and volume
+LEAST_SHARE = 0.05  # materials less probable than this are left out of an interval meant to hold 90 %
+_SKIN_FACTOR = 3.0  # a mesh this many times thicker than the usual wall is a closed outer skin
+_LEAST_SKIN_M = (
+    0.008  # above the median thickness of any thin-walled object with both sides modelled (measured: 5 mm at most)
+)
 _THICKNESS_SAMPLES = 800
 
 
 def median_thickness(solid: trimesh.Trimesh, seed: int) -> float:
-    """Return the median thickness behind points all over a mesh, in its unit."""
+    """Return the median thickness of a mesh, measured inward from surface samples, in the mesh's unit."""
     points, normals, _ = sample_surface(solid, _THICKNESS_SAMPLES, np.random.default_rng(seed))
     return float(np.median(local_thickness(solid, points, normals)))
 
 
 def is_outer_skin(thickness_m: float, wall_thickness_m: float) -> bool:
-    """Tell whether a mesh of that median thickness has only the outer side of such a wall: too thick to be the wall."""
+    """Tell whether a mesh of this median thickness lacks the inner side of the wall, because it is too thick to be the wall."""
     return thickness_m > max(_SKIN_FACTOR * wall_thickness_m, _LEAST_SKIN_M)
 
 
 def density_by_wall(prior: Prior, solid: trimesh.Trimesh, seed: int) -> Interval | None:
-    """Return the bulk density (kg/m3) that the wall of a mesh in metres leaves of the materials that its prior names.
+    """Return the bulk density (kg/m3) from the wall thickness of a mesh in metres and the materials that its prior names.
 
-    None where the prior names fewer than two that walls are made of, where such a thing is no open ware, and where the mesh is
-    thicker than the thickest of such walls: then it is no wall.
+    None if the prior names fewer than two wall materials, if such objects are not open containers, or if the mesh is thicker
+    than the thickest of these walls.
     """
     options = wall_materials(prior)
     if (
@@ -60,10 +62,11 @@ def density_by_wall(prior: Prior, solid: trimesh.Trimesh, seed: int) -> Interval
 
 
 def density_as_stated(prior: Prior, density_kg_m3: float, solid: trimesh.Trimesh, seed: int) -> Interval | None:
-    """Return the bulk density (kg/m3) that the wall of a mesh in metres leaves of the material that it is stated to be of.
+    """Return the bulk density (kg/m3) from the wall thickness of a mesh in metres and its stated material.
 
-    A wall as thin as usual is all matter; a thicker one may be swollen by its scan. One that is thicker than any of sheet or
-    moulded plastic is hollow between two skins. None where the mesh is no open ware, and of another wall that is too thick.
+    A wall of usual thickness is all material; a thicker one may be thickened by its scan. A wall thicker than any of sheet
+    metal or moulded plastic consists of two skins. None if the object is not an open container, and for too thick walls of
+    other materials.
     """
     walls, matter = load_materials()[prior.surface].wall_m, load_materials()[prior.surface].density_kg_m3
     if walls is None or not prior.container or prior.mass_distribution != "solid":
@@ -85,7 +88,7 @@ def density_as_stated(prior: Prior, density_kg_m3: float, solid: trimesh.Trimesh
 
 @dataclass(frozen=True)
 class WallMaterial:
-    """A material that walls are made of: its density (kg/m3), usual walls (m), and how many such things are of it, relatively."""
+    """A material of walls: density (kg/m3), usual wall thickness (m), and relative frequency among such objects."""
 
     density_kg_m3: Interval
     wall_m: Interval
@@ -93,7 +96,7 @@ class WallMaterial:
 
 
 def wall_materials(prior: Prior) -> dict[str, WallMaterial]:
-    """Return the materials that a prior names and that walls are made of, all as usual; its metals share the vote of one."""
+    """Return the wall materials that a prior names, with equal weights; metals share the weight of one."""
     words = prior.material.replace(",", " ").split()
     names = [(name, 1 / len(METALS)) for name in METALS if "metal" in words] + [(word, 1.0) for word in words]
     known = load_materials()
@@ -105,9 +108,10 @@ def wall_materials(prior: Prior) -> dict[str, WallMaterial]:
 
 
 def _left_open(options: Sequence[WallMaterial], thickness_m: float, within: Interval) -> Interval:
-    """Return the mean density by the likelihood of such a wall, all as log-normal, between those of all that it may well be.
+    """Return the mean density by the likelihood of this wall thickness, with an interval over all probable materials.
 
-    ``within`` is what scans of such things have: of swollen sheet metal less than the metal.
+    All distributions are log-normal. ``within`` is the usual interval of scans; thickened sheet metal has less than the
+    density of the metal.
     """
     spread = np.hypot([each.wall_m.log_spread for each in options], MEASURED_SPREAD)
     away = np.log(thickness_m / np.array([each.wall_m.typical for each in options])) / spread

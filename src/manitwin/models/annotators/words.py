@@ -1,4 +1,4 @@
-"""Put an object into words: colour and size as measured, the rest from its prior and its shape."""
+"""Descriptions of an object in words: colour and size as measured, the rest from its prior and its shape."""
 
 from __future__ import annotations
 
@@ -16,12 +16,21 @@ from manitwin.twin.record import Language
 
 UNKNOWN_FUNCTION = "unknown function (no name given that the priors know)"
 
-# Up to this longest side (m).
+# upper limits of the longest side (m)
 _SIZE_WORDS = ((0.03, "tiny"), (0.10, "palm-sized"), (0.20, "hand-sized"), (0.35, "medium-sized"), (np.inf, "large"))
 
-_A_NOT_AN = ("uk", "uni", "usb", "use", "ute", "eu", "one", "once")  # spelt with a vowel, spoken with a consonant
+_A_NOT_AN = (
+    "uk",
+    "uni",
+    "usb",
+    "use",
+    "ute",
+    "eu",
+    "one",
+    "once",
+)  # starts with a vowel in writing but a consonant in speech
 _LETTERS_FROM_A_VOWEL = "efhilmnorsx"
-"""Letters that stand alone are spoken by their names: an s hook, a u joint."""
+"""Single letters whose names start with a vowel: an s hook, but a u joint."""
 _AN_NOT_A = ("hour", "honest", "heir", "mp3", "x-ray")
 _SINGULAR_ENDS = ("ss", "us", "is", "as", "os", "lens", "series")
 _SHORTEST_PLURAL = 3
@@ -50,10 +59,10 @@ _MADE_OF = {"wooden": "wood", "woollen": "wool", "golden": "gold", "metallic": "
 
 
 def article(phrase: str) -> str:
-    """Return 'a' or 'an', as the first sound of a phrase asks for."""
+    """Return 'a' or 'an', as the first sound of a phrase requires."""
     first = phrase.lower()
     letter = re.match(r"([a-z])(?![a-z0-9'])", first)
-    if letter is not None and letter[1] != "a":  # an article of its own: 'a mug'
+    if letter is not None and letter[1] != "a":  # the phrase starts with an article: 'a mug'
         return "an" if letter[1] in _LETTERS_FROM_A_VOWEL else "a"
     if first.startswith(_AN_NOT_A) or (first[:1] in "aeiou" and not first.startswith(_A_NOT_AN)):
         return "an"
@@ -61,7 +70,7 @@ def article(phrase: str) -> str:
 
 
 def _takes_no_article(noun: str) -> bool:
-    """Tell whether a thing that no prior knows is named in the plural, or as no single thing: kitchen utensils, tableware."""
+    """Tell whether an unknown noun is a plural or uncountable: kitchen utensils, tableware."""
     last = noun.split()[-1]
     plural = last.endswith("s") and len(last) > _SHORTEST_PLURAL and not last.endswith(_SINGULAR_ENDS)
     return plural or last in _NO_SINGLE_THING or (last.endswith("ware") and last != "ware")
@@ -73,7 +82,7 @@ def joined(words: list[str]) -> str:
 
 
 def size_words(extents_m: np.ndarray) -> str:
-    """Return extents ``(3,)`` as '21 x 16 x 7 cm, medium-sized', the longest first."""
+    """Return extents ``(3,)`` in m as '21 x 16 x 7 cm, medium-sized', the longest first."""
     longest, second, shortest = sorted((100 * float(e) for e in extents_m), reverse=True)
     digits = 0 if shortest >= 3 else 1
     numbers = " x ".join(f"{value:.{digits}f}" for value in (longest, second, shortest))
@@ -81,7 +90,7 @@ def size_words(extents_m: np.ndarray) -> str:
 
 
 def describe(subject: Subject, prior: Prior | None, material: str, extents_m: np.ndarray) -> Language:
-    """Describe an object; ``prior`` is None where nobody has said what it is, and then the words say so."""
+    """Describe an object; without a ``prior`` (unnamed object) the texts say that it is unknown."""
     rng = np.random.default_rng(subject.seed)
     own_colors = None if subject.light is None else subject.light.own_colors
     colors = measure_colors(
@@ -104,12 +113,12 @@ def describe(subject: Subject, prior: Prior | None, material: str, extents_m: np
 
 
 def is_metal(material: str) -> bool:
-    """Tell whether a material in words is metal and nothing else."""
+    """Tell whether a material in words is metal only."""
     return all(matter.split()[-1] in _METALS for matter in re.split(r", | and | or | with ", material) if matter)
 
 
 def _category(subject: Subject, prior: Prior | None) -> str:
-    """Return what the user calls it: a 'coffee mug' is a mug, but a 'skillet' is called so and a 'pan' is no frying pan."""
+    """Return the noun for the object: a 'coffee mug' is a mug, but a 'skillet' stays one and a 'pan' is not a frying pan."""
     found = found_by(subject.name)
     if prior is None or found is None:
         return normalised(subject.name) or "unknown" if subject.name else "unknown"
@@ -134,14 +143,16 @@ def _shape(subject: Subject, prior: Prior | None, rng: np.random.Generator) -> s
         proportion = measured.proportion
         said = prior.shape.lower()
         if measured.is_box and _ROUND & set(re.findall(r"\w+", said)):
-            return measured.word  # most speakers are cylinders, this one is none
+            return (
+                measured.word
+            )  # the prior's shape contradicts the geometry: most speakers are cylinders, this one is a box
         return prior.shape if proportion == "compact" or proportion in said else f"{prior.shape}, {proportion}"
     opening = find_opening(subject.solid)
     return f"{measured.word} and hollow, open at one side" if opening is not None else measured.word
 
 
 def _says(noun: str, material: str) -> bool:
-    """Tell whether a noun says what the thing is made of: a glass bottle, a wooden spoon, a bar of soap."""
+    """Tell whether a noun already states the material: a glass bottle, a wooden spoon, a bar of soap."""
     words = {_MADE_OF.get(word, word) for word in noun.lower().split()}
     return material.lower() in words
 
@@ -151,9 +162,9 @@ def _capitalised(sentence: str) -> str:
 
 
 def write_captions(category: str, prior: Prior | None, material: str, color: str, shape: str, size: str) -> list[str]:
-    """Return captions of differing length, style and content, the full sentence first; ``color`` may be empty: unknown.
+    """Return captions of different length, style and content, a full sentence first; ``color`` may be empty (unknown).
 
-    No two of them tell the same facts: of colour, material, numbers, size word, shape and use each tells another choice.
+    Each caption uses another combination of colour, material, dimensions, size word, shape and use.
     """
     noun = "object" if category == "unknown" else category
     counter = None if prior is None else counter_of(prior, noun)

@@ -22,7 +22,7 @@ CLASSES = 1000
 
 @dataclass(frozen=True)
 class ImageNetNames:
-    """Names in alphabetical order with the classes that each covers, ``members (N, 1000) bool``, and the same for general terms."""
+    """Names in alphabetical order with the classes that each covers, ``members (N, 1000) bool``; likewise for general terms."""
 
     names: tuple[str, ...]
     members: np.ndarray

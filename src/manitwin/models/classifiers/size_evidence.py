@@ -40,7 +40,10 @@ def _usual_lengths_m() -> tuple[Interval, ...]:
 
 
 def _density(usual: Interval, longest_m: float) -> float:
-    """Return the density of a two-sided log-normal with 90 % in the usual interval, mixed with a uniform one for unusual sizes."""
+    """Return the density of a two-sided log-normal with 90 % in the usual interval, mixed with a uniform one.
+
+    The uniform part covers unusual sizes.
+    """
     below, above = (
         max(abs(math.log(end / usual.typical)) / _STANDARD_NORMAL_95, _LEAST_LOG_SPREAD)
         for end in (usual.low, usual.high)

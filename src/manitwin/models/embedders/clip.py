@@ -42,7 +42,7 @@ class ClipFolder:
     """The networks of a folder, each loaded when it is first used; all vectors have unit length."""
 
     def __init__(self, folder: Path, *, points: bool = False):
-        """Check that the required files exist, with ``points`` also a point-cloud network; raises UsageError for a missing file."""
+        """Check that the files exist, with ``points`` also a point-cloud network; raises UsageError for a missing file."""
         self.folder = folder
         self._networks: dict[str, _Network] = {}
         self._tried: set[str] = set()

@@ -182,7 +182,7 @@ class FalGenerator(VendorGenerator):
 
 
 def first_glb(result: Any) -> str | None:
-    """Return the first address in a result whose path ends in ``.glb``, or whose file name or content type says that it is a GLB."""
+    """Return the first address of a GLB in a result: by its path, or by the file name or content type beside it."""
     for part in _parts(result):
         if isinstance(part, str) and _is_glb_address(part):
             return part

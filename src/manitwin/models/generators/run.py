@@ -84,7 +84,7 @@ def _driven(drive: _Drive, request: GenerationRequest, attempts: int, submit_aga
 
 
 def request_digest(generator: Generator, request: GenerationRequest, settings: GenerateConfig) -> str:
-    """Return the digest under which a request's job is stored; it covers the request, the generator, its model and its options."""
+    """Return the digest under which a request's job is stored: of the request, the generator, its model and its options."""
     asked: dict[str, Any] = {
         "generator": generator.name,
         "model": generator.model,
@@ -142,7 +142,10 @@ class _Drive:
     kept: _Note | None = None
 
     def recalled(self, submit_again: bool) -> _Note:
-        """Return the stored state of the request; raises BadReply for a paid submit of unknown outcome, unless ``submit_again``."""
+        """Return the stored state of the request.
+
+        Raises BadReply for a paid submit of unknown outcome, unless ``submit_again``.
+        """
         text = self.jobs.recall(self.digest)
         if text is None:
             return _Note()

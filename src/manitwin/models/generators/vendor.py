@@ -119,7 +119,7 @@ def address(url: str | None, vendors: str) -> str:
 
 
 def chosen(name: str, said: str, config: BuildConfig, option: str, default: str) -> str:
-    """Return the model named by a spec or by an option of the settings, else the default; raises ConfigError if the two disagree."""
+    """Return the model named by a spec or an option of the settings, else the default; raises ConfigError if both disagree."""
     set_to = config.generate.options.get(option)
     if said and set_to is not None and said != set_to:
         raise ConfigError(

@@ -110,7 +110,7 @@ def _depth(hand: MultiFingerGripper, posture: Posture, reach_m: np.ndarray, rng:
 
 
 def _joints(hand: MultiFingerGripper, posture: Posture, width_m: np.ndarray) -> np.ndarray:
-    """Return joint angles ``(N, 2, J)``: of the hand opened wider than the object, and with fingertip targets inside the object."""
+    """Return joint angles ``(N, 2, J)``: of the hand opened wider than the object, and of fingertip targets inside it."""
     opening_m = np.ceil((width_m + 2 * hand.clearance_m) / OPENING_STEP_M) * OPENING_STEP_M
     return np.stack(
         [posture.joints_at(opening_m), posture.joints_at(opening_m - 2 * (hand.clearance_m + SQUEEZE_M))], axis=1

@@ -36,7 +36,7 @@ GOOD_ARM_M, WEAK_ARM_M = 0.010, 0.020
 
 
 class PadScreen:
-    """Screen for parallel grippers: the pads touch well and bear the load, and the open gripper does not collide with the object."""
+    """Screen for parallel grippers: the pads touch well and bear the load, and the open gripper is free of collisions."""
 
     def __init__(self, request: GraspRequest):
         self._request, self._gripper = request, of_kind(request.gripper, ParallelGripper)

@@ -190,7 +190,7 @@ def lost_parts(mask: np.ndarray, found: Segmentation, share: np.ndarray) -> np.n
 
 
 def _shade(found: Segmentation, share: np.ndarray) -> Callable[[tuple[slice, slice], np.ndarray], bool]:
-    """Return a predicate that tells whether a piece in its box is shaded background: darker, of the same colour, and no object."""
+    """Return a predicate that tells whether a piece in its box is shaded background: darker, not coloured, and no object."""
     seen, certain = at_size(share, found.mask.shape), found.colours.certain
     darker = found.background.light < 1
 

@@ -99,7 +99,7 @@ def _is_beside(mask: np.ndarray) -> bool:
 
 
 def _is_thin_by_its_holes(mask: np.ndarray) -> bool:
-    """Tell whether filling the holes of a mask (H, W) makes it much bulkier: a bracelet, or a bottle as pale as its background."""
+    """Tell whether a mask (H, W) is much bulkier with its holes filled: a bracelet, or a bottle as pale as its background."""
     return _bulk_px(np.asarray(binary_fill_holes(mask))) > BULKIER * _bulk_px(mask)
 
 

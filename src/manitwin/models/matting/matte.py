@@ -217,7 +217,10 @@ def _reject_several(name: str, mask: np.ndarray, second_object_share: float, win
 
 
 def _in_photo(piece: np.ndarray, shape: tuple[int, ...], window_px: PixelBox) -> str:
-    """Return the box of a piece in pixels of the photo, as text; ``piece`` is x, y, width and height in a mask of this ``shape``."""
+    """Return the box of a piece in pixels of the photo, as text.
+
+    ``piece`` is x, y, width and height in a mask of this ``shape``.
+    """
     left, top, right, bottom = window_px
     x, y, width, height = (float(piece[i]) for i in range(4))
     scale = shape[1] / (right - left), shape[0] / (bottom - top)

@@ -69,7 +69,7 @@ class _Spread:
     """Colours propagated from source pixels to other pixels; only sources that a requested pixel refers to are stored."""
 
     def __init__(self, nearest: np.ndarray, asked: np.ndarray):
-        """Take the flat index ``nearest (H, W)`` int32 of each pixel's source, and the mask ``asked (H, W)`` of requested pixels."""
+        """Take the flat index ``nearest (H, W)`` int32 of each pixel's source, and the mask ``asked (H, W)`` of pixels."""
         wanted = nearest[asked]
         used = np.zeros(nearest.size, bool)
         used[wanted] = True
@@ -97,7 +97,7 @@ class BothSides:
     """
 
     def __init__(self, rgb: np.ndarray, rough: np.ndarray, band_px: int):
-        """Take a picture (H, W, 3) uint8, its mask (H, W) float32 at that size, and the maximum error of the outline in pixels."""
+        """Take a picture (H, W, 3) uint8, its mask (H, W) float32 at that size, and the maximum error of the outline."""
         self.rough, self._rgb, self._band_px = rough, rgb, band_px
         self.near, inner, outer = _where(rough > 0.5, band_px)
         self._told_apart = bool(inner.any() and outer.any())
@@ -220,7 +220,7 @@ def outline_model() -> str:
 
 
 def _answers(given: np.ndarray) -> np.ndarray:
-    """Evaluate the network: return the object probability (N,) in [0, 1] of the centre pixel of each of the ``patches`` (N, F)."""
+    """Evaluate the network: return the object probability (N,) in [0, 1] of the centre pixels of ``patches`` (N, F)."""
     layers = _layers()
     for weight, bias in layers[:-1]:
         given = np.maximum(given @ weight + bias, 0)

@@ -1,4 +1,4 @@
-"""Rule-based segmentation of the object: everything but the flooded background, without shadows and gaps, cut along image edges."""
+"""Rule-based segmentation of the object: all but the flooded background, without shadows and gaps, cut along edges."""
 
 from __future__ import annotations
 

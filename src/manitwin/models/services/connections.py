@@ -104,7 +104,10 @@ class GuardedTransport(httpx2.BaseTransport):
         )
 
     def _check_for_proxy(self, host: str, port: int) -> None:
-        """Check the addresses of a name that a proxy will connect to, if it can be resolved here; behind some proxies it cannot."""
+        """Check the addresses of a name that a proxy will connect to, if it can be resolved here.
+
+        Behind some proxies names cannot be resolved.
+        """
         try:
             addresses = addresses_of(host, port, self._deadline.left_s(MAX_CONNECT_S, httpcore2.ConnectTimeout))
         except UnknownName:

@@ -1,1 +1,1 @@
-"""The annotator that asks a vision-language model, and checks its answers against geometry and priors."""
+"""Annotator that asks a vision-language model, and checks its answers against geometry and priors."""

@@ -1,4 +1,4 @@
-"""The annotator that asks a vision-language model the paper's four questions, and checks what it answers."""
+"""Annotator that asks a vision-language model the paper's four questions, and checks the answers."""
 
 from __future__ import annotations
 
@@ -76,29 +76,30 @@ PROMPTS: dict[AnnotatorQuestion, tuple[str, ...]] = {
     "captions": ("captions",),
     "points": ("functional_points", "grasp_points", "closer_look"),
 }
-"""The prompts of each question."""
+"""Prompts of each question."""
 
 VIEWS = 8
 PICTURES = {"functional_points": 2 * VIEWS, "grasp_points": 2 * VIEWS, "closer_look": 2 * len(LETTERS)}
-"""How many pictures the questions have that are not asked with the eight views alone: each clean and marked."""
+"""Number of pictures of the prompts that have more than the eight views: each view without and with markers."""
 
 ANSWER_TOKENS = {
     "quality": 500, "physical": 700, "captions": 600, "functional_points": 500, "grasp_points": 500, "closer_look": 300,
 }  # fmt: skip
-"""About what an answer has: that of ``fakes.vlm_answers`` has 250 to 500; a model is wordier."""
+"""Approximate tokens of an answer: those of ``fakes.vlm_answers`` have 250 to 500; models are wordier."""
 
 VALUES_CHARACTERS = 200
-"""About what is put in for the placeholders of a prompt, the list of ids aside."""
+"""Approximate characters of the values that fill a prompt's placeholders, without the list of ids."""
 
 LISTED_CHARACTERS = {"functional_points": 16, "grasp_points": 24}
-"""What a candidate has in the list of ids, and in the schema's enum."""
+"""Characters per candidate in the list of ids and in the enum of the schema."""
 
 
 class VlmAnnotator:
-    """Ask a chat model, and accept nothing that contradicts geometry or priors without asking again and saying so.
+    """Annotator that asks a chat model; an answer that contradicts geometry or priors is asked for again, and reported if it
+    stays.
 
-    Raises what the chat model raises, BadReply for an answer that cannot be used, Rejected for a size or mass that no such thing
-    has. Raises ConfigError for prompts that cannot be used.
+    Raises the errors of the chat model, BadReply for an unusable answer, Rejected for an impossible size or mass, and
+    ConfigError for invalid prompts.
     """
 
     needs: Resource = "vlm"
@@ -111,13 +112,13 @@ class VlmAnnotator:
         self.prompts: dict[str, Prompt] = load_prompts(config.vlm.prompts)
 
     def model_for(self, question: AnnotatorQuestion) -> str:
-        """Return 'MODEL, prompt quality v1 0123abcd': model, prompt, and a digest of all that the question is asked with."""
+        """Return 'MODEL, prompt quality v1 0123abcd': model, prompt versions, and a digest of prompts, schemas and settings."""
         names = PROMPTS[question]
         versions = " and ".join(f"{name} v{self.prompts[name].version}" for name in names)
         return f"{self.chat.model}, prompt {versions} {self._digests[question]}"
 
     def expected_usd(self, question: AnnotatorQuestion) -> float:
-        """Return about what a question costs when nothing has to be asked again; 0 where the chat model has no price."""
+        """Return the approximate cost of a question that is asked once; 0 if the chat model has no price."""
         price = getattr(self.chat, "price", None)
         if price is None:
             return 0.0
@@ -134,21 +135,21 @@ class VlmAnnotator:
         )
 
     def probe(self) -> str:
-        """Ask one small question with a picture; return what works, as a short phrase."""
+        """Ask one small question with a picture; return the result as a short phrase."""
         return probe(self.chat)
 
     @cached_property
     def template_reader(self) -> TemplateReader:
-        """What fills in templates for built-in generators."""
+        """Reader that fills in templates for built-in generators."""
         return TemplateReader(self.chat, self.config.vlm, self.prompts)
 
     def judge_quality(self, subject: Subject) -> QualityVerdict:
-        """Judge the criteria, beside the photos if there are any; what is unsure when asked twice is a no."""
+        """Judge the two criteria, with the photos if there are any; an answer that is unsure when asked twice counts as no."""
         question = quality_question(subject, self.prompts["quality"], self.picture_px)
         return quality_verdict(ask(self.chat, question, quality_answer(subject), examine_quality).value)
 
     def estimate_physical(self, subject: Subject) -> PhysicalEstimates:
-        """Estimate size, mass and contact; raises Rejected for what is impossible when asked twice."""
+        """Estimate size, mass and contact properties; raises Rejected for values that are impossible when asked twice."""
         question, mesh = physical_question(subject, self.prompts["physical"]), measure(subject)
 
         def check(answer: PhysicalAnswer) -> list[PhysicalFinding]:
@@ -165,7 +166,7 @@ class VlmAnnotator:
         )
 
     def describe(self, subject: Subject, material: str, extents_m: np.ndarray) -> Language:
-        """Describe the object; what may not be said is left out, or BadReply where too little is left."""
+        """Describe the object; inadmissible sentences are left out. Raises BadReply if too few remain."""
         question = captions_question(subject, material, extents_m, self.prompts["captions"])
         answered = ask(
             self.chat, question, CaptionsAnswer, lambda answer: examine_captions(answer, subject.name, extents_m)
@@ -177,9 +178,9 @@ class VlmAnnotator:
             raise
 
     def select_points(self, request: PointsRequest) -> SelectedPoints:
-        """Choose functional points in one query, and grasp points by a vote over several at once.
+        """Choose functional points in one query, and grasp points by a vote over several concurrent queries.
 
-        Each of these has other views, in another order, other numbers and another wording.
+        Each grasp query has its own views, order, numbering and wording.
         """
         checks = PlaceChecks(request)
         numbering = functional_numbering(request)
@@ -198,7 +199,7 @@ class VlmAnnotator:
         return SelectedPoints(functional, grasp, findings + more, spare)
 
     def look_closer(self, request: PointsRequest, points: Sequence[FunctionalPoint]) -> CloserLook:
-        """Choose for each point the best of twelve places around it, in one query with a picture of each from nearby."""
+        """Choose for each point the best of twelve places around it, in one query with a close-up picture of each point."""
         nearby = nearby_places(PlaceChecks(request), points, self.picture_px)
         if not nearby:
             return CloserLook()
@@ -210,9 +211,9 @@ class VlmAnnotator:
     def questions(
         self, request: PointsRequest, material: str, extents_m: np.ndarray, chosen: Sequence[FunctionalPoint] = ()
     ) -> list[Question]:
-        """Return all that an object is asked about in a build, the votes last; asks nothing.
+        """Return all questions about an object in a build, the grasp votes last, without asking them.
 
-        The closer look is among them where the functional points are given that were ``chosen``, at their candidates.
+        The closer look is included if the ``chosen`` functional points, at their candidates, are given.
         """
         subject, prompts, checks, votes = request.subject, self.prompts, PlaceChecks(request), self.config.vlm.votes
         grasps = [
@@ -223,7 +224,7 @@ class VlmAnnotator:
         closer = list[Question]()
         if nearby:
             closer.append(closer_question(request, nearby, nearby_pictures(request, nearby), prompts["closer_look"]))
-        # what it is and how large is known from the physical question on
+        # name and size are known only after the physical question
         unknown = replace(subject, known_as=None, metric=not subject.size_estimated)
         return [
             quality_question(unknown, prompts["quality"], self.picture_px),
@@ -235,7 +236,7 @@ class VlmAnnotator:
         ]
 
     def _query(self, checks: PlaceChecks, vote: int, votes: int) -> Callable[[], list[Ballot]]:
-        """Return what asks one of the grasp queries; its pictures are drawn here, in the thread that may."""
+        """Return a function that asks one of the grasp queries; its pictures are rendered here, in the calling thread."""
         numbering = grasp_numbering(checks.request, vote, votes)
         question = grasp_question(checks, numbering, self.prompts["grasp_points"], vote)
 
@@ -251,7 +252,7 @@ class VlmAnnotator:
         return ballots_of_query
 
     def _forget(self, question: Question) -> None:
-        # A kept answer that cannot be used would be of no use again.
+        # a cached answer that is unusable would be unusable again
         if isinstance(self.chat, Forgetful):
             self.chat.forget(question)
 
@@ -287,27 +288,27 @@ _FORMS: dict[str, type[BaseModel]] = {
 
 
 class OpenAiAnnotator(VlmAnnotator):
-    """``openai:MODEL`` or ``openai:MODEL@URL``: any server that speaks OpenAI's chat completions."""
+    """``openai:MODEL`` or ``openai:MODEL@URL``: any server with OpenAI's chat completions API."""
 
     @classmethod
     def from_spec(cls, argument: str, config: BuildConfig) -> OpenAiAnnotator:
-        """Create it; raises ConfigError for a spec without a model, a missing key or an unknown price."""
+        """Create it; raises ConfigError for a missing model or key, or an unknown price."""
         return cls(openai_from_spec(argument, config), config)
 
 
 class AnthropicAnnotator(VlmAnnotator):
-    """``anthropic:MODEL`` or ``anthropic:MODEL@URL``: any server that speaks Anthropic's messages."""
+    """``anthropic:MODEL`` or ``anthropic:MODEL@URL``: any server with Anthropic's Messages API."""
 
     @classmethod
     def from_spec(cls, argument: str, config: BuildConfig) -> AnthropicAnnotator:
-        """Create it; raises ConfigError for a spec without a model, a missing key or an unknown price."""
+        """Create it; raises ConfigError for a missing model or key, or an unknown price."""
         return cls(anthropic_from_spec(argument, config), config)
 
 
 class ReplayAnnotator(VlmAnnotator):
-    """``replay:FILE``: the answers that an earlier run recorded."""
+    """``replay:FILE``: the recorded answers of an earlier run."""
 
     @classmethod
     def from_spec(cls, argument: str, config: BuildConfig) -> ReplayAnnotator:
-        """Create it; raises ConfigError for a file that is not there or holds no answers."""
+        """Create it; raises ConfigError for a file that is missing or has no answers."""
         return cls(replay_from_spec(argument, config), config)

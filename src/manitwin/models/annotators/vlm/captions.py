@@ -1,4 +1,4 @@
-"""The captions question: the paper's six attributes, and sentences of different length and style."""
+"""Captions question: the paper's six attributes, and sentences of different length and style."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _LENGTH = re.compile(
     re.IGNORECASE,
 )
 _METRES = {"mm": 0.001, "mi": 0.001, "cm": 0.01, "ce": 0.01, "m": 1.0, "me": 1.0, "in": 0.0254}
-_LENGTH_FACTOR = 1.3  # a length that is rounded or measured along a curve
+_LENGTH_FACTOR = 1.3  # tolerance for a length that is rounded or measured along a curve
 
 
 class CaptionsAnswer(BaseModel):
@@ -59,7 +59,7 @@ class CaptionsAnswer(BaseModel):
 
 
 def captions_question(subject: Subject, material: str, extents_m: np.ndarray, prompt: Prompt) -> Question:
-    """Ask for words; what is measured is told."""
+    """Ask for attributes and sentences; measured values are stated in the question."""
     values = {
         "count": str(len(subject.views)),
         "name": name_line(subject.name, subject.known_as),
@@ -71,7 +71,7 @@ def captions_question(subject: Subject, material: str, extents_m: np.ndarray, pr
 
 
 def examine_captions(answer: CaptionsAnswer, name: str | None, extents_m: np.ndarray) -> list[str]:
-    """Return what may not stay in the words."""
+    """Return the findings about inadmissible texts."""
     findings = []
     for field in (*ATTRIBUTES, *SENTENCES):
         findings += [f"{field}: {fault}" for fault in _faults(getattr(answer, field), answer, name, extents_m)]
@@ -85,10 +85,10 @@ def examine_captions(answer: CaptionsAnswer, name: str | None, extents_m: np.nda
 
 
 def language_of(answer: CaptionsAnswer, name: str | None, extents_m: np.ndarray) -> Language:
-    """Return the words that may stay, the main caption first.
+    """Return the admissible texts, the main caption first.
 
-    Where the model twice says that it is not what the user calls it, the category says so. Raises BadReply where an attribute,
-    or more than two of the eight sentences, cannot stay.
+    If the model says twice that the object is not what the user calls it, the category says so. Raises BadReply if an
+    attribute, or more than two of the eight sentences, are inadmissible.
     """
     for field in ATTRIBUTES:
         faults = _faults(getattr(answer, field), answer, name, extents_m)
@@ -114,14 +114,14 @@ def language_of(answer: CaptionsAnswer, name: str | None, extents_m: np.ndarray)
 
 
 def _faults(text: str, answer: CaptionsAnswer, name: str | None, extents_m: np.ndarray) -> list[str]:
-    """Return why a text may not stay: it speaks of how the object is shown, or of a length that it has not."""
+    """Return why a text is inadmissible: it refers to the presentation of the object, or states an impossible length."""
     own = f"{name or ''} {answer.category}".lower()  # a camera may be called a camera
     faults = [
         f"{word!r} speaks of how the object is shown, not of the object"
         for word in dict.fromkeys(found.group(1).lower() for found in _NOT_THE_OBJECT.finditer(text))
         if word.rstrip("s") not in own
     ]
-    low = float(np.min(extents_m)) / 10  # a wall or a stroke may be thin
+    low = float(np.min(extents_m)) / 10  # allows walls and thin strokes
     high = float(np.linalg.norm(extents_m)) * _LENGTH_FACTOR
     for number, unit in _LENGTH.findall(text):
         length_m = float(number) * _METRES[unit.lower()[:2] if len(unit) > 1 else "m"]
@@ -131,7 +131,7 @@ def _faults(text: str, answer: CaptionsAnswer, name: str | None, extents_m: np.n
 
 
 def _repeated(answer: CaptionsAnswer) -> list[tuple[str, str]]:
-    """Return the sentences that say the same words as an earlier one, with that one."""
+    """Return the sentences with the same words as an earlier one, with that sentence."""
     seen: dict[tuple[str, ...], str] = {}
     found = []
     for field in SENTENCES:

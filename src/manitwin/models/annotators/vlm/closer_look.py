@@ -1,4 +1,4 @@
-"""The closer look: around each functional point a closer set of places on its part, in a picture from nearby."""
+"""Closer look: a denser set of places around each functional point, on its part, marked in a close-up picture."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ from manitwin.render.renderer import BACKDROP, shared_renderer
 from manitwin.twin.point_records import FunctionalPoint
 
 PLACES = 12
-"""How many places around a point are marked, the point's own among them."""
+"""Number of places marked around a point, including the point itself."""
 LEAST_PLACES = 4
-"""Fewer that can be seen from nearby leave nothing to choose: such a point is not asked about."""
+"""Minimum number of visible places; a point with fewer is not asked about, because there is nothing to choose."""
 LETTERS = "ABCD"
-_SHOWN = 1.6  # of the reach: half of what the picture is wide
+_SHOWN = 1.6  # half width of the picture, as a multiple of the reach
 _STREAM = 3
 
 
@@ -49,7 +49,7 @@ class CloserChoice(BaseModel):
 
 @dataclass(frozen=True)
 class Nearby:
-    """One point with its closer set: positions and normals ``(K, 3)``, the number of each ``(K,)``, its camera and letter."""
+    """A point with its set of places: positions and normals ``(K, 3)``, marker numbers ``(K,)``, and its camera and letter."""
 
     point: FunctionalPoint
     letter: str
@@ -59,17 +59,17 @@ class Nearby:
     numbers: np.ndarray
 
     def place(self, number: str) -> CloserPlace:
-        """Return the place that a number stands for."""
+        """Return the place with a marker number."""
         index = int(np.flatnonzero(self.numbers == int(number))[0])
         return CloserPlace(self.positions_m[index], self.normals[index])
 
 
 def nearby_places(checks: PlaceChecks, points: Sequence[FunctionalPoint], side_px: int) -> list[Nearby]:
-    """Return the points that can be looked at closer, each with its set: its own place and eleven around it.
+    """Return the points that can be refined, each with its set of places: its own and eleven around it.
 
-    These are samples of the surface that the camera sees, within 15 % of the longest side, on the point's side of the matter and
-    on its part where the form of such things tells one, as far apart as can be. The camera stands where that of the view does
-    which sees the point most squarely, and looks at the point.
+    The places are surface samples visible from the camera within 15 % of the longest side, on the same side of the object and
+    on the same part if the shape determines parts, chosen by farthest point sampling. The camera is at the position of the
+    view that sees the point most directly, and looks at the point.
     """
     request = checks.request
     surface = FramedMesh(merged(list(request.subject.parts)), request.center_of_mass_m, request.subject.seed)
@@ -86,7 +86,7 @@ def nearby_places(checks: PlaceChecks, points: Sequence[FunctionalPoint], side_p
             continue
         chosen = np.flatnonzero(seen)[
             farthest_point_sampling(positions[seen], PLACES, 0)
-        ]  # from the point's own place on
+        ]  # starts with the point's own place
         rng = np.random.default_rng([request.subject.seed, _STREAM, LETTERS.index(letter)])
         numbers = rng.permutation(len(chosen)) + 1
         found.append(Nearby(point, letter, camera, positions[chosen], normals[chosen], numbers))
@@ -94,7 +94,7 @@ def nearby_places(checks: PlaceChecks, points: Sequence[FunctionalPoint], side_p
 
 
 def _camera(request: PointsRequest, point: FunctionalPoint, reach_m: float, side_px: int) -> Camera | None:
-    """Return the camera that looks at a point from nearby, None where no view shows it."""
+    """Return the camera that looks at a point from nearby, None if no view shows the point."""
     at, outward = np.array(point.position_m), np.array(point.normal)
     pairs = zip(request.subject.cameras, request.visible, strict=True)
     eyes = [camera.position for camera, seen in pairs if point.candidate in seen]
@@ -106,7 +106,7 @@ def _camera(request: PointsRequest, point: FunctionalPoint, reach_m: float, side
 
 
 def _of_part(checks: PlaceChecks, point: FunctionalPoint, surface: FramedMesh) -> np.ndarray:
-    """Return the indices of the samples around a point that are of its part, of all where no parts are told."""
+    """Return the indices of the samples around a point on the same part; all of them if the shape determines no parts."""
     subject, at = checks.request.subject, np.array(point.position_m)
     near = around(surface, at, np.array(point.normal))
     prior = lookup(subject.name or subject.known_as)
@@ -117,14 +117,14 @@ def _of_part(checks: PlaceChecks, point: FunctionalPoint, surface: FramedMesh) -
 
 
 def closer_answer(nearby: Sequence[Nearby]) -> type[BaseModel]:
-    """Return the model of an answer: for each point's letter one of the numbers in its picture."""
+    """Return the model class of an answer: for each point's letter one of the numbers in its picture."""
     return _answer({each.letter: [str(number) for number in sorted(each.numbers)] for each in nearby})
 
 
 def _answer(ids: dict[str, list[str]]) -> type[BaseModel]:
     fields: dict[str, Any] = {}
     for letter, numbers in ids.items():
-        # texts, as in the points questions: a number written as a number is the same id
+        # ids are strings, as in the points questions; a JSON number is accepted for the same id
         one_of = Annotated[Literal[tuple(numbers)], BeforeValidator(str)]  # type: ignore[valid-type]
         number: Any = (one_of, Field(description="the marker's number"))
         choice = create_model(f"CloserChoice{letter}", __base__=CloserChoice, id=number)
@@ -133,12 +133,12 @@ def _answer(ids: dict[str, list[str]]) -> type[BaseModel]:
 
 
 CLOSER_FORM = _answer({letter: ["1"] for letter in LETTERS})
-"""The form of an answer, for what does not depend on the object."""
+"""Form of an answer independent of the object."""
 
 
 @dataclass(frozen=True)
 class NearbyPictures:
-    """The pictures ``(H, W, 3) uint8`` of points from nearby, clean and with their numbered places, and the markers' colour."""
+    """Close-up pictures ``(H, W, 3) uint8`` of points, without and with numbered markers, and the name of the markers' colour."""
 
     clean: list[np.ndarray]
     marked: list[np.ndarray]
@@ -146,7 +146,7 @@ class NearbyPictures:
 
 
 def nearby_pictures(request: PointsRequest, nearby: Sequence[Nearby]) -> NearbyPictures:
-    """Draw the places around each point; raises RendererMissing where nothing renders."""
+    """Draw the places around each point; raises RendererMissing without a renderer."""
     parts = list(request.subject.parts)
     frames = shared_renderer().render(parts, [each.camera for each in nearby])
     ground = ground_for(frames)
@@ -187,7 +187,7 @@ def closer_question(
 
 
 def chosen_places(answer: BaseModel, nearby: Sequence[Nearby]) -> dict[str, CloserPlace]:
-    """Return the place chosen for each point that is not to stay where it is, by the point's id."""
+    """Return the chosen place of each point that is to be moved, by the point's id."""
     chosen = {each.point.id: each.place(getattr(answer, each.letter).id) for each in nearby}
     own = {each.point.id: each.point.position_m for each in nearby}
     return {name: place for name, place in chosen.items() if not np.array_equal(place.position_m, own[name])}

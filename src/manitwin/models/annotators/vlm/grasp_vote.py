@@ -1,4 +1,4 @@
-"""The vote over several grasp queries: places that many of them chose, whatever their numbers were."""
+"""Vote over several grasp queries: elects the places that many queries chose, independent of their numbering."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from manitwin.twin.point_records import GraspPoint
 
 @dataclass(frozen=True)
 class Ballot:
-    """One point of one query: its candidate, and how geometry contradicts it, if it does."""
+    """One point of one query: its candidate, and how geometry contradicts it, if so."""
 
     vote: int
     candidate: int
@@ -30,13 +30,13 @@ class Ballot:
 
     @property
     def confidence(self) -> float:
-        """The query's own confidence, less where geometry contradicts it."""
+        """Confidence given by the query, reduced if geometry contradicts it."""
         return self.choice.confidence * (1.0 if self.contradiction is None else CONTRADICTED)
 
 
 @dataclass(frozen=True)
 class Elected:
-    """A candidate with the ballots that support it, one of each query: the nearest."""
+    """A candidate with the supporting ballots: of each query the nearest one."""
 
     candidate: int
     ballots: tuple[Ballot, ...]
@@ -44,22 +44,22 @@ class Elected:
 
     @property
     def support(self) -> int:
-        """The number of queries that chose this place."""
+        """Number of queries that chose this place."""
         return len(self.ballots)
 
     @property
     def confidence(self) -> float:
-        """The supporters' mean confidence, times the share of all queries that they are."""
+        """Mean confidence of the supporters, times their share of all queries."""
         return float(np.mean([ballot.confidence for ballot in self.ballots])) * self.support / self.votes
 
     @property
     def exact(self) -> int:
-        """The number of queries that chose this very candidate."""
+        """Number of queries that chose exactly this candidate."""
         return sum(ballot.candidate == self.candidate for ballot in self.ballots)
 
     @property
     def rank(self) -> tuple[float, ...]:
-        """The order: support, then confidence."""
+        """Sort key: support, then confidence."""
         return -self.support, -round(self.confidence, 6)
 
 
@@ -74,12 +74,12 @@ def ballots(answer: PointsAnswer, numbering: Numbering, checks: PlaceChecks, vot
 
 
 def elect(cast: list[Ballot], votes: int, checks: PlaceChecks) -> tuple[tuple[GraspPoint, ...], tuple[str, ...]]:
-    """Return 2 to 3 grasp points by support, then confidence, and what speaks against them.
+    """Return 2 to 3 grasp points by support, then confidence, with the findings about them.
 
-    A query supports a place where it chose its candidate, or one within 2 cm of it, where places that a symmetry of the solid
-    moves onto each other are one (self-consistency: Wang et al. 2022, arXiv 2203.11171, with places in the part of answers).
-    Points without a majority are taken only where there would be fewer than two. Findings: no majority, a tie at the cut, a
-    contradiction with geometry.
+    A query supports a place if it chose its candidate or one within 2 cm; places that a symmetry of the solid maps onto each
+    other are the same place. This is self-consistency (Wang et al. 2022, arXiv 2203.11171) with places as answers. Points
+    without a majority are taken only if there would be fewer than two otherwise. Findings: no majority, a tie for the last
+    place, a contradiction with geometry.
     """
     elected = _elected(cast, votes, checks)
     majority = [place for place in elected if 2 * place.support > votes]
@@ -102,13 +102,13 @@ def elect(cast: list[Ballot], votes: int, checks: PlaceChecks) -> tuple[tuple[Gr
 
 
 def runners_up(cast: list[Ballot], votes: int, checks: PlaceChecks, taken: list[int]) -> tuple[GraspPoint, ...]:
-    """Return the places that were chosen by fewer, at none of the candidates ``taken``, in the order of the vote."""
+    """Return the other places in the order of the vote, except at the candidates ``taken``."""
     others = [place for place in _elected(cast, votes, checks) if place.candidate not in taken]
     return tuple(_grasp_point(len(taken) + number, place, checks) for number, place in enumerate(others))
 
 
 def _elected(cast: list[Ballot], votes: int, checks: PlaceChecks) -> list[Elected]:
-    """Return places in order; each ballot supports one of them."""
+    """Return places in order; each ballot supports only one of them."""
     left, found = list(cast), list[Elected]()
     while left:
         places = [_supporters(candidate, left, votes, checks) for candidate in {b.candidate for b in left}]
@@ -120,7 +120,7 @@ def _elected(cast: list[Ballot], votes: int, checks: PlaceChecks) -> list[Electe
 
 def _supporters(candidate: int, cast: list[Ballot], votes: int, checks: PlaceChecks) -> Elected:
     nearest: dict[int, Ballot] = {}
-    # the very candidate before its mirror image: each is at distance 0
+    # the candidate itself precedes its mirror images, which also have distance 0
     nearest_first = sorted(
         cast, key=lambda b: (_apart_m(b.candidate, candidate, checks), b.candidate != candidate, b.candidate)
     )
@@ -136,7 +136,8 @@ def _apart_m(first: int, second: int, checks: PlaceChecks) -> float:
 
 
 def _leading(place: Elected) -> Ballot:
-    """Return the ballot whose words stand: of the type that most supporters said, at this very candidate, the surest."""
+    """Return the ballot whose texts are used: of the most frequent type, preferably at this candidate, with the highest
+    confidence."""
     types = [ballot.choice.type for ballot in place.ballots]
     return max(
         place.ballots,

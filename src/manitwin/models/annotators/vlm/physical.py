@@ -1,4 +1,4 @@
-"""The physical question: what it is, of what, how large, how heavy, and how it slides and bounces."""
+"""Physical question: name, materials, size, mass, friction and restitution of the object."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Matter = Literal[
     "plastic", "ceramic", "glass", "steel", "aluminium", "wood", "cardboard", "paper", "rubber", "foam", "textile",
     "leather", "food skin", "wax", "stone", "other", "unknown",
 ]  # fmt: skip
-"""The materials of ``data/priors/materials.toml``, any other one, and one that the pictures do not tell."""
+"""The materials of ``data/priors/materials.toml``, any other one, and unknown."""
 
 Structure = Literal["solid", "open_container", "hollow_closed", "full_closed"]
 SameAsNamed = Literal["yes", "no", "unsure", "no name given"]
@@ -44,7 +44,7 @@ class AnsweredInterval(BaseModel):
         return self
 
     def estimate(self, source: str) -> Estimate:
-        """Return the quantity as the twin keeps it."""
+        """Return the quantity as an estimate of the twin."""
         return Estimate(value=self.typical, low=self.low, high=self.high, source=source)
 
 
@@ -94,15 +94,16 @@ class PhysicalAnswer(BaseModel):
 
     @property
     def sides_m(self) -> tuple[Positive, Positive, Positive]:
-        """The box's sides, the longest first, however they were named."""
+        """Sides of the box, the longest first, whatever their names."""
         first, second, third = sorted((self.length_m, self.width_m, self.height_m), key=lambda s: -s.typical)
         return first, second, third
 
 
 def physical_question(subject: Subject, prompt: Prompt) -> Question:
-    """Ask for size, mass and contact properties over all views.
+    """Ask for size, mass and contact properties with all views.
 
-    A declared size is told, for the mass has to belong to it; proportions are not: the answer is checked against them.
+    A declared size is stated, because the mass has to fit it; proportions are not, because the answer is checked against
+    them.
     """
     values = {"count": str(len(subject.views)), "name": name_line(subject.name), "size": _size_said(subject)}
     instructions, parts = prompt.filled(values, [*clean_views(subject), *longest_extent_view(subject)])
@@ -120,9 +121,10 @@ def _size_said(subject: Subject) -> str:
 
 
 def part_materials(answer: PhysicalAnswer, name: str | None) -> dict[str, str] | None:
-    """Return the materials of parts by role, of several named for one that with more of the mass; None where no parts are named.
+    """Return the materials of parts by role; None if no parts are named.
 
-    A neck of which nothing is said is of the matter that such a thing's neck shares with head or handle (priors).
+    Of several materials named for a part, the one with more of the mass is used. A neck that is not mentioned has the
+    material that necks of such objects share with the head or the handle (priors).
     """
     prior = lookup(name) or lookup(answer.object)
     if prior is None or prior.parts is None:
@@ -141,9 +143,9 @@ def part_materials(answer: PhysicalAnswer, name: str | None) -> dict[str, str] |
 def physical_estimates(
     answer: PhysicalAnswer, subject: Subject, model: str, *, outer_skin: bool, findings: tuple[str, ...]
 ) -> PhysicalEstimates:
-    """Return the answer as the protocol has it; a metric mesh keeps its size.
+    """Return the answer as ``PhysicalEstimates``; a metric mesh keeps its size.
 
-    ``outer_skin``: the mesh is a closed skin without its inner side, so that a hollow thing needs its wall.
+    ``outer_skin``: the mesh is a closed skin without its inner side, so that a hollow object needs a wall thickness.
     """
     source = f"vlm:{model}"
     hollow = answer.structure == "hollow_closed" and outer_skin and answer.wall_thickness_m > 0

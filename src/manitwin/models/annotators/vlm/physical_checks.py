@@ -1,4 +1,4 @@
-"""Check what was said of an object's physics against what its mesh, matter and the priors say."""
+"""Checks of a physical answer against the mesh, the densities of materials, and the priors."""
 
 from __future__ import annotations
 
@@ -18,28 +18,31 @@ from manitwin.models.annotators.vlm.physical import PhysicalAnswer
 from manitwin.models.annotators.walls import is_outer_skin, median_thickness
 
 PROPORTION_FACTOR, PROPORTION_SHARE = 1.5, 0.1
-"""A side may be off by this factor, or by this share of the longest one: eyes judge thin sides badly."""
+"""Tolerances of a side: this factor, or this share of the longest side, because thin sides are hard to judge by eye."""
 
 METRIC_FACTOR = 1.5
-"""How far beyond its interval a size may be from that of a mesh of declared scale."""
+"""Tolerance of an answered size interval around the size of a mesh of declared scale."""
 
 FRICTION = (0.05, 1.5)
-"""Dry solids: PTFE on steel 0.04 to 0.1, soft clean rubber on rough ground above 1 (engineering handbooks)."""
+"""Range for dry solids: PTFE on steel 0.04 to 0.1, soft clean rubber on rough ground above 1 (engineering handbooks)."""
 
 LIGHTEST_CONTENTS_KG_M3 = 20.0
-"""Of a closed package: crisps in a bag have more."""
+"""Minimum bulk density of a closed package; crisps in a bag have more."""
 
 LIGHTER, HEAVIER = 5.0, 2.0
-"""How far the mass by volume of a mesh may be from its matter's density: scans are thicker than thin matter is, so that a
-fork of steel and plastic has 1,735 kg/m3 by its scan, scissors 1,752 (published masses); hollow handles add to it."""
+"""Factors by which the mass per mesh volume may be below and above the density of the material.
+
+Scans are thicker than thin objects: by their scans a fork of steel and plastic has 1,735 kg/m3, scissors 1,752 (published
+masses). Hollow handles have the same effect.
+"""
 
 PARTS_INSIDE = 8.0
-"""A closed skin may hold so many times its own mass: motors, batteries, springs."""
+"""Maximum ratio of the contents of a closed skin to its own mass: motors, batteries, springs."""
 
 
 @dataclass(frozen=True)
 class PhysicalFinding:
-    """A contradiction, in words for the model that answered; ``rejects`` is the reason where no such object can exist."""
+    """A contradiction, in words for the model; ``rejects`` is the rejection reason if no such object can exist."""
 
     text: str
     rejects: str | None = None
@@ -47,7 +50,10 @@ class PhysicalFinding:
 
 @dataclass(frozen=True)
 class MeasuredMesh:
-    """The mesh in its own unit, metres where ``metric``: sides ``(3,)`` as it stands, longest first; area, volume, thickness."""
+    """Measurements of the mesh in its own unit, metres if ``metric``.
+
+    ``sides (3,)`` of the upright bounding box, the longest first; area, volume, and median thickness.
+    """
 
     sides: np.ndarray
     area: float
@@ -78,7 +84,7 @@ def measure(subject: Subject) -> MeasuredMesh:
 def examine_physical(
     answer: PhysicalAnswer, mesh: MeasuredMesh, name: str | None, settings: PhysicalConfig
 ) -> list[PhysicalFinding]:
-    """Return all that is wrong with an answer, the impossible first."""
+    """Return all findings about an answer, the impossible ones first."""
     findings = [
         *_density(answer, mesh, settings),
         *_against_prior(answer, mesh, name, settings),
@@ -92,12 +98,12 @@ def examine_physical(
 
 
 def texts(check: Callable[[PhysicalAnswer], list[PhysicalFinding]]) -> Callable[[PhysicalAnswer], list[str]]:
-    """Return a check that says its findings in words only."""
+    """Return a check that returns the texts of its findings."""
     return lambda answer: [finding.text for finding in check(answer)]
 
 
 def reject_impossible(findings: list[PhysicalFinding]) -> None:
-    """Raise Rejected where a finding says that no such object can exist."""
+    """Raise Rejected if a finding says that no such object can exist."""
     for finding in findings:
         if finding.rejects is not None:
             raise Rejected(finding.rejects, f"{finding.text} (the model said so when asked twice)")
@@ -118,14 +124,14 @@ def _density(answer: PhysicalAnswer, mesh: MeasuredMesh, settings: PhysicalConfi
 
 
 def _usual_density(answer: PhysicalAnswer, mesh: MeasuredMesh) -> tuple[float, float]:
-    """Return the mass (kg) that things of these materials and structure have, per m3 of the mesh."""
+    """Return the usual lower and upper mass per m3 of the mesh (kg) for these materials and structure."""
     named = [
         load_materials()["unknown" if p.material in ("other", "unknown") else p.material] for p in answer.materials
     ]
     lightest = min(material.density_kg_m3.low for material in named)
     heaviest = max(material.density_kg_m3.high for material in named)
     wall = answer.wall_thickness_m
-    # The mesh of an open wall has both sides of it, that of a closed skin one.
+    # the mesh of an open wall has both of its sides, that of a closed skin only one
     sides = 1 if mesh.is_outer_skin(answer) else 2
     share = mesh.area / sides * wall / (mesh.volume * mesh.scale(answer))
     skin_share = min(share, 1.0) if wall > 0 else 1.0

@@ -1,4 +1,4 @@
-"""Check what a place on an object was called, and how it is to be held, against the object's geometry."""
+"""Checks of the label and grasp type of a place on an object against its geometry."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from manitwin.geometry.symmetry import Symmetries, find_symmetries
 from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.protocol import PointsRequest
 
-FINGERS_BETWEEN_M = 0.02  # how far below the surface fingers may reach from above (Franka hand: finger pads of 18 mm)
-LEAST_PLAY_M = 0.002  # of the opening: fingers must get around the object
-SAME_PLACE_M, SAME_PLACE_SHARE = 0.02, 0.25  # a fingertip's width: grasps as near to each other are one
-UPPER, LOWER = 0.6, 0.4  # shares of the height: what is above is no base, what is below no top
-LYING_COSINE = 0.5  # a long axis nearer to level than to upright
-ROUND, END_SHARE = 1.25, 0.2  # second by third side of what rolls; shares of its length that are its ends
-PINCH_M = 0.010  # two fingertips hold what is thinner, two flat fingers what is not (and is within the opening)
-_PINCH_SLACK = 2.0  # widths are those at a point: what is off by less is no contradiction
-_DIRECTIONS = 12  # in which a gripper that comes from outside may close
+FINGERS_BETWEEN_M = 0.02  # depth below the surface that fingers reach from above (Franka hand: finger pads of 18 mm)
+LEAST_PLAY_M = 0.002  # of the opening: clearance of the fingers around the object
+SAME_PLACE_M, SAME_PLACE_SHARE = 0.02, 0.25  # a fingertip's width: grasps closer than this are the same place
+UPPER, LOWER = 0.6, 0.4  # shares of the height: a base is not above, a top not below
+LYING_COSINE = 0.5  # maximum vertical component of the axis of a lying object
+# maximum ratio of the second to the third side of a rolling object; share of its length at each end
+ROUND, END_SHARE = 1.25, 0.2
+PINCH_M = 0.010  # maximum width of a pinch with fingertips; wider parts are held with flat fingers
+_PINCH_SLACK = 2.0  # tolerance factor, since widths are measured at a point
+_DIRECTIONS = 12  # closing directions of a gripper that approaches along the normal
 
 _RIM = re.compile(r"\b(rim|mouth|lip|brim|opening edge|open top|opening)\b")
 _BASE = re.compile(
@@ -36,13 +37,13 @@ _NOT_ITS_HANDLE = re.compile(r"\b(attachment|joint|base of|root|junction|opposit
 
 @dataclass(frozen=True)
 class PlaceChecks:
-    """One object's candidates, and what geometry knows of it."""
+    """Checks for one object's candidates, with cached measurements of its geometry."""
 
     request: PointsRequest
 
     @cached_property
     def shape(self) -> Shape:
-        """The measurements that the rules use too."""
+        """Measurements of the shape, as the rules use them."""
         subject = self.request.subject
         prior = lookup(subject.name or subject.known_as)
         return measure_shape(
@@ -55,18 +56,18 @@ class PlaceChecks:
 
     @cached_property
     def symmetries(self) -> Symmetries:
-        """The motions that move the solid onto itself."""
+        """Rigid motions that map the solid onto itself."""
         subject = self.request.subject
         return find_symmetries(subject.solid, np.random.default_rng(subject.seed))
 
     @cached_property
     def same_place_m(self) -> float:
-        """How far apart (m) two candidates may be that are one place: 2 cm, and of small things a quarter of their length."""
+        """Maximum distance (m) of two candidates that count as one place: 2 cm, or a quarter of the length of small objects."""
         return min(SAME_PLACE_M, SAME_PLACE_SHARE * float(self.request.subject.solid.extents.max()))
 
     @cached_property
     def spacing_m(self) -> float:
-        """The median distance (m) of a candidate to its nearest neighbour."""
+        """Median distance (m) of a candidate to its nearest neighbour."""
         positions = self.request.positions_m
         apart = np.linalg.norm(positions[:, None] - positions[None], axis=2)
         np.fill_diagonal(apart, np.inf)
@@ -74,11 +75,11 @@ class PlaceChecks:
 
     @cached_property
     def caster(self) -> RayCaster:
-        """The solid for rays."""
+        """Ray caster of the solid."""
         return RayCaster(self.request.subject.solid)
 
     def of_label(self, label: str, candidate: int) -> str | None:
-        """Return how the geometry contradicts that a candidate is on a part of this name; None: it does not."""
+        """Return how geometry contradicts that a candidate is on a part with this name, None if it does not."""
         words = " ".join(label.lower().split())
         position = self.request.positions_m[candidate]
         height = self._share_of_height(position)
@@ -99,7 +100,7 @@ class PlaceChecks:
         return None
 
     def of_grasp(self, kind: str, candidate: int) -> str | None:
-        """Return why two fingers cannot take the object at a candidate; None: they can, or it is another grasp."""
+        """Return why two fingers cannot grasp the object at a candidate, None if they can or for another grasp type."""
         if kind not in ("parallel_jaw", "pinch"):
             return None
         width_m, opening_m = self.width_m(candidate), self.request.max_opening_m
@@ -111,20 +112,20 @@ class PlaceChecks:
         return f"the object is at least {wide} wide there, but the fingers of a {kind} grasp open to {opening}"
 
     def width_phrase(self, candidate: int) -> str:
-        """Return the width at a candidate as '23 mm', 'unknown' where no matter is behind it."""
+        """Return the width at a candidate as '23 mm', or 'unknown' if a ray finds no opposite surface."""
         width_m = self.width_m(candidate)
         return f"{1000 * width_m:.0f} mm" if width_m > 0 else "unknown"
 
     def width_m(self, candidate: int) -> float:
-        """Return the least width (m) that fingers would have to span at a candidate.
+        """Return the minimum width (m) that fingers have to span at a candidate.
 
-        Either straight through the matter behind it, or across: between the surfaces that rays meet from a point a finger's
-        length below the surface, in the directions that are tangent to it.
+        It is the thickness along the normal, or the width across: the distance between the surfaces hit by opposite rays in
+        tangential directions, from a point a finger's depth below the surface.
         """
         position, normal = self.request.positions_m[candidate], self.request.normals[candidate]
         through, _ = self.caster.first_hits((position - 1e-5 * normal)[None], -normal[None])
         if not np.isfinite(through[0]):
-            return 0.0  # no matter behind it: an imperfect mesh says nothing
+            return 0.0  # no opposite surface: the mesh is imperfect and gives no width
         inside = position - normal * min(FINGERS_BETWEEN_M, float(through[0]) / 2)
         across = _tangents(normal)
         ahead, _ = self.caster.first_hits(np.repeat(inside[None], len(across), axis=0), across)
@@ -136,7 +137,7 @@ class PlaceChecks:
         return float((position[2] - low) / max(high - low, 1e-9))
 
     def _at_end_of_lying(self, position: np.ndarray) -> bool:
-        """Tell whether a place is at an end of a thing that lies and rolls: its bottom or top as it stands."""
+        """Tell whether a place is at an end of a lying, rolling object: such an end is its bottom or top when it stands."""
         axis, sides = self.shape.axis, np.sort(self.shape.obb_extents_m)
         lies = abs(float(axis.direction[2])) < LYING_COSINE and sides[1] < ROUND * sides[0]
         along = float(axis.along(position[None])[0])
@@ -148,11 +149,11 @@ class PlaceChecks:
         offset = position - opening.center_m
         above = float(offset @ opening.axis)
         beyond = float(np.linalg.norm(offset - above * opening.axis)) - 1.2 * opening.rim_radius_m
-        # A rim may rise to a lip or spout: what is above it and within its circle is of it.
+        # a rim may rise to a lip or spout, so places above it and within its circle belong to it
         return float(np.hypot(max(-above, 0.0) + max(above - self.spacing_m, 0.0), max(beyond, 0.0)))
 
     def _from_side_handle_m(self, position: np.ndarray) -> float:
-        """Return the distance (m) from the nearest handle beside or over an upright body; 0 where there is none."""
+        """Return the distance (m) from the nearest handle beside or over an upright body; 0 if there is none."""
         if self.shape.side_handle is None:
             return 0.0
         body, surface = self.shape.body, self.shape.surface_m
@@ -163,7 +164,7 @@ class PlaceChecks:
 
 
 def _tangents(normal: np.ndarray) -> np.ndarray:
-    """Return unit vectors ``(12, 3)`` at right angles to a normal, over half a turn."""
+    """Return unit vectors ``(12, 3)`` perpendicular to a normal, over half a turn."""
     first = np.cross(normal, np.eye(3)[int(np.abs(normal).argmin())])
     first /= np.linalg.norm(first)
     angles = np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS

@@ -1,4 +1,4 @@
-"""The points questions: functional points in one query, grasp points in several with other numbers, by marked candidates."""
+"""Points questions over marked candidates: functional points in one query, grasp points in several with different numbering."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from manitwin.models.vlm.strict_schema import strict_schema
 from manitwin.twin.point_records import FunctionalPoint, GraspType
 
 FUNCTIONAL, GRASP = (2, 4), (2, 3)
-"""How many points an object has (paper)."""
+"""Minimum and maximum number of points of an object (paper)."""
 
 CONTRADICTED = 0.5
-"""What is left of the confidence of a point that geometry contradicts still when asked twice."""
+"""Factor on the confidence of a point that geometry still contradicts after asking twice."""
 
 _FUNCTIONAL_STREAM, _GRASP_STREAM = 0, 1
 _NUMBER_SAID = re.compile(
@@ -78,17 +78,17 @@ class PointsAnswer(BaseModel):
 
 
 def functional_answer(ids: Sequence[str]) -> type[PointsAnswer]:
-    """Return the model of an answer whose ids are among those that can be seen."""
+    """Return the model class of an answer, with ``ids`` as the allowed marker numbers."""
     return _answer("FunctionalAnswer", FunctionalChoice, ids, FUNCTIONAL)
 
 
 def grasp_answer(ids: Sequence[str]) -> type[PointsAnswer]:
-    """Return the model of an answer whose ids are among those that can be seen."""
+    """Return the model class of an answer, with ``ids`` as the allowed marker numbers."""
     return _answer("GraspAnswer", GraspChoice, ids, GRASP)
 
 
 def _answer(name: str, choice: type[BaseModel], ids: Sequence[str], limits: tuple[int, int]) -> type[PointsAnswer]:
-    # Texts, for some servers take no enum of numbers; a number written as a number is the same id.
+    # ids are strings, because some servers support no enum of numbers; a JSON number is accepted for the same id
     one_of = Annotated[Literal[tuple(ids)], BeforeValidator(str)]  # type: ignore[valid-type]
     seen = create_model(choice.__name__, __base__=choice, id=(one_of, Field(description="the marker's number")))  # type: ignore[arg-type]
     points = Annotated[list[seen], Field(min_length=limits[0], max_length=limits[1])]  # type: ignore[valid-type]
@@ -96,7 +96,7 @@ def _answer(name: str, choice: type[BaseModel], ids: Sequence[str], limits: tupl
 
 
 class Numbering:
-    """The numbers that stand for candidates in one query, ``numbers (N,)``, in an order of its own, and its views."""
+    """Marker numbers of the candidates in one query, ``numbers (N,)``, a random permutation, and the views of the query."""
 
     def __init__(self, request: PointsRequest, stream: int, vote: int, views: QueryViews):
         self.numbers, self.views = _numbers(request, stream, vote), views
@@ -105,11 +105,11 @@ class Numbering:
 
     @property
     def ids(self) -> list[str]:
-        """The numbers that some view shows, rising."""
+        """Numbers of the candidates that some view shows, ascending."""
         return list(self.candidates)
 
     def translated(self, text: str) -> str:
-        """Return a text in which numbers of markers are those of candidates: elsewhere the query's own mean nothing."""
+        """Return a text with marker numbers replaced by candidate numbers, which are valid outside the query."""
 
         def said(found: re.Match[str]) -> str:
             return "candidates" + re.sub(r"\d+", lambda n: str(self.candidates.get(n.group(), "?")), found.group(2))
@@ -123,17 +123,17 @@ def _numbers(request: PointsRequest, stream: int, vote: int) -> np.ndarray:
 
 
 def grasp_numbers(request: PointsRequest, vote: int) -> np.ndarray:
-    """Return the number of each candidate ``(N,)`` in one of the grasp queries."""
+    """Return the marker number of each candidate ``(N,)`` in one of the grasp queries."""
     return _numbers(request, _GRASP_STREAM, vote)
 
 
 def functional_numbering(request: PointsRequest) -> Numbering:
-    """Return the numbers of the functional query."""
+    """Return the numbering of the functional query."""
     return Numbering(request, _FUNCTIONAL_STREAM, 0, own_views(request))
 
 
 def grasp_numbering(request: PointsRequest, vote: int, votes: int) -> Numbering:
-    """Return the numbers and views of one of the grasp queries; ``vote`` counts them from 0."""
+    """Return the numbering and views of one of the grasp queries; ``vote`` is its index from 0."""
     return Numbering(request, _GRASP_STREAM, vote, views_of_vote(request, vote, votes))
 
 
@@ -148,7 +148,7 @@ def functional_question(request: PointsRequest, numbering: Numbering, prompt: Pr
 
 
 def grasp_question(checks: PlaceChecks, numbering: Numbering, prompt: Prompt, vote: int) -> Question:
-    """Ask for grasp points, each vote in words of its own; ``vote`` counts the queries from 0."""
+    """Ask for grasp points, with a different wording per vote; ``vote`` is the index of the query from 0."""
     request = checks.request
     away_m = np.linalg.norm(request.positions_m - request.center_of_mass_m, axis=1)
     above_m = request.positions_m[:, 2]
@@ -181,7 +181,7 @@ def _values(request: PointsRequest) -> dict[str, str]:
 
 
 def examine_points(answer: PointsAnswer, numbering: Numbering, checks: PlaceChecks) -> list[str]:
-    """Return where geometry contradicts a label or a grasp, in the query's own numbers."""
+    """Return findings where geometry contradicts a label or a grasp, in the query's own numbers."""
     findings = []
     for point in answer.points:
         wrong = contradiction(point, numbering.candidates[point.id], checks)
@@ -191,7 +191,7 @@ def examine_points(answer: PointsAnswer, numbering: Numbering, checks: PlaceChec
 
 
 def contradiction(point: FunctionalChoice | GraspChoice, candidate: int, checks: PlaceChecks) -> str | None:
-    """Return how geometry contradicts one point; None: it does not."""
+    """Return how geometry contradicts a point, None if it does not."""
     wrong = checks.of_label(point.label, candidate)
     if wrong is None and isinstance(point, GraspChoice):
         wrong = checks.of_grasp(point.type, candidate)
@@ -201,7 +201,7 @@ def contradiction(point: FunctionalChoice | GraspChoice, candidate: int, checks:
 def functional_points(
     answer: PointsAnswer, numbering: Numbering, checks: PlaceChecks
 ) -> tuple[tuple[FunctionalPoint, ...], tuple[str, ...]]:
-    """Return the points of the last answer, and what contradicts them still; such points lose half of their confidence."""
+    """Return the points of the last answer, and findings about contradictions; such points lose half of their confidence."""
     request, points, findings = checks.request, list[FunctionalPoint](), list[str]()
     for number, choice in enumerate(answer.points):
         candidate = numbering.candidates[choice.id]

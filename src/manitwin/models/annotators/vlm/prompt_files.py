@@ -1,4 +1,4 @@
-"""The prompts: files that a person can read and edit, with a version in the first line."""
+"""Prompts: editable text files with a version in the first line."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PLACEHOLDERS: dict[str, frozenset[str]] = {
         {"given", "name", "category", "about", "round", "measures", "parts", "colors", "pictures"}
     ),
 }
-"""The prompts that there are, and what is put in for ``{placeholder}`` in each."""
+"""The prompts, with the names of the ``{placeholder}`` values that each may use."""
 
 PICTURES = "{pictures}"
 OTHERWISE = "\n# The same question in other words\n"
@@ -37,9 +37,9 @@ _FORM = re.compile(r"version: (\S+)\n+# Instructions\n(.*)\n# Question\n(.*)", r
 
 @dataclass(frozen=True)
 class Prompt:
-    """A prompt as it was read: standing instructions, and the question with places for what differs by object.
+    """A parsed prompt: system instructions, and the question with placeholders for the object's values.
 
-    ``otherwise`` is the same question in other words, for what is asked several times.
+    ``otherwise`` has other wordings of the question, for questions that are asked several times.
     """
 
     name: str
@@ -50,13 +50,13 @@ class Prompt:
 
     @property
     def text(self) -> list[str]:
-        """All that it says."""
+        """All texts of the prompt."""
         return [self.instructions, self.question, *self.otherwise]
 
     def filled(
         self, values: Mapping[str, str], pictures: Iterable[str | Picture], wording: int = 0
     ) -> tuple[str, tuple[str | Picture, ...]]:
-        """Return the instructions, and the question's parts with the pictures in their place, in one of its wordings."""
+        """Return the instructions, and the parts of the question with values and pictures inserted, in the given wording."""
         wordings = (self.question, *self.otherwise)
         before, after = wordings[wording % len(wordings)].split(PICTURES)
         parts = (_filled(before, values).rstrip(), *pictures, _filled(after, values).lstrip())
@@ -68,9 +68,9 @@ def _filled(text: str, values: Mapping[str, str]) -> str:
 
 
 def load_prompts(folder: Path | None) -> dict[str, Prompt]:
-    """Read all prompts; those in ``folder`` (``<name>.md``) replace the package's own.
+    """Read all prompts; files in ``folder`` (``<name>.md``) replace the package's own.
 
-    Raises ConfigError for a folder that is not there, a file of another name, form or placeholder.
+    Raises ConfigError for a missing folder, and a file with an unknown name, an invalid form or an unknown placeholder.
     """
     own = resources.files("manitwin.models.annotators.vlm") / "prompts"
     texts = {name: (own / f"{name}.md").read_text(encoding="utf-8") for name in PLACEHOLDERS}

@@ -1,4 +1,4 @@
-"""The quality question: the paper's two criteria, each with evidence, beside the photo; what is not clearly passed is failed."""
+"""Quality question: the paper's two criteria, each with evidence, compared with the photo; an unclear answer counts as failed."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class QualityAnswer(BaseModel):
 
     @property
     def artifacts(self) -> dict[str, Artifact]:
-        """The three kinds by name."""
+        """The three kinds of artifacts by name."""
         return {
             "fragmentation": self.fragmentation,
             "texture corruption": self.texture_corruption,
@@ -50,7 +50,7 @@ class QualityAnswer(BaseModel):
         }
 
     def of_severity(self, severity: Severity) -> list[str]:
-        """Return the kinds of a severity."""
+        """Return the kinds of artifacts with a severity."""
         return [name for name, artifact in self.artifacts.items() if artifact.severity == severity]
 
 
@@ -64,12 +64,12 @@ class QualityBesidePhotoAnswer(QualityAnswer):
 
 
 def quality_answer(subject: Subject) -> type[QualityAnswer]:
-    """Return the model of the answer: with a photo, likeness to it is asked too."""
+    """Return the model class of the answer; with a photo it includes the likeness to the photo."""
     return QualityBesidePhotoAnswer if subject.photos else QualityAnswer
 
 
 def quality_question(subject: Subject, prompt: Prompt, picture_px: int) -> Question:
-    """Ask for the criteria over all views, beside the photos that the model was made of."""
+    """Ask for the criteria with all views, beside the photos from which the object was made."""
     made_of = ""
     if subject.photos:
         made_of = (
@@ -83,7 +83,7 @@ def quality_question(subject: Subject, prompt: Prompt, picture_px: int) -> Quest
 
 
 def examine_quality(answer: QualityAnswer) -> list[str]:
-    """Return what keeps the answer from being a decision: doubt, or a decision against the evidence."""
+    """Return why the answer is not a decision: it is unsure, or contradicts its evidence."""
     findings = []
     if answer.single_object == "unsure":
         findings.append("single_object is unsure: look at every view again and answer yes or no")
@@ -102,7 +102,7 @@ def examine_quality(answer: QualityAnswer) -> list[str]:
 
 
 def quality_verdict(answer: QualityAnswer) -> QualityVerdict:
-    """Turn the last answer into the verdict; doubt that is left, and a yes against the evidence, is a no."""
+    """Convert the last answer to the verdict; an unsure answer, or a yes against the evidence, counts as no."""
     doubtful = answer.of_severity("severe") + answer.of_severity("unsure")
     single, sound = answer.single_object == "yes", answer.visual_quality == "yes" and not doubtful
     if isinstance(answer, QualityBesidePhotoAnswer) and answer.like_photo != "yes":

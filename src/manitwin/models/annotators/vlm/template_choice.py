@@ -1,4 +1,5 @@
-"""The template question: which template has the parts and the build of the object in a photo, or of what a text asks for."""
+"""Template question: which template has the parts and structure of the object in a photo, or of the object that a text
+describes."""
 
 from __future__ import annotations
 
@@ -22,7 +23,7 @@ NONE_OF_THESE = "none of these"
 
 @dataclass(frozen=True)
 class Shown:
-    """What is asked about: the matted photo ``rgba (H, W, 4) uint8``, or a text; ``name`` is what the user calls it."""
+    """The input: the matted photo ``rgba (H, W, 4) uint8``, or a text; ``name`` is the user's name for the object."""
 
     rgba: np.ndarray | None
     text: str | None
@@ -30,13 +31,13 @@ class Shown:
 
     @property
     def given(self) -> str:
-        """The sentence that says what the model is given."""
+        """The sentence that tells the model what the input is."""
         if self.rgba is not None:
             return "The picture shows one object, cut out of its photo."
         return f"There is no picture of the object: somebody asks for {' '.join((self.text or '').split())!r}."
 
     def pictures(self, picture_px: int) -> list[str | Picture]:
-        """Return the photo with a caption; nothing for a text."""
+        """Return the photo with a caption; an empty list for a text."""
         return [] if self.rgba is None else ["The photo:", cut_out_picture(self.rgba, picture_px)]
 
 
@@ -51,13 +52,13 @@ class ChoiceAnswer(BaseModel):
 
 @cache
 def choice_answer() -> type[ChoiceAnswer]:
-    """Return the model of an answer whose category is one of the templates, or none of them."""
+    """Return the model class of an answer whose category is one of the templates, or none of them."""
     one_of = Literal[(*load_templates(), NONE_OF_THESE)]  # type: ignore[valid-type]
     return create_model("ChoiceAnswer", __base__=ChoiceAnswer, category=(one_of, ...))  # type: ignore[arg-type]
 
 
 def choice_question(shown: Shown, prompt: Prompt, picture_px: int) -> Question:
-    """Ask which template it is."""
+    """Ask which template fits."""
     named = [
         f"{category} ({', '.join(template.names)})" if template.names else category
         for category, template in load_templates().items()
@@ -68,7 +69,7 @@ def choice_question(shown: Shown, prompt: Prompt, picture_px: int) -> Question:
 
 
 def examine_choice(answer: ChoiceAnswer, name: str | None) -> list[str]:
-    """Return what speaks against a template: the user's name for the thing is that of another one."""
+    """Return a finding if the user's name for the object is that of another template."""
     said = template_for(name)
     if said is None or answer.category in (said.category, *kinds_of(said.category)):
         return []

@@ -1,4 +1,4 @@
-"""The likeness question: a model beside the photo, or the words, that it was made from; and what has to change."""
+"""Likeness question: compares a model with its photo or text, and asks for corrections."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ class LikenessAnswer(BaseModel):
 
     @property
     def severe(self) -> list[str]:
-        """The severe differences, in words."""
+        """Descriptions of the severe differences."""
         return [f"{said.aspect}: {said.evidence}" for said in self.differences if said.severity == "severe"]
 
 
 @dataclass(frozen=True)
 class Likeness:
-    """Whether a thing is like what it was made from, why not, and what is said instead; ``findings`` stayed when asked again."""
+    """Whether a model is like its input, the reason if not, and the corrections; ``findings`` remained after asking again."""
 
     right: bool
     detail: str
@@ -69,7 +69,7 @@ class Likeness:
 
 @cache
 def likeness_answer(category: str) -> type[LikenessAnswer]:
-    """Return the model of an answer for a template."""
+    """Return the model class of an answer for a template."""
     look = look_answer(category)
     looks = Annotated[list[look], Field(max_length=MOST_LOOKS, description="those that have to change")]  # type: ignore[valid-type]
     return create_model(
@@ -87,7 +87,7 @@ def likeness_question(
     *,
     round_line: str,
 ) -> Question:
-    """Ask whether a thing with these measures, as ``pictures`` show it, is like what is shown."""
+    """Ask whether a model with these measures, shown in ``pictures``, is like the input."""
     values = {"given": shown.given, "name": name_line(shown.name), "round": round_line}
     values |= template_values(category, measures)
     instructions, parts = prompt.filled(values, [*shown.pictures(picture_px), *pictures])
@@ -95,7 +95,7 @@ def likeness_question(
 
 
 def examine_likeness(category: str, answer: LikenessAnswer) -> list[str]:
-    """Return what keeps the answer from being a decision: doubt, a decision against the evidence, measures of no such thing."""
+    """Return why the answer is not a decision: it is unsure, contradicts its evidence, or has impossible measures."""
     findings = []
     if answer.right == "unsure":
         findings.append("right is unsure: look at every picture again and answer yes or no")
@@ -107,7 +107,7 @@ def examine_likeness(category: str, answer: LikenessAnswer) -> list[str]:
 
 
 def likeness_of(category: str, answer: LikenessAnswer, findings: tuple[str, ...]) -> Likeness:
-    """Turn the last answer into the verdict; doubt that is left, and a yes against the evidence, is a no."""
+    """Convert the last answer to the verdict; an unsure answer, or a yes against the evidence, counts as no."""
     right = answer.right == "yes" and not answer.severe
     said = "; ".join(answer.severe) or answer.shown
     if answer.right == "unsure":

@@ -1,4 +1,4 @@
-"""The measures question: a template's measures, and the colours and materials of its parts, by a form of its own."""
+"""Measures question: a template's measures, and the colours and materials of its parts, with a form per template."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from manitwin.models.vlm.strict_schema import strict_schema
 
 UNSAID = "unsaid"
 MOST_LOOKS = 8
-_ROUNDING = 0.02  # a bound that is given to three digits may be answered with two
+_ROUNDING = 0.02  # a bound given to three digits may be answered with two
 
 
 def _known_color(text: str) -> str:
@@ -37,7 +37,7 @@ class MeasuresAnswer(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     def said(self) -> dict[str, float]:
-        """Return the measures that are said."""
+        """Return the measures that are given."""
         return {name: float(value) for name, value in self if value is not None}
 
 
@@ -54,7 +54,7 @@ class PartLook(BaseModel):
 
     @property
     def wish(self) -> Wish:
-        """What is wished for."""
+        """The requested colour and material."""
         return Wish(color_said(self.color), MATERIALS.get(self.material))
 
 
@@ -70,7 +70,7 @@ class FilledAnswer(BaseModel):
 
 @cache
 def measures_answer(category: str) -> type[MeasuresAnswer]:
-    """Return the model of a template's measures."""
+    """Return the model class of a template's measures."""
     template = load_templates()[category]
     fields = {
         name: (Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)] | None, Field(description=said))
@@ -81,14 +81,14 @@ def measures_answer(category: str) -> type[MeasuresAnswer]:
 
 @cache
 def look_answer(category: str) -> type[PartLook]:
-    """Return the model of the looks of a template's parts."""
+    """Return the model class of the looks of a template's parts."""
     one_of = Literal[tuple(parts_of(load_templates()[category]))]  # type: ignore[valid-type]
     return create_model("PartLook", __base__=PartLook, part=(one_of, ...))  # type: ignore[arg-type]
 
 
 @cache
 def filled_answer(category: str) -> type[FilledAnswer]:
-    """Return the model of an answer for a template."""
+    """Return the model class of an answer for a template."""
     look = look_answer(category)
     looks = Annotated[list[look], Field(max_length=MOST_LOOKS, description="of the parts that are seen or named")]  # type: ignore[valid-type]
     return create_model(
@@ -97,7 +97,7 @@ def filled_answer(category: str) -> type[FilledAnswer]:
 
 
 def measures_in_words(template: Template) -> dict[str, str]:
-    """Return what each measure is and the interval that it is in: 'a ratio, 0.75 to 1, usually 0.85'."""
+    """Return the description of each measure with its interval: 'a ratio, 0.75 to 1, usually 0.85'."""
     kinds = {"m": "metres", "": "a ratio"}
     return {
         name: f"{kinds[measure.unit]}, {measure.low:g} to {measure.high:g}, usually {measure.typical:g}"
@@ -106,13 +106,13 @@ def measures_in_words(template: Template) -> dict[str, str]:
 
 
 def about(template: Template) -> str:
-    """Return what the template builds and what its ratios are of, by its builder's own words."""
+    """Return what the template builds and to what its ratios refer, from the docstring of its builder."""
     words = " ".join((template.build.__doc__ or "").replace("``", "").split())
     return re.sub(r"^Build ", "It is ", words)
 
 
 def template_values(category: str, measures: Mapping[str, float] | None = None) -> dict[str, str]:
-    """Return what prompts are told of a template, ``measures`` of the thing as it is besides."""
+    """Return the prompt values of a template; ``measures`` adds the current measures of the object."""
     template = load_templates()[category]
     listed = [
         f"{name} ({said})" if measures is None else f"{name} {measures[name]:.3g} ({said})"
@@ -135,7 +135,7 @@ def measures_question(shown: Shown, category: str, prompt: Prompt, picture_px: i
 
 
 def filled_of(category: str, measures: MeasuresAnswer, looks: Sequence[PartLook]) -> Filled:
-    """Return what an answer says of a template; measures beyond their interval are left out."""
+    """Return the filled template of an answer; measures outside their intervals are left out."""
     template, said = load_templates()[category], measures.said()
     kept = {name: value for name, value in said.items() if _within(template, name, value)}
     filled = Filled(category, kept, {look.part: look.wish for look in looks})
@@ -143,7 +143,7 @@ def filled_of(category: str, measures: MeasuresAnswer, looks: Sequence[PartLook]
 
 
 def examine_measures(category: str, measures: MeasuresAnswer) -> list[str]:
-    """Return which measures no such thing has, and why they give no solid."""
+    """Return findings about measures outside their intervals, or why they give no solid."""
     template, said = load_templates()[category], measures.said()
     words = measures_in_words(template)
     findings = [

@@ -1,4 +1,4 @@
-"""The reader that asks a vision-language model to choose and fill in a template, and to compare what was built of it."""
+"""Template reader: asks a vision-language model to choose and fill in a template, and to compare the result with the input."""
 
 from __future__ import annotations
 
@@ -40,21 +40,21 @@ from manitwin.models.vlm.structured import ask
 
 PROMPTS = ("template", "template_measures", "template_likeness")
 MODEL_VIEWS = 3
-"""How many pictures of a model are compared with what it was made from."""
-_USUAL = "mug"  # a template of usual size, for the estimate
+"""Number of pictures of a model that are compared with its input."""
+_USUAL = "mug"  # a template of average size, for cost estimates
 _PICTURES = {"template": 1, "template_measures": 1, "template_likeness": 1 + MODEL_VIEWS}
-# about as many as the form and the filled placeholders have for a mug
+# approximate characters of the form and the filled placeholders for a mug
 _FORM_CHARACTERS = {"template": 5600, "template_measures": 2500, "template_likeness": 3200}
 ANSWER_TOKENS = {
     "template": 80,
     "template_measures": 200,
     "template_likeness": 250,
-}  # of answers like those in fakes.vlm_answers
+}  # for answers like those in fakes.vlm_answers
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A template's category, None for none of them; ``findings`` stayed when the question was asked again."""
+    """The category of a template, None for none of them; ``findings`` remained after asking again."""
 
     category: str | None
     findings: tuple[str, ...]
@@ -62,7 +62,7 @@ class Choice:
 
 @cache
 def _forms() -> str:
-    """Return all forms and what is told of each template, as JSON: forms of other templates differ in nothing else."""
+    """Return all forms and the texts about each template as JSON; the forms of other templates differ in nothing else."""
     forms = [strict_schema(form) for form in (choice_answer(), filled_answer(_USUAL), likeness_answer(_USUAL))]
     templates = [
         [category, about(each), {name: vars(measure) for name, measure in each.measures.items()}, dict(each.slots)]
@@ -72,9 +72,9 @@ def _forms() -> str:
 
 
 class TemplateReader:
-    """Ask a chat model three questions about a photo or a text: which template, its measures, and whether the result is like it.
+    """Ask a chat model three questions about a photo or a text: which template, its measures, and the likeness of the result.
 
-    Each raises what the chat model raises, and BadReply for an answer that twice has another form than was asked for.
+    Each raises the errors of the chat model, and BadReply for an answer that is invalid twice.
     """
 
     def __init__(self, chat: ChatModel, settings: VlmConfig, prompts: Mapping[str, Prompt]):
@@ -83,12 +83,12 @@ class TemplateReader:
 
     @property
     def source(self) -> str:
-        """The ``source`` of an Estimate that this model gives."""
+        """``source`` of an estimate by this model."""
         return f"vlm:{self.chat.model}"
 
     @cached_property
     def model(self) -> str:
-        """'MODEL, prompt template v1 and ... 0123abcd': model, prompts, and a digest of all that is asked with."""
+        """'MODEL, prompt template v1 and ... 0123abcd': model, prompt versions, and a digest of prompts, forms and settings."""
         settings = self.settings.model_dump(mode="json", include={"picture_px", "max_tokens", "temperature"})
         asked = [prompt.text for prompt in self._prompts.values()]
         text = json.dumps([asked, _forms(), settings], sort_keys=True)
@@ -97,7 +97,7 @@ class TemplateReader:
 
     @property
     def expected_usd(self) -> float:
-        """About what a photo costs that needs one round; 0 where the chat model has no price."""
+        """Approximate cost of a photo that needs one round; 0 if the chat model has no price."""
         price = getattr(self.chat, "price", None)
         if price is None:
             return 0.0
@@ -120,7 +120,7 @@ class TemplateReader:
         return Choice(None if category == NONE_OF_THESE else category, answered.findings)
 
     def fill(self, shown: Shown, category: str) -> tuple[Filled, tuple[str, ...]]:
-        """Fill in a template; returns what stayed wrong when asked again besides: such measures are left out."""
+        """Fill in a template; return it with the findings that remained. Measures with findings are left out."""
         question = measures_question(shown, category, self._prompts["template_measures"], self.settings.picture_px)
         form = filled_answer(category)
         answered = ask(self.chat, question, form, lambda answer: examine_measures(category, answer.measures))
@@ -134,7 +134,7 @@ class TemplateReader:
         pictures: Sequence[str | Picture],
         round_line: str,
     ) -> Likeness:
-        """Compare a thing of these measures with what is shown."""
+        """Compare a model with these measures with the input."""
         prompt, side_px = self._prompts["template_likeness"], self.settings.picture_px
         question = likeness_question(shown, category, measures, pictures, prompt, side_px, round_line=round_line)
         answered = ask(

@@ -1,4 +1,4 @@
-"""The views as a model is shown them: PNG, each with a caption; clean, or with numbered markers; photos that are cut out."""
+"""Pictures for questions: PNG views with captions, without or with numbered markers, and matted photos."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from manitwin.render.raycast import merged, silhouette
 from manitwin.render.scale_marks import best_camera, draw_dimension, draw_scale_bar
 
 MOST_PHOTOS = 8
-"""So many photos are shown at most: servers limit the pictures of a question, and eight views follow."""
-_FILLED = 0.9  # of a picture's side by the object cut out of a photo
+"""Largest number of photos in one question: servers limit the images of a request, and eight views follow the photos."""
+_FILLED = 0.9  # share of a picture's side that the object of a photo fills
 
 
 def read_picture(path: Path) -> np.ndarray:
@@ -31,14 +31,14 @@ def read_picture(path: Path) -> np.ndarray:
 
 
 def view_caption(number: int, count: int, camera: Camera) -> str:
-    """Return 'View 3 of 8, azimuth 30, elevation 20' in whole degrees: from where the camera looks."""
+    """Return 'View 3 of 8, azimuth 30, elevation 20' with the camera's direction in whole degrees."""
     x, y, z = camera.camera_to_object[:3, 2]
     azimuth = round(float(np.degrees(np.arctan2(y, x)))) % 360
     return f"View {number} of {count}, azimuth {azimuth}, elevation {round(float(np.degrees(np.arcsin(z))))}"
 
 
 def clean_views(subject: Subject) -> list[str | Picture]:
-    """Return each view's caption and picture."""
+    """Return each view's caption and picture, without markers."""
     parts: list[str | Picture] = []
     for number, (path, camera) in enumerate(zip(subject.views, subject.cameras, strict=True), 1):
         parts += [f"{view_caption(number, len(subject.views), camera)}:", Picture(png_of(read_picture(path)))]
@@ -46,9 +46,9 @@ def clean_views(subject: Subject) -> list[str | Picture]:
 
 
 def longest_extent_view(subject: Subject) -> list[str | Picture]:
-    """Return the view that shows the object's longest extent best, with that drawn into it, and its caption.
+    """Return the view that shows the object's longest extent best, with that extent drawn into it, and its caption.
 
-    The line is labelled with its length where the metres are declared, else with the name that the answer has for it.
+    The line is labelled with its length if the scale is declared, else with the name of the answer's field.
     """
     points = np.concatenate([part.vertices for part in subject.parts])
     edges = longest_edges(points)
@@ -63,9 +63,9 @@ def longest_extent_view(subject: Subject) -> list[str | Picture]:
 
 
 def photos_beside(subject: Subject, side_px: int) -> list[str | Picture]:
-    """Return the cut-out photos that the model was made of, each after a caption; of more than ``MOST_PHOTOS`` an even selection.
+    """Return the matted photos from which the object was made, each with a caption.
 
-    Raises OSError for a photo that cannot be read.
+    If there are more than ``MOST_PHOTOS``, an even selection is returned. Raises OSError for a photo that cannot be read.
     """
     count = len(subject.photos)
     shown = np.unique(np.linspace(0, count, min(count, MOST_PHOTOS), endpoint=False).astype(int))
@@ -78,7 +78,7 @@ def photos_beside(subject: Subject, side_px: int) -> list[str | Picture]:
 
 
 def cut_out_picture(rgba: np.ndarray, side_px: int) -> Picture:
-    """Return the object of ``rgba (H, W, 4) uint8``, whose alpha is its mask, on the views' plain ground, ``side_px`` wide."""
+    """Return the object of ``rgba (H, W, 4) uint8``, whose alpha is its mask, on a plain background, ``side_px`` wide."""
     inside = rgba[..., 3] > 127
     rows, columns = np.nonzero(inside)
     top, left = int(rows.min()), int(columns.min())
@@ -103,11 +103,11 @@ def marked_views(
     cameras: Sequence[Camera],
     visible: Sequence[tuple[int, ...]],
 ) -> tuple[list[str | Picture], str]:
-    """Return each view clean and with the candidates that it shows, and the word for the markers' colour.
+    """Return each view without and with its visible candidates marked, and the name of the markers' colour.
 
-    The last picture is the first view with a scale bar. Candidate ``i`` is marked by the number ``numbers[i]``.
-    Source: set-of-mark prompting (Yang et al. 2023, arXiv 2310.11441): marks by number, kept off what they mark; only what a
-    view shows is marked in it.
+    The last picture is the first view with a scale bar. Candidate ``i`` has the marker ``numbers[i]``. Source: set-of-mark
+    prompting (Yang et al. 2023, arXiv 2310.11441): numbered marks that do not cover the marked places; only candidates
+    visible in a view are marked.
     """
     caster = RayCaster(merged(list(request.subject.parts)))
     color = marker_color(pictures)
@@ -118,7 +118,7 @@ def marked_views(
         if not seen:
             parts.append(f"{caption}: no marker can be seen from here.")
             continue
-        # By number, not by candidate: where boxes compete for room, no place is favoured in all queries.
+        # ordered by number, not by candidate, so that label placement does not favour the same places in all queries
         ids = sorted(seen, key=lambda i: int(numbers[i]))
         marked = draw_markers(
             clean,
@@ -133,7 +133,7 @@ def marked_views(
 
 
 def _scale_view(subject: Subject, clean: np.ndarray, camera: Camera) -> list[str | Picture]:
-    """Return a view with a scale bar, and its caption; an object has its size before its points are asked for."""
+    """Return a view with a scale bar, and its caption; the object's size is known before its points are asked for."""
     middle_m = np.mean([part.bounds for part in subject.parts], axis=(0, 1))
     bar = draw_scale_bar(clean, camera, middle_m)
     return ["The first view with a scale bar, which holds at the object's middle:", Picture(png_of(bar))]

@@ -1,4 +1,4 @@
-"""The views of one query: the object's own eight, or eight others around it, in an order of their own, and what each shows."""
+"""Views of a query: the object's own eight, or eight others around it in random order, with the candidates visible in each."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from manitwin.render.raycast import merged, seen_tolerance_m, visible_points
 from manitwin.render.renderer import BACKDROP, shared_renderer
 
 _ORDER_STREAM = 2
-_HEIGHTS_MOVED = 3  # of eight: a side that is seen from above in one query is seen from another height in the next
+_HEIGHTS_MOVED = 3  # of eight: shifts the elevations between queries, so that each side is seen from different heights
 
 
 @dataclass(frozen=True)
 class QueryViews:
-    """Pictures ``(H, W, 3) uint8``, their cameras, and the candidates that each shows."""
+    """Pictures ``(H, W, 3) uint8``, their cameras, and the indices of the candidates visible in each."""
 
     pictures: tuple[np.ndarray, ...]
     cameras: tuple[Camera, ...]
@@ -28,20 +28,20 @@ class QueryViews:
 
     @property
     def seen(self) -> set[int]:
-        """The candidates that some view shows."""
+        """Candidates that some view shows."""
         return {i for view in self.visible for i in view}
 
 
 def own_views(request: PointsRequest) -> QueryViews:
-    """Return the object's views as they are."""
+    """Return the object's own views."""
     subject = request.subject
     return QueryViews(tuple(read_picture(path) for path in subject.views), subject.cameras, request.visible)
 
 
 def views_of_vote(request: PointsRequest, vote: int, votes: int) -> QueryViews:
-    """Return the views of a query: the first one's are the object's own, those of the others are drawn from between them.
+    """Return the views of a query: the object's own for the first query, rendered from positions between them for the others.
 
-    Each query has an order of its own. Raises RendererMissing where nothing renders.
+    Each query has its own order. Raises RendererMissing without a renderer.
     """
     if vote == 0 or not len(request.subject.cameras):
         return own_views(request)
