@@ -87,8 +87,7 @@ _NO_THING = re.compile(
 _IMITATIONS = {"toy": "toy", "plush": "stuffed toy", "stuffed": "stuffed toy"}
 """Words that say that an object imitates another one: a toy elephant is a toy."""
 _SMALL = frozenset({*_IMITATIONS, "doll", "dollhouse", "miniature"})
-"""Words that make a piece of furniture a toy (a doll's chair); toys of other objects, such as tools, have entries of their
-own."""
+"""Words that make a piece of furniture a toy (a doll's chair); toy tools and the like have entries of their own."""
 _TOO_LARGE = "furniture"
 """Domain of objects that are too large for a hand, so that a toy version is a toy."""
 

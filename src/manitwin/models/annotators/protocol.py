@@ -95,7 +95,7 @@ class PointsRequest:
     """Numbered candidate points, and pictures in which they are marked.
 
     ``positions_m`` and ``normals`` are ``(N, 3)`` in the object frame; ``visible`` has the indices of the candidates seen in
-    each view; ``max_opening_m`` is the widest opening of the grippers.
+    each view; ``max_opening_m`` is the opening of the gripper.
     """
 
     subject: Subject

@@ -95,11 +95,10 @@ LISTED_CHARACTERS = {"functional_points": 16, "grasp_points": 24}
 
 
 class VlmAnnotator:
-    """Annotator that asks a chat model; an answer that contradicts geometry or priors is asked for again, and reported if it
-    stays.
+    """Annotator that asks a chat model, and asks again if an answer contradicts geometry or priors.
 
-    Raises the errors of the chat model, BadReply for an unusable answer, Rejected for an impossible size or mass, and
-    ConfigError for invalid prompts.
+    A contradiction that stays is reported as a finding. Raises the errors of the chat model, BadReply for an unusable answer,
+    Rejected for an impossible size or mass, and ConfigError for invalid prompts.
     """
 
     needs: Resource = "vlm"

@@ -136,8 +136,7 @@ def _apart_m(first: int, second: int, checks: PlaceChecks) -> float:
 
 
 def _leading(place: Elected) -> Ballot:
-    """Return the ballot whose texts are used: of the most frequent type, preferably at this candidate, with the highest
-    confidence."""
+    """Return the ballot whose texts are used: of the most frequent type, then at this candidate, then most confident."""
     types = [ballot.choice.type for ballot in place.ballots]
     return max(
         place.ballots,

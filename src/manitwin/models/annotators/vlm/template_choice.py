@@ -1,5 +1,4 @@
-"""Template question: which template has the parts and structure of the object in a photo, or of the object that a text
-describes."""
+"""Template question: which template has the parts and structure of the object in a photo, or described by a text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The built-in generator that needs no weights: see ``lifting`` for how it chooses."""
+"""The built-in generator ``lift``, which needs no weights; ``lifting`` describes how it chooses a shape."""
 
 from manitwin.models.generators.lift.generator import LiftGenerator
 

@@ -1,8 +1,9 @@
-"""The blocks, and the views of them, whose outline is that of a photo: what fits of boxes begin with.
+"""Blocks (boxes) and views of them that match the silhouette of a photo: initial values for fits of boxes.
 
-A block's outline is convex, and a convex outline is told in full by its support function: how far it reaches each way (Schneider
-1993, "Convex Bodies", 1.7). That of a block is the largest of its eight corners', so that hundreds of fits by least squares, from
-all around, cost less than one that draws. Several blocks have nearly one outline: which it is, the photo's inner edges tell.
+The silhouette of a block is convex, and a convex silhouette is fully described by its support function (Schneider 1993,
+"Convex Bodies", 1.7). The support function of a block is the maximum over its eight corners, so hundreds of least-squares
+fits from all directions cost less than one fit that renders. Several blocks have nearly the same silhouette; the inner edges
+of the photo tell them apart.
 """
 
 from __future__ import annotations
@@ -16,27 +17,29 @@ import numpy as np
 from manitwin.models.generators.templates.fitting.view import LEAST_PERSPECTIVE, MOST_PERSPECTIVE, View
 
 WAYS = 72
-"""In which the outlines are compared."""
+"""Number of directions in which the support functions are compared."""
 ELEVATIONS_DEG, YAWS_DEG = (5.0, 14.0, 27.0, 42.0, 58.0, 76.0), (-36.0, -12.0, 12.0, 36.0)
 PROPORTIONS = (0.4, 1.0, 2.4, 8.0)
-"""Of width and of depth to height, to begin with."""
+"""Initial values of width and depth over height."""
 LEAST_PROPORTION, MOST_PROPORTION = 0.05, 50.0
 MOST_VIEWS = 6
 MOST_OFF, WORSE = 0.005, 2.5
-"""Root mean square distance of the outlines, of the longer side, up to which a block may be it; and over that of the nearest."""
+"""Maximum root mean square distance of the silhouettes, over the longer side, and maximum ratio to that of the best block."""
 _ROUNDS, _COARSE_ROUNDS, _KEPT = 24, 6, 48
 _ROLL_RAD = np.radians(4.0)
-_PRIOR = 0.0015  # a standard deviation of lens or roll, as a distance of the outlines in one way
+_PRIOR = 0.0015  # residual of one standard deviation of perspective or roll, as a support distance
 _STEPS = np.array([0.01, 0.01, 0.005, 0.02, 0.01, 0.01, 0.003, 0.002, 0.002])
 _SIGNS = np.array(list(product((-0.5, 0.5), repeat=3)))
-_ALIKE = 0.06  # of a logarithm of proportions
+_ALIKE = 0.06  # difference of log proportions
 _ALIKE_RAD = np.radians(4.0)
 
 
 @dataclass(frozen=True)
 class BlockView:
-    """A block by its ``width`` and ``depth`` over its height, the ``view`` of it, and how far its outline is ``off`` (root mean
-    square, of the longer side)."""
+    """A block with ``width`` and ``depth`` over its height, the ``view`` of it, and its distance ``off`` from the silhouette.
+
+    ``off`` is the root mean square distance of the support functions over the longer side.
+    """
 
     width: float
     depth: float
@@ -45,7 +48,7 @@ class BlockView:
 
 
 def block_views(mask: np.ndarray, perspective: float, focal_spread: float) -> list[BlockView]:
-    """Return the blocks whose outline is about that of a ``mask (H, W) bool``, the nearest first; empty where none is.
+    """Return the blocks whose silhouette is close to that of ``mask (H, W) bool``, the best first; may be empty.
 
     The camera is above the block and not rolled. ``perspective`` and ``focal_spread`` are those of ``Evidence``.
     """
@@ -70,13 +73,13 @@ def block_views(mask: np.ndarray, perspective: float, focal_spread: float) -> li
 
 
 def outline_points(mask: np.ndarray) -> np.ndarray:
-    """Return the corners ``(N, 2)`` of the convex hull of a mask that is not empty, in the photo frame of ``View``."""
+    """Return the corners ``(N, 2)`` of the convex hull of a non-empty mask, in the photo frame of ``View``."""
     contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     hull = cv2.convexHull(max(contours, key=len))[:, 0].astype(float)
     low, high = hull.min(0) - 0.5, hull.max(0) + 0.5
     middle = (low + high) / 2
     away = hull - middle
-    # a contour goes through the middles of pixels, an outline around them
+    # a contour passes through pixel centres, the outline around the pixels
     return np.asarray((away + 0.5 * np.sign(away)) / (high - low).max())
 
 
@@ -90,7 +93,7 @@ def _support(points: np.ndarray) -> np.ndarray:
 
 
 def _starts(usual: float) -> np.ndarray:
-    """Return what fits begin with ``(S, 9)``: yaw, elevation, roll, the logarithms of perspective, width, depth, scale; x, y."""
+    """Return initial parameters ``(S, 9)``: yaw, elevation, roll, logarithms of perspective, width, depth, scale; x, y."""
     grid = product(np.radians(YAWS_DEG), np.radians(ELEVATIONS_DEG), np.log(PROPORTIONS), np.log(PROPORTIONS))
     at = np.array([[yaw, elevation, 0.0, usual, width, depth, 0.0, 0.0, 0.0] for yaw, elevation, width, depth in grid])
     flat = _projected(at)
@@ -102,7 +105,7 @@ def _starts(usual: float) -> np.ndarray:
 
 
 def _projected(at: np.ndarray) -> np.ndarray:
-    """Return the places ``(S, 8, 2)`` of blocks' corners in the photo frame; as ``View.project``, many at a time."""
+    """Return the projected corners ``(S, 8, 2)`` of blocks in the photo frame; a vectorized ``View.project``."""
     sides = np.column_stack([np.exp(at[:, 4]), np.exp(at[:, 5]), np.ones(len(at))])
     corners = _SIGNS * (sides / (np.linalg.norm(sides, axis=1, keepdims=True) / 2))[:, None]
     (cos_y, cos_e, cos_r), (sin_y, sin_e, sin_r) = np.cos(at[:, :3]).T, np.sin(at[:, :3]).T
@@ -124,7 +127,7 @@ def _residuals(at: np.ndarray, reach: np.ndarray, usual: float, focal_spread: fl
 def _improved(
     at: np.ndarray, value: np.ndarray, damping: np.ndarray, reach: np.ndarray, usual: float, focal_spread: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return all fits a step of Levenberg and Marquardt further, where that is nearer; else with more damping."""
+    """Return all fits after one Levenberg-Marquardt step; steps that do not improve are rejected and damped more."""
     count, width = at.shape
     moved = np.repeat(at[:, None], width, axis=1) + np.diag(_STEPS)
     ahead = _residuals(moved.reshape(-1, width), reach, usual, focal_spread).reshape(count, width, -1)
@@ -152,7 +155,7 @@ def _bounded(at: np.ndarray) -> np.ndarray:
 
 
 def _block_view(at: np.ndarray, off: float) -> BlockView:
-    """Return a fit, its front within 45 degrees of the camera: turned by 90 degrees it is a block whose sides are exchanged."""
+    """Return a fit with its front within 45 degrees of the camera: a rotation by 90 degrees exchanges width and depth."""
     quarters = round(float(at[0]) / (np.pi / 2))
     width, depth = np.exp(at[4:6] if quarters % 2 == 0 else at[5:3:-1])
     view = View(

@@ -1,4 +1,4 @@
-"""The solids that may explain a photo: a body of revolution with handles, one that lies, a box, an inflated outline."""
+"""Candidate solids for a photo: bodies of revolution with handles, standing or lying, boxes, and inflated silhouettes."""
 
 from __future__ import annotations
 
@@ -27,39 +27,41 @@ from manitwin.models.generators.lift.surface import (
 )
 from manitwin.models.generators.lift.texture import Crop
 
-_FLAT_BOX_DEPTH_SHARE = 0.12  # of the shorter side: a book, a tray
-_LEAST_FLAT_SHARE = 0.02  # a card is thinner, but hulls and fingertips need a body
-UPRIGHT_TILT_DEG = 20.0  # an axis that leans less stands in the photo
-LEANING_DEG = 3.0  # what leans more is set upright about its own axis, as if seen from the side
-LEAST_BODY_SHARE = 0.55  # of the outline: the body that a round container's handles and spouts stick out of
+_FLAT_BOX_DEPTH_SHARE = 0.12  # of the shorter side, as for a book or a tray
+_LEAST_FLAT_SHARE = 0.02  # a card is thinner, but collision hulls and grasps need some thickness
+UPRIGHT_TILT_DEG = 20.0  # maximum tilt of the axis of an object that stands in the photo
+LEANING_DEG = 3.0  # an object that leans more is revolved about its own axis, as if seen from the side
+LEAST_BODY_SHARE = 0.55  # of the silhouette: minimum share of a round container's body, without handles and spouts
 LEAST_TURNED_IOU, LEAST_MIRROR_IOU = 0.92, 0.9
-_LONGER = 1.1  # width over height from which on the axis across may be the one that a thing is turned about
+_LONGER = 1.1  # minimum width over height for which the other mirror axis may be the axis of revolution
 _RIM_RADIUS, _SHARP_RIM = 0.93, 0.24
-"""A rim is sharp where less than 0.24 of a body's height has 0.93 of the largest radius or more: of an ellipsoid 0.37 has, of a
-lemon that is turned about the wrong axis 0.2."""
-_LIKE_ENDS = 0.15  # difference of the mean radii of both ends, over the larger one, up to which they are alike
-_CLEARLY_NEARER = 0.1  # difference of logarithms of volumes
+"""A rim is sharp if less than 0.24 of the height has 0.93 of the largest radius or more.
+
+The share is 0.37 for an ellipsoid, and 0.2 for a lemon revolved about the wrong axis.
+"""
+_LIKE_ENDS = 0.15  # maximum difference of the mean radii of two similar ends, over the larger one
+_CLEARLY_NEARER = 0.1  # difference of log volumes
 LEAST_TIP_ANGLE_DEG = 5.0
-LEAST_STATED_ANGLE_DEG = 2.0  # the same, where it is known that the thing stands
-SLIGHT_CUTS = (0.015, 0.03)  # a rounded underside; what is cut higher are feet
-STANDING_CUTS = (0.05, 0.08, 0.12)  # shares of the height tried for a flat base
-_ONE_BULGE = 0.85  # solidity from which on an outline is that of one body: a handle is no thicker for its wide head
-_TOLD_RELIEF_RISE = 2.0  # of a body whose depth is known: a relief is as high as all of it is deep
-_RELIEF_RISE = 1.5  # a bar of radius r lies as a relief this many r high: between a half bar and a whole one
+LEAST_STATED_ANGLE_DEG = 2.0  # the same for an object that is known to stand
+SLIGHT_CUTS = (0.015, 0.03)  # cuts of a rounded underside; higher cuts would remove feet
+STANDING_CUTS = (0.05, 0.08, 0.12)  # shares of the height at which a flat base is tried
+_ONE_BULGE = 0.85  # minimum solidity of a single body; the thickness of a handle does not follow from a wide head
+_TOLD_RELIEF_RISE = 2.0  # for a body of known depth: a relief is as high as the whole body is deep
+_RELIEF_RISE = 1.5  # height of a relief of a bar over its radius: between a half bar and a whole one
 _COMPACT = 1.5
-"""Round things no longer than so many widths are set on their base, however such things usually lie: they do not roll."""
+"""Maximum elongation of round objects that are set on their base regardless of their usual pose, so that they do not roll."""
 
 
 @dataclass(frozen=True)
 class View:
-    """What is known of the photo: the crop, its colours at the mask's size, and the outline's measures."""
+    """A photo with its measurements: the crop, its colours at the size of the mask, and the measured silhouette."""
 
     crop: Crop
     photo: np.ndarray
     silhouette: Silhouette
 
     def explained(self, surface: LiftedSurface, elevation_deg: float = 0.0) -> Explained:
-        """Compare a solid in the picture's pixels with the photo."""
+        """Compare a solid in the pixels of the crop with the photo."""
         shape = (self.crop.mask.shape[0], self.crop.mask.shape[1])
         camera = parallel_camera(shape, elevation_deg=elevation_deg)
         return explained(bare_mesh(surface), camera, self.crop.mask, self.photo)
@@ -67,7 +69,7 @@ class View:
 
 @dataclass(frozen=True)
 class Made:
-    """A solid at rest, how well it explained the photo as it was seen, and notes."""
+    """A solid in its resting pose, how well it explained the photo, and notes."""
 
     surface: LiftedSurface
     explained: Explained
@@ -75,10 +77,10 @@ class Made:
 
 
 def turned_about(silhouette: Silhouette, hint: ShapeHint) -> Silhouette:
-    """Return the silhouette about the axis that the thing is turned about, where it is symmetric along and across.
+    """Return the silhouette about the other mirror axis if that is the axis of revolution, for one that is symmetric about both.
 
-    A lemon on its side that is turned about the axis across it would be a lens: with a sharp rim, which hardly anything has, and
-    more than its category's volume.
+    A lemon on its side would be a lens if it were revolved about the axis across it: with a sharp rim, which is rare, and
+    with more than the volume of its category.
     """
     if hint.stands or hint.container or hint.flat or hint.boxy:
         return silhouette
@@ -94,7 +96,7 @@ def turned_about(silhouette: Silhouette, hint: ShapeHint) -> Silhouette:
 
 
 def _too_much(flatness: float, hint: ShapeHint) -> bool:
-    """Tell whether an ellipsoid turned about its long axis is clearly nearer to the category's volume than about its short."""
+    """Tell whether revolving about the long axis gives clearly a better volume for the category than about the short one."""
     if not hint.round or hint.volume_share is None:
         return False
     flat, long = (abs(float(np.log(np.pi / 6 * flatness**power / hint.volume_share))) for power in (1, 2))
@@ -102,9 +104,9 @@ def _too_much(flatness: float, hint: ShapeHint) -> bool:
 
 
 def standing_turned(view: View, hint: ShapeHint, *, plain: bool) -> Made | None:
-    """Return a body of revolution that stands in the photo, with its handles; None where that does not explain the outline.
+    """Return a body of revolution that stands in the photo, with its handles; None if it does not explain the silhouette.
 
-    ``plain``: the outline alone is one that such bodies have.
+    ``plain``: the silhouette alone suggests a body of revolution.
     """
     silhouette, mask = view.silhouette, view.crop.mask
     round_thing = hint.round or (hint.container and not hint.boxy)
@@ -144,15 +146,15 @@ def standing_turned(view: View, hint: ShapeHint, *, plain: bool) -> Made | None:
 
 
 def revolved(view: View, hint: ShapeHint) -> Made:
-    """Return a body of revolution about the outline's mirror axis, however it lies, seen from the side."""
+    """Return a body of revolution about the silhouette's mirror axis, in any orientation, seen from the side."""
     silhouette = view.silhouette
     tilt = silhouette.axis_tilt_deg
     rows, radii = profile(silhouette)
     third = len(radii) // 3
-    # a thing that lies in the photo stands on its wider end
+    # an object that lies in the photo stands on its wider end
     first, last = float(radii[:third].mean()), float(radii[-third:].mean())
     upside_down = abs(tilt) > 45 and first > last
-    # neither end is the one that such a thing would stand on
+    # such an object stands on neither end
     lies = abs(tilt) > 45 and hint.stands is False and abs(first - last) < _LIKE_ENDS * max(first, last)
     if not lies:
         rows, radii = trim_caps(rows, radii, base_at_top=upside_down)
@@ -165,14 +167,14 @@ def revolved(view: View, hint: ShapeHint) -> Made:
     stands = hint.stands if hint.stands is not None else tip_angle_deg(surface) >= least
     if stands or (silhouette.elongation < _COMPACT and not lies):
         return Made(surface, found, {"rests": "standing", "hollow": bool(open_top)})
-    leaning = np.radians(90.0 * round((tilt + (180 if upside_down else 0)) / 90.0))  # along an axis of its frame
+    leaning = np.radians(90.0 * round((tilt + (180 if upside_down else 0)) / 90.0))  # align with an axis of the frame
     turn = np.array([[np.cos(leaning), np.sin(leaning), 0], [-np.sin(leaning), np.cos(leaning), 0], [0, 0, 1]])
     lying = laid_round(surface.moved(turn, np.zeros(3)))
     return Made(lying, found, {"rests": "lying", "hollow": bool(open_top)})
 
 
 def _in_picture(surface: LiftedSurface, silhouette: Silhouette) -> LiftedSurface:
-    """Return a surface about the upright axis as it lies in the picture's pixels."""
+    """Return a surface about the upright axis in the pixels of the picture."""
     height, width = silhouette.mask.shape
     back = np.linalg.inv(np.vstack([turning(height, width, silhouette.axis_tilt_deg), [0, 0, 1]]))
     upright = np.column_stack(
@@ -184,11 +186,11 @@ def _in_picture(surface: LiftedSurface, silhouette: Silhouette) -> LiftedSurface
 
 
 def boxed(view: View, hint: ShapeHint) -> Made:
-    """Return a box whose front is the outline's rectangle."""
+    """Return a box whose front is the bounding rectangle of the silhouette."""
     flat = hint.flat or hint.stands is False
     share = _flat_share(view.silhouette, hint) if flat else _deep_share(view.silhouette, hint)
     surface = make_box(view.silhouette, depth_share=share)
-    # a box's own axes are those of its rectangle: it is compared by that
+    # the box has the axes of the rectangle, so the rectangle's overlap is used
     found = Explained(view.silhouette.rectangle_iou)
     if flat:
         return Made(laid(surface), found, {"rests": "lying", "depth_share": round(share, 4)})
@@ -196,17 +198,17 @@ def boxed(view: View, hint: ShapeHint) -> Made:
 
 
 def _flat_share(silhouette: Silhouette, hint: ShapeHint) -> float:
-    """Return the thickness of a flat box over its shorter side: that of the usual volume of its category, where it is known."""
+    """Return the thickness of a flat box over its shorter side, from the usual volume of its category if known."""
     if not hint.flat or hint.volume_share is None:
         return _FLAT_BOX_DEPTH_SHARE
     return float(np.clip(_usual_share(silhouette, hint.volume_share), _LEAST_FLAT_SHARE, DEPTH_SHARE))
 
 
 def _deep_share(silhouette: Silhouette, hint: ShapeHint) -> float:
-    """Return the depth of a box over its shorter side: that of the usual volume of its category, where that makes it deeper.
+    """Return the depth of a box over its shorter side, from the usual volume of its category if that makes it deeper.
 
-    A carton and a cube are about as deep as wide, a box of crackers is not: of 17 boxes of known sides (YCB's, cartons, packs)
-    the depth is off by a factor of 1.04 in the median, 1.5 at most; by 1.59 and 2.5 with ``DEPTH_SHARE`` alone.
+    A carton and a cube are about as deep as wide, a box of crackers is not. For 17 boxes of known dimensions (YCB's, cartons,
+    packs) the error of the depth is a factor of 1.04 in the median and 1.5 at most; with ``DEPTH_SHARE`` alone 1.59 and 2.5.
     """
     if not hint.boxy or hint.volume_share is None:
         return DEPTH_SHARE
@@ -214,13 +216,13 @@ def _deep_share(silhouette: Silhouette, hint: ShapeHint) -> float:
 
 
 def _usual_share(silhouette: Silhouette, volume_share: float) -> float:
-    """Return the depth over the shorter side with which a box with the outline's sides has its category's usual volume."""
+    """Return the depth over the shorter side at which a box with the rectangle's sides has the category's usual volume."""
     sides = np.linalg.norm(np.diff(silhouette.corners[:3], axis=0), axis=1)
     return volume_share * float(sides.max() / sides.min()) ** 2
 
 
 def inflated(view: View, hint: ShapeHint) -> Made:
-    """Return the inflated outline: rounded on both sides, with a flat base where it stands and a facet where it lies."""
+    """Return the inflated silhouette: rounded on both sides, with a flat base if it stands and a facet if it lies."""
     silhouette = view.silhouette
     depth = _depth(silhouette, hint)
     notes: dict[str, Any] = {"depth_limit": _share(depth.limit_px, silhouette), "depth_source": depth.source}
@@ -237,7 +239,7 @@ def inflated(view: View, hint: ShapeHint) -> Made:
         cut = trimmed or stood(body, least_deg, STANDING_CUTS)
         if cut is not None or hint.stands:
             soles = None
-            if trimmed is None:  # a higher cut would take feet off
+            if trimmed is None:  # a higher cut would remove feet
                 soles = on_soles(silhouette.mask, lambda footed: body_of(1.0, mask=footed), least_deg)
             standing = soles or cut or stood(body, LEAST_STATED_ANGLE_DEG)
             if standing is not None:
@@ -255,7 +257,7 @@ def inflated(view: View, hint: ShapeHint) -> Made:
 
 @dataclass(frozen=True)
 class _Depth:
-    """How far a body may rise to each side (None: as far as it is round), how full it is below that, and what says so."""
+    """Limit of the height on each side (None: fully round), fullness below the limit, and the source of both."""
 
     limit_px: float | None
     fullness: float
@@ -263,11 +265,11 @@ class _Depth:
 
 
 def _depth(silhouette: Silhouette, hint: ShapeHint) -> _Depth:
-    """Return how deep a thing is that is seen from one side.
+    """Return the depth of an object that is seen from one side.
 
-    What is round by its name is as deep as wide. Else its category's volume is that of the body: what is flat is as thick
-    everywhere, what is round half as thick again in its middle. Without a category, nothing in one outline tells a flat head
-    from a round one: slender things get the mean of both.
+    An object whose name says round is as deep as wide. Otherwise the body gets the volume of its category: a flat object has
+    uniform thickness, a round one is half again as thick in its middle. Without a category one silhouette does not tell a
+    flat head from a round one; slender objects get the mean of both.
     """
     typical, largest = silhouette.typical_radius_px, silhouette.largest_radius_px
     fullness = full_round(silhouette.mask) if silhouette.solidity > _ONE_BULGE else 1.0

@@ -1,4 +1,4 @@
-"""A carved solid as a textured mesh, coloured by the photo that shows a place best."""
+"""Textured mesh of a carved solid: each face takes its colours from the photo that shows it best."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from manitwin.models.generators.lift.photo_atlas import photo_atlas
 from manitwin.models.generators.lift.surface import bare_mesh
 from manitwin.models.generators.photo_material import photo_material
 
-SEEN_COSINE = 0.2  # a face seen at less than 12 degrees takes painted colours
+SEEN_COSINE = 0.2  # faces seen at less than 12 degrees get painted colours
 MOST_COLOURING = 12
-"""Photos of many, spread over the directions, that colour: a texture has room for so many in detail."""
+"""Maximum number of photos used for colours, spread over the directions; more would leave too few texture pixels for each."""
 
 
 def carved_part(carved: Carved) -> trimesh.Trimesh:
-    """Return the mesh in the object frame (Z up) with one texture: photos beside each other, painted colours below them."""
+    """Return the mesh in the object frame (Z up) with one texture: photos side by side, painted colours below them."""
     surface, photos = carved.surface, colouring(carved)
     view = _best_views(carved, photos)
     atlas, places = photo_atlas([photo.crop for photo in photos])
@@ -45,7 +45,7 @@ def carved_part(carved: Carved) -> trimesh.Trimesh:
 
 
 def colouring(carved: Carved) -> tuple[CarvingPhoto, ...]:
-    """Return the photos that colour a carved solid: all, or of many some that are spread over the directions."""
+    """Return the photos used for colours: all of them, or a subset spread over the directions."""
     photos = carved.outlines
     if len(photos) <= MOST_COLOURING:
         return photos
@@ -57,14 +57,14 @@ def colouring(carved: Carved) -> tuple[CarvingPhoto, ...]:
 
 
 def seen_area_share(carved: Carved) -> float:
-    """Return how much of a carved surface's area the photos show that colour it."""
+    """Return the share of the surface area that the photos used for colours show."""
     mesh, photos = bare_mesh(carved.surface), colouring(carved)
     areas = np.asarray(mesh.area_faces)
     return float(areas[_best_views(carved, photos) < len(photos)].sum() / areas.sum())
 
 
 def _best_views(carved: Carved, photos: tuple[CarvingPhoto, ...]) -> np.ndarray:
-    """Return for each face the photo that shows it best; plus the number of photos where none does."""
+    """Return for each face the index of the photo that shows it best, plus the number of photos if none shows it well."""
     mesh = bare_mesh(carved.surface)
     caster, normals, centers = RayCaster(mesh), np.asarray(mesh.face_normals), mesh.triangles_center
     scores = []

@@ -1,4 +1,4 @@
-"""A solid as the level set of a field, at rest, and the photos that it was carved out of, which colour it."""
+"""Solid as a level set of a scalar field, in its resting pose, with the photos it was carved from."""
 
 from __future__ import annotations
 
@@ -13,28 +13,32 @@ from manitwin.errors import Rejected
 from manitwin.models.generators.lift.surface import LiftedSurface, from_manifold, normalised, stood, to_manifold
 from manitwin.models.generators.lift.texture import Crop
 
-SIMPLER_CELLS = 0.15  # how far the surface may move to have fewer faces
+SIMPLER_CELLS = 0.15  # tolerance of mesh simplification, in cells
 BASE_CUTS = (0.0, 0.01, 0.02, 0.04, 0.06, 0.1)
 LEAST_TIP_DEG = 5.0
 
 
 class CarvingPhoto(Protocol):
-    """One of the photos; points ``(N, 3)`` are x to the first photo's right, height, z towards its camera, as it was carved."""
+    """One of the photos that a solid is carved from.
+
+    Points ``(N, 3)`` have x to the first photo's right, y up, and z towards its camera, before the solid is put into its
+    resting pose.
+    """
 
     @property
     def name(self) -> str:
-        """The file's name."""
+        """Name of the file."""
 
     @property
     def turn_deg(self) -> float:
-        """The camera's turn about the vertical, counter-clockwise."""
+        """Rotation of the camera about the vertical, counter-clockwise."""
 
     @property
     def crop(self) -> Crop:
-        """What it shows of the thing."""
+        """Crop of the photo around the object."""
 
     def crop_share(self, points: np.ndarray) -> np.ndarray:
-        """Return where points are in the crop ``(N, 2)``, 0 to 1 right and down."""
+        """Return the positions ``(N, 2)`` of points in the crop, 0 to 1 to the right and down."""
 
     def toward(self, points: np.ndarray) -> np.ndarray:
         """Return the unit vectors ``(N, 3)`` from points to the camera."""
@@ -42,11 +46,12 @@ class CarvingPhoto(Protocol):
 
 @dataclass(frozen=True)
 class Carved:
-    """A solid from several photos, at rest, longest side 1 (see ``Lifted``); ``covered`` says how much of each outline it fills.
+    """A solid carved from several photos, in its resting pose, longest side 1 (see ``Lifted``).
 
-    ``to_carved (4, 4)`` takes the surface's points to the frame and the unit that it was carved in. ``camera`` says what the
-    outlines told of a camera that stays before a turntable; None where they were taken to be from the thing's own height.
-    ``left_out`` are the names of photos whose outlines do not go with the others.
+    ``covered`` is the share of each silhouette that the solid fills. ``to_carved (4, 4)`` transforms points of the surface to
+    the frame and unit of the carving. ``camera`` has the estimated parameters of a fixed camera before a turntable; None if
+    the photos were taken to be level with the object. ``left_out`` names photos whose silhouettes are inconsistent with the
+    others.
     """
 
     surface: LiftedSurface
@@ -66,14 +71,14 @@ def carved_of(
     camera: dict[str, float] | None = None,
     base_cuts: tuple[float, ...] = BASE_CUTS,
 ) -> Carved:
-    """Return the solid where a field (X, Y, Z; x right, y away, z up) is positive, at rest; raises Rejected where there is none.
+    """Return the solid where ``field`` (X, Y, Z; x right, y away, z up) is positive, in its resting pose.
 
-    ``cell`` is the field's own and ``origin (3,)`` its first node, in the unit that it was carved in. ``base_cuts`` are the
-    shares of the height that may be cut off so that it stands.
+    ``cell`` is the spacing of the field and ``origin (3,)`` its first node, in the unit of the carving. ``base_cuts`` are the
+    shares of the height that may be cut off so that the solid stands. Raises Rejected if the solid is empty.
     """
     mesh = _level_set(field, cell, origin).to_mesh()
     vertices = np.asarray(mesh.vert_properties, float)[:, :3]
-    # x right, height up, towards the viewer: the lifted frame
+    # the lifted frame: x right, y up, z towards the viewer
     frame = vertices[:, [0, 2, 1]] * [1, 1, -1]
     empty = np.zeros((len(vertices), 2)), np.zeros(len(vertices))
     surface = from_manifold(to_manifold(LiftedSurface(frame, np.asarray(mesh.tri_verts, np.int64), *empty)))
@@ -87,7 +92,7 @@ def carved_of(
 
 
 def _level_set(field: np.ndarray, cell: float, origin: np.ndarray) -> Manifold:
-    """Return the solid where a field (X, Y, Z) is positive; raises Rejected where there is none."""
+    """Return the solid where ``field`` (X, Y, Z) is positive; raises Rejected if it is empty."""
     solid = Manifold.level_set(interpolated(field, cell, origin), _bounds(field, cell, origin), 1.3 * cell)
     solid = solid.simplify(SIMPLER_CELLS * cell)
     if solid.is_empty():
@@ -101,10 +106,10 @@ def _bounds(field: np.ndarray, cell: float, origin: np.ndarray) -> list[float]:
 
 
 def interpolated(field: np.ndarray, cell: float, origin: np.ndarray) -> Callable[[float, float, float], float]:
-    """Return the function of a point that is the field (X, Y, Z) between its nodes, and ``-cell`` beyond them.
+    """Return a function that interpolates a field (X, Y, Z) trilinearly, with the value ``-cell`` outside.
 
-    ``cell`` is the field's own and ``origin (3,)`` its first node. Manifold asks for millions of points, of two lines along z
-    in turn: the two last lines are kept, as they are between the nodes along x and y.
+    ``cell`` is the spacing of the field and ``origin (3,)`` its first node. Manifold evaluates millions of points,
+    alternating between two lines along z, so the last two lines, interpolated in x and y, are cached.
     """
     values = field.astype(np.float64)
     nx, ny, nz = field.shape

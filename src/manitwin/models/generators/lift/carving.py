@@ -1,4 +1,4 @@
-"""Several matted photos at stated turns to a carved solid: before a camera that stays, or each from the thing's own height."""
+"""Carving of a solid from several matted photos at stated turns: with a fixed camera, or with level views."""
 
 from __future__ import annotations
 
@@ -23,25 +23,28 @@ from manitwin.models.generators.lift.pinhole_carving import carve_turned
 from manitwin.models.generators.lift.pinhole_hull import covered_shares as covered_by_rays
 from manitwin.models.generators.lift.turntable import SIDE_PX, TurntableCamera, calibrated, scaled_masks, sights_of
 
-ROUND_POWER, USUAL_POWER, BOXY_POWER = 2.0, 4.0, 8.0  # of the superellipse at each level (Barr 1981)
+ROUND_POWER, USUAL_POWER, BOXY_POWER = 2.0, 4.0, 8.0  # exponents of the superellipse at each level (Barr 1981)
 LEAST_COVERED_TURNED = 0.95
-"""Of each outline, where a camera stays: what is turned before one fills 0.98 and more, photos by hand 0.94 at most."""
+"""Minimum share of each silhouette that the solid fills with a fixed camera.
+
+Turntable photos reach 0.98 and more, handheld photos 0.94 at most.
+"""
 _SUSPECTS = 3
 _MANY = 5
-"""Photos by hand, of so many, explained none of a camera that stays."""
-_LEFT_OUT_OF = 4  # photos, at most one that does not go with the others
-_ROUNDED_PX = 1.0  # by which sizes of photos that were scaled are off their shape
+"""Minimum number of photos from which on a consistent turntable camera is trusted: no set of so many handheld photos fits one."""
+_LEFT_OUT_OF = 4  # at most one of this many photos may be inconsistent with the others
+_ROUNDED_PX = 1.0  # tolerance for rounded sizes of scaled photos
 _LEAST_TURNED = 3
-"""Photos from different turns that tell a camera's height, lens and axis; two have too little in common."""
+"""Minimum number of different turns that determine a camera's height, focal length and axis; two have too little in common."""
 
 
 def power_of(hint: ShapeHint) -> float:
-    """Return the power of the superellipse that a thing's cross-sections are where only two directions are seen."""
+    """Return the exponent of the superellipse of an object's cross-sections, used if only two directions are seen."""
     return ROUND_POWER if hint.round else BOXY_POWER if hint.boxy else USUAL_POWER
 
 
 def are_crossing(turns_deg: Sequence[float]) -> bool:
-    """Tell whether two of the directions differ by enough to say something of the depth; the opposite one says nothing."""
+    """Tell whether two of the directions differ enough to determine the depth; an opposite direction adds nothing."""
     return bool(np.abs(np.sin(np.deg2rad(np.subtract.outer(turns_deg, turns_deg)))).max() >= LEAST_CROSSING)
 
 
@@ -52,13 +55,14 @@ def carve(
     power: float = USUAL_POWER,
     focal_mm: float | None = None,
 ) -> Carved:
-    """Carve what matted ``photos`` (name, ``(H, W, 4) uint8``) show from ``turns_deg`` about the vertical, counter-clockwise.
+    """Carve a solid from matted ``photos`` (name, ``(H, W, 4) uint8``) seen from ``turns_deg``, counter-clockwise.
 
-    Three and more photos of one shape may be of a thing that is turned before a camera that stays, at any height, or of a camera
-    that goes round it at one height and distance: the outlines tell it. Else each is from about the thing's own height.
-    ``power`` is that of the superellipse at each level where only two directions are seen; ``focal_mm`` is the lens as 35 mm
-    equivalent, where it is stated. Of six photos and more before a camera that stays, at most a quarter is left out where the
-    others go together without them. Raises Rejected ``generator_failed`` naming the photo that does not go with the others.
+    Three and more photos of the same size may show an object that turns before a fixed camera at any height, or come from a
+    camera moved around it at constant height and distance; the silhouettes tell whether they do. Otherwise each photo is
+    taken to be level with the object. ``power`` is the exponent of the superellipse at each level if only two directions are
+    seen; ``focal_mm`` is the 35 mm equivalent focal length, if stated. Of six and more photos with a fixed camera up to a
+    quarter is left out if the others are consistent without them. Raises Rejected ``generator_failed`` naming the
+    inconsistent photo.
     """
     sized = _of_one_size(photos)
     if not _may_be_turned(sized, turns_deg):
@@ -71,7 +75,7 @@ def carve(
         return carve_turned(photos, turns_deg, camera, covered, power)
     outlines = placed_outlines(photos, turns_deg)
     level = min(covered_shares(outlines)) >= LEAST_COVERED
-    # three leave lens and height open; where level ones explain them as well, these are nearer to the truth
+    # three photos do not determine focal length and height well; level views are preferred if they also explain them
     doubted = level and (len(photos) <= _LEAST_TURNED or level_cost_px(outlines, SIDE_PX) < camera.cost_px)
     if fits and not doubted:
         return carve_turned(photos, turns_deg, camera, covered, power)
@@ -88,10 +92,10 @@ def carve(
 def _going_together(
     photos: Sequence[tuple[str, np.ndarray]], turns_deg: Sequence[float], focal_mm: float | None, without: np.ndarray
 ) -> list[int] | None:
-    """Return the photos that go together once the few are left out that do not; None where these would be too many."""
+    """Return the photos that are consistent after leaving a few out; None if too many would be left out."""
     kept = list(range(len(photos)))
     for _ in range(min(len(photos) // _LEFT_OUT_OF, len(photos) - _MANY)):
-        # the one without which the others are filled most
+        # remove the photo without which the others are covered best
         filled = [float(np.delete(without[:, k], k).mean()) for k in range(len(kept))]
         kept.pop(int(np.argmax(filled)))
         turns = [turns_deg[k] for k in kept]
@@ -104,7 +108,7 @@ def _going_together(
 
 
 def _carved_level(photos: Sequence[tuple[str, np.ndarray]], turns_deg: Sequence[float], power: float) -> Carved:
-    """Carve photos of several shapes; where they are refused and few have another shape than the rest, these are named."""
+    """Carve photos of different sizes as level views; if that fails and a few have a deviating size, the error names them."""
     try:
         return carve_level(placed_outlines(photos, turns_deg), power)
     except Rejected as error:
@@ -121,7 +125,7 @@ def _carved_level(photos: Sequence[tuple[str, np.ndarray]], turns_deg: Sequence[
 
 
 def _of_one_size(photos: Sequence[tuple[str, np.ndarray]]) -> Sequence[tuple[str, np.ndarray]]:
-    """Return photos of one shape in the size of the smallest: what was scaled since still shows what the camera saw."""
+    """Return photos of the same aspect ratio scaled to the smallest size; scaling does not change the field of view."""
     height, width = min((rgba.shape[:2] for _, rgba in photos), key=lambda shape: shape[0] * shape[1])
     for _, rgba in photos:
         scale = rgba.shape[1] / width
@@ -157,7 +161,7 @@ def _told(
     covered: Sequence[float],
     without: np.ndarray,
 ) -> str:
-    """Say why the outlines do not go together: turned the other way round, one of them, or none of these."""
+    """Return why the silhouettes are inconsistent: reversed turns, a single photo, or unknown."""
     _, turned_back, _ = _seen_turned([rgba for _, rgba in photos], [-turn for turn in turns_deg], focal_mm)
     if min(turned_back) >= LEAST_COVERED_TURNED:
         return (
@@ -181,7 +185,7 @@ def _told(
 def _another(
     photos: Sequence[tuple[str, np.ndarray]], turns_deg: Sequence[float], focal_mm: float | None, without: np.ndarray
 ) -> int | None:
-    """Return the photo without which all others go together best; None where they do so without none."""
+    """Return the index of the photo without which all others are most consistent; None if there is none."""
     others = [float(np.delete(without[:, k], k).min()) for k in range(len(photos))]
     likely = sorted(range(len(photos)), key=lambda k: -others[k])[:_SUSPECTS]
     found = []

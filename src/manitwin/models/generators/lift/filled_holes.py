@@ -1,7 +1,8 @@
-"""Whether a cut-out fills the holes that its name has: the rings of scissors in which the ground is seen.
+"""Detection of a mask that fills holes which the named object has, such as the rings of scissors.
 
-Ground that is seen through a small ring has shade, and in a JPEG the ring's own tint: the cut-out alone does not tell it from a
-part of the thing. That such a thing has a hole there, and that what is there is more like the ground than like the thing, does.
+Background seen through a small ring is shaded, and in a JPEG has the tint of the ring, so the mask alone does not tell it
+from a part of the object. It is detected by the template, which has a hole there, and by colours closer to the background
+than to the object.
 """
 
 from __future__ import annotations
@@ -17,21 +18,22 @@ from manitwin.models.generators.templates.fitting.view import normalised
 
 SIDE_PX = 256
 LEAST_HOLES = 0.02
-"""Of what is seen of a thing: smaller holes are left out of a fit as well."""
+"""Minimum share of holes in the visible object; fits ignore smaller holes too."""
 MOST_OPEN = 0.25
-"""Of the template's holes: a cut-out that has more of them has them."""
+"""Share of the template's hole area; a mask with more hole area has the holes."""
 LEAST_GROUND = 0.5
-"""Of the template's holes: as much is filled with ground. A fit that is not believed lies only roughly on the thing."""
+"""Minimum share of the template's hole area that is filled with background; a poor fit overlaps only roughly."""
 LEAST_CONTRAST_LAB = 20.0
-"""Between the thing and the ground around: with less nobody can tell which of them is seen."""
+"""Minimum L*a*b* distance between object and surrounding background; below it the two cannot be told apart."""
 AROUND = 0.12
-"""Of the thing's longer side, as far as its ground is looked at."""
+"""Width of the surrounding background, as a share of the object's longer side."""
 
 
 def reject_filled_holes(fitted: Fitted, rgba: np.ndarray) -> None:
-    """Raise Rejected (``generator_failed``) where the ground of ``rgba (H, W, 4) uint8`` is seen in a hole of the mask's thing.
+    """Raise Rejected (``generator_failed``) if background is visible in a hole of the object that the mask fills.
 
-    ``fitted`` is the nearest that a thing of its name comes to the mask, which is the alpha; under it are the photo's colours.
+    ``rgba (H, W, 4) uint8`` has the mask as alpha, with the colours of the photo below it. ``fitted`` is the closest fit of
+    the named object's template to the mask.
     """
     height, width = rgba.shape[:2]
     scale = SIDE_PX / max(height, width)
@@ -60,7 +62,7 @@ def _holes(mask: np.ndarray) -> np.ndarray:
 
 
 def _ground_inside(rgb: np.ndarray, mask: np.ndarray) -> int:
-    """Return how many pixels that the rest of a ``mask (H, W) bool`` encloses are nearer to the ground than to the thing."""
+    """Return the number of enclosed pixels of ``mask (H, W) bool`` with colours closer to the background than to the object."""
     lab = cv2.cvtColor(rgb.astype(np.float32) / 255, cv2.COLOR_RGB2LAB)
     away_px = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
     side_px = max(np.ptp(np.nonzero(mask), axis=1)) + 1

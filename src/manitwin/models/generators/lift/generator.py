@@ -1,4 +1,4 @@
-"""The built-in generator ``lift``: a matted photo, or the words for a thing of a known category, to a closed mesh."""
+"""The built-in generator ``lift``: makes a closed mesh from a matted photo, or from a text that names a known category."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from manitwin.models.generators.templates.text import MAX_CHARACTERS
 
 
 class LiftGenerator:
-    """Fit the template that a photo's name means, else lift its silhouette; or build the template that a text names.
+    """Fit the template of a photo's name, or else lift its silhouette; for a text, build the template that it names.
 
-    Of a photo it sees one side only and no depth: a stand-in for tests, demonstrations and machines without a GPU, not to
-    be compared with learned generators. ``submit`` does all the work; jobs live as long as this object. With a ``reader`` a
-    vision-language model chooses and fills in the template of every photo, and of a text that is not understood in full.
+    A photo shows one side and no depth. This generator is meant for tests, demonstrations and machines without a GPU, not for
+    comparison with learned generators. ``submit`` does all the work; jobs live as long as this object. With a ``reader`` a
+    vision-language model chooses and fills in the template of every photo, and of a text that is not fully understood.
     """
 
     name = "lift"
@@ -45,15 +45,15 @@ class LiftGenerator:
         return LiftGenerator(reader)
 
     def why_not(self, text: str) -> str | None:
-        """Return why no template makes what a text asks for; None where one does, or a model is to be asked."""
+        """Return why no template can make a text; None if one can, or if a model will be asked."""
         if self._reader is not None and len(text) <= MAX_CHARACTERS:
             return None
         return made_text.why_not(text)
 
     def submit(self, request: GenerationRequest) -> str:
-        """Make the mesh; raises Unsupported for a text that no template makes, Rejected for what ``lift`` cannot make.
+        """Make the mesh; raises Unsupported for a text without a template, Rejected for a photo that ``lift`` cannot make.
 
-        With a reader: also what its model raises, and Rejected where the model says twice that the result is wrong.
+        With a reader it also raises the errors of its model, and Rejected if the model says twice that the result is wrong.
         """
         asked = (
             f"{request.seed} {request.text}"
@@ -77,7 +77,7 @@ class LiftGenerator:
             if self._reader is None:
                 return made_text.from_text(text, request.seed)
             return guided_from_text(text, request.seed, self._reader)
-        if request.views:  # which the photos themselves settle
+        if request.views:  # several photos determine the shape without a reader
             made = from_views(request.views, request.name, request.unit_m)
             return Job(write_glb([made.part]), made.notes, made.unseen_share, made.known, made.metric)
         if self._reader is None:
@@ -85,13 +85,13 @@ class LiftGenerator:
         return guided_from_photo(request, self._reader)
 
     def poll(self, job_id: str) -> JobState:
-        """Return ``done``, or ``failed`` where this object does not know the job."""
+        """Return ``done``, or ``failed`` if this object does not know the job."""
         if job_id in self._jobs:
             return JobState("done")
         return JobState("failed", f"lift has no job {job_id}: its jobs end with the process; submit it again")
 
     def fetch(self, job_id: str, folder: Path) -> Generated:
-        """Write ``lift.glb`` below ``folder``; raises Unavailable for a job that is not known."""
+        """Write ``lift.glb`` into ``folder``; raises Unavailable for an unknown job."""
         if job_id not in self._jobs:
             raise Unavailable(self.poll(job_id).message)
         job = self._jobs.pop(job_id)

@@ -1,4 +1,4 @@
-"""A photo to a finished job with a model that fills in the template: its measures are where the fit begins."""
+"""Job for a photo with a vision-language model that fills in the template; its measures are initial values of the fit."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ class _Fit:
 
 
 def guided_from_photo(request: GenerationRequest, reader: TemplateReader) -> Job:
-    """Return the template that a model chose, filled in and fitted; where it chooses none, what the name means, or lifted.
+    """Return the template chosen and filled in by a model, fitted to the photo.
 
-    Raises what the model raises, and Rejected where it says in both rounds that a believable fit is wrong.
+    If the model chooses no template, the result is that of the name without a model, or the lifted silhouette. Raises the
+    errors of the model, and Rejected if the model says in both rounds that an acceptable fit is wrong.
     """
     rgba = request.rgba
     assert rgba is not None
@@ -83,7 +84,7 @@ def guided_from_photo(request: GenerationRequest, reader: TemplateReader) -> Job
 
 
 def _fit(filled: Filled, rgba: np.ndarray, name: str | None, focal_mm: float | None) -> _Fit | None:
-    """Fit a filled template; its usual measures, and what the user's name means, may explain the photo better."""
+    """Fit a filled template; usual measures, or the template of the user's name, replace it if they explain the photo better."""
     said = template_for(name)
     others = [filled.category] if filled.measures else []
     others += kinds_of(filled.category) if said is None or said.category == filled.category else [said.category]

@@ -1,4 +1,4 @@
-"""A text to a finished job with a model that reads what the plain reader does not understand in full."""
+"""Job for a text with a vision-language model that reads what the rule-based reader does not fully understand."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from manitwin.models.generators.templates.made import Made, visual_parts
 from manitwin.models.generators.templates.text import MAX_CHARACTERS
 from manitwin.twin.import_record import FILLED
 
-_SEEN_FROM_DEG = (-55.0, 25.0)  # azimuth and elevation: the front is towards -Y
+_SEEN_FROM_DEG = (-55.0, 25.0)  # azimuth and elevation; the front faces -Y
 
 
 @dataclass(frozen=True)
@@ -29,11 +29,11 @@ class _Thing:
 
 
 def guided_from_text(text: str, seed: int, reader: TemplateReader) -> Job:
-    """Return what a text asks for: as the plain reader reads it where it understands every word, else as a model fills it in.
+    """Return the object described by a text: by the rule-based reader if it understands every word, else filled in by a model.
 
-    Where the model says that it is none of the templates, it is what the plain reader takes it for, or Unsupported is raised
-    with the nearest categories. Raises what the model raises; Rejected where it says in both rounds that the result is not
-    what the text asks for.
+    If the model chooses no template, the result is that of the rule-based reader, or Unsupported is raised with the nearest
+    categories. Raises the errors of the model, and Rejected if it says in both rounds that the result does not match the
+    text.
     """
     if len(text) > MAX_CHARACTERS:
         raise Unsupported(f"a text of {len(text)} characters; at most {MAX_CHARACTERS} describe an object")

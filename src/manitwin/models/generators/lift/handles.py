@@ -1,6 +1,6 @@
-"""Handles that stick out of a body of revolution: the medial line of what is left of the outline becomes a swept tube.
+"""Handles of a body of revolution: the medial axis of each silhouette part outside the body becomes a swept tube.
 
-The handle lies in the plane through the body's axis that faces the camera: one photo says nothing of its turn.
+The handle lies in the plane through the body's axis parallel to the image, because one photo does not show its rotation.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from manitwin.geometry.solids.shapes import SolidError
 from manitwin.geometry.solids.sweep import tube
 from manitwin.models.generators.lift.revolution import Turned, outline_of
 
-LEAST_AREA_SHARE = 0.012  # of the outline: smaller bits are the outline's unevenness
-LEAST_REACH_SHARE = 0.12  # of the body's largest radius, out of the body
+LEAST_AREA_SHARE = 0.012  # of the silhouette: smaller parts are irregularities of the outline
+LEAST_REACH_SHARE = 0.12  # minimum reach out of the body, over the body's largest radius
 TOUCH_PX = 3.0
 MOST_HANDLES = 3
 SAMPLES = 28
@@ -26,13 +26,13 @@ _LEAST_RADIUS_PX = 1.5
 
 
 def body_mask(turned: Turned, shape: tuple[int, int]) -> np.ndarray:
-    """Return the picture (H, W) bool of a body of revolution."""
+    """Return the mask (H, W) bool of a body of revolution in the picture."""
     widths = outline_of(turned, np.arange(shape[0], dtype=float))
     return np.asarray(np.abs(np.arange(shape[1])[None] - turned.column_px) <= widths[:, None])
 
 
 def handle_tubes(mask: np.ndarray, turned: Turned) -> list[Manifold]:
-    """Return tubes in the solid's frame (see ``Turned``) for the parts of ``mask`` (H, W) that stick out of the body."""
+    """Return tubes in the solid's frame (see ``Turned``) for the parts of ``mask`` (H, W) outside the body."""
     body = body_mask(turned, (mask.shape[0], mask.shape[1]))
     outside = ndimage.binary_opening(mask & ~ndimage.binary_dilation(body, iterations=2))
     labels, count = ndimage.label(outside, np.ones((3, 3)))
@@ -51,12 +51,13 @@ def handle_tubes(mask: np.ndarray, turned: Turned) -> list[Manifold]:
 
 
 def medial_line(part: np.ndarray, from_body: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool] | None:
-    """Return the middle line ``(K, 2)`` (x, y) of a part from the body out, its radii ``(K,)``, and whether it comes back.
+    """Return the medial axis ``(K, 2)`` (x, y) of a part, from the body outward, its radii ``(K,)``, and whether it is a loop.
 
-    ``part (H, W) bool`` touches the body; ``from_body (H, W)`` is the distance to it. None for what touches nowhere.
+    ``part (H, W) bool`` touches the body; ``from_body (H, W)`` is the distance to the body. None if the part does not touch
+    it.
     """
     radius = cv2.distanceTransform(np.pad(part, 1).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
-    # where it joins the body it does not end
+    # the parts of the medial axis at the body
     touching, count = ndimage.label(part & (from_body <= TOUCH_PX), np.ones((3, 3)))
     if count == 0:
         return None
@@ -81,13 +82,13 @@ def medial_line(part: np.ndarray, from_body: np.ndarray) -> tuple[np.ndarray, np
         return None
     path = np.column_stack([columns[order], rows[order]]).astype(float)
     radii = radius[rows[order], columns[order]]
-    # near the body the part widens into it, and its own end is round: the middle is what it is
+    # the part widens at the body and is rounded at its end, so the radius of the middle part is used as limit
     usual = float(np.median(radii[len(radii) // 5 : max(len(radii) // 5 + 1, 4 * len(radii) // 5)]))
     return path, np.minimum(radii, 1.25 * usual), bool(loop)
 
 
 def _graph(index: np.ndarray, rows: np.ndarray, columns: np.ndarray, radius: np.ndarray) -> coo_matrix:
-    """Return the graph of neighbouring pixels, cheap along the middle."""
+    """Return the graph of neighbouring pixels with low cost along the medial axis."""
     weight = 1.0 / np.maximum(radius[rows, columns], 0.5) ** 2
     entries = []
     padded = np.pad(index, 1, constant_values=-1)
@@ -110,13 +111,13 @@ def _middle(where: np.ndarray, index: np.ndarray) -> int:
 
 
 def _swept(path: np.ndarray, radii: np.ndarray, loop: bool, turned: Turned) -> Manifold | None:
-    """Return the tube in the solid's frame, its ends within the body."""
+    """Return the tube in the solid's frame, with its ends inside the body; None if it is no valid solid."""
     smooth = gaussian_filter1d(path, max(1.0, len(path) / 40), axis=0, mode="nearest")
     radii = gaussian_filter1d(radii, max(1.0, len(path) / 20), mode="nearest")
     x, y = smooth[:, 0], -smooth[:, 1] / np.cos(turned.angle_rad)
     points = np.column_stack([x, y, np.zeros(len(x))])
     inward = np.sign(turned.column_px - x[0])
-    # into the wall: a tube that only touches does not join
+    # extend into the wall, because touching solids are not joined
     deep = float(np.median(radii)) + TOUCH_PX
     points = np.vstack(
         [points[0] + [inward * deep, 0, 0], points, *([points[-1] + [inward * deep, 0, 0]] if loop else [])]

@@ -1,4 +1,4 @@
-"""Several things of one name that touch or hide one another are one piece, of an outline that one such thing has from no side."""
+"""Detection of several objects of one name that touch or occlude each other, by a silhouette that no single one has."""
 
 from __future__ import annotations
 
@@ -12,17 +12,20 @@ GROWN = frozenset({
     "peach", "pear", "plum", "pomegranate", "potato", "pumpkin", "radish", "strawberry", "sweet potato", "tomato",
     "turnip",
 })  # fmt: skip
-"""Templates of what grows: one is much like another, so that the outline of each of them is near the template's."""
+"""Templates of fruit and vegetables, whose shapes vary little, so that the silhouette of one is close to the template's."""
 FAR_OUTLINE = 0.017
-"""Of the thing's length, in the mean, from which on an outline is not that of one such thing. Of 61 outlines of one, of 16 kinds,
-of random measures and bent, none is farther from its template's; of 58 of two to five that hide one another in part 54 are."""
+"""Maximum mean distance of the outlines, over the object's length, for a single object.
+
+Of 61 outlines of single objects of 16 categories, with random measures and bends, none is farther from its template's. Of 58
+outlines of two to five objects that partly occlude each other, 54 are.
+"""
 
 
 def reject_heap(fitted: Fitted, name: str, category: str) -> None:
-    """Raise Rejected (``several_objects``) where the nearest that one thing of a ``name`` comes to an outline is far from it.
+    """Raise Rejected (``several_objects``) if the best fit of a single object of this ``name`` is far from the silhouette.
 
-    That is where the name, whose template's ``category`` is given, is of what grows, or in the plural: other things of a name
-    have other shapes as well.
+    Only names of fruit and vegetables (by the template's ``category``) and plurals are tested, since other names may have
+    other shapes.
     """
     residual = fitted.residual
     plural = is_plural(name)
@@ -43,7 +46,7 @@ def reject_heap(fitted: Fitted, name: str, category: str) -> None:
 
 
 def is_plural(name: str) -> bool:
-    """Tell whether a name is the plural of what the priors have in the singular: carrots, and not scissors."""
+    """Tell whether a name is the plural of a name in the priors: carrots, but not scissors."""
     found = found_by(name)
     if found is None:
         return False

@@ -1,4 +1,4 @@
-"""What a name says of a thing's shape, by its category's prior."""
+"""Shape hints from an object's name, by the prior of its category."""
 
 from __future__ import annotations
 
@@ -11,19 +11,20 @@ from manitwin.models.annotators.prior_names import lookup
 from manitwin.models.annotators.prior_records import Prior
 
 MOST_OUT_OF_ROUND = 1.3
-"""Of a ball's longest side over its shortest, and of a plate's over its second."""
+"""Maximum ratio of the longest to the shortest side of a ball, and of the longest to the second side of a plate."""
 LEAST_ELLIPSE_IOU, ELLIPSE_IN_RECTANGLE = 0.92, 0.85
-"""An ellipse fills 0.785 of its rectangle, a rectangle overlaps by 0.84 with the ellipse of its moments."""
+"""An ellipse fills 0.785 of its bounding rectangle; a rectangle overlaps the ellipse of its moments by 0.84."""
 _CYLINDERS = frozenset({"cylindrical", "short cylindrical"})
 _NO_BALLS = frozenset({"rugby ball"})
 
 
 @dataclass(frozen=True)
 class ShapeHint:
-    """``stands``: put down upright (None: unknown); ``container``: open at the top; ``hollow_below``: open at the bottom; the
-    others describe its shape.
+    """Shape properties of a category.
 
-    ``volume_share`` is the usual volume of its matter over the cube of the usual longest side.
+    ``stands``: put down upright (None: unknown); ``container``: open at the top; ``hollow_below``: open at the bottom;
+    ``round``, ``boxy`` and ``flat`` describe the shape. ``volume_share`` is the usual volume of the material over the cube of
+    the usual longest side.
     """
 
     stands: bool | None = None
@@ -36,7 +37,7 @@ class ShapeHint:
 
 
 def hint_from_name(name: str | None) -> ShapeHint:
-    """Return the hint of the prior that ``name`` finds; an empty hint where it finds none."""
+    """Return the hint of the prior found for ``name``; an empty hint if there is none."""
     prior = lookup(name)
     if prior is None:
         return ShapeHint()
@@ -53,10 +54,10 @@ def hint_from_name(name: str | None) -> ShapeHint:
 
 
 def why_not_round(name: str | None, extents: np.ndarray) -> str | None:
-    """Return why sides of lengths ``(3,)`` are those of no such thing, where its name says that it is round; else None.
+    """Return why sides ``(3,)`` contradict a name that says round; None if they do not.
 
-    A ball is as wide as it is high, and a plate round from above: one that is seen at an angle has an ellipse for its outline,
-    and beside a mirror image a ball has that of a dumbbell.
+    A ball is as wide as high, and a plate is round from above. A plate seen at an angle has an elliptic silhouette, and a
+    ball beside its mirror image that of a dumbbell.
     """
     prior = lookup(name)
     if prior is None:
@@ -71,13 +72,13 @@ def why_not_round(name: str | None, extents: np.ndarray) -> str | None:
 
 
 def is_cylinder(name: str | None) -> bool:
-    """Tell whether a name's category is a cylinder and nothing else."""
+    """Tell whether a name's category is simply a cylinder."""
     prior = lookup(name)
     return prior is not None and prior.shape in _CYLINDERS
 
 
 def why_no_cylinder(name: str | None, silhouette: Mapping[str, float]) -> str | None:
-    """Return why an outline of these scores is that of no such thing seen from the side, where its name says cylinder; else None.
+    """Return why the scores of a silhouette contradict a cylinder seen from the side, for a name that says cylinder; else None.
 
     From the side a cylinder is a rectangle; an ellipse is its end, seen at an angle.
     """
@@ -90,7 +91,7 @@ def why_no_cylinder(name: str | None, silhouette: Mapping[str, float]) -> str | 
 
 
 def _volume_share(prior: Prior) -> float | None:
-    """Return the volume of a category's things by their mass, over the cube of their length; None for hollow ones."""
+    """Return the usual volume of a category from mass and density, over the cube of its length; None for hollow ones."""
     density = prior.bulk_density_kg_m3
     if density is None or prior.container:
         return None

@@ -1,7 +1,7 @@
-"""Inflate a silhouette: the height over it solves a Poisson equation, so that a strip becomes a round bar.
+"""Inflation of a silhouette: the height is the solution of a Poisson equation, so that a strip becomes a round bar.
 
-laplace(h) = -4 inside, h = 0 on the outline; z = sqrt(h / 2). For a strip of half-width r that is the circle
-z^2 + x^2 = r^2 (h = 2 (r^2 - x^2)). The family of Repousse (Joshi and Carr 2008) and Monster Mash (Dvoroznak et al. 2020).
+laplace(h) = -4 inside, h = 0 on the outline; z = sqrt(h / 2). For a strip of half-width r this is the circle z^2 + x^2 = r^2
+(h = 2 (r^2 - x^2)). The method follows Repousse (Joshi and Carr 2008) and Monster Mash (Dvoroznak et al. 2020).
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from manitwin.models.generators.lift.surface import LiftedSurface, from_manifold
 _HALVINGS = 24
 _TARGET_CELLS = 2200
 _SOLVER_SIDE_PX = 224
-_SNAP = 0.12  # crossings nearer to a grid node than this share of a cell are moved off it: no sliver triangles
-_AROUND = ((0, 0), (0, 1), (1, 1), (1, 0))  # a cell's corners (row, column), clockwise on the screen
+_SNAP = 0.12  # minimum distance of crossings from grid nodes, as a share of a cell, which avoids sliver triangles
+_AROUND = ((0, 0), (0, 1), (1, 1), (1, 0))  # corners of a cell (row, column), clockwise on the screen
 
 
 def inflate(
@@ -26,9 +26,9 @@ def inflate(
 ) -> LiftedSurface:
     """Inflate ``mask`` (H, W) to a closed surface in its pixels.
 
-    ``depth_limit_px`` flattens what would rise higher (thin flat things); ``flat_back`` makes a relief on the plane z = 0
-    instead of a body mirrored about it. ``fullness`` multiplies the height before it is limited, ``rise`` after. Holes of the
-    mask stay holes.
+    ``depth_limit_px`` limits the height smoothly (for thin flat objects); ``flat_back`` makes a relief on the plane z = 0
+    instead of a body mirrored about it. ``fullness`` multiplies the height before the limit, ``rise`` after it. Holes of the
+    mask remain holes.
     """
     cell = float(np.clip(np.sqrt(mask.sum() / _TARGET_CELLS), 1.5, max(mask.shape) / 24))
     points, triangles, rim = triangulate_mask(mask, cell)
@@ -37,7 +37,9 @@ def inflate(
         height = depth_limit_px * np.tanh(height / depth_limit_px)
     height *= rise
     height[rim] = 0
-    height = np.maximum(height, 0.35 * cell)  # a rim of some thickness: front and back never share an edge
+    height = np.maximum(
+        height, 0.35 * cell
+    )  # minimum thickness at the rim, so that front and back do not share an edge
     back_depth = np.zeros(len(points)) if flat_back else height
     x, y = points[:, 0], -points[:, 1]
     count = len(points)
@@ -46,16 +48,16 @@ def inflate(
     walls = np.concatenate([np.column_stack([b, a, a + count]), np.column_stack([b, a + count, b + count])])
     faces = np.concatenate([triangles, triangles[:, ::-1] + count, walls])
     uv = np.column_stack([(x + 0.5) / mask.shape[1], 1 - (0.5 - y) / mask.shape[0]])
-    # a bridge thinner than the grid may have broken: the largest part is the object
+    # a bridge thinner than the grid may have broken, so the largest part is kept
     front = trimesh.Trimesh(vertices[:count], triangles, process=False)
     facing = np.concatenate([np.asarray(front.vertex_normals)[:, 2], np.full(count, -1.0)])
     return from_manifold(to_manifold(LiftedSurface(vertices, faces, np.concatenate([uv, uv]), facing)))
 
 
 def limit_of_volume(mask: np.ndarray, volume_px: float, *, fullness: float, most_px: float) -> float:
-    """Return the ``depth_limit_px`` at which the body that ``mask`` (H, W) is inflated to has a volume; ``most_px`` at most.
+    """Return the ``depth_limit_px`` at which the inflated ``mask`` (H, W) has a given volume; at most ``most_px``.
 
-    It is no mean thickness: what is round is half as thick again in its middle as in the mean.
+    The limit is not the mean thickness: a round object is half again as thick in its middle as in the mean.
     """
     field = _solve(mask)
     height = fullness * np.sqrt(np.maximum(field, 0) / 2)
@@ -69,7 +71,7 @@ def limit_of_volume(mask: np.ndarray, volume_px: float, *, fullness: float, most
 
 
 def full_round(mask: np.ndarray) -> float:
-    """Return the ``fullness`` at which ``mask`` (H, W) is inflated as thick as its largest circle is wide: 1.41 for a disc."""
+    """Return the ``fullness`` that makes the inflated ``mask`` (H, W) as thick as its largest circle is wide: 1.41 for a disc."""
     peak_px = float(np.sqrt(max(float(_solve(mask).max()), 1e-9) / 2))
     return float(cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5).max()) / peak_px
 
@@ -88,7 +90,7 @@ def _solve(mask: np.ndarray) -> np.ndarray:
     for dy, dx in ((0, 1), (0, -1), (1, 0), (-1, 0)):
         neighbour = index[rows + dy, columns + dx]
         inside = neighbour >= 0
-        diagonal += ~inside  # the outline lies half a pixel away: the value beyond it is the negative of this one
+        diagonal += ~inside  # the outline is half a pixel away, so the value beyond it is the negative of this one
         entries.append((np.nonzero(inside)[0], neighbour[inside], np.full(inside.sum(), -1.0)))
     entries.append((np.arange(len(rows)), np.arange(len(rows)), diagonal))
     row, column, value = (np.concatenate(part) for part in zip(*entries, strict=True))
@@ -108,8 +110,8 @@ def triangulate_mask(mask: np.ndarray, cell_px: float) -> tuple[np.ndarray, np.n
     """Triangulate ``mask`` (H, W) bool over a square grid of ``cell_px`` pixels.
 
     Returns points (P, 2) as pixel (x, y), y downward; triangles (T, 3), counter-clockwise on the screen; and the outline's
-    edges (E, 2), directed as in the triangles. Where two parts touch at a corner only they are kept apart, so the outline
-    never crosses itself.
+    edges (E, 2), directed as in the triangles. Parts that touch only at a corner are separated, so the outline never crosses
+    itself.
     """
     builder = _Builder(_node_field(mask, cell_px), cell_px)
     inside = builder.field > 0
@@ -137,7 +139,7 @@ def _node_field(mask: np.ndarray, cell_px: float) -> np.ndarray:
 
 
 class _Builder:
-    """Points, triangles and outline edges, cell by cell; points on shared nodes and edges are made once."""
+    """Builder of points, triangles and outline edges, cell by cell; points on shared nodes and edges are created once."""
 
     def __init__(self, field: np.ndarray, cell_px: float):
         self.field = field

@@ -1,8 +1,9 @@
-"""Carve a solid out of several outlines of one object, seen from about its own height at known turns about the vertical.
+"""Carving of a solid from silhouettes seen from about the object's height, at known turns about the vertical.
 
-The visual hull (Laurentini 1994): what lies within every outline. Photos are scaled to one height; where the axis that the
-turns are about stands in each is found from the outlines, for the hull must fill all of them. Two outlines at a right angle say
-nothing of the corners between them: there each level is an ellipse over both widths, or nearly their rectangle for a boxy thing.
+The result is the visual hull (Laurentini 1994), the solid within all silhouettes. Photos are scaled to the same height. The
+column of the turning axis in each photo is estimated from the silhouettes, since the hull must fill all of them. Two
+silhouettes at a right angle leave the corners of each level open; there the level is an ellipse over both widths, or nearly
+their rectangle for a boxy object.
 """
 
 from __future__ import annotations
@@ -20,20 +21,20 @@ from manitwin.models.generators.lift.pinhole import Sight, passing_px, signed_di
 from manitwin.models.generators.lift.texture import Crop, crop_object
 
 HEIGHT_PX = 128
-CELLS = 64  # of the grid along the height or the widest side
+CELLS = 64  # grid cells along the height or the widest side
 LEAST_COVERED = 0.93
-"""Share of an outline that the common hull must fill; set on rendered templates: right turns fill 0.95 and more of all."""
-WIDTH_SPREAD = 0.06  # of round things' outlines, seen by different lenses
-OFFSETS = 21  # places of the axis tried in each photo
-OFFSET_SHARE = 0.25  # of the outline's width, to each side
+"""Minimum share of a silhouette that the hull fills; on rendered templates with the right turns it is 0.95 and more for all."""
+WIDTH_SPREAD = 0.06  # relative spread of the widths of a round object's silhouettes with different lenses
+OFFSETS = 21  # number of axis columns tried in each photo
+OFFSET_SHARE = 0.25  # of the silhouette's width, to each side
 LEAST_CROSSING = 0.3
-"""The sine of the widest angle between two photos' directions, below which they say the same."""
-_FAR = 50.0  # heights of the thing: a camera from which its outlines have no perspective
+"""Minimum sine of the largest angle between the directions of two photos; below it they show the same."""
+_FAR = 50.0  # camera distance in object heights at which silhouettes have no perspective
 
 
 @dataclass(frozen=True)
 class Outline:
-    """One photo: its crop, the outline ``(HEIGHT_PX, W) bool`` cut to its box, and the axis' place in it, px from the left."""
+    """Silhouette of one photo: its crop, the mask ``(HEIGHT_PX, W) bool`` of its bounding box, and the column of the axis."""
 
     name: str
     crop: Crop
@@ -42,12 +43,12 @@ class Outline:
     axis_px: float
 
     def across(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the picture's column of points; x to the right and y away from the viewer of the first photo, pixels."""
+        """Return the column of points; x to the right and y away from the viewer of the first photo, in pixels."""
         angle = np.deg2rad(self.turn_deg)
         return np.asarray(self.axis_px + x * np.cos(angle) + y * np.sin(angle))
 
     def crop_share(self, points: np.ndarray) -> np.ndarray:
-        """Return where points ``(N, 3)`` (x, height, z towards the first viewer) are in the crop, 0 to 1 right and down."""
+        """Return positions of points ``(N, 3)`` (x, height, z towards the first viewer) in the crop, 0 to 1 right and down."""
         rows = np.nonzero(self.crop.mask.any(axis=1))[0]
         columns = np.nonzero(self.crop.mask.any(axis=0))[0]
         scale = (rows[-1] + 1 - rows[0]) / HEIGHT_PX
@@ -62,7 +63,7 @@ class Outline:
         return np.tile([np.sin(angle), 0.0, np.cos(angle)], (len(points), 1))
 
     def sight(self, side_px: int) -> Sight:
-        """Return the outline as a camera that is far away sees it, ``side_px`` high."""
+        """Return the silhouette as a ``Sight`` of a distant camera, ``side_px`` high."""
         scale = side_px / HEIGHT_PX
         size = max(3, round(self.mask.shape[1] * scale)), side_px
         mask = cv2.resize(self.mask.astype(np.float32), size, interpolation=cv2.INTER_LINEAR) > 0.5
@@ -74,20 +75,20 @@ class Outline:
 
 
 def placed_outlines(photos: Sequence[tuple[str, np.ndarray]], turns_deg: Sequence[float]) -> list[Outline]:
-    """Return the outlines of matted photos (name, ``(H, W, 4) uint8``), the axis where their hull fills them best."""
+    """Return the silhouettes of matted photos (name, ``(H, W, 4) uint8``) with the axis at which the hull covers them best."""
     return _placed([_outline(name, rgba, turn) for (name, rgba), turn in zip(photos, turns_deg, strict=True)])
 
 
 def level_cost_px(outlines: Sequence[Outline], side_px: int) -> float:
-    """Return by how many pixels the rays along all outlines, scaled to one height of ``side_px``, pass outside of the others'."""
+    """Return the mean distance in pixels by which rays along all silhouettes, ``side_px`` high, miss the others' silhouettes."""
     return passing_px([outline.sight(side_px) for outline in outlines])
 
 
 def carve_level(outlines: Sequence[Outline], power: float) -> Carved:
-    """Carve what placed outlines show.
+    """Carve a solid from placed silhouettes.
 
-    ``power`` is that of the superellipse at each level where only two directions are seen.
-    Raises Rejected ``generator_failed`` naming the photo that does not go with the others.
+    ``power`` is the exponent of the superellipse at each level if only two directions are seen. Raises Rejected
+    ``generator_failed`` naming the inconsistent photo.
     """
     covered = covered_shares(outlines)
     if min(covered) < LEAST_COVERED:
@@ -105,7 +106,7 @@ def _outline(name: str, rgba: np.ndarray, turn_deg: float) -> Outline:
 
 
 def same_from_every_side(photos: Sequence[tuple[str, np.ndarray]]) -> bool:
-    """Tell whether all outlines are about the same one, and their own mirror images: those of a round thing are."""
+    """Tell whether all silhouettes are about equal, and mirror symmetric, as those of a round object are."""
     masks = [_outline(name, rgba, 0.0).mask for name, rgba in photos]
     widths = [mask.shape[1] for mask in masks]
     if max(widths) > (1 + WIDTH_SPREAD) * min(widths):
@@ -117,7 +118,7 @@ def same_from_every_side(photos: Sequence[tuple[str, np.ndarray]]) -> bool:
 
 
 def _placed(outlines: list[Outline]) -> list[Outline]:
-    """Return the outlines with the axis where their hull fills them best; the first two that cross fix it."""
+    """Return the silhouettes with the axis at which the hull covers them best; the first two that cross define it."""
     fixed = [outlines[0]]
     rest = sorted(outlines[1:], key=lambda o: -abs(np.sin(np.deg2rad(o.turn_deg - outlines[0].turn_deg))))
     for number, outline in enumerate(rest):
@@ -136,7 +137,7 @@ def _placed(outlines: list[Outline]) -> list[Outline]:
 
 
 def _grid(outlines: Sequence[Outline], cells: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Return the coordinates (X, Y), heights (Z) and the cell of a grid that holds everything."""
+    """Return the coordinates (X, Y), heights (Z) and the cell size of a grid that contains the object."""
     half = max(max(o.axis_px, o.mask.shape[1] - 1 - o.axis_px) for o in outlines) + 3
     cell = max(HEIGHT_PX, 2 * half) / cells
     across = np.arange(-half, half + cell, cell)
@@ -145,7 +146,7 @@ def _grid(outlines: Sequence[Outline], cells: int) -> tuple[np.ndarray, np.ndarr
 
 
 def covered_shares(outlines: Sequence[Outline]) -> list[float]:
-    """Return for each outline how much of it the common hull fills."""
+    """Return for each silhouette the share that the hull fills."""
     x, y, heights, _ = _grid(outlines, CELLS)
     rows = np.round(HEIGHT_PX - 1 - heights).astype(int)
     valid = (rows >= 0) & (rows < HEIGHT_PX)
@@ -160,7 +161,7 @@ def covered_shares(outlines: Sequence[Outline]) -> list[float]:
         filled = np.zeros((len(rows), outline.mask.shape[1]), bool)
         z, i, j = np.nonzero(inside)
         filled[z, column[i, j]] = True
-        # a cell is wider than a pixel, and one that the outline cuts may be left out
+        # cells are wider than pixels, and cells cut by the outline may be missing
         filled = ndimage.binary_dilation(ndimage.binary_closing(filled, np.ones((1, 5))), np.ones((1, 5)))
         wanted = outline.mask[np.clip(rows, 0, HEIGHT_PX - 1)] & valid[:, None]
         shares.append(float((filled & wanted).sum() / max(1, wanted.sum())))
@@ -168,7 +169,7 @@ def covered_shares(outlines: Sequence[Outline]) -> list[float]:
 
 
 def _told(outlines: Sequence[Outline], covered: Sequence[float]) -> str:
-    """Say which photo does not go with the others: the one without which they agree."""
+    """Return which photo is inconsistent with the others: the one without which they agree."""
     remedy = (
         "check its turn (degrees, counter-clockwise from above), that it shows the same thing whole, and from its height, or"
         " take all photos from one place and turn the thing"
@@ -183,7 +184,7 @@ def _told(outlines: Sequence[Outline], covered: Sequence[float]) -> str:
 
 
 def _field(outlines: Sequence[Outline], power: float) -> tuple[np.ndarray, float, np.ndarray]:
-    """Return how far inside each node of a grid (X, Y, Z) is, its cell and its first node, pixels."""
+    """Return the signed distance inside the hull at the nodes of a grid (X, Y, Z), its cell and its first node, in pixels."""
     x, y, heights, cell = _grid(outlines, CELLS)
     row = (HEIGHT_PX - 1 - heights).astype(np.float32)
     directions = {round(o.turn_deg % 180.0) for o in outlines}
@@ -202,7 +203,7 @@ def _field(outlines: Sequence[Outline], power: float) -> tuple[np.ndarray, float
             round(o.turn_deg % 180.0) == round(outline.turn_deg % 180.0) for o in outlines
         )
     if crossed:
-        # the ellipse's level as a length: a cell's worth of slope at the outline
+        # converts the ellipse's level to a length, so that its slope at the outline is that of a distance
         scale = 0.5 * float(np.mean([o.mask.sum() / HEIGHT_PX for o in outlines]))
         hull = np.minimum(hull, scale * (1 - powers ** np.float32(1 / power)))
     smooth = ndimage.gaussian_filter(np.clip(hull, -3 * cell, 3 * cell), 0.7)
@@ -219,7 +220,7 @@ def _signed_distance(mask: np.ndarray) -> np.ndarray:
 
 
 def _from_middle(mask: np.ndarray) -> np.ndarray:
-    """Return how far each pixel is from the middle of its run of a row: 0 there, 1 at its ends, 2 outside."""
+    """Return the distance of each pixel from the middle of its run in the row: 0 there, 1 at the ends, 2 outside."""
     padded = np.pad(mask, 12)
     found = np.full(padded.shape, 2.0, np.float32)
     steps = np.diff(np.pad(padded, ((0, 0), (1, 1))).astype(np.int8), axis=1)

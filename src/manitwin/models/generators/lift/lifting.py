@@ -1,4 +1,4 @@
-"""Lift a matted photo to a closed, textured surface that rests on a flat face: the choice of the primitive, and how it lies."""
+"""Lifting of a matted photo to a closed, textured surface that rests on a flat face: choice of the primitive and the pose."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ __all__ = ["Lifted", "ShapeHint", "choose_primitive", "hint_from_name", "lift"]
 
 Primitive = Literal["revolution", "box", "inflation"]
 LEAST_IOU = 0.8
-"""Overlap with the outline below which a solid does not explain it; set on rendered templates, which reach 0.93 and more."""
+"""Minimum overlap of a solid with the silhouette; rendered templates reach 0.93 and more."""
 
 DISC_ELONGATION = 1.15
-"""Of an ellipse (``DISC_ELLIPSE_IOU``) that is no circle."""
+"""Minimum elongation of an ellipse (``DISC_ELLIPSE_IOU``) that is not a circle."""
 
 
 @dataclass(frozen=True)
 class Lifted:
-    """A solid in glTF's frame (Y up, front +Z, longest side 1, lowest point y = 0), its textures and how it was made.
+    """A solid in the glTF frame (Y up, front +Z, longest side 1, lowest point y = 0), its textures and notes.
 
-    ``texture (H, W, 3)`` is the photo's, for what it shows; ``unseen (h, w, 3)``, of the same rectangle, is for the rest.
-    ``explained`` says how well the solid, as it was seen, explains the matte and the photo's inner edges.
+    ``texture (H, W, 3)`` is the photo, for the visible surface; ``unseen (h, w, 3)``, of the same rectangle, is for the rest.
+    ``explained`` tells how well the solid explains the mask and the inner edges of the photo.
     """
 
     surface: LiftedSurface
@@ -54,8 +54,8 @@ class Lifted:
 def lift(rgba: np.ndarray, hint: ShapeHint) -> Lifted:
     """Lift the object in ``rgba`` (H, W, 4) uint8, whose alpha is its mask, to a solid.
 
-    Raises Rejected ``generator_failed`` for what is hollow from below, for an open container whose hollow cannot be told, where
-    no solid explains the outline, and where nothing is known of a thing whose outline is an ellipse.
+    Raises Rejected ``generator_failed`` for an object that is hollow from below, for an open container whose cavity cannot be
+    inferred, if no solid explains the silhouette, and for an unnamed object with an elliptic silhouette.
     """
     crop = crop_object(rgba, CROP_SIDE_PX)
     height, width = crop.mask.shape
@@ -78,7 +78,7 @@ def lift(rgba: np.ndarray, hint: ShapeHint) -> Lifted:
 
 
 def _explaining(view: View, hint: ShapeHint) -> tuple[Primitive, Made]:
-    """Return the simplest solid that explains the outline; raises Rejected where none does."""
+    """Return the simplest solid that explains the silhouette; raises Rejected if there is none."""
     if hint.hollow_below:
         raise Rejected(
             "generator_failed",
@@ -122,10 +122,10 @@ def _is_ellipse(silhouette: Silhouette) -> bool:
 
 
 def choose_primitive(silhouette: Silhouette, hint: ShapeHint) -> Primitive:
-    """Choose the simplest solid that has this outline.
+    """Choose the simplest solid that has this silhouette.
 
-    Solids of revolution have a mirror axis and filled rows across it; what is wide on a short stretch only (a spatula, a
-    squeegee) is flat rather than round. A box has the outline of a rectangle. All else is inflated.
+    Solids of revolution have a mirror axis and filled rows across it; a shape that is wide only on a short stretch (a
+    spatula, a squeegee) is flat rather than round. A box has a rectangular silhouette. All others are inflated.
     """
     whole = silhouette.holes == 0
     if whole and not hint.round and silhouette.rectangle_iou > (0.88 if hint.boxy else 0.955):

@@ -1,6 +1,6 @@
-"""Whether what nobody has named is round about its length, by what it may be called and by its outline.
+"""Decision whether an unnamed object is round about its length, from its probable names and its silhouette.
 
-A single guess is often wrong and yet of the same shape: a bottle that is taken for a screwdriver is round, and so are both.
+A single guess is often wrong but has the right shape: a bottle taken for a screwdriver is round, as both are.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.fitting.fit import made_of, template_for
 
 LEAST_SHARE, LEAST_SAID = 0.5, 0.1
-"""Of the probability of the likely names, what has to be that of round things; and that probability itself."""
+"""Minimum share of round objects in the probability of the candidate names, and minimum of that probability."""
 LEAST_SOLIDITY, LEAST_MIRROR_IOU = 0.85, 0.8
-"""Of an outline of one body that is about the same on both sides of an axis, as far as a cut-out tells."""
+"""Limits for the silhouette of a single body that is about symmetric, within the accuracy of a mask."""
 
 
 def is_likely_round(likely: Sequence[tuple[str, float]], silhouette: Mapping[str, float]) -> bool:
-    """Tell whether most of the ``likely`` names, each with its probability, are of things that are round about their length.
+    """Tell whether most of the ``likely`` names (name, probability) are of objects that are round about their length.
 
-    ``silhouette`` has the scores of the outline (``Silhouette.scores``), which has to be one that such things may have.
+    ``silhouette`` has the scores of the silhouette (``Silhouette.scores``), which must be possible for such an object.
     """
     if silhouette["solidity"] < LEAST_SOLIDITY or silhouette["mirror_iou"] < LEAST_MIRROR_IOU or silhouette["holes"]:
         return False
@@ -44,7 +44,7 @@ def _is_round_thing(name: str) -> bool:
 
 @cache
 def _is_round_template(category: str) -> bool:
-    """Tell whether a template of usual measures is as thick one way across its length as the other."""
+    """Tell whether a template with typical measures is equally thick in both directions across its length."""
     template = load_templates()[category]
     thin_m, thick_m, _ = np.sort(np.ptp(made_of(template, template.typical()).mesh.vertices, axis=0))
     return bool(thick_m - thin_m <= ROUND_SHARE * thick_m)

@@ -1,4 +1,4 @@
-"""Several round things that touch or hide one another have the outline of none of them: it has a waist between two bellies."""
+"""Detection of several round objects that touch or occlude each other, by a silhouette with a waist between two bulges."""
 
 from __future__ import annotations
 
@@ -13,18 +13,21 @@ from manitwin.models.annotators.prior_names import lookup
 
 SIDE_PX, LEVELS = 200, 60
 WAIST = 0.85
-"""Of the smaller belly's half width: what is between two of one thing is wider. Of 400 views of ten templates of fruit and of 27
-photos of one none has a narrower one; of ten photos of several that hide one another in part six have."""
+"""Maximum ratio of a waist to the half width of the smaller bulge; a single object is wider between its bulges.
+
+Of 400 views of ten fruit templates and 27 photos of single fruit none has a narrower waist; of ten photos of several that
+partly occlude each other six do.
+"""
 LEAST_BELLY = 0.7
-"""Of the largest one's half width: a stem, a crown of leaves, the neck of a squash are narrower."""
+"""Minimum half width of a bulge over the largest one; stems, leaf crowns and the neck of a squash are narrower."""
 BUNCHES = frozenset({"grape", "cherry"})
-"""What is called so may be several that hang together."""
+"""Names that may mean several objects that hang together."""
 LEAST_LIKELY = 0.5
-"""Of the probability of what nobody has named: that much is of round food and balls."""
+"""Minimum probability of round food and balls for an unnamed object."""
 
 
 def bellies(mask: np.ndarray) -> int:
-    """Return how many places of a mask ``(H, W) bool`` are about as wide as its widest, with waists between; at least 1."""
+    """Return the number of bulges of ``mask (H, W) bool`` about as wide as the widest, with waists between; at least 1."""
     scale = SIDE_PX / max(mask.shape)
     small = cv2.resize(mask.astype(np.uint8), None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     filled = np.pad(ndimage.binary_fill_holes(small), 2).astype(np.uint8)
@@ -40,10 +43,10 @@ def bellies(mask: np.ndarray) -> int:
 
 
 def reject_several_round(mask: np.ndarray, name: str | None, likely: Sequence[tuple[str, float]] = ()) -> None:
-    """Raise Rejected (``several_objects``) where a mask ``(H, W) bool`` is that of several things of a ``name``.
+    """Raise Rejected (``several_objects``) if ``mask (H, W) bool`` shows several objects of a ``name``.
 
-    That is where the name is of round food or balls. What nobody has named is such a thing where most of what it is ``likely``
-    called, by name and probability, is.
+    Only names of round food or balls are tested. An unnamed object is tested if most of the probability of its ``likely``
+    names (name, probability) is on such names.
     """
     prior = lookup(name)
     is_round = _is_round(name) if name is not None else sum(p for each, p in likely if _is_round(each)) >= LEAST_LIKELY

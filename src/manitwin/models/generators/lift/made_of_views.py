@@ -1,4 +1,4 @@
-"""What is made of several photos of one thing."""
+"""Result of a generation from several photos of one object."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from manitwin.twin.import_record import ImportRecord
 
 @dataclass(frozen=True)
 class MadeOfViews:
-    """A mesh ``part`` in the object frame, notes, how much of its area no photo shows, and what a template knows.
+    """A mesh ``part`` in the object frame, notes, the share of its area that no photo shows, and what a template knows of it.
 
-    ``metric``: it is in metres; else its longest side is 1.
+    ``metric``: the mesh is in metres; otherwise its longest side is 1.
     """
 
     part: trimesh.Trimesh
@@ -27,7 +27,7 @@ class MadeOfViews:
 
 
 def made_of_carved(carved: Carved, source: str) -> MadeOfViews:
-    """Return a carved solid as a mesh, with notes on each photo: how much of its outline is filled, whether it colours."""
+    """Return a carved solid as a mesh, with notes on each photo: covered share of its silhouette, use of its colours."""
     shown = {id(photo) for photo in colouring(carved)}
     notes = {
         "primitive": "visual hull",

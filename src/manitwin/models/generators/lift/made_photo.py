@@ -1,4 +1,4 @@
-"""A matted photo to a finished job: the template that its name means, fitted, or its silhouette lifted."""
+"""Job for a matted photo: the template of its name, fitted, or its lifted silhouette."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ from manitwin.twin.import_record import ImportRecord
 
 @dataclass(frozen=True)
 class Job:
-    """A finished job: the mesh as GLB, how it was made, and what is known of it (see ``Generated``)."""
+    """A finished job: the mesh as GLB, notes on how it was made, and known properties (see ``Generated``)."""
 
     glb: bytes
     notes: dict[str, Any]
@@ -67,13 +67,14 @@ def from_photo(
     *,
     likely: Sequence[tuple[str, float]] = (),
 ) -> Job:
-    """Return the template that the name means where its fit explains the photo, else the photo lifted; raises Rejected.
+    """Return the template of the name if its fit explains the photo, else the lifted photo; raises Rejected.
 
-    What has no template, and no name or that of a box, is a box where its outline is that of one seen from a corner; so is what
-    lies otherwise than its template does where a box explains it much better (a long speaker). What has no template, or one whose
-    fit is not believed, is a plain solid where one explains the photo closely. What has no name has the shape that explains the
-    photo best (``nameless``), a template's of the ``likely`` names, each with its probability, among others.
-    ``focal_mm`` is the lens as 35 mm equivalent, where it is known. Several things of the name that touch are rejected.
+    Without a template, and without a name or with a boxy one, the result is a box if the silhouette is that of a box seen
+    from a corner; likewise for an object in another pose than its template's if a box explains it much better (a speaker
+    lying on its side). Without an accepted template, a plain solid is used if it explains the photo closely. Without a name,
+    the shape that explains the photo best is used (``nameless``), including templates of the ``likely`` names (name,
+    probability). ``focal_mm`` is the 35 mm equivalent focal length, if known. Several touching objects of the name are
+    rejected.
     """
     reject_several_round(rgba[..., 3] > 127, name, likely)
     template = template_for(name)
@@ -89,7 +90,7 @@ def from_photo(
         if template is None
         else fit(template.category, rgba, or_of=kinds_of(template.category, name), focal_mm=focal_mm)
     )
-    lies = fitted is not None and not fitted.upright  # otherwise than the template rests
+    lies = fitted is not None and not fitted.upright  # in another pose than the template's
     box = box_from_corner(rgba, focal_mm) if lies else None
     if box is not None and fitted is not None and explains_more(box, fitted.residual.iou):
         return _shape_alone(box, rgba, primitive="box", source="the outline's six corners")
@@ -103,21 +104,21 @@ def from_photo(
 
 
 def _why_no_plain(solid: Fitted, name: str | None) -> str | None:
-    """Return why a thing of this name is no such plain solid; None where it may be."""
+    """Return why an object of this name cannot be this plain solid; None if it can."""
     extents = np.ptp(solid.made.mesh.vertices, axis=0)
     turned = why_never_turned(name) if PRIMITIVES[solid.category] in ROUND else None
     return turned or why_not_round(name, extents)
 
 
 def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) -> Job:
-    """Return a fit that explains the photo ``rgba (H, W, 4) uint8``, else the photo lifted; raises Rejected for neither."""
+    """Return a fit that explains the photo ``rgba (H, W, 4) uint8``, else the lifted photo; raises Rejected if neither does."""
     if fitted is not None and fitted.confidence >= LEAST_CONFIDENCE:
         extents, toward_camera = np.ptp(fitted.made.mesh.vertices, axis=0), fitted.view.object_to_camera[2]
         reject_end_on(extents, toward_camera, fitted.residual.iou, rgba, name or fitted.category)
         return from_fit(fitted, rgba, name)
     hint = hint_from_name(name)
     if fitted is not None and hint.hollow_below and fitted.confidence >= LEAST_AGAINST_INFLATION:
-        return from_fit(fitted, rgba, name)  # no outline that is lifted has its hollow
+        return from_fit(fitted, rgba, name)  # a lifted silhouette would lack the cavity
     try:
         lifted = lift(rgba, hint)
     except Rejected as error:
@@ -161,11 +162,11 @@ def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) 
             f"{unlike}; take the photo from another side, or give several photos of it; check the name and the cut-out",
             "generate",
         )
-    if lifted.notes.get("elevation_deg"):  # about the upright axis, from above
+    if lifted.notes.get("elevation_deg"):  # a body of revolution about the upright axis, seen from above
         above = np.radians(lifted.notes["elevation_deg"])
         extents, toward_camera = np.ptp(lifted.surface.vertices, axis=0), np.array([0.0, np.sin(above), np.cos(above)])
         reject_end_on(extents, toward_camera, lifted.explained.silhouette_iou, rgba, name or "thing")
-    flat = lifted.notes["primitive"] == "inflation"  # knows nothing of the back
+    flat = lifted.notes["primitive"] == "inflation"  # an inflation knows nothing about the back
     if fitted is not None and flat and fitted.confidence >= LEAST_AGAINST_INFLATION:
         return from_fit(fitted, rgba, name)
     if fitted is not None and flat and is_round(fitted) and is_cylinder(name):
@@ -189,7 +190,7 @@ def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) 
 
 
 def _why_unlike(lifted: Lifted, name: str | None) -> str | None:
-    """Return why a thing of this name is no solid like the one that its outline was lifted to; None where it may be."""
+    """Return why an object of this name cannot be the lifted solid; None if it can."""
     turned = lifted.notes["primitive"] == "revolution"
     extents = np.ptp(lifted.surface.vertices, axis=0)
     return (why_never_turned(name) if turned else None) or why_other_proportions(name, extents, turned=turned)
@@ -204,12 +205,12 @@ def _how_far(fitted: Fitted) -> str:
 
 
 def _from_the_side(lifted: Lifted) -> bool:
-    """Whether it is a body of revolution that was taken to be seen at the height of its middle."""
+    """Tell whether it is a body of revolution that was taken to be seen level."""
     return lifted.notes["primitive"] == "revolution" and not lifted.notes.get("elevation_deg")
 
 
 def _merely_as_wide(lifted: Lifted) -> bool:
-    """Whether it is a body of revolution of which no rim was seen from above and nothing sticks out: a box may look so too."""
+    """Tell whether it is a body of revolution without a visible rim or handles, whose silhouette a box may have too."""
     return _from_the_side(lifted) and not lifted.notes.get("handles")
 
 
@@ -218,7 +219,7 @@ def _one(fitted: Fitted) -> str:
 
 
 def from_fit(fitted: Fitted, rgba: np.ndarray, name: str | None) -> Job:
-    """Return a fitted template with the photo on it."""
+    """Return a fitted template textured with the photo."""
     fitted = with_its_front_seen(fitted)
     surface = texture_of([fitted], [rgba])
     known = known_of_fitted(fitted, name or fitted.category, surface)
@@ -243,9 +244,9 @@ def _lifted_job(lifted: Lifted, notes: dict[str, Any]) -> Job:
 
 
 def _shape_alone(fitted: Fitted, rgba: np.ndarray, *, primitive: str, source: str) -> Job:
-    """Return the solid alone, nothing known of it: a thing with a box's shape is not called a box.
+    """Return the solid without known properties: an object with the shape of a box is not named a box.
 
-    Its frame means nothing either: it is turned by quarter turns until the side that the photo shows is towards -Y.
+    Its frame is arbitrary, so it is rotated by quarter turns until the visible side faces -Y.
     """
     surface = texture_of([fitted], [rgba])
     usual = lookup(fitted.category)
@@ -260,9 +261,9 @@ def _shape_alone(fitted: Fitted, rgba: np.ndarray, *, primitive: str, source: st
 
 
 def textured_part(lifted: Lifted) -> trimesh.Trimesh:
-    """Return the mesh in the object frame (Z up) with its texture: the photo, and beside it what it does not show."""
+    """Return the mesh in the object frame (Z up) with its texture: the photo, and beside it the painted colours."""
     surface, seen = lifted.surface, lifted.surface.seen()
-    # a vertex on the border of both has a place in each
+    # a vertex between seen and unseen faces has texture coordinates in both
     corners = np.where(seen[:, None], surface.faces, surface.faces + len(surface.vertices))
     used, faces = np.unique(corners, return_inverse=True)
     source = used % len(surface.vertices)

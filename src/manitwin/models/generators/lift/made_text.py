@@ -1,4 +1,4 @@
-"""A text to a finished job: the template that it names, made."""
+"""Job for a text: builds the template that it names."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from manitwin.models.generators.templates.text import read_text
 
 
 def why_not(text: str) -> str | None:
-    """Return why no template makes what a text asks for; None where one does."""
+    """Return why no template can make a text; None if one can."""
     try:
         made_as_read(text, 0)
     except (UsageError, SolidError) as error:
@@ -27,10 +27,10 @@ def why_not(text: str) -> str | None:
 
 
 def made_as_read(text: str, seed: int) -> tuple[Made, tuple[str, ...]]:
-    """Return what a text asks for as the plain reader reads it, and the words that say nothing to it.
+    """Return the object described by a text, as the rule-based reader understands it, and the words that it ignored.
 
-    Raises UsageError for a text that names no category, a size that no such thing has or a part that it has not, SolidError
-    for measures that give no solid.
+    Raises UsageError for a text without a known category, with an impossible size or with a part that the object does not
+    have; SolidError for measures that give no solid.
     """
     templates = load_templates()
     wanted = read_text(text, templates)
@@ -38,7 +38,7 @@ def made_as_read(text: str, seed: int) -> tuple[Made, tuple[str, ...]]:
 
 
 def from_text(text: str, seed: int) -> Job:
-    """Return what a text asks for; raises Unsupported where no template makes it."""
+    """Return the object described by a text; raises Unsupported if no template can make it."""
     try:
         made, unused = made_as_read(text, seed)
     except (UsageError, SolidError) as error:
@@ -47,7 +47,7 @@ def from_text(text: str, seed: int) -> Job:
 
 
 def job_of(made: Made, text: str, unused: tuple[str, ...]) -> Job:
-    """Return a made thing with what is known of it."""
+    """Return the job of a built object with its known properties."""
     notes: dict[str, Any] = {
         "primitive": f"template:{made.category}",
         "category": made.category,

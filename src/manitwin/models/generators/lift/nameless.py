@@ -1,7 +1,7 @@
-"""The shape of what nobody has named: a template of a likely name, a plain solid, a body of revolution, or the outline lifted.
+"""Shape of an unnamed object: a template of a probable name, a plain solid, a body of revolution, or the lifted silhouette.
 
-A classifier's guess that is too unsure to be a name chooses among shapes, and never against the picture: what explains outline,
-inner edges and shading best is taken, whatever it is called.
+A classifier's guess that is too uncertain to be a name only proposes shapes. The shape that best explains silhouette, inner
+edges and shading is chosen, whatever its name.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from manitwin.models.generators.lift.turned_solid import turned_solid
 from manitwin.models.generators.templates.fitting.fit import Fitted, fit, template_for
 
 LEAST_LIKELY = 0.1
-"""Probability of a name below which its shape is not tried."""
+"""Minimum probability of a name whose template is tried."""
 NAMELESS_IOU, NAMELESS_OUTLINE = 0.92, 0.0045
-"""A name that is only likely has to explain more than one that a person says (``LEAST_IOU``, ``MOST_OUTLINE``)."""
+"""Limits for the template of a merely probable name, stricter than for a given name (``LEAST_IOU``, ``MOST_OUTLINE``)."""
 OF_LIKELY_NAMES = "template of a likely name fitted to the photo"
 OF_PLAIN_SOLIDS = "plain solid fitted to the photo"
 OF_TURNED_SOLIDS = "body of revolution fitted to the photo"
 SAID_COST = 0.01
-"""Of ``Residual.cost``: what a likely name speaks for its template beside a body of revolution that explains a photo as well."""
+"""Bonus in ``Residual.cost`` of a probable name's template over a body of revolution that explains the photo equally well."""
 ROUND = frozenset({"cylinder", "disc"})
-"""The plain solids that are bodies of revolution too."""
+"""Plain solids that are also bodies of revolution."""
 
 
 @dataclass(frozen=True)
 class Alone:
-    """A solid that was fitted to a photo, of which nothing is known but its shape: what it is, and how it was found."""
+    """A solid fitted to a photo, known only by its shape: its primitive, and how it was found."""
 
     fitted: Fitted
     primitive: str
@@ -45,13 +45,12 @@ class Alone:
 def shape_without_name(
     rgba: np.ndarray, likely: Sequence[tuple[str, float]], focal_mm: float | None, plain: PlainSolids
 ) -> Alone | Lifted:
-    """Return the shape of what ``rgba (H, W, 4) uint8`` shows, whose alpha is the mask; raises Rejected where none explains it.
+    """Return the shape of the object in ``rgba (H, W, 4) uint8``, whose alpha is the mask; raises Rejected if none explains it.
 
-    A ``plain`` solid that explains the photo closely stands but for a template of the ``likely`` names, each with its
-    probability, or a body of revolution that does so better; another one only where it explains the photo rather than what the
-    outline is lifted to. What is lifted to a body of revolution that stands is fitted again with the camera's perspective; what
-    is no such body by its outline, but likely has the name of something round, is as thick as it is wide.
-    ``focal_mm`` is the lens as 35 mm equivalent, where it is known.
+    A ``plain`` solid that explains the photo closely is used unless a template of the ``likely`` names (name, probability),
+    or a body of revolution, explains it better; other plain solids only if they are preferred to the lifted solid. A lifted,
+    standing body of revolution is fitted again with the camera's perspective. An inflated silhouette whose probable names are
+    round is made as thick as it is wide. ``focal_mm`` is the 35 mm equivalent focal length, if known.
     """
     fitted = _best_template(rgba, likely, focal_mm)
     if plain.close is not None and PRIMITIVES[plain.close.category] not in ROUND:
@@ -61,7 +60,8 @@ def shape_without_name(
     except Rejected:
         if plain.close is not None:
             return _cheaper(fitted, plain.close)
-        if fitted is None or not explains_more(fitted, DISC_ELLIPSE_IOU):  # what no solid explains may be an ellipse
+        # a silhouette that no solid explains may be an ellipse
+        if fitted is None or not explains_more(fitted, DISC_ELLIPSE_IOU):
             raise
         return _of_likely_name(fitted)
     turned = _turned(rgba, lifted, focal_mm)
@@ -79,14 +79,14 @@ def shape_without_name(
 
 
 def explains_more(fitted: Fitted, simpler_iou: float) -> bool:
-    """Tell whether a template leaves much less of the outline unexplained than a simpler solid of that overlap."""
+    """Tell whether a template leaves much less of the silhouette unexplained than a simpler solid with the given overlap."""
     return 1 - fitted.residual.iou < CLEARLY_LESS * (1 - simpler_iou)
 
 
 def _turned(rgba: np.ndarray, lifted: Lifted, focal_mm: float | None) -> Fitted | None:
-    """Return the body of revolution of a photo that was lifted to one which stands in it; None where it was not.
+    """Return the fitted body of revolution of a photo that was lifted to a standing one, else None.
 
-    What sticks out beside the body is none where the body alone explains as much.
+    Handles are ignored if the body alone explains as much.
     """
     if "elevation_deg" not in lifted.notes:
         return None
@@ -98,7 +98,7 @@ def _turned(rgba: np.ndarray, lifted: Lifted, focal_mm: float | None) -> Fitted 
 
 
 def _best_round(turned: Fitted, fitted: Fitted | None, plain: PlainSolids) -> Alone:
-    """Return a body of revolution, or what explains the photo better than it."""
+    """Return a body of revolution, or another solid that explains the photo better."""
     near = plain.nearest if plain.nearest is not None and is_rather(plain.nearest, "revolution") else None
     solid = plain.close or near
     if solid is not None and (PRIMITIVES[solid.category] not in ROUND or solid.residual.cost <= turned.residual.cost):
@@ -124,9 +124,9 @@ def _plain(plain: Fitted) -> Alone:
 
 
 def _is_preferred(fitted: Fitted, lifted: Lifted) -> bool:
-    """Whether a template is to be preferred to a solid that needs no name; an inflated outline explains nothing.
+    """Tell whether a template is preferred to the lifted solid; an inflated silhouette has no explanatory value.
 
-    The front of a box, its corners round or seen from near, is what many flat things seen at an angle nearly look like.
+    Many flat objects seen at an angle look nearly like the front of a box with rounded corners or seen from nearby.
     """
     if lifted.notes["primitive"] == "box" and not explains_closely(fitted.residual):
         return False
@@ -134,12 +134,12 @@ def _is_preferred(fitted: Fitted, lifted: Lifted) -> bool:
 
 
 def _best_template(rgba: np.ndarray, likely: Sequence[tuple[str, float]], focal_mm: float | None) -> Fitted | None:
-    """Return the template of the ``likely`` names that explains the photo best; None where none does closely."""
+    """Return the template of the ``likely`` names that explains the photo best; None if none explains it closely."""
     templates = [template_for(name) for name, probability in likely if probability >= LEAST_LIKELY]
     kinds = list(dict.fromkeys(template.category for template in templates if template is not None))
     found = fit(kinds[0], rgba, or_of=kinds[1:], focal_mm=focal_mm) if kinds else None
     if found is None or found.residual.iou < NAMELESS_IOU or found.residual.outline > NAMELESS_OUTLINE:
         return None
-    # a ball goes with the end of any round thing
+    # the end of any round object looks like a ball
     extents = np.ptp(found.made.mesh.vertices, axis=0)
     return None if shows_no_more_than_an_end(extents, found.view.object_to_camera[2], rgba) else found

@@ -1,4 +1,4 @@
-"""One picture of several photos' crops, and of their painted colours below: about square, since textures have a longest side."""
+"""Texture atlas of several photos' crops and their painted colours, about square because textures have a maximum side."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 
 from manitwin.models.generators.lift.texture import Crop, paint_unseen
 
-_PAINTED_SHARE = 0.5  # painted colours are soft
+_PAINTED_SHARE = 0.5  # scale of the painted colours, which have no fine detail
 Place = tuple[int, int, int, int]
-"""Left, top, width, height in the picture, pixels."""
+"""Left, top, width, height in the atlas, in pixels."""
 
 
 def photo_atlas(crops: Sequence[Crop]) -> tuple[np.ndarray, list[Place]]:
-    """Return a picture ``(H, W, 3) uint8`` of all crops and of their painted colours, with the place of each: crops first."""
+    """Return an atlas ``(H, W, 3) uint8`` of all crops and their painted colours, with the place of each, crops first."""
     painted = [paint_unseen(crop, None) for crop in crops]
     small = [
         cv2.resize(each, None, fx=_PAINTED_SHARE, fy=_PAINTED_SHARE, interpolation=cv2.INTER_AREA) for each in painted
@@ -34,7 +34,7 @@ def photo_atlas(crops: Sequence[Crop]) -> tuple[np.ndarray, list[Place]]:
 
 
 def _in_rows(shapes: Sequence[tuple[int, ...]], columns: int) -> tuple[list[Place], tuple[int, int]]:
-    """Return the places of pictures in rows of so many, and the width and height that they take."""
+    """Return the places of pictures in rows of ``columns``, and the total width and height."""
     places: list[Place] = []
     top = width = 0
     for first in range(0, len(shapes), columns):

@@ -1,4 +1,4 @@
-"""Outlines as pinhole cameras see them: which points lie within all of them, and how much of each their common solid fills."""
+"""Silhouettes seen by pinhole cameras: point-in-silhouette tests, and their mutual consistency."""
 
 from __future__ import annotations
 
@@ -10,19 +10,20 @@ import cv2
 import numpy as np
 
 FAR_PX = 24.0
-"""Beyond this distance from an outline, in pixels of a ``Sight``, it is not known how far."""
+"""Clamp of the signed distance to a silhouette, in pixels of a ``Sight``."""
 RIM_RAYS, MOST_PASSING_PX = 48, 6.0
-_STEPS = 40  # of a ray through the object's surroundings
-_AROUND = 1.15  # of the object's radius as the outlines have it
+_STEPS = 40  # samples of a ray through the object's surroundings
+_AROUND = 1.15  # times the object's radius estimated from the silhouettes
 
 
 @dataclass(frozen=True)
 class Sight:
-    """A signed distance to one outline, pixels, positive inside, and the camera that saw it.
+    """Signed distance to one silhouette in pixels, positive inside, and the camera that saw it.
 
-    ``distance (H, W) float32`` is that of ``signed_distance``, of a mask whose first pixel is ``box (2,)`` (x, y) of the picture;
-    ``matrix (3, 4)`` takes points of the object frame (x to the first photo's right, y away from its camera, z up) to homogeneous
-    pixels of the picture, the third of them the depth; ``focal_px`` is the lens's. All pixels are those of the scaled picture.
+    ``distance (H, W) float32`` is that of ``signed_distance``, for a mask whose first pixel is ``box (2,)`` (x, y) of the
+    picture. ``matrix (3, 4)`` projects points of the object frame (x to the first photo's right, y away from its camera, z
+    up) to homogeneous pixels of the picture; the third coordinate is the depth. ``focal_px`` is the focal length. Pixels are
+    those of the scaled picture.
     """
 
     distance: np.ndarray
@@ -32,58 +33,58 @@ class Sight:
 
     @cached_property
     def corner(self) -> np.ndarray:
-        """The first pixel (x, y) of the padded ``distance``."""
+        """First pixel (x, y) of the padded ``distance``."""
         return np.asarray(self.box - FAR_PX)
 
     @cached_property
     def rim(self) -> np.ndarray:
-        """The middles of the pixels along the outline's outer border, ``(N, 2)``, of the picture."""
+        """Centres ``(N, 2)`` of the pixels along the silhouette's outer border, in the picture."""
         inside = (self.distance > 0).astype(np.uint8)
         lines, _ = cv2.findContours(inside, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
         return np.asarray(max(lines, key=len)[:, 0, :] + self.corner + 0.5, float)
 
     @cached_property
     def rim_rays(self) -> np.ndarray:
-        """Some of the ``rim``, ``(RIM_RAYS, 2)``, spread along it."""
+        """Subset ``(RIM_RAYS, 2)`` of ``rim``, spread along it."""
         return np.asarray(self.rim[np.linspace(0, len(self.rim) - 1, RIM_RAYS).astype(int)])
 
     @cached_property
     def rim_circle(self) -> tuple[np.ndarray, float]:
-        """The middle ``(2,)`` of the box of the ``rim`` and how far the rim is from it at most, pixels."""
+        """Centre ``(2,)`` of the bounding box of ``rim``, and the maximum distance of the rim from it in pixels."""
         middle = (self.rim.min(axis=0) + self.rim.max(axis=0)) / 2
         return middle, float(np.linalg.norm(self.rim - middle, axis=1).max())
 
     def seen_from(self, matrix: np.ndarray, focal_px: float) -> Sight:
-        """Return the same outline as another camera saw it."""
+        """Return the same silhouette with another camera."""
         other = Sight(self.distance, self.box, matrix, focal_px)
         for name in (
             "corner",
             "rim",
             "rim_rays",
             "rim_circle",
-        ):  # found once: a camera is looked for in a thousand places
+        ):  # shared, because the search for a camera tries a thousand poses
             other.__dict__[name] = getattr(self, name)
         return other
 
     @property
     def position(self) -> np.ndarray:
-        """The projection centre ``(3,)``."""
+        """Projection centre ``(3,)``."""
         return np.asarray(-np.linalg.solve(self.matrix[:, :3], self.matrix[:, 3]))
 
     def project(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the columns, rows and depths of points ``(..., 3)``; behind the camera they are far outside."""
+        """Return columns, rows and depths of points ``(..., 3)``; column and row are 0 for points behind the camera."""
         seen = points @ self.matrix[:, :3].T + self.matrix[:, 3]
         depth = seen[..., 2]
         safe = np.where(depth > 1e-6, depth, np.inf)
         return seen[..., 0] / safe, seen[..., 1] / safe, depth
 
     def inside(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return how far inside the outline points ``(..., 3)`` are seen, pixels, and the length of a pixel at each."""
+        """Return the signed distance of points ``(..., 3)`` inside the silhouette in pixels, and the size of a pixel at each."""
         found, depth = self._looked_up(points)
         return found, np.maximum(depth, 1e-6) / self.focal_px
 
     def inside_px(self, points: np.ndarray) -> np.ndarray:
-        """Return how far inside the outline points ``(..., 3)`` are seen, pixels."""
+        """Return the signed distance of points ``(..., 3)`` inside the silhouette in pixels."""
         return self._looked_up(points)[0]
 
     def _looked_up(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -93,12 +94,12 @@ class Sight:
         return np.where(depth > 1e-6, found, -FAR_PX), depth
 
     def rays(self, pixels: np.ndarray) -> np.ndarray:
-        """Return the directions ``(N, 3)`` through pixels ``(N, 2)``, with a depth of 1."""
+        """Return the directions ``(N, 3)`` through pixels ``(N, 2)``, scaled to depth 1."""
         return np.asarray(np.linalg.solve(self.matrix[:, :3], np.column_stack([pixels, np.ones(len(pixels))]).T).T)
 
 
 def _looked_up(image: np.ndarray, column: np.ndarray, row: np.ndarray) -> np.ndarray:
-    """Return an image's values, between its pixels too; in slices, for OpenCV takes no more than 32,767 columns."""
+    """Interpolate an image at positions, in slices because OpenCV accepts at most 32,767 columns."""
     size = 1 << 14
     column, row = column.astype(np.float32), row.astype(np.float32)
     parts = [
@@ -116,7 +117,10 @@ def _looked_up(image: np.ndarray, column: np.ndarray, row: np.ndarray) -> np.nda
 
 
 def signed_distance(mask: np.ndarray) -> np.ndarray:
-    """Return how far inside each pixel of a mask ``(H, W) bool``, padded by ``FAR_PX``, is; at most that far."""
+    """Return the signed distance of each pixel inside a mask ``(H, W) bool``, padded by ``FAR_PX``.
+
+    Distances outside are limited to ``FAR_PX``.
+    """
     padded = np.pad(mask, int(FAR_PX))
     inside = cv2.distanceTransform(padded.astype(np.uint8), cv2.DIST_L2, 5)
     outside = cv2.distanceTransform((~padded).astype(np.uint8), cv2.DIST_L2, 5)
@@ -124,7 +128,10 @@ def signed_distance(mask: np.ndarray) -> np.ndarray:
 
 
 def around(sights: Sequence[Sight]) -> tuple[np.ndarray, float]:
-    """Return a centre ``(3,)`` and a radius that hold the object: where the rays through the outlines' middles are nearest."""
+    """Return a centre ``(3,)`` and a radius that contain the object.
+
+    The centre is the point nearest to the rays through the centres of the silhouettes.
+    """
     normal, moment, identity = np.zeros((3, 3)), np.zeros(3), np.eye(3)
     for sight in sights:
         ray = sight.rays(sight.rim_circle[0][None])[0]
@@ -138,7 +145,7 @@ def around(sights: Sequence[Sight]) -> tuple[np.ndarray, float]:
 
 
 def points_on_rays(own: Sight, pixels: np.ndarray, surroundings: tuple[np.ndarray, float]) -> np.ndarray:
-    """Return points ``(N, steps, 3)`` along the rays through pixels ``(N, 2)`` of one outline, within what is ``around`` all."""
+    """Return points ``(N, steps, 3)`` along the rays through pixels ``(N, 2)`` of one silhouette, within ``surroundings``."""
     centre, radius = surroundings
     depth = float(own.project(centre)[2])
     depths = np.linspace(max(depth - radius, 0.05 * depth), depth + radius, _STEPS)
@@ -146,7 +153,7 @@ def points_on_rays(own: Sight, pixels: np.ndarray, surroundings: tuple[np.ndarra
 
 
 def inside_others(sights: Sequence[Sight], number: int, points: np.ndarray) -> np.ndarray:
-    """Return how far inside all outlines but one points ``(..., 3)`` are seen, pixels."""
+    """Return the minimum signed distance of points ``(..., 3)`` inside all silhouettes but one, in pixels."""
     least = np.full(points.shape[:-1], FAR_PX, np.float32)
     for other, sight in enumerate(sights):
         if other != number:
@@ -155,11 +162,12 @@ def inside_others(sights: Sequence[Sight], number: int, points: np.ndarray) -> n
 
 
 def passing_px(sights: Sequence[Sight]) -> float:
-    """Return by how many pixels the rays along all outlines pass outside of the others' in the mean; each at most so many."""
+    """Return the mean distance in pixels by which rays along all silhouettes miss the others', each limited to
+    MOST_PASSING_PX."""
     surroundings = around(sights)
     passed = []
     for number, sight in enumerate(sights):
         best = inside_others(sights, number, points_on_rays(sight, sight.rim_rays, surroundings)).max(axis=1)
-        # the middle of a pixel of the rim is half a pixel within the outline
+        # the centre of a rim pixel is half a pixel inside the outline
         passed.append(np.clip(0.5 - best, 0.0, MOST_PASSING_PX))
     return float(np.mean(passed))

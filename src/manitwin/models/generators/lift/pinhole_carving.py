@@ -1,4 +1,4 @@
-"""Carve what a camera that stays sees of a thing that is turned before it: the solid within all outlines, with perspective."""
+"""Carving of an object that turns before a fixed camera: the solid within all silhouettes, with perspective."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from manitwin.models.generators.lift.texture import Crop, crop_object
 from manitwin.models.generators.lift.turntable import TurntableCamera, scaled_masks, sights_of
 
 SIDE_PX = 320
-"""The longest side of the outlines' boxes, where the solid is carved."""
+"""Longest side of the silhouettes' bounding boxes at which the solid is carved."""
 MASK_PX = 384
 
 
 @dataclass(frozen=True)
 class SeenPhoto:
-    """A photo with its camera, see ``CarvingPhoto``; ``scale`` is that of the camera's pixels against the photo's."""
+    """A photo with its camera, see ``CarvingPhoto``; ``scale`` is the size of the camera's pixels relative to the photo's."""
 
     name: str
     turn_deg: float
@@ -29,7 +29,7 @@ class SeenPhoto:
     scale: float
 
     def crop_share(self, points: np.ndarray) -> np.ndarray:
-        """Return where points ``(N, 3)`` (x, height, z towards the first viewer) are in the crop, 0 to 1 right and down."""
+        """Return positions of points ``(N, 3)`` (x, height, z towards the first viewer) in the crop, 0 to 1 right and down."""
         column, row, _ = self.sight.project(_z_up(points))
         left, top, width, height = self.crop.box
         return np.clip(
@@ -49,9 +49,10 @@ def carve_turned(
     covered: Sequence[float],
     power: float,
 ) -> Carved:
-    """Carve what matted photos (name, ``(H, W, 4) uint8``, all of one size) show from the turns to a camera that stays.
+    """Carve a solid from matted photos (name, ``(H, W, 4) uint8``, all of the same size) of a turning object with a fixed camera.
 
-    ``power`` is that of the superellipse at each level where only two directions are seen. Raises Rejected where nothing is left.
+    ``power`` is the exponent of the superellipse at each level if only two directions are seen. Raises Rejected for an empty
+    solid.
     """
     masks = scaled_masks([rgba for _, rgba in photos], SIDE_PX)
     sights = sights_of(masks, camera, turns_deg)
@@ -70,7 +71,7 @@ def carve_turned(
 
 
 def _are_two_crossing(turns_deg: Sequence[float]) -> bool:
-    """Tell whether all directions are, but for their sense, two at about a right angle along the first photo's axes."""
+    """Tell whether all directions are multiples of about 90 degrees from the first photo's."""
     relative = np.subtract(turns_deg, turns_deg[0]) % 90.0
     return bool((np.minimum(relative, 90.0 - relative) < 10.0).all())
 

@@ -1,4 +1,4 @@
-"""The solid within all outlines that pinhole cameras saw, cut off at the ground that it stands on."""
+"""Visual hull of silhouettes seen by pinhole cameras, cut off at the ground on which the object stands."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from manitwin.errors import Rejected
 from manitwin.models.generators.lift.pinhole import FAR_PX, Sight, around, inside_others, points_on_rays
 
 COARSE_CELLS, CELLS = 24, 96
-"""Of the grids along the longest side: one that finds where the solid is, and its own."""
+"""Grid cells along the longest side: of a coarse grid that locates the solid, and of its own grid."""
 NEAR_PX = 1.5
-"""A ray that passes the common solid by less, of outlines of ``turntable.SIDE_PX``, is taken to meet it."""
+"""Maximum distance by which a ray may miss the solid and still count as a hit, at the resolution of ``turntable.SIDE_PX``."""
 _COVERED_RAYS = 300
-_LEAST_DOWNWARD = 0.05  # of a ray's slope: flatter ones do not tell how high what they meet is
+_LEAST_DOWNWARD = 0.05  # minimum downward slope of a ray; flatter rays do not determine the height of what they hit
 _LOWEST_SHARE = 0.25
 
 
 def covered_shares(sights: Sequence[Sight]) -> tuple[list[float], np.ndarray]:
-    """Return how much of each outline the common solid of all fills, and of outline i that of all but k, ``(N, N)`` by (i, k).
+    """Return the share of each silhouette that the hull fills, and ``(N, N)`` the share of silhouette i for the hull without k.
 
-    Without itself an outline is filled by the others, as it is with itself.
+    Each silhouette is tested against the others, which gives the same result as with itself.
     """
     count = len(sights)
     surroundings = around(sights)
@@ -47,11 +47,11 @@ def covered_shares(sights: Sequence[Sight]) -> tuple[list[float], np.ndarray]:
 def hull_field(
     sights: Sequence[Sight], power: float | None, ground: float | None = None, cells: int = CELLS
 ) -> tuple[np.ndarray, float, np.ndarray]:
-    """Return how far inside all outlines each node of a grid (X, Y, Z) is, its cell and its first node, as lengths.
+    """Return the signed distance inside all silhouettes on a grid (X, Y, Z), its cell and its first node, as lengths.
 
-    What would lie below the ground, which cameras from above do not see, is outside: ``ground`` says how high that is, else the
-    outlines do; ``cells`` are along the longest side. With a ``power`` the corners that outlines along x and y leave are those
-    of superellipses (Barr 1981). Raises Rejected where nothing is inside all.
+    Points below the ground, which cameras from above do not see, are outside; ``ground`` is its height, by default estimated
+    from the silhouettes. ``cells`` is the resolution along the longest side. With ``power``, corners left open by silhouettes
+    along x and y are rounded to superellipses (Barr 1981). Raises Rejected if the hull is empty.
     """
     centre, radius = around(sights)
     rough = 2 * radius / COARSE_CELLS
@@ -76,11 +76,10 @@ def hull_field(
 
 
 def ground_level(sights: Sequence[Sight], of: Sequence[int] | None = None) -> float:
-    """Return how high the ground is that the thing stands on, as all or the ``of`` so many-th cameras tell it.
+    """Return the height of the ground on which the object stands, from all cameras or those with indices ``of``.
 
-    It is minus infinity where none of them looks down at it.
-
-    Of each photo the rays along the outline that meet the common solid lowest do so at the ground, or just in front of it.
+    In each photo, the rays along the silhouette that hit the hull lowest hit it at the ground or just in front of it. The
+    result is minus infinity if no camera looks down at the ground.
     """
     surroundings = around(sights)
     lowest = []
@@ -98,7 +97,7 @@ def ground_level(sights: Sequence[Sight], of: Sequence[int] | None = None) -> fl
 
 
 def _cornered(depth: np.ndarray, cell: float, power: float) -> np.ndarray:
-    """Cut the corners off each part of each level of a field (X, Y, Z): it is a superellipse over its widths along x and y."""
+    """Round each part of each level of a field (X, Y, Z) to a superellipse over its widths along x and y."""
     cut = depth.copy()
     for level in range(depth.shape[2]):
         parts, _ = ndimage.label(depth[:, :, level] > 0)
@@ -117,7 +116,7 @@ def _cornered(depth: np.ndarray, cell: float, power: float) -> np.ndarray:
 
 
 def _depth(sights: Sequence[Sight], points: np.ndarray) -> np.ndarray:
-    """Return how far inside all outlines points are, as lengths."""
+    """Return the signed distance of points inside all silhouettes, as lengths."""
     least = np.full(points.shape[:-1], np.inf)
     for sight in sights:
         inside, pixel = sight.inside(points)

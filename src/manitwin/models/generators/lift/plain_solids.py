@@ -1,8 +1,8 @@
-"""Plain solids that a photo may show of a thing that nobody named: blocks, slabs with round corners, cylinders, discs.
+"""Plain solids fitted to a photo of an unnamed object: blocks, slabs with round corners, cylinders, discs.
 
-An outline inflated in the picture's plane takes a book on a table for one that stands before the camera, as high as it looks.
-A plain solid seen from above explains such an outline almost to the pixel, and its edges are seen in the photo; then the view
-from which they are is believed with it.
+Inflating a silhouette in the image plane makes a book that lies on a table stand before the camera, as high as it looks. A
+plain solid seen from above explains such a silhouette almost to the pixel, and its edges are visible in the photo; then its
+view is accepted too.
 """
 
 from __future__ import annotations
@@ -27,29 +27,35 @@ from manitwin.models.generators.templates.fitting.view import View
 from manitwin.models.generators.templates.template import Measure, Model, Template
 
 LEAST_IOU, MOST_OUTLINE = 0.985, 0.0022
-"""Overlap and distance of the outlines (of the longer side) from which on a plain solid explains a photo."""
+"""Minimum overlap, and maximum distance of the outlines over the longer side, of a plain solid that explains a photo."""
 MOST_EDGES_MISSING = 0.67
-"""Of the solid's inner edges in the photo; 0.7 says nothing either way. Set with the limits above on made photos of 43 things."""
+"""Maximum share of the solid's inner edges that are missing in the photo; 0.7 is neutral.
+
+This limit and those above were set on synthetic photos of 43 objects.
+"""
 EDGES_SEEN, NEAR_IOU, NEAR_OUTLINE = 0.4, 0.96, 0.0045
 SILENT_EDGES, EXACT_IOU, EXACT_OUTLINE = 0.7, 0.995, 0.001
-"""Of a solid that is preferred to a lifted outline (``is_rather``). Of 164 photos of 57 made things those that no solid explains
-closely gain 0.08 to 0.31 by edges that are seen (volumetric IoU; five), 0.2 by their outlines (two dice), and none loses."""
+"""Limits for a solid that is preferred to a lifted silhouette (``is_rather``).
+
+Of 164 photos of 57 synthetic objects, those that no solid explains closely gain 0.08 to 0.31 volumetric IoU by visible edges
+(five photos) and 0.2 by their silhouettes (two dice); none loses.
+"""
 LEAST_SOLIDITY = 0.96
-"""These solids are convex, so that their outlines are."""
+"""Minimum solidity of a silhouette, since these solids are convex."""
 MOST_DISC = 0.15
-"""Thickness of a disc over its width: what is thicker may as well be a bowl seen from above."""
+"""Maximum thickness of a disc over its width; a thicker one may be a bowl seen from above."""
 PRIMITIVES = {"box": "box", "cutting board": "slab", "can": "cylinder", "coaster": "disc"}
-"""What the solids are, by the category of things that stand or lie as each does."""
-_ROUNDS = 6  # of least squares, from a block with sharp edges
-_NEAR = 1.1  # about which proportions of a block are looked for
-_THICKEST_SLAB = 0.3  # of its length: what is thicker is a block
-_EDGE = 0.02  # radius of a block's edges over its least side
-_ROUNDED = 0.2  # radius of a slab's upper and lower edges over its thickness
+"""Primitive of each solid, by a category of objects that rest in the same pose."""
+_ROUNDS = 6  # least-squares iterations, starting from a block with sharp edges
+_NEAR = 1.1  # factor around the initial proportions of a block
+_THICKEST_SLAB = 0.3  # of its length: a thicker one is a block
+_EDGE = 0.02  # edge radius of a block over its shortest side
+_ROUNDED = 0.2  # edge radius of a slab over its thickness
 
 
 @dataclass(frozen=True)
 class PlainSolids:
-    """The plain solid that explains a photo closely, and the one that explains it best; None where there is none."""
+    """The plain solid that explains a photo closely, and the one that explains it best; None if there is none."""
 
     close: Fitted | None = None
     nearest: Fitted | None = None
@@ -58,7 +64,7 @@ class PlainSolids:
 def plain_solids(rgba: np.ndarray, hint: ShapeHint, focal_mm: float | None = None) -> PlainSolids:
     """Return the plain solids that explain ``rgba (H, W, 4) uint8``, whose alpha is the mask.
 
-    Of solids that ``hint`` speaks against none is tried. ``focal_mm`` is the lens as 35 mm equivalent, where it is known.
+    Solids that contradict ``hint`` are not tried. ``focal_mm`` is the 35 mm equivalent focal length, if known.
     """
     tried, mask = [solid for solid in solids() if _may_be(solid, hint)], rgba[..., 3] > 127
     if not tried or _solidity(mask) < LEAST_SOLIDITY:
@@ -72,7 +78,7 @@ def plain_solids(rgba: np.ndarray, hint: ShapeHint, focal_mm: float | None = Non
 
 
 def _fits(solid: Template, evidence: Evidence, blocks: Sequence[BlockView]) -> list[Candidate]:
-    """Return fits of a solid: of a block those of its outline, of a slab what they lead to beside what a search finds."""
+    """Return fits of a solid: for a block from the blocks of the silhouette, for a slab from these and from a search."""
     kind = PRIMITIVES[solid.category]
     if kind == "box":
         return [_block_of(solid, each, evidence) for each in blocks]
@@ -85,7 +91,7 @@ def _fits(solid: Template, evidence: Evidence, blocks: Sequence[BlockView]) -> l
 
 
 def _block_of(template: Template, block: BlockView, evidence: Evidence) -> Candidate:
-    """Return the block whose edges are round that a sharp one's outline leads to."""
+    """Return the block with rounded edges that is fitted from a sharp block."""
     near = {
         name: Measure(usual / _NEAR, usual, usual * _NEAR, "")
         for name, usual in (("width", block.width), ("depth", block.depth))
@@ -95,26 +101,26 @@ def _block_of(template: Template, block: BlockView, evidence: Evidence) -> Candi
 
 
 def _slab_of(template: Template, block: BlockView, evidence: Evidence) -> Candidate:
-    """Return the slab, its corners and edges round, that a block's outline leads to."""
+    """Return the slab with rounded corners and edges that is fitted from a block."""
     length, across = max(block.width, block.depth), min(block.width, block.depth)
     family = Family(template, {"width": across / length, "thick": 1 / length})
-    turn = 0.0 if block.width >= block.depth else np.pi / 2  # a slab's length is its width, seen from the front
+    turn = 0.0 if block.width >= block.depth else np.pi / 2  # the length of a slab is its width seen from the front
     return _refined(family, replace(block.view, yaw_rad=block.view.yaw_rad + turn), evidence)
 
 
 def _refined(family: Family, view: View, evidence: Evidence) -> Candidate:
-    """Return a family's fit from its expected measures and a view, of a camera that is not rolled."""
+    """Return a family's fit from its expected measures and a view, for a camera that is not rolled."""
     start, begin = np.zeros(len(family.free)), [Placed(view, upright=True)]
     problem = Problem(family, [evidence], turns=False)
     at, (placed,) = problem.solve(start, begin, measures=True, rounds=_ROUNDS)
     solid = family.solid(at)
-    assert solid is not None  # measures that give none are no step of the fit
+    assert solid is not None  # the fit rejects steps to measures without a solid
     return Candidate(family, at, placed.view, True, residual(solid, placed.view, evidence))
 
 
 @cache
 def solids() -> tuple[Template, ...]:
-    """Return the solids as templates, each under the category of things that stand or lie as it does."""
+    """Return the solids as templates, each with a category of objects that rest in the same pose."""
     block = {"height_m": _fixed(0.1), "width": Measure(0.4, 1.0, 2.5, ""), "depth": Measure(0.3, 0.7, 1.5, "")}
     slab = {
         "length_m": _fixed(0.2),
@@ -161,7 +167,7 @@ def _disc(*, width_m: float, thick: float) -> Model:
 
 
 def _may_be(solid: Template, hint: ShapeHint) -> bool:
-    """Whether a solid may be what the hint tells of: what is open at the top is none of them."""
+    """Tell whether a solid is compatible with the hint; open containers are none of them."""
     kind = PRIMITIVES[solid.category]
     if hint.container:
         return False
@@ -171,15 +177,15 @@ def _may_be(solid: Template, hint: ShapeHint) -> bool:
 
 
 def explains_closely(left: Residual) -> bool:
-    """Tell whether hardly anything is left unexplained: neither of the outline nor of the solid's inner edges."""
+    """Tell whether hardly anything is left unexplained, neither of the silhouette nor of the solid's inner edges."""
     return left.iou >= LEAST_IOU and left.outline <= MOST_OUTLINE and left.edges <= MOST_EDGES_MISSING
 
 
 def is_rather(plain: Fitted, lifted: str) -> bool:
-    """Tell whether a plain solid is to be preferred to what an outline was ``lifted`` to: a revolution, a box or an inflation.
+    """Tell whether a plain solid is preferred to a primitive that was ``lifted``: a revolution, a box or an inflation.
 
-    Where its inner edges are seen in the photo; and, as a cube from above has the outline of a body of revolution but for a few
-    pixels, where a block has the outline to the pixel. (A glass from the side has that of a slab seen from near.)
+    It is if its inner edges are visible in the photo. A block also is if it has the silhouette to the pixel, because a cube
+    from above has nearly the silhouette of a body of revolution. (A glass from the side has that of a slab seen from nearby.)
     """
     left = plain.residual
     edges_seen = left.edges <= EDGES_SEEN and left.iou >= NEAR_IOU and left.outline <= NEAR_OUTLINE
@@ -188,7 +194,7 @@ def is_rather(plain: Fitted, lifted: str) -> bool:
 
 
 def _is_possible(candidate: Candidate) -> bool:
-    """Whether a candidate is seen by a camera that is not rolled, and is no disc that may be a bowl."""
+    """Tell whether a candidate's camera is not rolled, and the candidate is not a disc that may be a bowl."""
     family = candidate.family
     thick = PRIMITIVES[family.template.category] == "disc" and family.measures(candidate.spreads)["thick"] > MOST_DISC
     return candidate.upright and not thick

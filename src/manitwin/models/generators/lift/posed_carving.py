@@ -1,4 +1,4 @@
-"""Carve what photos with stated cameras show, from whatever distances and heights: the solid within all outlines."""
+"""Carving of a solid from photos with stated camera poses at any distance and height: the solid within all silhouettes."""
 
 from __future__ import annotations
 
@@ -19,24 +19,28 @@ from manitwin.models.generators.lift.texture import crop_object
 from manitwin.models.generators.lift.turntable import SIDE_PX as ROUGH_SIDE_PX
 
 SIDE_PX, CELLS = 640, 160
-"""The longest side of the outlines' boxes, and the cells along the solid's longest side: poses that are measured are true to less
-than what those that outlines tell are carved with, and of a tail that tapers 96 cells left a sixteenth out."""
+"""Longest side of the silhouettes' bounding boxes, and grid cells along the solid's longest side.
+
+Measured poses are more accurate than poses estimated from silhouettes, so the resolution is higher; 96 cells lost a sixteenth
+of a tapered tail.
+"""
 LEAST_CROSSING = 0.3
-"""The sine of the widest angle between two cameras' directions, below which they say the same."""
-_MANY, _LEFT_OUT_OF = 6, 4  # of so many photos, at most one of four that does not go with the others
+"""Minimum sine of the largest angle between the directions of two cameras; below it they show the same."""
+_MANY, _LEFT_OUT_OF = 6, 4  # from this many photos on, one in four may be inconsistent with the others
 _BELOW_DEG, _LOW_DEG = -10.0, 15.0
-"""Cameras that look up at the thing see its underside; those that tell the ground are so much above the lowest at most."""
-_BASE_CUTS = (0.0, 0.01, 0.02)  # of the height: where lengths are measured, a base is cut off their precision at most
+"""Cameras below the first elevation see the underside; only cameras within the second of the lowest determine the ground."""
+_BASE_CUTS = (0.0, 0.01, 0.02)  # of the height: with measured lengths, base cuts stay within the measurement error
 
 
 def carve_posed(
     photos: Sequence[tuple[str, np.ndarray]], cameras: Sequence[PosedCamera], turns_deg: Sequence[float]
 ) -> tuple[Carved, float]:
-    """Carve what matted photos (name, ``(H, W, 4) uint8``) show; return also what 1 of its surface is in their unit.
+    """Carve a solid from matted photos (name, ``(H, W, 4) uint8``); return it and the length of its unit in the poses' unit.
 
-    The cameras' world has z up; ``turns_deg`` are their turns about it, that of the first 0. Of six photos and more at most a
-    quarter is left out where the others go together without them. Raises Rejected ``generator_failed``: where all are from one
-    direction, and naming the photos whose poses do not go with their outlines, or the convention in which they do.
+    The world frame of the cameras has z up; ``turns_deg`` are their rotations about it, 0 for the first. Of six and more
+    photos up to a quarter is left out if the others are consistent without them. Raises Rejected ``generator_failed`` if all
+    cameras are in one direction, and if poses and silhouettes are inconsistent, naming the photos, or the convention in which
+    they are consistent.
     """
     posed, unit = posed_photos(photos, cameras, turns_deg)
     rough = [photo.sight(ROUGH_SIDE_PX)[0] for photo in posed]
@@ -54,14 +58,14 @@ def carve_posed(
 def _going_together(
     posed: Sequence[PosedPhoto], sights: Sequence[Sight], told: Callable[[Sequence[float], np.ndarray], str]
 ) -> tuple[list[int], list[float]]:
-    """Return the photos that go together once the few are left out that do not, and how much of each outline is filled."""
+    """Return the photos that are consistent after leaving a few out, and the covered share of each silhouette."""
     kept = list(range(len(posed)))
     first = covered, without = covered_shares(sights)
     most = len(posed) // _LEFT_OUT_OF if len(posed) >= _MANY else 0
     while min(covered) < LEAST_COVERED:
         if len(posed) - len(kept) >= most:
             raise Rejected("generator_failed", told(*first), "generate")
-        # the one without which the others are filled most
+        # remove the photo without which the others are covered best
         filled = [float(np.delete(without[:, k], k).mean()) for k in range(len(kept))]
         kept.pop(int(np.argmax(filled)))
         covered, without = covered_shares([sights[number] for number in kept])
@@ -83,9 +87,9 @@ def _require_crossing(sights: Sequence[Sight]) -> None:
 
 
 def _ground(sights: Sequence[Sight]) -> float:
-    """Return how high the ground is; minus infinity where cameras look up at the thing, and see where it ends themselves.
+    """Return the height of the ground; minus infinity if some cameras look up at the object and see its lower end.
 
-    Cameras high above see what bulges out, and not the ground: the lowest ones tell it.
+    Cameras high above see bulges instead of the ground, so only the lowest ones are used.
     """
     centre, _ = around(sights)
     heights = []

@@ -1,4 +1,4 @@
-"""Why outlines do not go with the poses that a file states for them: another convention, one photo, or something else."""
+"""Diagnosis of silhouettes that are inconsistent with the stated poses: another convention, a single photo, or unknown."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from manitwin.models.generators.lift.posed_sights import posed_photos
 from manitwin.models.generators.lift.turntable import SIDE_PX
 
 LEAST_COVERED = 0.95
-"""Share of an outline that the common solid must fill; with right poses and clean cut-outs it is 0.98 and more."""
+"""Minimum share of a silhouette that the hull fills; with correct poses and masks it is 0.98 and more."""
 _FLIPPED = np.diag([1.0, -1.0, -1.0, 1.0])
-"""Takes the axes of OpenGL's cameras (y up, z backward) to those of OpenCV's (y down, z forward), and back."""
-_MOST_WRONG = 0.25  # of the photos, in the right convention
+"""Converts between camera axes of OpenGL (y up, z backward) and OpenCV (y down, z forward)."""
+_MOST_WRONG = 0.25  # of the photos: tolerated share of inconsistent photos under the right convention
 
 CONVENTIONS: tuple[tuple[Callable[[np.ndarray], np.ndarray], str], ...] = (
     (
@@ -39,7 +39,7 @@ CONVENTIONS: tuple[tuple[Callable[[np.ndarray], np.ndarray], str], ...] = (
         " every one",
     ),
 )
-"""What a pose ``(4, 4)`` from the world to the camera, as it was read, is where it was written otherwise than its format asks."""
+"""Corrections of a world-to-camera pose ``(4, 4)`` that was read in a wrong convention, with their descriptions."""
 
 
 def told(
@@ -48,7 +48,7 @@ def told(
     covered: Sequence[float],
     without: np.ndarray,
 ) -> str:
-    """Say why the outlines of matted photos (name, ``(H, W, 4) uint8``) and their poses do not go together.
+    """Return why the silhouettes of matted photos (name, ``(H, W, 4) uint8``) are inconsistent with their poses.
 
     ``covered`` and ``without`` are those of ``covered_shares``.
     """

@@ -1,4 +1,4 @@
-"""Photos whose cameras are stated, as sights: the lens's distortion undone, lengths in distances of the cameras."""
+"""Silhouettes of photos with stated cameras: lens distortion is removed, and lengths are normalized by the camera distance."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from manitwin.models.generators.lift.turntable import scaled_masks
 class PosedPhoto:
     """A matted photo, ``rgba (H, W, 4) uint8`` without distortion, and its camera.
 
-    ``pose (3, 4)`` takes points of the frame that is carved in to the camera's (x right, y down, z forward), ``lens (3, 3)``
-    these to pixels of ``rgba`` whose middles are at one half. ``turn_deg`` is the camera's about the vertical, that of the
-    first photo 0.
+    ``pose (3, 4)`` transforms points of the carving frame to the camera frame (x right, y down, z forward); ``lens (3, 3)``
+    projects these to pixels of ``rgba``, whose centres are at one half. ``turn_deg`` is the rotation of the camera about the
+    vertical, 0 for the first photo.
     """
 
     name: str
@@ -31,11 +31,11 @@ class PosedPhoto:
 
     @property
     def position(self) -> np.ndarray:
-        """Where the camera stands, ``(3,)``."""
+        """Camera position ``(3,)``."""
         return np.asarray(-self.pose[:, :3].T @ self.pose[:, 3])
 
     def sight(self, side_px: int) -> tuple[Sight, float]:
-        """Return the outline as the camera saw it, its box ``side_px`` long, and the scale of its pixels against the photo's."""
+        """Return the silhouette with its bounding box scaled to ``side_px``, and the scale of its pixels to the photo's."""
         (mask,) = scaled_masks([self.rgba], side_px)
         scale = mask.size_px[0] / self.rgba.shape[1]
         lens = np.diag([scale, scale, 1.0]) @ self.lens
@@ -53,7 +53,7 @@ class SeenPosed:
     photo: PosedPhoto
 
     def crop_share(self, points: np.ndarray) -> np.ndarray:
-        """Return where points ``(N, 3)`` (x, height, z towards the first viewer) are in the crop, 0 to 1 right and down."""
+        """Return positions of points ``(N, 3)`` (x, height, z towards the first viewer) in the crop, 0 to 1 right and down."""
         seen = (points[:, [0, 2, 1]] * [1, -1, 1]) @ self.photo.pose[:, :3].T + self.photo.pose[:, 3]
         pixels = (seen / np.maximum(seen[:, 2:], 1e-9)) @ self.photo.lens.T
         left, top, width, height = self.crop.box
@@ -68,10 +68,11 @@ class SeenPosed:
 def posed_photos(
     photos: Sequence[tuple[str, np.ndarray]], cameras: Sequence[PosedCamera], turns_deg: Sequence[float]
 ) -> tuple[list[PosedPhoto], float]:
-    """Return matted photos (name, ``(H, W, 4) uint8``) with their cameras in a frame to carve in, and the file's unit in that.
+    """Return matted photos (name, ``(H, W, 4) uint8``) with their cameras in the carving frame, and the scale of that frame.
 
-    The cameras' world has z up. The frame's x is to the first photo's right, y away from its camera, and cameras are about 1 away
-    from its origin, near which they look.
+    The world frame of the cameras has z up. The carving frame has x to the first photo's right and y away from its camera;
+    its origin is near the point at which the cameras look, and their distance from it is about 1. The scale is the length of
+    the poses' unit in it.
     """
     poses = np.array([camera.world_to_camera for camera in cameras])
     positions = -np.einsum("nji,nj->ni", poses[:, :, :3], poses[:, :, 3])
@@ -88,21 +89,21 @@ def posed_photos(
 
 
 def _looked_at(positions: np.ndarray, ahead: np.ndarray) -> np.ndarray:
-    """Return the point that is nearest to the cameras' axes."""
+    """Return the point nearest to the optical axes of the cameras."""
     across = np.eye(3) - ahead[:, :, None] * ahead[:, None, :]
     found = np.linalg.lstsq(across.sum(axis=0), np.einsum("nij,nj->i", across, positions), rcond=1e-6)[0]
     return np.asarray(found)
 
 
 def _turn_about_z(right: np.ndarray) -> np.ndarray:
-    """Return the rotation ``(3, 3)`` about z that takes the level part of a direction to x."""
+    """Return the rotation ``(3, 3)`` about z that takes the horizontal part of a direction to x."""
     angle = np.arctan2(right[1], right[0])
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1.0]])
 
 
 def _without_distortion(rgba: np.ndarray, camera: PosedCamera) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lens ``(3, 3)`` for a photo as it was scaled, and the photo as a lens without distortion had seen it."""
+    """Return the camera matrix ``(3, 3)`` for a photo as scaled, and the photo without lens distortion."""
     lens = camera.lens
     height, width = rgba.shape[:2]
     stated = lens.of_picture(width, height)
@@ -113,9 +114,9 @@ def _without_distortion(rgba: np.ndarray, camera: PosedCamera) -> tuple[np.ndarr
     )
     if not any(lens.distortion) and not lens.fisheye:
         return matrix, rgba
-    # OpenCV's pixels have their middles at whole numbers
+    # pixel centres of OpenCV have integer coordinates
     shifted = matrix - np.array([[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])
-    # premultiplied: colours hidden under full transparency do not bleed into visible ones
+    # premultiplied, so that colours of transparent pixels do not bleed into visible ones
     alpha = rgba[..., 3:].astype(np.float32) / 255
     layers = np.concatenate([rgba[..., :3] * alpha, alpha], axis=2)
     bent, size_px = np.array(lens.distortion, float), (width, height)

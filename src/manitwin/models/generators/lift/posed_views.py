@@ -1,4 +1,4 @@
-"""Photos with stated cameras to a textured mesh, in metres where the unit of the poses is known."""
+"""Textured mesh from photos with stated cameras, in metres if the unit of the poses is known."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from manitwin.models.generators.lift.posed_carving import carve_posed
 from manitwin.models.generators.protocol import PhotoView
 
 LONG_SHARE = 0.5
-"""Sides of a template that are half as long as its longest say its size: short ones are less sure."""
+"""Minimum length, over the longest side, of a template's side that determines its size; shorter sides are less certain."""
 
 
 def are_posed(views: Sequence[PhotoView]) -> bool:
-    """Tell whether a file states the cameras of all photos."""
+    """Tell whether the cameras of all photos are stated."""
     return all(view.pose is not None for view in views)
 
 
 def from_posed(views: Sequence[PhotoView], unit_m: float | None) -> MadeOfViews:
-    """Carve what photos show; ``unit_m`` is how many metres the unit of their poses is. Raises Rejected as ``carve_posed``."""
+    """Carve the object in the photos; ``unit_m`` is the poses' unit in metres. Raises Rejected as ``carve_posed``."""
     carved, longest = _carved(views)
     made = made_of_carved(carved, f"carved out of {len(views)} photos with stated cameras")
     if unit_m is None:
@@ -34,10 +34,10 @@ def from_posed(views: Sequence[PhotoView], unit_m: float | None) -> MadeOfViews:
 
 
 def sized_by_poses(made: MadeOfViews, views: Sequence[PhotoView], unit_m: float) -> MadeOfViews:
-    """Return what a template made, as large as the solid within the outlines allows.
+    """Return a fitted template scaled to the size that the visual hull allows.
 
-    A hull is as wide as the thing or wider, never narrower: of the longer sides that which leaves the least room says the size.
-    Raises Rejected as ``carve_posed``.
+    A hull is at least as wide as the object, so the longer side with the smallest ratio determines the size. Raises Rejected
+    as ``carve_posed``.
     """
     carved, longest = _carved(views)
     hull = upright_extents(longest * unit_m * carved.surface.vertices[:, [0, 2, 1]])
@@ -48,7 +48,7 @@ def sized_by_poses(made: MadeOfViews, views: Sequence[PhotoView], unit_m: float)
 
 
 def scaled_part(part: trimesh.Trimesh, factor: float) -> trimesh.Trimesh:
-    """Return a mesh at another size."""
+    """Return a scaled copy of a mesh."""
     scaled = part.copy()
     scaled.apply_scale(factor)
     return scaled

@@ -10,10 +10,10 @@ from manitwin.models.generators.lift.surface import LiftedSurface
 
 SIDES = 64
 _RINGS = 56
-_BROAD_BASE = 0.85  # a base nearly as wide as the body is cut where a cut of 6 % of the length reaches it
-_EDGE = 0.97  # texture is taken no nearer to the outline than this share of the radius
-DEPTH_SHARE = 0.4  # of the shorter side: nothing in one photo says how deep a box seen from the front is
-_AT_AXIS_PX = 1.5  # a needle is a pixel or two wide
+_BROAD_BASE = 0.85  # a base this wide relative to the body is cut there if that removes at most 6 % of the length
+_EDGE = 0.97  # texture is sampled within this share of the radius
+DEPTH_SHARE = 0.4  # of the shorter side: one photo does not show the depth of a box seen from the front
+_AT_AXIS_PX = 1.5  # half width of the band around the axis
 _STEPS = 24
 _INSET = 0.02
 
@@ -25,15 +25,15 @@ def profile(silhouette: Silhouette) -> tuple[np.ndarray, np.ndarray]:
     body = turned[rows[0] : rows[-1] + 1]
     column = round(silhouette.axis_column_px)
     left, right = body[:, :column].sum(axis=1), body[:, column:].sum(axis=1)
-    # where the halves disagree the narrower one is believed: what sticks out on one side only is no part of the solid
+    # where the halves differ the narrower one is used, because a part on one side only is not part of the solid
     radii = np.where(np.abs(left - right) > 0.15 * (left + right), np.minimum(left, right), (left + right) / 2.0)
     return np.arange(rows[0], rows[-1] + 1, dtype=float), gaussian_filter1d(radii, 1.2, mode="nearest")
 
 
 def rows_on_axis(mask: np.ndarray, column_px: float) -> np.ndarray:
-    """Return the rows (K,) of a mask (H, W) from the first to the last that has something at an upright axis in this column.
+    """Return the rows (K,) of a mask (H, W) from the first to the last with a pixel at an upright axis in this column.
 
-    A corner or an ear that rises beside the axis is no part of a body about it, and would be a needle on its end.
+    A corner or an ear that rises beside the axis is not part of a body about it; it would become a needle at its end.
     """
     columns = np.arange(mask.shape[1])
     at_axis = np.nonzero(mask[:, np.abs(columns - column_px) <= _AT_AXIS_PX].any(axis=1))[0]
@@ -45,9 +45,9 @@ def trim_caps(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Cut the rounded ends off a profile so that its base is a flat disc.
 
-    A camera above or below the disc at an end sees it as an ellipse: the last rows narrow although the solid does not.
-    Both ends are cut where they narrow like a half-ellipse less than a quarter as deep as its radius; the base also where
-    it has less than ``base_share`` of the radius nearby, so that round things stand.
+    A camera above or below the disc at an end sees it as an ellipse, so the last rows narrow although the solid does not.
+    Both ends are cut where they narrow like a half-ellipse less than a quarter as deep as its radius; the base also where it
+    has less than ``base_share`` of the radius nearby, so that round objects stand.
     """
     top = _end_of(radii, base_share if base_at_top else 0.0, len(rows))
     bottom = _end_of(radii[::-1], 0.0 if base_at_top else base_share, len(rows))
@@ -55,7 +55,7 @@ def trim_caps(
 
 
 def _end_of(radii: np.ndarray, least_share: float, length: int) -> int:
-    """Return how many rows to cut at the start of ``radii``."""
+    """Return the number of rows to cut at the start of ``radii``."""
     nearby = float(radii[: max(8, length // 4)].max())
     widest = int(np.argmax(radii[: max(8, length // 4)] >= 0.97 * nearby))
     if 2 <= widest < 0.25 * nearby:
@@ -70,10 +70,10 @@ def _end_of(radii: np.ndarray, least_share: float, length: int) -> int:
 
 
 def revolve(silhouette: Silhouette, rows: np.ndarray, radii: np.ndarray, *, wall_px: float | None) -> LiftedSurface:
-    """Revolve a profile about the silhouette's axis; ``wall_px`` hollows it from the top with a wall that thick.
+    """Revolve a profile about the silhouette's axis; ``wall_px`` hollows it from the top with a wall of that thickness.
 
-    The surface has the axis along y and z = 0 through it, rows of the upright mask being -y. The photo is projected on
-    the front; it shows neither the back nor the inside.
+    The surface has the axis along y at z = 0; y is minus the row of the upright mask. The photo is projected onto the front;
+    the back and the inside are not visible.
     """
     rings = np.linspace(rows[0], rows[-1], _RINGS)
     outline = [(row, radius) for row, radius in zip(rings, np.interp(rings, rows, radii), strict=True)]
@@ -88,9 +88,9 @@ def revolve(silhouette: Silhouette, rows: np.ndarray, radii: np.ndarray, *, wall
 
 
 def _lathe(silhouette: Silhouette, loop: np.ndarray, inside: int) -> LiftedSurface:
-    """Turn a loop of (row, radius) from axis to axis into a closed surface, outside to the left of its direction.
+    """Revolve a loop of (row, radius) from axis to axis into a closed surface, with the outside to the left of its direction.
 
-    Its first ``inside`` rings are those of the inside.
+    The first ``inside`` rings belong to the inside.
     """
     turns = 2 * np.pi * np.arange(SIDES) / SIDES
     middle = loop[1:-1]
@@ -115,7 +115,7 @@ def _lathe(silhouette: Silhouette, loop: np.ndarray, inside: int) -> LiftedSurfa
     bottom = np.column_stack([np.full(SIDES, last), low + (sides + 1) % SIDES, low + sides])
     facing = np.tile(np.cos(turns), (len(middle), 1))
     facing[:inside] = -1.0
-    facing = np.append(facing.ravel(), [-1.0, -1.0])  # a photo shows an end as a sliver at most
+    facing = np.append(facing.ravel(), [-1.0, -1.0])  # a photo shows an end at a grazing angle at most
     return LiftedSurface(vertices, np.concatenate([quads, top, bottom]), _projected(silhouette, vertices), facing)
 
 
@@ -131,7 +131,7 @@ def _projected(silhouette: Silhouette, vertices: np.ndarray) -> np.ndarray:
 def make_box(silhouette: Silhouette, *, depth_share: float) -> LiftedSurface:
     """Make a box with the fitted rectangle as its front; its depth is ``depth_share`` of the shorter side.
 
-    Sides continue the colours of the front's edge.
+    The sides continue the colours of the front's edges.
     """
     corners = _ordered(silhouette.corners)
     width = float(np.linalg.norm(corners[1] - corners[0]))
@@ -166,10 +166,10 @@ def make_box(silhouette: Silhouette, *, depth_share: float) -> LiftedSurface:
 
 
 def _ordered(corners: np.ndarray) -> np.ndarray:
-    """Return the corners top left, top right, bottom right, bottom left of the upright rectangle nearest to the photo's."""
+    """Return the corners top left, top right, bottom right, bottom left of the rectangle, with the top side uppermost."""
     centre = corners.mean(axis=0)
     angles = np.arctan2(corners[:, 1] - centre[1], corners[:, 0] - centre[0])
-    ordered = corners[np.argsort(angles)]  # clockwise on the screen, from the left
+    ordered = corners[np.argsort(angles)]  # clockwise on the screen, starting from the left
     tops = [((ordered[k] + ordered[(k + 1) % 4]) / 2)[1] for k in range(4)]
     start = int(np.argmin(tops))
     return np.roll(ordered, -start, axis=0).astype(float)

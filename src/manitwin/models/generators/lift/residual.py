@@ -1,8 +1,8 @@
-"""How well a solid explains a photo: its rendered outline against the matte, its creases against the photo's inner edges.
+"""Fit of a solid to a photo: rendered silhouette against mask, and creases against inner edges of the photo.
 
-Every candidate for the shape of a photo, of whatever family, is measured by ``explained``, so that the choice between them is one
-of numbers on one scale. Letters and patterns are edges of no shape: so creases must be seen in the photo, but edges of the photo
-need no crease.
+``explained`` measures every candidate shape of any family on the same scale, so that candidates can be compared by numbers.
+Letters and patterns are edges without a shape, so creases must be visible in the photo, but edges of the photo need no
+crease.
 """
 
 from __future__ import annotations
@@ -18,40 +18,44 @@ from manitwin.render.cameras import Camera
 from manitwin.render.raycast import cast_camera
 
 SIDE_PX = 192
-"""The longer side of the pictures that are compared: an outline is a pixel of 192 exact."""
-CREASE_COSINE = 0.6  # faces that meet at more than 53 degrees are seen as an edge under any light
-STEP_SHARE = 0.04  # of the object's depth: a jump in depth from one pixel to the next
+"""Longer side of the compared pictures; silhouettes are accurate to a pixel of 192."""
+CREASE_COSINE = 0.6  # faces that meet at more than 53 degrees are visible as an edge under any light
+STEP_SHARE = 0.04  # of the object's depth: minimum depth discontinuity between adjacent pixels
 NEAR_PX = 2.0
-EDGE_WEIGHT = 0.15  # of the creases in the score: the outline is sure, what is seen inside depends on light and paint
+EDGE_WEIGHT = 0.15  # weight of creases in the score: the silhouette is reliable, inner edges depend on light and paint
 TELESCOPE_FOV_RAD = np.deg2rad(1.0)
-"""The angle of a camera so far away that its picture is a parallel projection."""
+"""Field of view of a camera so far away that its projection is practically parallel."""
 
 
 @dataclass(frozen=True)
 class Explained:
-    """``silhouette_iou``: overlap over union of the rendered outline and the matte; ``edge_support``: the share of the creases
-    and steps inside the outline that lie on edges of the photo, None where there are none or no photo was given."""
+    """How well a solid explains a photo.
+
+    ``silhouette_iou`` is the intersection over union of the rendered silhouette and the mask. ``edge_support`` is the share
+    of creases and depth steps inside the silhouette that lie on edges of the photo; None if there are none or no photo was
+    given.
+    """
 
     silhouette_iou: float
     edge_support: float | None = None
 
     @property
     def score(self) -> float:
-        """The number that candidates are compared by, 1 for one that explains all; creases that nobody sees cost."""
+        """Score for comparing candidates, 1 for a perfect one; creases that are not visible in the photo lower it."""
         missing = 0.0 if self.edge_support is None else 1.0 - self.edge_support
         return self.silhouette_iou - EDGE_WEIGHT * missing
 
     @property
     def residual(self) -> float:
-        """What the candidate leaves unexplained: 1 - ``score``."""
+        """Unexplained part: 1 - ``score``."""
         return 1.0 - self.score
 
 
 def explained(mesh: trimesh.Trimesh, camera: Camera, mask: np.ndarray, rgb: np.ndarray | None = None) -> Explained:
     """Render ``mesh`` from ``camera`` and compare it with a photo.
 
-    ``mask (H, W) bool`` is the matte and ``rgb (H, W, 3) uint8`` the photo, of the camera's picture or any smaller size with its
-    aspect; mesh and camera are in one frame and unit.
+    ``mask (H, W) bool`` is the matte and ``rgb (H, W, 3) uint8`` the photo, of the size of the camera's picture or smaller
+    with the same aspect ratio; mesh and camera are in the same frame and unit.
     """
     scale = SIDE_PX / max(camera.width_px, camera.height_px)
     small = camera.resized(max(1, round(camera.width_px * scale)), max(1, round(camera.height_px * scale)))
@@ -69,10 +73,10 @@ def explained(mesh: trimesh.Trimesh, camera: Camera, mask: np.ndarray, rgb: np.n
 
 
 def parallel_camera(mask_shape: tuple[int, int], *, elevation_deg: float = 0.0) -> Camera:
-    """Return the camera of a parallel projection onto a picture of ``mask_shape`` (H, W), for solids in its pixels.
+    """Return a (nearly) parallel projection onto a picture of ``mask_shape`` (H, W), for solids in its pixels.
 
-    x runs to the right, y up, z towards the viewer; the camera looks down by ``elevation_deg`` e. The pixel (column, row) shows
-    what has x = column and y cos(e) - z sin(e) = -row.
+    x is to the right, y up, z towards the viewer; the camera looks down by ``elevation_deg`` e. The pixel (column, row) shows
+    points with x = column and y cos(e) - z sin(e) = -row.
     """
     height, width = mask_shape
     distance = height / 2 / float(np.tan(TELESCOPE_FOV_RAD / 2))
@@ -100,13 +104,13 @@ def _edge_support(creases: np.ndarray, object_px: np.ndarray, rgb: np.ndarray) -
 
 
 def _creases(depth: np.ndarray, normals: np.ndarray, facing: np.ndarray, shown: np.ndarray) -> np.ndarray:
-    """Return where neighbouring pixels of the solid see faces at an angle, or one far behind the other."""
+    """Return the pixels where adjacent pixels of the solid show faces at an angle, or a depth discontinuity."""
     step = STEP_SHARE * float(np.ptp(depth[shown])) if shown.any() else 0.0
     found = np.zeros(shown.shape, bool)
     for here, there in ((np.s_[:-1], np.s_[1:]), (np.s_[:, :-1], np.s_[:, 1:])):
         both = shown[here] & shown[there]
         bent = (normals[here] * normals[there]).sum(axis=2) < CREASE_COSINE
-        # a plane that runs away from the viewer is no step
+        # an oblique plane is not a step
         jump = np.abs(depth[here] - depth[there]) * np.maximum(0.2, np.minimum(facing[here], facing[there]))
         found[here] |= both & (bent | (jump > max(step, 1e-12)))
     return found

@@ -1,14 +1,15 @@
-"""Solids of revolution that stand in the photo, seen from above: the camera's elevation, the profile, and the hollow.
+"""Standing solids of revolution seen from above: elevation of the camera, profile, and cavity.
 
-Under a parallel projection from elevation e a disc of radius r at height h is an ellipse about the axis' picture, its centre at
-h cos(e), as wide as 2 r and as high as 2 r sin(e). The largest body of revolution whose discs all lie within an outline of half
-width W(v) at picture height v is therefore
+Under a parallel projection from elevation e a disc of radius r at height h is an ellipse about the projected axis, with its
+centre at h cos(e), width 2 r and height 2 r sin(e). The largest body of revolution whose discs all lie within a silhouette of
+half width W(v) at picture height v is therefore
 
-    r(h)^2 = min over v of  W(v)^2 + ((v - h cos(e)) / sin(e))^2,
+r(h)^2 = min over v of  W(v)^2 + ((v - h cos(e)) / sin(e))^2,
 
-the visual hull (Laurentini 1994) under that symmetry. Every elevation up to the true one explains the outline, by rounding ends
-that are flat discs; so the largest that does is the true one where both ends are flat, and what is round at both ends says
-nothing: there the rim that is seen inside the outline decides, or the camera is taken to be level.
+the visual hull (Laurentini 1994) under that symmetry. Every elevation up to the true one explains the silhouette, by rounding
+ends that are flat discs. If both ends are flat, the largest elevation that explains it is therefore the true one. If both
+ends are round, the silhouette does not determine it; then the rim visible inside the silhouette decides, or the camera is
+taken to be level.
 """
 
 from __future__ import annotations
@@ -27,31 +28,31 @@ from manitwin.models.generators.lift.residual import Explained, explained, paral
 from manitwin.models.generators.lift.surface import LiftedSurface, bare_mesh, from_manifold, to_manifold
 
 SIDES, RINGS = 64, 64
-LEAST_TRIANGLES, EDGES = 3000, 48  # edges of height and width together
-FLOOR_WALLS = 1.5  # a container's floor is so many times as thick as its wall
+LEAST_TRIANGLES, EDGES = 3000, 48  # edges along height and width together
+FLOOR_WALLS = 1.5  # thickness of a container's floor over that of its wall
 ELEVATIONS_DEG = (0.0, 4.0, 8.0, 12.0, 16.0, 20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 50.0, 55.0, 60.0, 65.0, 70.0)
 CORNERS_LOST = 0.02
-"""Area, of the square over an end's radius, that a flat end may lose for corners that the matte rounds or that are round."""
+"""Area that a flat end may lose to rounded corners, over the square of its radius."""
 ENDS_APART_DEG = 25.0
-LEVEL_DEG = 4.0  # flat ends seen from the side allow as much, for their corners are never quite sharp
-LEAST_END_PX = 10  # an end that is smaller says nothing of the elevation
-WALL_SHARE = 0.06  # of the radius: the wall of a container where nothing is known of it
-RIM_SEEN = 0.5  # the share of the rim's front edge that must lie on edges of the photo to believe an elevation by it
-ROUND_ENDS_DEG = 57.0  # an outline whose upper end fits a steeper view may as well be round
-MOUTH_SHARE = 0.6  # of the largest radius: the least of an opening whose rim tells the elevation
+LEVEL_DEG = 4.0  # flat ends in a level view allow this elevation, because corners are never quite sharp
+LEAST_END_PX = 10  # a smaller end does not determine the elevation
+WALL_SHARE = 0.06  # of the radius: default wall thickness of a container
+RIM_SEEN = 0.5  # minimum share of the rim's front edge on edges of the photo for an elevation by the rim
+ROUND_ENDS_DEG = 57.0  # a silhouette whose upper end fits a steeper view may be round instead
+MOUTH_SHARE = 0.6  # of the largest radius: minimum width of an opening whose rim determines the elevation
 COLLAR_SHARE, COLLAR_RISE = 0.3, 0.08
-"""Of the height, of the largest radius: a shorter and higher bulge is a pair of handles."""
-_SMOOTH_SHARE = 0.012  # of the height, a Gaussian's sigma: the profile's unevenness within a pixel
-_LEAST = 0.02  # of the largest radius: no ring is a point
-_EDGE_ON = 0.01  # the outline itself is seen, however its normals are rounded
-_EDGE = 0.97  # texture is taken no nearer to the outline than this share of the radius
+"""Maximum length over the height, and minimum rise over the largest radius, of a bulge that is a pair of handles."""
+_SMOOTH_SHARE = 0.012  # of the height: sigma of the Gaussian that smooths the profile
+_LEAST = 0.02  # of the largest radius: minimum radius of a ring
+_EDGE_ON = 0.01  # tolerance on the cosine, so that the outline itself counts as visible
+_EDGE = 0.97  # texture is sampled within this share of the radius
 
 
 @dataclass(frozen=True)
 class Turned:
-    """A profile about a vertical axis: ``radii (K,)`` at ``heights (K,)``, upward, pixels; the axis stands in ``column_px``.
+    """Profile about a vertical axis: ``radii (K,)`` at ``heights (K,)``, upward, in pixels; the axis is at ``column_px``.
 
-    Height h is seen in the picture's row ``-(h cos(e) - z sin(e))``, e the ``elevation_deg``, z towards the viewer.
+    Height h appears in row ``-(h cos(e) - z sin(e))``, where e is ``elevation_deg`` and z points towards the viewer.
     """
 
     heights: np.ndarray
@@ -61,14 +62,14 @@ class Turned:
 
     @property
     def angle_rad(self) -> float:
-        """The elevation in radians."""
+        """Elevation in radians."""
         return float(np.deg2rad(self.elevation_deg))
 
 
 def half_widths(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return the rows (K,), the half width (K,) at each of the body about its vertical axis, and the axis' column.
+    """Return the rows (K,), the half width (K,) of the body about its vertical axis at each, and the column of the axis.
 
-    The axis is where the body that is the same on both sides is largest; what sticks out on one side only (a handle) is no part.
+    The axis maximizes the symmetric body; a part that sticks out on one side only (a handle) is excluded.
     """
     rows = np.nonzero(mask.any(axis=1))[0]
     filled = mask[rows]
@@ -89,7 +90,7 @@ def half_widths(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def _runs(filled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return how many pixels of rows ``(K, W) bool`` are filled in one go left and right of each border, ``(W + 1, K)`` both."""
+    """Return the lengths of the filled runs left and right of each column border in rows ``(K, W) bool``, ``(W + 1, K)`` each."""
     across = np.arange(filled.shape[1])
     empty_before = np.maximum.accumulate(np.where(filled, -1, across), axis=1)
     empty_from = np.minimum.accumulate(np.where(filled, len(across), across)[:, ::-1], axis=1)[:, ::-1]
@@ -112,7 +113,7 @@ def without_collars(widths: np.ndarray) -> np.ndarray:
 
 
 def turned_from(rows: np.ndarray, widths: np.ndarray, column_px: float, elevation_deg: float) -> Turned:
-    """Return the largest body of revolution within an outline of half ``widths`` at picture ``rows``; see above."""
+    """Return the largest body of revolution within a silhouette of half ``widths`` at picture ``rows`` (see the module)."""
     if elevation_deg <= 0:
         heights, radii = (each[::-1] for each in trim_caps(-rows, np.maximum(widths, _LEAST * widths.max())))
         return Turned(heights, radii, column_px, 0.0)
@@ -122,32 +123,33 @@ def turned_from(rows: np.ndarray, widths: np.ndarray, column_px: float, elevatio
     squares = np.concatenate([[0.0], widths**2, [0.0]])
     heights = np.linspace(v[-1], v[0], 2 * len(rows)) / cosine
     radii = np.sqrt(np.min(squares[None] + ((v[None] - heights[:, None] * cosine) / sine) ** 2, axis=1))
-    # the lowest disc touches the outline's lower end with its front, the highest the upper end with its back
+    # the front of the lowest disc touches the lower end of the silhouette, the back of the highest disc the upper end
     low = heights * cosine - radii * sine
     high = heights * cosine + radii * sine
     kept = (low >= v[-1] - 0.75) & (high <= v[0] + 0.75)
     inner = np.nonzero(kept & (radii > _LEAST * radii.max()))[0]
     span = slice(inner[0], inner[-1] + 1)
     heights, radii = heights[span], radii[span]
-    # ends that the hull tapers to nothing within a disc's picture are discs
+    # ends that the hull tapers within the picture of a disc are flat discs
     first, last = _flat_end(heights, radii, sine, cosine), _flat_end(-heights[::-1], radii[::-1], sine, cosine)
     heights, radii = heights[first : len(heights) - last], radii[first : len(radii) - last]
-    if len(heights) >= 16:  # what the hull rounds off where the end was seen less steeply
+    if len(heights) >= 16:  # trims what the hull rounds off where the end was seen less steeply
         heights, radii = (each[::-1] for each in trim_caps(heights[::-1], radii[::-1]))
     return Turned(heights, radii, column_px, elevation_deg)
 
 
 def _flat_end(heights: np.ndarray, radii: np.ndarray, sine: float, cosine: float) -> int:
-    """Return how many samples at the start are no discs: a fuller one behind them covers their picture."""
+    """Return the number of samples at the start that are no discs, because a larger disc behind them covers their picture."""
     front = heights * cosine - radii * sine
     covered = np.nonzero(front <= front[0] + 1.0)[0]
     return int(covered[np.argmax(radii[covered])])
 
 
 def solid_of(turned: Turned, *, wall_px: float | None = None, tubes: Sequence[Manifold] = ()) -> LiftedSurface:
-    """Revolve a profile and join ``tubes``; ``wall_px`` hollows it from the top with a wall so thick.
+    """Revolve a profile and join ``tubes``; ``wall_px`` hollows it from the top with a wall of that thickness.
 
-    The surface has the axis at x = ``column_px``, z = 0, in the picture's pixels; ``projected`` sets what the photo shows.
+    The surface has the axis at x = ``column_px``, z = 0, in pixels; ``projected`` sets its visibility and texture
+    coordinates.
     """
     heights = np.linspace(turned.heights[0], turned.heights[-1], RINGS)
     smooth = gaussian_filter1d(turned.radii, _SMOOTH_SHARE * len(turned.radii), mode="nearest")
@@ -158,14 +160,12 @@ def solid_of(turned: Turned, *, wall_px: float | None = None, tubes: Sequence[Ma
         within = (heights > heights[0] + FLOOR_WALLS * wall_px) & (inner > wall_px)
         if within.any():
             start = int(np.argmax(within))
-            # past the rim, so that no film is left over the opening
+            # extends beyond the rim, so that no film is left over the opening
             h = np.append(heights[start:], heights[-1] + wall_px)
             solid = solid - _upright(
                 h, np.append(np.maximum(inner[start:], 0.5 * wall_px), inner[-1]), turned.column_px
             )
-    if (
-        solid.num_tri() < LEAST_TRIANGLES
-    ):  # straight walls are few triangles, too large to tell what the photo shows of them
+    if solid.num_tri() < LEAST_TRIANGLES:  # straight walls have few triangles, too large to represent visibility
         solid = solid.refine_to_length(float(np.ptp(heights) + 2 * radii.max()) / EDGES)
     mesh = solid.to_mesh()
     vertices = np.asarray(mesh.vert_properties, float)[:, :3]
@@ -179,7 +179,7 @@ def solid_of(turned: Turned, *, wall_px: float | None = None, tubes: Sequence[Ma
 
 
 def _upright(heights: np.ndarray, radii: np.ndarray, column_px: float) -> Manifold:
-    """Return a solid of revolution about the picture's vertical: Z of the lathe is y here, and x stays."""
+    """Return a solid of revolution about the vertical of the picture: the lathe's Z is y here, and x is unchanged."""
     turned = lathe(np.column_stack([radii, heights]), sides=SIDES)
     return turned.transform([[1, 0, 0, column_px], [0, 0, 1, 0], [0, -1, 0, 0]])
 
@@ -187,9 +187,9 @@ def _upright(heights: np.ndarray, radii: np.ndarray, column_px: float) -> Manifo
 def projected(
     surface: LiftedSurface, mask_shape: tuple[int, int], elevation_deg: float, column_px: float
 ) -> LiftedSurface:
-    """Return the surface with what the photo shows of it: ``facing`` by rays towards the viewer, ``uv`` by the projection.
+    """Return the surface with its visibility in the photo: ``facing`` by ray casting towards the viewer, ``uv`` by projection.
 
-    What is hidden takes the coordinates of its mirror image in front, for the painted colours.
+    Hidden vertices get the coordinates of their mirror image in front, for the painted colours.
     """
     height, width = mask_shape
     angle = np.deg2rad(elevation_deg)
@@ -198,7 +198,7 @@ def projected(
     normals = np.asarray(mesh.vertex_normals)
     facing = normals @ toward
     extent = float(np.ptp(surface.vertices, axis=0).max())
-    # beside the surface, not above it: a rim does not look over the rim before it
+    # offset sideways, not upwards, so that a rim does not see over the rim before it
     up = np.array([0.0, np.cos(angle), -np.sin(angle)])
     starts = surface.vertices + 1e-3 * extent * (normals - (normals @ up)[:, None] * up)
     hit = RayCaster(mesh).first_hits(starts, np.tile(toward, (len(starts), 1)))[1] >= 0
@@ -211,7 +211,7 @@ def projected(
 
 
 def outline_of(turned: Turned, rows: np.ndarray) -> np.ndarray:
-    """Return the half width (K,) of a profile's picture at picture ``rows``."""
+    """Return the half width (K,) of the projected profile at picture ``rows``."""
     sine, cosine = float(np.sin(turned.angle_rad)), float(np.cos(turned.angle_rad))
     if sine == 0:
         return np.interp(-rows, turned.heights, turned.radii, left=0.0, right=0.0)
@@ -220,7 +220,7 @@ def outline_of(turned: Turned, rows: np.ndarray) -> np.ndarray:
 
 
 def end_elevations(rows: np.ndarray, widths: np.ndarray, column_px: float) -> tuple[float, float]:
-    """Return the largest elevations at which the upper and the lower end can be a flat disc's picture."""
+    """Return the largest elevations at which the upper and the lower end can be projections of flat discs."""
     bands = _end_band(widths), _end_band(widths[::-1])
     found = [0.0, 0.0]
     for elevation in ELEVATIONS_DEG[1:]:
@@ -235,24 +235,24 @@ def end_elevations(rows: np.ndarray, widths: np.ndarray, column_px: float) -> tu
 
 
 def _end_band(widths: np.ndarray) -> int:
-    """Return how many rows from the start are as many as the outline is then half wide: those that show an end's disc."""
+    """Return the number of rows from the start that show the end's disc: until the row count reaches the half width."""
     reached = np.arange(1, len(widths) + 1) >= np.maximum.accumulate(widths)
     return int(np.argmax(reached)) + 1 if reached.any() else len(widths)
 
 
 def chosen_elevation(body: np.ndarray, photo: np.ndarray, *, hollow: bool, handled: bool) -> tuple[Turned, Explained]:
-    """Return the profile from the elevation that explains best what is seen, and how well it does.
+    """Return the profile at the elevation that explains the photo best, and how well it does.
 
-    ``body (H, W) bool`` is the outline, ``photo (H, W, 3)`` its colours; ``hollow`` opens the top; ``handled``: it may
-    have handles on both sides. Seen from near, the upper end is seen less steeply than the lower one: the mean of both is
-    taken where they are not far apart.
+    ``body (H, W) bool`` is the silhouette, ``photo (H, W, 3)`` its colours; ``hollow`` opens the top; ``handled`` means that
+    it may have handles on both sides. From nearby the upper end is seen less steeply than the lower one, so the mean of both
+    is used if they are close.
     """
     rows, widths, column = half_widths(body)
     if handled:
         widths = without_collars(widths)
     upper, lower = end_elevations(rows, widths, column)
     if hollow and widths[: _end_band(widths)].max() > MOUTH_SHARE * widths.max():
-        both = upper  # a rim is a disc's edge for sure, a base is often round
+        both = upper  # a rim is certainly the edge of a disc, a base is often round
     elif _end_band(widths) < LEAST_END_PX:
         both = lower if lower < ROUND_ENDS_DEG else 0.0
     else:

@@ -1,4 +1,4 @@
-"""Whether what a template makes is round: what is not cannot be what a body of revolution was made of an outline for."""
+"""Roundness of fitted templates: a template that is not round contradicts a lifted body of revolution."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from manitwin.models.generators.lift.end_on import LONG
 from manitwin.models.generators.templates.fitting.fit import Fitted
 
 ROUND_SHARE = 0.02
-"""Of the larger of both: what is as wide as deep but for this is a body of revolution without a handle."""
+"""Maximum difference of width and depth over the larger one, for a body of revolution without a handle."""
 
 
 def is_round(fitted: Fitted) -> bool:
-    """Tell whether it is as wide as it is deep, so that it has no handle."""
+    """Tell whether it is as wide as deep, so that it has no handle."""
     width_m, depth_m, _ = np.ptp(fitted.made.mesh.vertices, axis=0)
     return bool(abs(width_m - depth_m) <= ROUND_SHARE * max(width_m, depth_m))
 
 
 def is_round_along(fitted: Fitted) -> bool:
-    """Tell whether it is long, and as thick one way across as the other: a screwdriver that lies, an egg."""
+    """Tell whether it is long and equally thick in both directions across, as a lying screwdriver or an egg."""
     thin_m, thick_m, long_m = np.sort(np.ptp(fitted.made.mesh.vertices, axis=0))
     return bool(long_m >= LONG * thick_m and thick_m - thin_m <= ROUND_SHARE * thick_m)

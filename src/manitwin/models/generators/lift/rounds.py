@@ -1,4 +1,4 @@
-"""Two rounds at most: a model looks at a thing beside what it was made from, corrects it once, and looks again."""
+"""Two rounds of review by a model: it compares an object with its input, corrects it once, and compares again."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from manitwin.render.renderer import BACKDROP, shared_renderer
 
 T = TypeVar("T")
 FOV_Y_DEG = 30.0
-MOST_SAID = 400  # characters of a model's words in a line
+MOST_SAID = 400  # maximum characters of a model's text in a message
 
 
 @dataclass(frozen=True)
 class Agreed(Generic[T]):
-    """The thing that stays, whether the model calls it right in the end, its words in each round, and what was found."""
+    """The object that is kept, whether the model finally calls it right, its text in each round, and the findings."""
 
     kept: T
     right: bool
@@ -39,10 +39,10 @@ class Agreed(Generic[T]):
 def in_two_rounds(
     first: T, compare: Callable[[T, str], Likeness], correct: Callable[[T, Filled], tuple[T, str]]
 ) -> Agreed[T]:
-    """Return what stays of a thing that a model may correct once.
+    """Return the object that is kept after a model may correct it once.
 
-    ``compare`` asks about a thing with a line on what was before; ``correct`` returns what stays of it after a correction, and
-    in a sentence which of both that is.
+    ``compare`` asks about an object, with a line about the previous round; ``correct`` returns the object that is kept after
+    a correction, and a sentence that says which one it is.
     """
     look = compare(first, FIRST_LOOK)
     if look.right:
@@ -54,7 +54,7 @@ def in_two_rounds(
 
 
 def require_right(agreed: Agreed[Any], what: str, reader: TemplateReader) -> None:
-    """Raise Rejected where the model has called a thing wrong in both rounds."""
+    """Raise Rejected if the model calls an object wrong in both rounds."""
     if not agreed.right:
         words = "; then: ".join(" ".join(said.split())[:MOST_SAID] for said in agreed.rounds)
         raise Rejected(
@@ -68,7 +68,7 @@ def require_right(agreed: Agreed[Any], what: str, reader: TemplateReader) -> Non
 def noted(
     job: Job, reader: TemplateReader, filled: Filled | None, findings: Sequence[str], agreed: Agreed[Any] | None = None
 ) -> Job:
-    """Return a job with what a model said of the thing, for the record; None: it is none of the templates."""
+    """Return a job with a record of the model's answers; ``filled`` is None if it chose none of the templates."""
     said = filled or Filled("")
     notes = {
         "source": reader.source,
@@ -90,7 +90,7 @@ def _look(wish: Wish) -> dict[str, str | None]:
 def pictures_of(
     parts: Sequence[trimesh.Trimesh], front_deg: float, elevation_deg: float, side_px: int
 ) -> list[str | Picture]:
-    """Return captions and pictures of a thing in the object frame: from the given side (azimuth), and from two others."""
+    """Return captions and pictures of an object in the object frame, from the given azimuth and from two other sides."""
     points = np.concatenate([part.vertices for part in parts])
     sides = [
         (front_deg + turn, elevation_deg if turn == 0 else 25.0) for turn in np.arange(MODEL_VIEWS) * 360 / MODEL_VIEWS

@@ -1,7 +1,8 @@
-"""Boxes that a photo shows from a corner: the six corners of the outline tell its sides.
+"""Boxes seen from a corner: the six corners of the silhouette determine the sides.
 
-Of a box with sides l turned by R, a parallel projection shows the three edges at a corner as the columns of P = R[:2] diag(l).
-The rows of R are orthonormal, so P diag(1 / l^2) P^T is a multiple of the unit matrix: three linear equations for 1 / l^2.
+For a box with sides l and rotation R, a parallel projection shows the three edges at a corner as the columns of P = R[:2]
+diag(l). The rows of R are orthonormal, so P diag(1 / l^2) P^T is a multiple of the identity: three linear equations for 1 /
+l^2.
 """
 
 from __future__ import annotations
@@ -14,15 +15,15 @@ from manitwin.models.generators.templates.fitting.fit import LEAST_CONFIDENCE, F
 BOX = "box"
 CORNERS = 6
 LEAST_POLYGON_IOU = 0.965
-"""Overlap of the outline with that of its corners: what is round between them is no box."""
+"""Minimum overlap of the silhouette with the hexagon of its corners; a silhouette that is round between them is no box."""
 LEAST_SIDE_SHARE = 0.03  # of the outline's length
 MOST_TURN_DEG, MOST_UNEQUAL = 40.0, 0.6
-"""Opposite sides of a box differ by perspective alone: by so many degrees, and by this share of their mean length."""
+"""Maximum differences of opposite sides of a box by perspective: in direction, and in length relative to their mean."""
 _TOLERANCES = np.geomspace(0.004, 0.05, 24)  # of the outline's length
 
 
 def box_from_corner(rgba: np.ndarray, focal_mm: float | None = None) -> Fitted | None:
-    """Return the box that explains ``rgba (H, W, 4) uint8``, whose alpha is the mask; None where its outline is of no box."""
+    """Return the box that explains ``rgba (H, W, 4) uint8``, whose alpha is the mask; None for another silhouette."""
     corners = six_corners(rgba[..., 3] > 127)
     sides = None if corners is None else box_sides(corners)
     if sides is None:
@@ -33,7 +34,7 @@ def box_from_corner(rgba: np.ndarray, focal_mm: float | None = None) -> Fitted |
 
 
 def six_corners(mask: np.ndarray) -> np.ndarray | None:
-    """Return the corners ``(6, 2)`` (x, y) along the outline of a mask ``(H, W) bool`` that is a convex hexagon, else None."""
+    """Return the corners ``(6, 2)`` (x, y) of the silhouette ``(H, W) bool`` if it is a convex hexagon, else None."""
     contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     if not contours:
         return None
@@ -53,9 +54,9 @@ def six_corners(mask: np.ndarray) -> np.ndarray | None:
 
 
 def box_sides(corners: np.ndarray) -> tuple[float, float, float] | None:
-    """Return width, depth and height, up to scale, of the box whose outline has these ``corners (6, 2)``; None for no box.
+    """Return width, depth and height, up to scale, of the box with silhouette ``corners (6, 2)``; None if it is no box.
 
-    Height is the edge that is nearest to the picture's vertical.
+    The height is the edge nearest to the vertical of the picture.
     """
     edges = np.roll(corners, -1, axis=0) - corners
     here, there = edges[:3], -edges[3:]

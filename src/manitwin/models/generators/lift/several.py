@@ -1,4 +1,4 @@
-"""Several photos of one thing to a textured mesh: the template of its name fitted to all, else what the outlines carve."""
+"""Textured mesh from several photos of one object: the template of its name fitted to all, else a carved solid."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from manitwin.models.generators.templates.fitting.generated import known_of_fitt
 from manitwin.models.generators.templates.fitting.several import SeveralFitted, fit_several
 
 MOST_TURN_ERROR_DEG = 30.0
-"""A template that stands is seen from within so much of what was stated, or the statement is wrong."""
+"""Maximum difference between the fitted and the stated turn of a standing template; a larger one contradicts the statement."""
 
 
 def from_views(views: Sequence[PhotoView], name: str | None, unit_m: float | None = None) -> MadeOfViews:
-    """Make the thing that two photos or more show; ``unit_m`` is how many metres the unit of their poses is, where it is known.
+    """Make the object shown in two or more photos; ``unit_m`` is the poses' unit in metres, if known.
 
-    Raises Rejected ``generator_failed`` where no shape explains every photo, where the stated turns are not those of the photos,
-    and where the turns are neither stated nor told by the photos.
+    Raises Rejected ``generator_failed`` if no shape explains every photo, if the stated turns contradict the photos, and if
+    the turns are neither stated nor determined by the photos.
     """
     template = template_for(name)
     poor: SeveralFitted | None = None
@@ -60,7 +60,7 @@ def _stated(views: Sequence[PhotoView]) -> list[float] | None:
 
 
 def _fitted(category: str, name: str | None, views: Sequence[PhotoView]) -> SeveralFitted | None:
-    """Fit the kind of thing that explains the first photo best; at the stated turns where there are any."""
+    """Fit the category that explains the first photo best, at the stated turns if there are any."""
     kinds, photos, turns = kinds_of(category, name), [view.rgba for view in views], _stated(views)
     focals_mm = [view.focal_mm for view in views]
     meant = fit(category, photos[0], or_of=kinds, focal_mm=focals_mm[0]) if kinds else None
@@ -73,7 +73,7 @@ def _fitted(category: str, name: str | None, views: Sequence[PhotoView]) -> Seve
         return found
     wrong = _wrong(free, views, told_only=True)
     if wrong and are_posed(views):
-        return found  # which way a thing faces is in its poses: the template is not that of this one
+        return found  # the poses determine the facing direction, so the template is not that of this object
     if wrong:
         raise Rejected(
             "generator_failed",
@@ -85,7 +85,10 @@ def _fitted(category: str, name: str | None, views: Sequence[PhotoView]) -> Seve
 
 
 def _wrong(found: SeveralFitted, views: Sequence[PhotoView], *, told_only: bool = False) -> list[str]:
-    """Say which photos of a thing that stands upright were fitted, or clearly show it, at another turn than is stated."""
+    """Return which photos of a standing object were fitted at another turn than stated.
+
+    With ``told_only``, only photos that clearly show their turn count.
+    """
     first = views[0].turn_deg or 0.0
     said = []
     for view, fit_, turn, told in zip(views, found.fits, found.turns_deg, found.told, strict=True):
@@ -99,7 +102,7 @@ def _wrong(found: SeveralFitted, views: Sequence[PhotoView], *, told_only: bool 
 
 def _from_fit(found: SeveralFitted, views: Sequence[PhotoView], name: str | None) -> MadeOfViews:
     stated = _stated(views) is not None
-    # whose turn nobody knows might show any side: its colours are not taken
+    # a photo with unknown turn may show any side, so its colours are not used
     shown = [number == 0 or stated or (found.told[0] and found.told[number]) for number in range(len(views))]
     fits = [fit_ for fit_, taken in zip(found.fits, shown, strict=True) if taken]
     surface = texture_of(fits, [view.rgba for view, taken in zip(views, shown, strict=True) if taken])
@@ -138,10 +141,11 @@ def _carved(views: Sequence[PhotoView], hint: ShapeHint) -> MadeOfViews:
 
 
 def _round(views: Sequence[PhotoView], hint: ShapeHint) -> MadeOfViews:
-    """Return what the first photo of a round thing shows: its outline is the same from every side, so no turn is needed.
+    """Return the lifted first photo of a round object: its silhouette is the same from every side, so no turn is needed.
 
-    Of all else outlines do not tell the turns: two of one height are those of some solid at any turn, and more are still those of
-    its mirror image (Koenderink and van Doorn 1991: orthographic views tell a shape up to such changes).
+    For other objects silhouettes do not determine the turns: two of the same height are those of some solid at any turn, and
+    more are also those of its mirror image (Koenderink and van Doorn 1991: orthographic views determine a shape up to such
+    transformations).
     """
     names = ", ".join(view.name for view in views)
     if not (hint.round and same_from_every_side([(view.name, view.rgba) for view in views])):

@@ -1,6 +1,6 @@
-"""Measures of a silhouette: symmetry, fill, corners, slenderness.
+"""Measurements of a silhouette: symmetry, fill, corners, elongation.
 
-Pixels are (row, column) of a crop around the object; angles are in degrees, positive when the axis leans clockwise.
+Pixels are (row, column) of a crop around the object; angles are in degrees, positive if the axis leans clockwise.
 """
 
 from __future__ import annotations
@@ -12,18 +12,22 @@ import numpy as np
 
 CROP_SIDE_PX = 384
 _SEARCH_SIDE_PX = 192
-_ELLIPSE_BITS = 4  # of a fraction of a pixel
+_ELLIPSE_BITS = 4  # fractional bits of pixel coordinates
 
 
 @dataclass(frozen=True)
 class Silhouette:
-    """An object's mask (H, W) with a margin, longer side about 384 px, and its measures.
+    """An object's mask (H, W) with a margin, longer side about 384 px, and its measurements.
 
-    ``axis_tilt_deg`` and ``axis_column_px`` are the best mirror axis (of the mask turned upright by ``-axis_tilt_deg`` about
-    its centre); ``mirror_iou`` how well the halves agree; ``row_fill`` the filled share of rows across it; ``solidity``
-    area over that of the convex hull; ``rectangle_iou`` agreement with the rectangle ``corners`` (4, 2) (x, y), ``ellipse_iou``
-    with the ellipse of its moments; ``elongation`` length over width; ``typical_radius_px`` median radius along the medial
-    axis; ``largest_radius_px``.
+    - ``axis_tilt_deg``, ``axis_column_px``: the best mirror axis, of the mask rotated by ``-axis_tilt_deg`` about its centre
+    - ``mirror_iou``: overlap of the mirrored halves
+    - ``row_fill``: filled share of the rows across the axis
+    - ``solidity``: area over that of the convex hull
+    - ``rectangle_iou``: overlap with the minimum-area rectangle ``corners`` (4, 2) (x, y)
+    - ``ellipse_iou``: overlap with the ellipse of the same moments
+    - ``elongation``: length over width
+    - ``typical_radius_px``: median radius along the medial axis; ``largest_radius_px``: maximum
+    - ``holes``: number of holes above 0.2 % of the area
     """
 
     mask: np.ndarray
@@ -41,7 +45,7 @@ class Silhouette:
     holes: int
 
     def scores(self) -> dict[str, float]:
-        """Return the measures that decide about the primitive, rounded."""
+        """Return the measurements that decide on the primitive, rounded."""
         names = ("mirror_iou", "row_fill", "solidity", "rectangle_iou", "ellipse_iou", "elongation", "axis_tilt_deg")
         return {name: round(float(getattr(self, name)), 3) for name in names} | {"holes": float(self.holes)}
 
@@ -82,7 +86,7 @@ def analyse_silhouette(mask: np.ndarray) -> Silhouette:
 
 
 def about_the_other_axis(silhouette: Silhouette) -> Silhouette:
-    """Return the measures about the mirror axis across the one that was found."""
+    """Return the measurements about the mirror axis perpendicular to the one found."""
     mask = silhouette.mask
     long_tilt, _ = _principal_axis(mask)
     across = abs((silhouette.axis_tilt_deg - long_tilt + 90.0) % 180.0 - 90.0) > 45.0
@@ -93,7 +97,7 @@ def about_the_other_axis(silhouette: Silhouette) -> Silhouette:
 
 
 def turned_upright(image: np.ndarray, tilt_deg: float) -> np.ndarray:
-    """Turn an image or mask by ``-tilt_deg`` about its centre into a square that holds all of it."""
+    """Rotate an image or mask by ``-tilt_deg`` about its centre into a square that contains all of it."""
     height, width = image.shape[:2]
     matrix = turning(height, width, tilt_deg)
     side = upright_side(height, width)
@@ -103,7 +107,7 @@ def turned_upright(image: np.ndarray, tilt_deg: float) -> np.ndarray:
 
 
 def upright_side(height: int, width: int) -> int:
-    """Return the side of the square that ``turned_upright`` makes."""
+    """Return the side of the square made by ``turned_upright``."""
     return int(np.ceil(np.hypot(height, width))) + 4
 
 
@@ -127,7 +131,7 @@ def _principal_axis(mask: np.ndarray) -> tuple[float, float]:
 
 
 def _ellipse_iou(mask: np.ndarray) -> float:
-    """Return the overlap with the full ellipse that has the mask's centre and second moments."""
+    """Return the overlap with the filled ellipse that has the mask's centroid and second moments."""
     places = np.stack(np.nonzero(mask)[::-1]).astype(float)
     values, vectors = np.linalg.eigh(np.cov(places))
     x, y = vectors[:, 1]
@@ -139,19 +143,19 @@ def _ellipse_iou(mask: np.ndarray) -> float:
 
 
 def _mirror_axis(mask: np.ndarray, long_tilt: float) -> tuple[float, float]:
-    """Search the tilt whose two halves agree best: upright, along and across the longest direction, then refined."""
+    """Find the tilt with the best mirror symmetry: upright, along or across the principal axis, then refined."""
     small = _made_small(mask)
 
     def agreement(tilt: float) -> float:
         return _best_column(turned_upright(small, tilt))[1]
 
-    # the upright axis is preferred where others are hardly better: most photos show things as they stand
+    # the upright axis is preferred unless others are clearly better, because most photos show upright objects
     starts = {0.0: 0.012, long_tilt: 0.0, long_tilt + 90.0: -0.02}
     return _refined_axis(mask, small, max(starts, key=lambda tilt: agreement(tilt) + starts[tilt]))
 
 
 def _refined_axis(mask: np.ndarray, small: np.ndarray, best: float) -> tuple[float, float]:
-    """Return the tilt near ``best`` whose halves agree best, by the mask made small and then the mask, and that agreement."""
+    """Return the tilt near ``best`` with the best mirror symmetry, first at low and then at full resolution, and its overlap."""
 
     def agreement(tilt: float) -> float:
         return _best_column(turned_upright(small, tilt))[1]

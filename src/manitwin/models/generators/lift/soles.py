@@ -1,8 +1,7 @@
-"""An inflated outline that stands on its soles: the feet go down to the ground, and end there in full.
+"""Standing pose of an inflated silhouette on its feet: the feet are extended to the ground and end there in flat soles.
 
-An outline that is inflated ends below in a round edge, on which nothing stands, and of a thing that is seen from a little above
-the feet that are farther back end higher in the picture. A cut at the height where all of it is wide enough would take the
-feet off.
+An inflated silhouette has a round lower edge, on which nothing stands. In a view from slightly above, feet farther back end
+higher in the picture. A cut at the height where the body is wide enough would remove the feet.
 """
 
 from __future__ import annotations
@@ -16,20 +15,20 @@ from scipy import ndimage
 from manitwin.models.generators.lift.surface import LiftedSurface, cut_below, tip_angle_deg
 
 REACHES = (0.0, 0.03, 0.06, 0.09, 0.12)
-"""Shares of the height, tried in turn: what ends so little above the lowest point is a foot too."""
+"""Heights above the lowest point, as shares of the total height, up to which a part counts as a foot; tried in turn."""
 SOLE_SHARE = 0.02
-"""The share of the height, at the end of a foot, that is its sole."""
+"""Height of a sole at the end of a foot, as a share of the total height."""
 DEEPER = (1.0, 1.5, 2.0, 2.5, 3.0)
-"""How much deeper soles may be than their outline tells, tried in turn: a foot is longer than it looks from before it."""
+"""Factors on the depth of the soles, tried in turn: a foot is longer than it looks from the front."""
 LEAST_SOLE_PX = 2.0
 
 
 def on_soles(
     mask: np.ndarray, inflated: Callable[[np.ndarray], LiftedSurface], least_angle_deg: float
 ) -> LiftedSurface | None:
-    """Return what ``mask (H, W) bool`` is ``inflated`` to, with its feet on the ground; None where it would tip all the same.
+    """Return the inflation of ``mask (H, W) bool`` with its feet on the ground; None if it would still tip over.
 
-    ``inflated`` makes a body of a mask in its pixels. No part of the outline is cut off.
+    ``inflated`` makes a body of a mask in its pixels. No part of the silhouette is cut off.
     """
     rows = np.nonzero(mask.any(axis=1))[0]
     height = int(rows[-1] - rows[0]) + 1
@@ -45,9 +44,9 @@ def on_soles(
 
 
 def with_soles(mask: np.ndarray, reach: float) -> np.ndarray:
-    """Return ``mask (H, W) bool`` with its feet to its lowest row and on below the picture, ``(H + h, W)``.
+    """Return ``mask (H, W) bool`` with its feet extended to the lowest row and below the picture, ``(H + h, W)``.
 
-    Feet are what lies in the lowest ``reach`` of its height, each with the columns that end in the lowest part of it.
+    Feet are the parts in the lowest ``reach`` of the height; of each, the columns that end in its lowest part are extended.
     """
     rows = np.nonzero(mask.any(axis=1))[0]
     lowest, height = int(rows[-1]), int(rows[-1] - rows[0]) + 1
@@ -68,14 +67,14 @@ def with_soles(mask: np.ndarray, reach: float) -> np.ndarray:
 
 
 def _of_picture(surface: LiftedSurface, made_rows: int, rows: int) -> LiftedSurface:
-    """Return a surface whose texture coordinates are those of a picture with ``made_rows`` in the upper ``rows`` of it."""
+    """Convert texture coordinates from a picture with ``made_rows`` to its upper ``rows``."""
     uv = surface.uv.copy()
     uv[:, 1] = 1 - (1 - uv[:, 1]) * made_rows / rows
     return replace(surface, uv=uv)
 
 
 def _deepened(surface: LiftedSurface, deeper: float, reach_px: float) -> LiftedSurface:
-    """Return a surface whose lowest ``reach_px`` become, downwards, as many times as deep; no deeper than all of it is."""
+    """Scale the depth of the lowest ``reach_px`` gradually by ``deeper``, up to the depth of the whole surface."""
     if deeper == 1.0:
         return surface
     y, z = surface.vertices[:, 1], surface.vertices[:, 2]

@@ -1,4 +1,4 @@
-"""A closed surface with texture coordinates: the cuts that keep it closed, and its rest on a flat base or back."""
+"""Closed surface with texture coordinates: cuts that keep it closed, and resting poses on a flat base or back."""
 
 from __future__ import annotations
 
@@ -12,22 +12,23 @@ from scipy.spatial import ConvexHull, QhullError
 from manitwin.geometry.boxes import turn_to_sides
 
 GRAZING_COSINE = 0.3
-"""At 73 degrees a pixel of the photo is three and a half times as long as wide on the surface."""
-UPRIGHT_TIP_ANGLE_DEG = 8.0  # what stands in the photo and would not fall at this slope
-TILTED_TIP_ANGLE_DEG = 15.0  # what does not stand in the photo must be steadier to be set upright
-_CUTS = (0.015, 0.03, 0.05, 0.08)  # shares of the height tried for a flat base
-_LYING_CUTS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3)  # a thick head of a thin thing is cut down to where both touch
+"""At this angle (73 degrees) a pixel of the photo is three and a half times as long as wide on the surface."""
+UPRIGHT_TIP_ANGLE_DEG = 8.0  # minimum tip angle of an object that stands in the photo
+TILTED_TIP_ANGLE_DEG = 15.0  # an object that does not stand in the photo must be more stable to be set upright
+_CUTS = (0.015, 0.03, 0.05, 0.08)  # shares of the height at which a flat base is tried
+# up to where both head and handle of a thin object with a thick head touch the ground
+_LYING_CUTS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.25, 0.3)
 LYING = np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])
-"""Turns the direction towards the camera up: (x, y, z) -> (x, z, -y)."""
+"""Rotation that turns the direction towards the camera up: (x, y, z) -> (x, z, -y)."""
 
 
 @dataclass(frozen=True)
 class LiftedSurface:
     """A closed triangle mesh: ``vertices (V, 3)``, ``faces (F, 3)`` wound outward, ``uv (V, 2)`` (v upward).
 
-    x to the right of the photo, y up, z towards the camera, in pixels of the mask until scaled. Every vertex has one
-    texture coordinate, of the photo seen along z: the projection has no seams. ``facing (V,)`` is the cosine at which the
-    camera looks at the surface: 1 from straight before it, 0 on the outline, -1 where the photo cannot show it.
+    x is to the right of the photo, y up, z towards the camera, in pixels of the mask until scaled. Every vertex has one
+    texture coordinate, of the photo projected along z, so there are no seams. ``facing (V,)`` is the cosine of the viewing
+    angle: 1 for a frontal view, 0 on the outline, -1 where the photo cannot show the surface.
     """
 
     vertices: np.ndarray
@@ -36,7 +37,7 @@ class LiftedSurface:
     facing: np.ndarray
 
     def seen(self) -> np.ndarray:
-        """Return for each face (F,) whether the photo shows it: at no corner so askew that its pixels would be streaks."""
+        """Return for each face (F,) whether the photo shows it; faces with a corner at a grazing angle count as unseen."""
         return np.asarray(self.facing[self.faces].min(axis=1) > GRAZING_COSINE)
 
     def moved(self, matrix: np.ndarray, offset: np.ndarray) -> LiftedSurface:
@@ -45,19 +46,19 @@ class LiftedSurface:
 
 
 def bare_mesh(surface: LiftedSurface) -> trimesh.Trimesh:
-    """Return the geometry alone."""
+    """Return the geometry without texture."""
     return trimesh.Trimesh(surface.vertices, surface.faces, process=False)
 
 
 def unseen_share(surface: LiftedSurface) -> float:
-    """Return how much of the area the photo does not show."""
+    """Return the share of the area that the photo does not show."""
     a, b, c = (surface.vertices[surface.faces[:, corner]] for corner in range(3))
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     return float(areas[~surface.seen()].sum() / areas.sum())
 
 
 def to_manifold(surface: LiftedSurface) -> manifold3d.Manifold:
-    """Return the solid; raises ValueError naming manifold3d's status where the surface is not closed."""
+    """Return the solid; raises ValueError with manifold3d's status if the surface is not closed."""
     properties = np.column_stack([surface.vertices, surface.uv, surface.facing]).astype(np.float32)
     solid = manifold3d.Manifold(manifold3d.Mesh(properties, surface.faces.astype(np.uint32)))
     if solid.status() != manifold3d.Error.NoError:
@@ -71,7 +72,7 @@ def from_manifold(solid: manifold3d.Manifold) -> LiftedSurface:
     largest = max(parts, key=lambda part: part.volume()) if parts else solid
     mesh = largest.to_mesh()
     properties = np.asarray(mesh.vert_properties, float)
-    # a cut duplicates vertices on its edge; they have the same properties, so they may be one again
+    # merges the vertices that a cut duplicates on its edge; their properties are equal
     target = np.arange(len(properties))
     target[np.asarray(mesh.merge_from_vert, np.int64)] = np.asarray(mesh.merge_to_vert, np.int64)
     used, faces = np.unique(target[np.asarray(mesh.tri_verts, np.int64)], return_inverse=True)
@@ -79,21 +80,21 @@ def from_manifold(solid: manifold3d.Manifold) -> LiftedSurface:
 
 
 def cut_below(surface: LiftedSurface, axis: int, level: float) -> LiftedSurface:
-    """Cut off what lies below ``level`` along a coordinate axis; the cut is closed by a flat face."""
+    """Cut off the part below ``level`` along a coordinate axis; a flat face closes the cut."""
     normal = np.zeros(3)
     normal[axis] = 1.0
     return from_manifold(to_manifold(surface).trim_by_plane(normal.tolist(), float(level)))
 
 
 def tip_angle_deg(surface: LiftedSurface) -> float:
-    """Return the slope at which a solid standing on its lowest face (along y) tips over; 0 where it does not stand."""
+    """Return the slope at which a solid on its lowest face (along y) tips over; 0 if it does not stand."""
     low = surface.vertices[:, 1].min()
     height = float(np.ptp(surface.vertices[:, 1]))
     feet = surface.vertices[surface.vertices[:, 1] < low + 1e-3 * height][:, [0, 2]]
     center = center_of_volume(surface)
     try:
         support = ConvexHull(feet)
-    except (QhullError, ValueError):  # fewer than three feet, or all on a line
+    except (QhullError, ValueError):  # fewer than three contact points, or all on a line
         return 0.0
     margin = -(support.equations[:, :2] @ center[[0, 2]] + support.equations[:, 2]).max()
     return float(np.degrees(np.arctan2(margin, center[1] - low)))
@@ -107,7 +108,7 @@ def center_of_volume(surface: LiftedSurface) -> np.ndarray:
 
 
 def stood(surface: LiftedSurface, least_angle_deg: float, cuts: tuple[float, ...] = _CUTS) -> LiftedSurface | None:
-    """Cut a flat base just as high as the solid needs to stand (along y); None where it would tip all the same."""
+    """Cut the smallest flat base with which the solid stands (along y); None if it tips over with all cuts."""
     low, height = surface.vertices[:, 1].min(), float(np.ptp(surface.vertices[:, 1]))
     for share in cuts:
         cut = cut_below(surface, 1, low + share * height)
@@ -117,12 +118,12 @@ def stood(surface: LiftedSurface, least_angle_deg: float, cuts: tuple[float, ...
 
 
 def laid(surface: LiftedSurface) -> LiftedSurface:
-    """Turn a relief with a flat back so that it lies on it, its front upward."""
+    """Lay a relief with a flat back on that back, front upward."""
     return surface.moved(LYING, np.zeros(3))
 
 
 def laid_round(surface: LiftedSurface) -> LiftedSurface:
-    """Lay a round solid down, front upward, with a facet along its underside: it does not roll."""
+    """Lay a round solid down, front upward, with a facet along its underside so that it does not roll."""
     lying = laid(surface)
     flattened = stood(lying, UPRIGHT_TIP_ANGLE_DEG, _LYING_CUTS)
     if flattened is not None:
@@ -132,9 +133,9 @@ def laid_round(surface: LiftedSurface) -> LiftedSurface:
 
 
 def squared(surface: LiftedSurface) -> LiftedSurface:
-    """Turn what lies about the vertical, by 45 degrees at most, so that its sides seen from above lie along x and z.
+    """Rotate a lying object about the vertical, by at most 45 degrees, so that its sides seen from above are along x and z.
 
-    A photo shows what lies at any angle; lengths along the axes are so those that a ruler shows.
+    A photo shows a lying object at any angle; after the rotation, extents along the axes are its length and width.
     """
     cosine, sine = turn_to_sides(surface.vertices[:, [0, 2]])
     return surface.moved(np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]]), np.zeros(3))

@@ -1,9 +1,9 @@
-"""The texture of a lifted mesh: the photo's crop, continued past its outline, and painted colours for unseen sides.
+"""Texture of a lifted mesh: the crop of the photo, extended beyond its outline, and painted colours for unseen sides.
 
-A mirrored front would carry mirrored letters, so unseen sides are painted. The photo's pixels are sorted into a few colours;
-each place gets the colour that most of its surroundings have, which keeps large regions and their borders and drops strokes:
-letters cover less than the ground that they are on. Round an axis the surroundings are the whole ring. Towards the outline
-the colours become those of the photo there, so that no seam shows.
+A mirrored front would show mirrored letters, so unseen sides are painted. The photo's pixels are quantized to a few colours,
+and each place gets the colour that dominates its surroundings. This keeps large regions and their borders and drops strokes,
+because letters cover less area than their background. For a body of revolution the surroundings are the whole ring. Towards
+the outline the colours blend into those of the photo, so that no seam shows.
 """
 
 from __future__ import annotations
@@ -22,21 +22,22 @@ MAX_SIDE_PX = 1024
 _MARGIN = 0.06
 _COLOURS = 6
 _SAMPLES, _ROUNDS = 4096, 10
-_AROUND_SHARE = 0.06  # of the longer side, a Gaussian's sigma: a letter with the ground around it
-_RING_SHARE = 0.03  # of the length along an axis: a line of text with its ground; a cap is higher
-_SOFT_SHARE = 0.008  # of the longer side: borders between two colours are no sharper
+_AROUND_SHARE = 0.06  # of the longer side: sigma of a Gaussian that covers a letter and its background
+_RING_SHARE = 0.03  # of the length along the axis: covers a line of text with its background; a cap is higher
+_SOFT_SHARE = 0.008  # of the longer side: blur of borders between two colours
 _SOFT_RIM_SHARE = 0.015
-"""Of the longer side, a Gaussian's sigma: strokes of letters are lost, the shade of the side is not."""
-_GRAZED_SHARE = 0.025  # of the longer side: so far inward a large round body is seen too much askew to show the photo
-_RIM_SHARE = 0.04  # of the longer side: how far the outline's colours reach inward
+"""Sigma of a Gaussian over the longer side; it removes strokes of letters but keeps the shading of the sides."""
+_GRAZED_SHARE = 0.025  # of the longer side: width of the rim where a large round body is seen at a grazing angle
+_RIM_SHARE = 0.04  # of the longer side: decay length of the outline's colours inward
 
 
 @dataclass(frozen=True)
 class Crop:
-    """The object cut out of a photo: ``colours (H, W, 3) uint8`` with the outline bled outward, ``mask (h, w) bool``.
+    """The object cropped from a photo: ``colours (H, W, 3) uint8``, extended beyond the outline, and ``mask (h, w) bool``.
 
-    Both show the same rectangle of the photo; the mask is smaller. Texture coordinates of the mask's pixel (x, y) are
-    ``((x + 0.5) / w, 1 - (y + 0.5) / h)``. ``box`` is the rectangle in the photo's pixels: left, top, width, height.
+    Both show the same rectangle of the photo; the mask has a lower resolution. The texture coordinates of the mask's pixel
+    (x, y) are ``((x + 0.5) / w, 1 - (y + 0.5) / h)``. ``box`` is the rectangle in pixels of the photo: left, top, width,
+    height.
     """
 
     colours: np.ndarray
@@ -45,9 +46,9 @@ class Crop:
 
 
 def crop_object(rgba: np.ndarray, mask_side_px: int) -> Crop:
-    """Cut the object out of ``rgba`` (H, W, 4) uint8.
+    """Crop the object from ``rgba`` (H, W, 4) uint8.
 
-    Colours come only from pixels well inside the mask: none from the background, and none that hide under full transparency.
+    Colours come only from pixels well inside the mask, so neither from the background nor from transparent pixels.
     """
     solid = rgba[..., 3] > 127
     rows, columns = np.nonzero(solid.any(axis=1))[0], np.nonzero(solid.any(axis=0))[0]
@@ -63,9 +64,10 @@ def crop_object(rgba: np.ndarray, mask_side_px: int) -> Crop:
 def beside(
     first: np.ndarray, second: np.ndarray, uv: np.ndarray, on_second: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Put a smaller picture to the right of a tall one, or below a wide one; both ``(H, W, 3) uint8``.
+    """Place a smaller picture to the right of a tall one, or below a wide one; both ``(H, W, 3) uint8``.
 
-    Returns the picture of both and the coordinates in it, of ``uv (V, 2)`` in the first or, by ``on_second (V,)``, the second.
+    Returns the joined picture and the converted coordinates of ``uv (V, 2)``, which refer to the first picture or, where
+    ``on_second (V,)``, to the second.
     """
     (height, width), (h, w) = first.shape[:2], second.shape[:2]
     wide = width > height
@@ -79,7 +81,7 @@ def beside(
 
 
 def _scaled(rgba: np.ndarray, side_px: int) -> tuple[np.ndarray, np.ndarray]:
-    """Scale down with premultiplied alpha: hidden colours do not bleed into visible ones."""
+    """Scale down with premultiplied alpha, so that colours of transparent pixels do not bleed into visible ones."""
     alpha = rgba[..., 3].astype(np.float32) / 255
     premultiplied = rgba[..., :3].astype(np.float32) * alpha[..., None]
     scale = side_px / max(rgba.shape[:2])
@@ -92,7 +94,7 @@ def _scaled(rgba: np.ndarray, side_px: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _cleaned(mask: np.ndarray) -> np.ndarray:
-    """Keep the largest 4-connected part and fill holes of less than 0.2 % of it."""
+    """Keep the largest 4-connected part and fill holes smaller than 0.2 % of it."""
     labels, count = ndimage.label(mask)
     if count > 1:
         mask = labels == 1 + int(np.argmax(ndimage.sum_labels(mask, labels, np.arange(1, count + 1))))
@@ -104,7 +106,7 @@ def _cleaned(mask: np.ndarray) -> np.ndarray:
 
 
 def paint_unseen(crop: Crop, axis: Silhouette | None) -> np.ndarray:
-    """Return colours ``(h, w, 3) uint8`` over the crop's mask ``(h, w)``; ``axis`` is given for solids of revolution."""
+    """Return painted colours ``(h, w, 3) uint8`` for the crop's mask ``(h, w)``; ``axis`` is given for solids of revolution."""
     height, width = crop.mask.shape
     photo = cv2.resize(crop.colours, (width, height), interpolation=cv2.INTER_AREA).astype(np.float32)
     if axis is None:
@@ -116,9 +118,9 @@ def paint_unseen(crop: Crop, axis: Silhouette | None) -> np.ndarray:
 
 
 def _voted(photo: np.ndarray, mask: np.ndarray, spread: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """Return for each place the mean of the kind of colour that most pixels near it have.
+    """Return for each place the mean of the colour class that dominates its surroundings.
 
-    ``spread`` adds up what is near each place of an image ``(H, W, C)`` and may change its shape.
+    ``spread`` sums an image ``(H, W, C)`` over the surroundings of each place and may change its shape.
     """
     kinds = _kinds(photo, mask)
     sums = [spread(np.dstack([photo, np.ones_like(mask)]) * (kinds == kind)[..., None]) for kind in range(_COLOURS)]
@@ -131,9 +133,10 @@ def _voted(photo: np.ndarray, mask: np.ndarray, spread: Callable[[np.ndarray], n
 
 
 def _kinds(photo: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Return which of a few colours each pixel of the mask is nearest to, -1 outside: k-means in Lab.
+    """Return the nearest of a few colours for each pixel of the mask, -1 outside: k-means in L*a*b*.
 
-    It begins with the median and the colours farthest from those before (Gonzalez 1985), so that nothing is drawn at random.
+    The initial centres are the median and then the colour farthest from the previous ones (Gonzalez 1985), which is
+    deterministic.
     """
     colours = cv2.cvtColor(photo / 255, cv2.COLOR_RGB2Lab)[mask]
     some = colours[:: max(1, len(colours) // _SAMPLES)]
@@ -178,7 +181,7 @@ def _of_rings(photo: np.ndarray, mask: np.ndarray, axis: Silhouette) -> np.ndarr
 
 
 def _rim_difference(photo: np.ndarray, base: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Return the photo less ``base`` near the outline, smoothed and fading inward; beyond the outline it stays as it is there."""
+    """Return the photo minus ``base`` near the outline, smoothed and fading inward, and constant beyond the outline."""
     side = max(mask.shape)
     sigma = _SOFT_RIM_SHARE * side
     inside = mask.astype(np.float32)

@@ -1,9 +1,10 @@
-"""A body of revolution that stands in the photo, with the camera's perspective: its profile and the view, by least squares.
+"""Standing body of revolution with the camera's perspective: its profile and view are fitted by least squares.
 
-The visual hull of an outline (``revolution``) is that of a camera far away, and follows the upper and lower ends, which are seen
-less and more steeply from near: its elevation is some 8 degrees too high, and what is seen from 55 degrees then a quarter too
-long. Here the hull at each of several elevations is where a least-squares fit begins (``templates.fitting``), of the radii at the
-corners of its profile and of a pinhole camera; edges and the outline choose among what they end at.
+The visual hull of a silhouette (``revolution``) assumes a distant camera, but nearby the upper and the lower end are seen
+less and more steeply. Its elevation is therefore about 8 degrees too high, and an object seen from 55 degrees becomes a
+quarter too long. Here the hull at each of several elevations is the initial value of a least-squares fit
+(``templates.fitting``) of the radii at the corners of its profile and of a pinhole camera; the result is selected by edges
+and silhouette.
 """
 
 from __future__ import annotations
@@ -33,32 +34,32 @@ from manitwin.models.generators.templates.fitting.view import LEAST_PERSPECTIVE,
 from manitwin.models.generators.templates.template import Measure, Model, Template
 
 UPRIGHT = "can"
-"""A category of things that stand and are round: a body of revolution stands as they do."""
+"""A category of standing, round objects, whose resting pose a body of revolution has."""
 STEPS_DEG = (0.0, 4.0, 8.0, 12.0, 16.0)
-"""Below the elevation of the hull: those of 54 photos of templates from 10, 30 and 55 degrees are 0 to 16 degrees too high."""
+"""Steps below the elevation of the hull; for 54 photos of templates from 10, 30 and 55 degrees it is 0 to 16 degrees too high."""
 LEVEL_START_DEG = 2.0
 MOST_CORNERS, CORNER_SHARE, COARSER = 12, 0.006, 1.2
-"""Of a profile that is drawn with so few corners: how far it may be off, of its height; as much more until they are so few."""
-LEAST_SAMPLES = 8  # of a profile
-HEIGHT_M = 0.1  # of no meaning: a photo tells no size
-SPREAD = 0.12  # of a radius, by which the hull's may be off
-STRETCH = (0.5, 1.0, 2.0)  # of all radii to the height: that of an elevation which is off
-_AXIS = 1e-3  # of the height: no ring is a point
+"""Maximum number of corners of a simplified profile, its initial tolerance over the height, and the factor to increase it."""
+LEAST_SAMPLES = 8  # minimum samples of a profile
+HEIGHT_M = 0.1  # arbitrary: a photo does not determine the size
+SPREAD = 0.12  # relative error of the hull's radii
+STRETCH = (0.5, 1.0, 2.0)  # range of a common factor on all radii, for an error of the elevation
+_AXIS = 1e-3  # of the height: minimum radius of a ring
 _ROUNDS, _ENOUGH = 12, 0.9995
 
 
 @dataclass(frozen=True)
 class _Start:
-    """A profile, (K, 2) of heights and radii in pixels, and the elevation at which it is the hull of an outline."""
+    """A profile, (K, 2) of heights and radii in pixels, and the elevation at which it is the hull of a silhouette."""
 
     profile: np.ndarray
     elevation_deg: float
 
 
 def turned_solid(rgba: np.ndarray, focal_mm: float | None = None) -> Fitted | None:
-    """Return the body of revolution about the picture's vertical that explains ``rgba (H, W, 4) uint8``, whose alpha is the mask.
+    """Return the body of revolution about the vertical that explains ``rgba (H, W, 4) uint8``, whose alpha is the mask.
 
-    None where no profile gives a solid. ``focal_mm`` is the lens as 35 mm equivalent, where it is known.
+    None if no profile gives a solid. ``focal_mm`` is the 35 mm equivalent focal length, if known.
     """
     tilted, level = _starts(crop_object(rgba, CROP_SIDE_PX).mask)
     evidence = evidence_of(rgba, focal_mm)
@@ -71,7 +72,7 @@ def turned_solid(rgba: np.ndarray, focal_mm: float | None = None) -> Fitted | No
 
 
 def _starts(mask: np.ndarray) -> tuple[list[_Start], list[_Start]]:
-    """Return where to begin with a camera that looks down, and with one at the thing's height where the outline may be that."""
+    """Return initial values for a camera that looks down, and for a level camera if the silhouette permits it."""
     rows, widths, column_px = half_widths(mask)
     upper, lower = end_elevations(rows, widths, column_px)
     highest = (upper + lower) / 2
@@ -88,7 +89,7 @@ def _starts(mask: np.ndarray) -> tuple[list[_Start], list[_Start]]:
 
 
 def _with_corners(heights: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Return a profile as a line with few corners ``(K, 2)``, upward (Douglas and Peucker 1973)."""
+    """Return a profile simplified to a polyline with few corners ``(K, 2)``, upward (Douglas and Peucker 1973)."""
     points = np.column_stack([heights, radii]).astype(np.float32)[:, None]
     tolerance = CORNER_SHARE * float(np.ptp(heights))
     while len(corners := cv2.approxPolyDP(points, tolerance, closed=False)[:, 0]) > MOST_CORNERS:
@@ -97,7 +98,7 @@ def _with_corners(heights: np.ndarray, radii: np.ndarray) -> np.ndarray:
 
 
 def _family(profile: np.ndarray) -> Family:
-    """Return the bodies with corners at the heights of a profile ``(K, 2)``, upward, and about its radii."""
+    """Return the family of bodies with corners at the heights of a profile ``(K, 2)``, upward, and radii near its radii."""
     height = float(profile[-1, 0] - profile[0, 0])
     levels, radii = (profile[:, 0] - profile[0, 0]) / height, np.maximum(profile[:, 1] / height, _AXIS)
     names = [f"radius_{number}" for number in range(len(radii))]
@@ -113,7 +114,7 @@ def _family(profile: np.ndarray) -> Family:
 
 
 def _refined(start: _Start, evidence: Evidence) -> Candidate | None:
-    """Return what a least-squares fit from a start ends at; None where it has no solid."""
+    """Return the least-squares fit from a start; None if it gives no solid."""
     try:
         family = _family(start.profile)
     except SolidError:
@@ -136,5 +137,5 @@ def _refined(start: _Start, evidence: Evidence) -> Candidate | None:
 
 
 def _unexplained(candidate: Candidate) -> float:
-    """Return what a candidate leaves of outline and edges: how it is shaded tells a body from a view of it, not its elevation."""
+    """Return the cost of silhouette and edges; shading separates a body from other shapes, but not its elevation."""
     return candidate.residual.outline_cost + steep_cost(candidate.view)

@@ -1,7 +1,8 @@
-"""Where a camera that stays stands before a turntable: told by the outlines, since their common solid must fill all of them.
+"""Calibration of a fixed camera before a turntable from silhouettes, since the visual hull must fill all of them.
 
-Silhouette coherence (Hernandez, Schmitt and Cipolla 2007, "Silhouette Coherence for Camera Calibration under Circular Motion") at
-stated turns. A camera that is moved round the thing at one height and distance, aimed at it, is the same.
+Silhouette coherence (Hernandez, Schmitt and Cipolla 2007, "Silhouette Coherence for Camera Calibration under Circular
+Motion") at stated turns. A camera that is moved around the object at constant height and distance, aimed at it, is
+equivalent.
 """
 
 from __future__ import annotations
@@ -16,26 +17,29 @@ from scipy.optimize import minimize
 from manitwin.models.generators.lift.pinhole import Sight, passing_px, signed_distance
 
 SIDE_PX = 160
-"""The longest side of the outlines' boxes, where the camera is sought."""
+"""Longest side of the silhouettes' bounding boxes during calibration."""
 LEAST_ELEVATION_DEG, MOST_ELEVATION_DEG = -12.0, 75.0
-"""Below the first, a thing turned the other way round looks about the same as from above."""
+"""Range of elevations. Below the lower limit, an object turned the other way round looks about the same as from above."""
 LEAST_FOCAL, MOST_FOCAL = 0.5, 12.0
-"""In longer sides of the picture: an 18 mm lens of full frame; hardly a perspective. Wider ones explain anything."""
+"""Range of focal lengths over the longer side of the picture: from an 18 mm full-frame lens to almost no perspective.
+
+Wider lenses explain any silhouettes.
+"""
 _ELEVATIONS_DEG, _FOCALS = tuple(range(0, 73, 8)), (0.9, 1.8, 5.0)
 _USUAL_FOCAL, _FOCAL_SPREAD, _FOCAL_WEIGHT = 1.1, 0.7, 0.003
-"""Of the lens, in longer sides of the picture, where nobody states it; a spread of its logarithm; against pixels."""
+"""Prior of an unstated focal length over the picture's longer side, spread of its logarithm, and weight against pixels."""
 _STATED_FOCAL_WEIGHT = 0.1
 _PHOTOS = 8
 _STARTS = 3
-_FULL_FRAME_MM = 36.0  # the longer side of the picture that a 35 mm equivalent is of
+_FULL_FRAME_MM = 36.0  # longer side of the full frame, to which a 35 mm equivalent refers
 
 
 @dataclass(frozen=True)
 class TurntableCamera:
-    """A camera at a distance of 1 from the axis: its height angle, its lens in longer sides of the picture, the axis' column.
+    """A camera at distance 1 from the axis: elevation, focal length over the longer side of the picture, and column of the axis.
 
-    ``axis_share`` is a share of the picture's width; ``cost_px`` is by how far rays along the outlines pass their common solid in
-    the mean, of outlines of ``SIDE_PX``.
+    ``axis_share`` is a share of the picture's width. ``cost_px`` is the mean distance by which rays along the silhouettes
+    miss the hull, for silhouettes of ``SIDE_PX``.
     """
 
     elevation_deg: float
@@ -44,7 +48,7 @@ class TurntableCamera:
     cost_px: float
 
     def matrix(self, turn_deg: float, width_px: float, height_px: float) -> np.ndarray:
-        """Return the ``(3, 4)`` projection of a ``Sight`` into a picture of that size, the thing seen from ``turn_deg``."""
+        """Return the projection ``(3, 4)`` of a ``Sight`` to a picture of that size, with the object seen from ``turn_deg``."""
         turn, elevation = np.deg2rad([turn_deg, self.elevation_deg])
         toward = np.array([np.sin(turn) * np.cos(elevation), -np.cos(turn) * np.cos(elevation), np.sin(elevation)])
         right = np.array([np.cos(turn), np.sin(turn), 0.0])
@@ -58,7 +62,7 @@ class TurntableCamera:
 
 @dataclass(frozen=True)
 class ScaledMask:
-    """An outline cut to its box: ``mask (H, W) bool``, the box' corner (x, y) and the picture's size in pixels of that scale."""
+    """A silhouette cropped to its box: ``mask (H, W) bool``, the box's corner (x, y) and the picture's size in scaled pixels."""
 
     mask: np.ndarray
     corner: np.ndarray
@@ -66,7 +70,7 @@ class ScaledMask:
 
 
 def scaled_masks(photos: Sequence[np.ndarray], side_px: int) -> list[ScaledMask]:
-    """Return the outlines of photos ``(H, W, 4) uint8`` of one size at a common scale; the widest box has ``side_px``."""
+    """Return the silhouettes of photos ``(H, W, 4) uint8`` of the same size at a common scale; the widest box has ``side_px``."""
     boxes = [_box(rgba[..., 3] > 127) for rgba in photos]
     scale = side_px / max(max(box[2] - box[0], box[3] - box[1]) for box in boxes)
     found = []
@@ -81,7 +85,7 @@ def scaled_masks(photos: Sequence[np.ndarray], side_px: int) -> list[ScaledMask]
 
 
 def sights_of(masks: Sequence[ScaledMask], camera: TurntableCamera, turns_deg: Sequence[float]) -> list[Sight]:
-    """Return the outlines as the camera saw them at the turns."""
+    """Return the silhouettes as ``Sight`` of the camera at the turns."""
     plain = [_unplaced(mask) for mask in masks]
     return _seen_by(plain, masks, camera, turns_deg)
 
@@ -89,10 +93,10 @@ def sights_of(masks: Sequence[ScaledMask], camera: TurntableCamera, turns_deg: S
 def calibrated(
     photos: Sequence[np.ndarray], turns_deg: Sequence[float], focal_mm: float | None = None
 ) -> TurntableCamera:
-    """Find the camera that stays while what matted ``photos (H, W, 4) uint8``, all of one size, show is turned before it.
+    """Estimate the fixed camera for matted ``photos (H, W, 4) uint8``, all of the same size, of a turning object.
 
-    ``turns_deg`` are the camera's about the vertical, counter-clockwise; ``focal_mm`` is the lens as 35 mm equivalent, where
-    it is stated. Of many photos some that are spread over the turns are looked at.
+    ``turns_deg`` are those of the camera about the vertical, counter-clockwise; ``focal_mm`` is the 35 mm equivalent focal
+    length, if stated. Of many photos a subset spread over the turns is used.
     """
     chosen = _spread(turns_deg)
     masks = scaled_masks([photos[k] for k in chosen], SIDE_PX)
@@ -154,7 +158,7 @@ def _spread(turns_deg: Sequence[float]) -> list[int]:
 
 
 def _axis_px(masks: Sequence[ScaledMask], turns_deg: Sequence[float]) -> float:
-    """Return the column about which the outlines' middles swing."""
+    """Return the column about which the centres of the silhouettes swing."""
     turns = np.deg2rad(turns_deg)
     middles = [mask.corner[0] + mask.mask.shape[1] / 2 for mask in masks]
     swing = np.column_stack([np.ones(len(turns)), np.cos(turns), np.sin(turns)])

@@ -1,7 +1,7 @@
-"""What a thing's name says against the shape that its outline was lifted to: that it is not round, or has other proportions.
+"""Checks of a lifted solid against the name's template: whether the object is not round, or has other proportions.
 
-The outline of a shoe seen from its toe is that of a body of revolution, of a pencil from its end that of a peg, and of a book
-at its edge that of a bar. What such things are like, the template of the name says.
+The silhouette of a shoe seen from the toe is that of a body of revolution, that of a pencil from its end that of a peg, and
+that of a book at its edge that of a bar. The template of the name gives the shape of such objects.
 """
 
 from __future__ import annotations
@@ -22,27 +22,34 @@ from manitwin.models.generators.templates.fitting.fit import kinds_of, template_
 from manitwin.models.generators.templates.template import Template
 
 LEAST_TURNED_SHARE = 0.86
-"""Of a solid, what is in one disc a level: a square bar has pi/4 = 0.79 and a hexagonal one 0.91; this is between them. Of 280
-templates those that are bodies of revolution but for handles and spouts have 0.87 to 0.98, the others 0.86 or less."""
+"""Minimum share of a solid within one disc per level for a body of revolution.
+
+A square bar has pi/4 = 0.79 and a hexagonal one 0.91. Of 280 templates, those that are bodies of revolution apart from
+handles and spouts have 0.87 to 0.98, the others 0.86 or less.
+"""
 _LEVELS, _SIDE_PX = 24, 96
 _COARSE = 0.6
 _ROUND_ABOUT = ((0.0, 0.0, 0.0), (90.0, 0.0, 0.0), (0.0, 90.0, 0.0))
 _NEVER_TURNED = frozenset({"two", "frame", "arc", "pistol", "seat", "legs", "bag"})
-"""Words of a prior's shape that no body of revolution has."""
+"""Words of a prior's shape that exclude a body of revolution."""
 MARGIN = 2.0
-"""Beyond what the template's measures give by more than this factor, a proportion is that of no such thing. Of 351 photos of made
-things of 93 kinds that were lifted without their templates 72 are beyond: all but one share at most 0.53 of their volume with the
-true thing (0.25 in the median), the others 0.72 in the median."""
+"""Maximum factor by which a proportion may exceed the range of the template's measures.
+
+Of 351 photos of synthetic objects of 93 categories lifted without their templates, 72 exceed it: all but one share at most
+0.53 of their volume with the true object (median 0.25), the others 0.72 in the median.
+"""
 LEAST_MISSING = 0.03
-"""Of the length: so much may be missing of the thickness of what lies flat, such as a turner seen from above. Its surfaces are
-then half as far off; of the 351 lifted things surfaces are off by 0.026 in the median."""
+"""Tolerated error of the thickness of a flat object, over its length, such as a turner seen from above.
+
+Its surfaces then deviate by half of that; those of the 351 lifted objects deviate by 0.026 in the median.
+"""
 
 
 def why_never_turned(name: str | None) -> str | None:
-    """Return why a thing of this name is no body of revolution, by its template or, where it has none, its prior; else None.
+    """Return why an object of this name is no body of revolution, by its template or, without one, its prior; else None.
 
-    What the prior calls round or cylindrical may be one whatever the template makes of it, and so may what is of a shape that
-    some templates make round: a basket is an open container, as a flower pot is; and what nothing is known of.
+    An object that its prior calls round or cylindrical may be one whatever its template is, and so may an object whose shape
+    word is shared with round templates (a basket is an open container, as a flower pot is), and an unknown one.
     """
     prior = lookup(name)
     if prior is None or hint_from_name(name).round:
@@ -58,10 +65,10 @@ def why_never_turned(name: str | None) -> str | None:
 
 
 def why_other_proportions(name: str | None, extents: np.ndarray, *, turned: bool = False) -> str | None:
-    """Return why sides of lengths ``(3,)`` are those of no thing that a template of this name makes; None where they may be.
+    """Return why sides ``(3,)`` are impossible for all objects of this name's template; None if they are possible.
 
-    No view shows a body of revolution (``turned``) longer than it is, only shorter: such a one may be as long as it looks.
-    Names that are not the template's own, as a boot's which is a kind of shoe, are not judged, nor are things of any proportions.
+    A body of revolution (``turned``) never looks longer than it is, so it may be as long as it looks. Names that are not the
+    template's own (a boot is a kind of shoe) and objects of arbitrary proportions are not tested.
     """
     meant = _meant(name)
     if not meant or not _is_own_name(meant[0], name) or any(template.any_proportions for template in meant):
@@ -84,7 +91,7 @@ def why_other_proportions(name: str | None, extents: np.ndarray, *, turned: bool
 
 
 def _meant(name: str | None) -> list[Template]:
-    """Return the templates of what a name may mean, its own first; empty where it has none."""
+    """Return the templates that a name may mean, its own first; empty without one."""
     template = template_for(name)
     if template is None:
         return []
@@ -98,14 +105,14 @@ def _is_own_name(template: Template, name: str | None) -> bool:
 
 
 def _ratios(extents: np.ndarray) -> np.ndarray:
-    """Return how many times as long as wide, and as thick, a thing of these sides is ``(2,)``."""
+    """Return the ratios of length to width and to thickness ``(2,)``."""
     longest, second, shortest = np.sort(extents)[::-1]
     return np.array([longest / second, longest / shortest])
 
 
 @cache
 def _usual_ratios(category: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the least and the largest ``_ratios`` of a template's things: of usual measures, one at a time at its ends."""
+    """Return the minimum and maximum ``_ratios`` of a template with typical measures, varying one at a time to its limits."""
     template = load_templates()[category]
     usual = template.typical()
     tried = [usual]
@@ -116,7 +123,7 @@ def _usual_ratios(category: str) -> tuple[np.ndarray, np.ndarray]:
         try:
             with coarser(_COARSE):
                 mesh = template.build(**measures).assembly.mesh()
-        except SolidError:  # an end that goes with no usual measure of the others
+        except SolidError:  # a limit that is incompatible with the typical values of the others
             continue
         ratios.append(_ratios(np.ptp(mesh.vertices, axis=0)))
     return np.min(ratios, axis=0), np.max(ratios, axis=0)
@@ -124,7 +131,7 @@ def _usual_ratios(category: str) -> tuple[np.ndarray, np.ndarray]:
 
 @cache
 def _is_turned(category: str) -> bool:
-    """Tell whether a template of usual measures is round across one of its axes, but for handles and spouts."""
+    """Tell whether a template with typical measures is round about one of its axes, apart from handles and spouts."""
     template = load_templates()[category]
     with coarser(_COARSE):
         whole = union([solid for _, solid in template.build(**template.typical()).assembly.solids()])
@@ -132,7 +139,7 @@ def _is_turned(category: str) -> bool:
 
 
 def turned_share(solid: Manifold) -> float:
-    """Return the share of a solid, its hollows filled, that is in the largest disc of each of its level sections."""
+    """Return the share of a solid, with holes filled, within the largest disc of each of its level sections."""
     low, high = np.reshape(solid.bounding_box(), (2, 3))
     scale = (_SIDE_PX - 8) / float((high - low)[:2].max())
     area_px, disc_px = 0.0, 0.0
