@@ -221,6 +221,10 @@ class KeepsGiven:
 
 
 def _with_given(answer: PhysicalEstimates, given: ImportRecord) -> PhysicalEstimates:
+    """Replace estimates by given values, and add a finding for each given value outside the estimate's interval.
+
+    Dynamic friction is kept at or below static friction.
+    """
     source, findings = given.source, []
     static, dynamic = answer.friction_static, answer.friction_dynamic
     if given.mass_kg is not None and answer.mass_kg is not None:

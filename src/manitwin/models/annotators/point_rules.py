@@ -26,9 +26,7 @@ MOST_FUNCTIONAL, MOST_GRASPS, LEAST = 4, 3, 2  # the paper: 2-4 functional and 2
 MOST_SPARES = 3
 
 _WEAK = 0.2  # minimum score: below it the feature does not exist on the object
-_LEVER_M = (
-    0.08  # lever arm at which the weight is about half; grasps at 80 mm slip half of the time, measured in SAPIEN
-)
+_LEVER_M = 0.08  # lever arm at which the variable part of the weight is halved; grasps at 80 mm slip half of the time in SAPIEN
 _FINGER_CLEARANCE_M = 0.004  # of the opening: the pads need clearance on both sides
 _PINCH_M = 0.03  # maximum thickness of a pinch; thicker parts are held between the pads
 _UNSEEN = 0.3  # weight of a candidate that is visible in no view
@@ -127,6 +125,7 @@ class PointSelection:
         return _Choice(index, float(scores[index])) if scores[index] >= _WEAK and ranked[index] > 0 else None
 
     def _functional(self) -> tuple[FunctionalPoint, ...]:
+        """Choose functional points: at the prior's parts first, then at generic features, then near the centre of mass."""
         generic = tuple(
             FunctionalPart(label=_PLACES[f], description=f"{_PLACES[f]} of {self._thing}", feature=f)
             for f in _GENERIC_FUNCTIONAL
@@ -147,6 +146,7 @@ class PointSelection:
         return tuple(found)
 
     def _grasps(self) -> tuple[GraspPoint, ...]:
+        """Choose grasp points: at the prior's parts first, then at generic features, on opposite sides, near the centre."""
         generic = _generic_grasps()
         weights = self._seen() * self._fit() * self._closeness()
         found: list[GraspPoint] = []
@@ -224,6 +224,7 @@ class PointSelection:
         )
 
     def _measured(self, feature: Feature, i: int) -> str:
+        """Return the measurement that supports a choice, as part of its rationale."""
         shape, height = self.shape, 1000 * self.request.positions_m[i, 2]
         if feature in ("opening", "rim", "inside") and shape.opening is not None:
             opening = shape.opening

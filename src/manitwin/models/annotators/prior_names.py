@@ -114,6 +114,7 @@ def _found_abroad(name: str) -> tuple[Prior, str] | None:
 
 
 def _found_in_english(name: str) -> tuple[Prior, str] | None:
+    """Return the prior of an English name, with the attempts in the order that ``found_by`` describes."""
     if not (phrase := normalised(name)):
         return None
     head = re.split(r" (?:made |full )?(?:of|with|for|in|on|without|no|from) ", phrase, maxsplit=1)[0].split()

@@ -42,6 +42,7 @@ def _worded(parts: list[dict[str, Any]], category: str) -> list[dict[str, Any]]:
 
 
 def _prior(category: str, row: dict[str, Any], domain: str, defaults: dict[str, Any], forms: dict[str, Any]) -> Prior:
+    """Build a prior from its row, the domain's defaults and its form; raises ManiTwinError for unknown names in the row."""
     materials = load_materials()
     row = {**defaults, **row}
     form_name, surface = row.pop("form"), row.pop("surface")

@@ -138,6 +138,7 @@ def _color_words(colors: list[ColorShare]) -> str:
 
 
 def _shape(subject: Subject, prior: Prior | None, rng: np.random.Generator) -> str:
+    """Return the shape in words: the prior's, refined or corrected by the measured shape."""
     measured = overall_shape(subject.solid, rng)
     if prior is not None:
         proportion = measured.proportion

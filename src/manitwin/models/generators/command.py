@@ -133,6 +133,7 @@ class CommandGenerator:
         return place
 
     def _arguments(self, request: GenerationRequest, folder: Path) -> list[str]:
+        """Write the picture, and return the arguments with the placeholders replaced."""
         if "image" in self._takes and request.rgba is None:
             raise Unsupported(
                 f"command: {self.model} needs an {{image}} and cannot make a mesh from text ({request.text!r});"
@@ -160,6 +161,7 @@ class CommandGenerator:
         return [PLACEHOLDER.sub(lambda found: values[found[1]], word) for word in self.words]
 
     def _run(self, arguments: list[str], folder: Path) -> int:
+        """Run the program under the supervisor and return its exit status; raises Unavailable after ``max_wait_s``."""
         with (folder / "output.txt").open("wb") as output, (folder / "errors.txt").open("wb") as errors:
             process = subprocess.Popen(
                 [sys.executable, "-I", str(Path(supervisor.__file__)), *arguments],
@@ -180,6 +182,7 @@ class CommandGenerator:
                 ) from error
 
     def _state(self, status: int, folder: Path) -> JobState:
+        """Return the job state of an exit status; raises Unavailable if the program may succeed later."""
         said = self._last_line(folder / "errors.txt")
         if status == 0:
             return JobState("done")
@@ -207,6 +210,7 @@ def passed(environment: Mapping[str, str], named: tuple[str, ...]) -> dict[str, 
 
 
 def _words(command: str) -> tuple[str, ...]:
+    """Split a command into arguments; raises ConfigError for missing or unknown placeholders."""
     try:
         words = tuple(shlex.split(command))
     except ValueError as error:

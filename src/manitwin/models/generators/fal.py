@@ -148,6 +148,7 @@ class FalGenerator(VendorGenerator):
         return Generated(path, self.model, {"endpoint": self.model})
 
     def _input(self, request: GenerationRequest) -> dict[str, Any]:
+        """Return the endpoint's input for a request; raises Unsupported if the endpoint does not take its kind."""
         takes, body = self.takes, dict[str, Any]()
         if request.rgba is not None:
             if takes.image is None:

@@ -126,6 +126,7 @@ class MeshyGenerator(VendorGenerator):
         self._refines[id] = found or self._submit(TEXT, body)
 
     def _refine_among_latest(self, preview: Mapping[str, Any], text: str) -> str | None:
+        """Return the id of the refine task with this text among the tasks created after the preview, None if there is none."""
         since = number(preview.get("finished_at")) or 0
         for page in range(1, PAGES + 1):
             tasks = self._listed(page)

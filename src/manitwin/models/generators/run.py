@@ -66,6 +66,7 @@ def run_generator(
 
 
 def _driven(drive: _Drive, request: GenerationRequest, attempts: int, submit_again: bool) -> Generated:
+    """Poll or submit until an attempt succeeds; raises Rejected if all attempts fail."""
     note = drive.recalled(submit_again)
     while note.job_id is not None or note.attempt < attempts:
         recalled = note.job_id is not None
@@ -132,6 +133,8 @@ class _Note:
 
 @dataclass
 class _Drive:
+    """State of one request while it is driven: its generator, stored note, and remaining waiting time."""
+
     generator: Generator
     folder: Path
     jobs: JobMemory
@@ -194,6 +197,7 @@ class _Drive:
         return generated
 
     def _wait_for(self, job_id: str) -> None:
+        """Poll with growing pauses until the job is done; raises _Failed if it failed, Unavailable if time runs out."""
         pause = FIRST_WAIT_S
         while (job := self.generator.poll(job_id)).state not in ("done", "failed"):
             if pause > self.left_s:

@@ -79,6 +79,7 @@ class GraspServer:
         raise AssertionError("the last try returns or raises")
 
     def _exchange(self, question: dict[str, Any]) -> dict[str, Any]:
+        """Send one request and return its answer; translates transport errors to Unavailable and BadReply."""
         timeout_s = self._services.timeout_s
         try:
             reply = zmtp.ask(
@@ -106,6 +107,7 @@ class GraspServer:
         return self._read(reply)
 
     def _read(self, reply: bytes) -> dict[str, Any]:
+        """Decode an answer; raises BadReply if it is invalid, ServerError if it reports an error."""
         try:
             answer = unpack(reply)
         except ValueError as error:

@@ -66,6 +66,8 @@ def _connected(url: str, timeout_s: float) -> socket.socket:
 
 
 class _Peer:
+    """A ZMTP connection with a deadline and a limit on the received bytes."""
+
     def __init__(self, connection: socket.socket, until: float, max_bytes: int):
         self._connection, self._until, self._left, self._max = connection, until, max_bytes, max_bytes
 

@@ -137,6 +137,7 @@ def _powers(degree: int) -> list[tuple[int, int]]:
 
 
 def _fit_surfaces(lab: np.ndarray) -> tuple[list[tuple[np.ndarray, int]], float]:
+    """Fit surfaces at low resolution; return (coefficients, degree) of each and the unexplained share of the border."""
     scale = FIT_SIDE_PX / max(lab.shape[:2])
     small = cv2.resize(lab, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) if scale < 1 else lab
     height, width = small.shape[:2]
@@ -187,6 +188,7 @@ def _grow_surface(
 def _distance(
     lab: np.ndarray, blur_px: float, surfaces: list[np.ndarray], border: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Return the Mahalanobis distance to the nearest surface, the residual from it, its colours, and the largest noise."""
     smooth = cv2.GaussianBlur(lab, (0, 0), blur_px)
     floor = NOISE_FLOOR_LAB**2 * np.eye(3)
     found: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []

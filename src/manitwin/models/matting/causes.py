@@ -45,7 +45,7 @@ BULKIER = 2.0
 """A mask is thin because of its holes if filling them multiplies its area per outline pixel by more than this factor."""
 AGAINST = ("network_beyond", "network_within")
 ALIKE = 0.9
-"""Similarity of two masks from which on they show the same object and differ at most in a part of it."""
+"""Minimum similarity of two masks that show the same object and differ at most in a part of it."""
 FILLING = 0.8
 """Share of the picture's longer side; an object of that length cannot be photographed from much closer."""
 
@@ -109,6 +109,7 @@ def _bulk_px(mask: np.ndarray) -> float:
 
 
 def _remedy(cause: str, candidate: Candidate) -> str:
+    """Return what the user can do about a cause."""
     if cause == "beside":
         return CROP
     if cause not in THIN:

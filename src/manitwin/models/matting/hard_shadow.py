@@ -83,6 +83,7 @@ def edge_width_px(depth: np.ndarray, steepest: np.ndarray) -> np.ndarray:
 
 
 def _is_shadow(evidence: _Evidence) -> bool:
+    """Tell whether the measurements of a region are those of a shadow."""
     return (
         LEAST_ATTACHED < evidence.attached < MOST_ATTACHED
         and evidence.object_edge > STRONGER * evidence.light_edge
@@ -123,6 +124,7 @@ def _evidence(
     falling: np.ndarray,
     near_narrow: np.ndarray,
 ) -> _Evidence:
+    """Measure a region; without an edge to both object and light the result is never a shadow."""
     near = dilated(region, 3) & ~region
     to_object, to_light = near & solid & ~reached, near & ~solid
     if not to_object.any() or not to_light.any():

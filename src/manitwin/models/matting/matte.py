@@ -156,6 +156,7 @@ def decided(
 def _given_matte(
     image: np.ndarray, name: str, min_area_share: float, second_object_share: float, window_px: PixelBox | None
 ) -> Matte:
+    """Return the matte of an image with an alpha channel, with small holes closed and border colours replaced."""
     mask = image[..., 3] > 127
     if mask.mean() < min_area_share:
         raise Rejected("no_object", f"{name}: its alpha channel is empty; export it with the object opaque", "generate")
@@ -187,6 +188,7 @@ def _rounded_down(confidence: float) -> float:
 def _reject_doubtful(
     name: str, judged: Judged, min_confidence: float, second_object_share: float, window_px: PixelBox | None
 ) -> None:
+    """Raise Rejected for separate objects or a confidence below ``min_confidence``."""
     found = judged.candidate.found
     if judged.of_pieces >= min(min_confidence, LIKELY):
         _reject_several(name, found.mask, second_object_share, window_px)
@@ -200,6 +202,7 @@ def _reject_doubtful(
 
 
 def _reject_several(name: str, mask: np.ndarray, second_object_share: float, window_px: PixelBox | None) -> None:
+    """Raise Rejected if the mask has several pieces of at least ``second_object_share`` of the largest one's area."""
     _, _, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     areas = stats[1:, cv2.CC_STAT_AREA]
     large = stats[1:][areas >= second_object_share * areas.max()]
@@ -228,6 +231,7 @@ def _in_photo(piece: np.ndarray, shape: tuple[int, ...], window_px: PixelBox) ->
 
 
 def _findings(chosen: Judged) -> list[str]:
+    """Return the findings about an accepted mask."""
     scores, found, findings = chosen.candidate.scores, chosen.candidate.found, []
     if chosen.is_explained:
         findings.append(

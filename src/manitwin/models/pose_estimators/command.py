@@ -67,6 +67,7 @@ class CommandEstimator:
         return parse_guesses(told, "command")
 
     def _run(self, arguments: list[str], scratch: Path) -> None:
+        """Run the program under the supervisor; raises Unavailable if it fails or exceeds the timeout."""
         with (scratch / "output.txt").open("wb") as output, (scratch / "errors.txt").open("wb") as errors:
             process = subprocess.Popen(
                 [sys.executable, "-I", str(Path(supervisor.__file__)), *arguments],

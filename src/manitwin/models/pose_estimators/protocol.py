@@ -75,6 +75,7 @@ def parse_guesses(answer: Any, who: str) -> PoseGuesses:
 
 
 def _pose(told: Any, place: int, who: str) -> np.ndarray:
+    """Validate one pose and orthonormalize its rotation; raises BadReply if it is not rigid or behind the camera."""
     try:
         pose = np.array(told["object_to_camera"], float)
         if pose.shape != (4, 4) or not np.isfinite(pose).all() or np.abs(pose).max() > MOST_M:

@@ -85,6 +85,7 @@ class GuardedTransport(httpx2.BaseTransport):
             self._pools.pop().close()
 
     def _pool(self, url: httpx2.URL) -> httpcore2.ConnectionPool:
+        """Return a connection pool for one request, through a proxy if the environment names one for https."""
         backend = _GuardedBackend(self._reach, self._deadline)
         host, port = url.raw_host.decode(), _port_of(url)
         own = self._reach.is_own(host, port)
@@ -116,6 +117,8 @@ class GuardedTransport(httpx2.BaseTransport):
 
 
 class _GuardedBackend(httpcore2.NetworkBackend):
+    """Network backend that resolves names, checks the addresses against ``reach``, and connects within the deadline."""
+
     def __init__(self, reach: Reach, deadline: Deadline):
         self.reach, self._deadline, self._inner = reach, deadline, httpcore2.SyncBackend()
 
@@ -173,6 +176,8 @@ class _Stream(httpcore2.NetworkStream):
 
 
 class _Body(httpx2.SyncByteStream):
+    """Body stream that translates errors of httpcore."""
+
     def __init__(self, inner: Any, deadline: Deadline):
         self._inner, self._deadline = inner, deadline
 

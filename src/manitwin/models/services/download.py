@@ -66,6 +66,7 @@ def download_file(
 def _fetched(
     client: httpx2.Client, url: str, part: Path, name: str, max_bytes: int, schemes: Set[str], deadline: Deadline
 ) -> tuple[BackendError | None, bool]:
+    """Follow redirects and write the file; return the error or None, and whether a retry may help."""
     for _ in range(MAX_REDIRECTS + 1):
         if not _is_url(url):
             return BadReply(f"{name}: the link to its file leads to an invalid URL"), False
@@ -90,6 +91,7 @@ def _fetched(
 def _written(
     response: httpx2.Response, part: Path, name: str, max_bytes: int, deadline: Deadline
 ) -> tuple[BackendError | None, bool]:
+    """Write the body of a response to ``part``; return the error or None, and whether a retry may help."""
     status = response.status_code
     if status in EXPIRED:
         return Gone(f"{name}: the link to its file is no longer valid (HTTP {status})"), False

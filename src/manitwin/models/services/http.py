@@ -196,6 +196,7 @@ class HttpService:
     def _once(
         self, method: str, url: str, content: dict[str, Any], pays: bool, max_bytes: int
     ) -> bytes | FailedRequest:
+        """Send a request once; return the body or the failure with the decision whether it may be repeated."""
         headers = {**self._authorization, "Accept": "application/json, */*"}
         deadline = Deadline(self._services.timeout_s)
         try:
@@ -213,6 +214,7 @@ class HttpService:
         return self._judged(status, data, after, pays)
 
     def _judged(self, status: int, data: bytes, after: float | None, pays: bool) -> bytes | FailedRequest:
+        """Return the body of an accepted request, or the failure of a refused one."""
         if 300 <= status < 400:
             error: ManiTwinError = BadReply(f"{self.name}: {self.base_url} redirects; give the new address after @")
             return FailedRequest(error, again=False)

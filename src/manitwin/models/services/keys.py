@@ -40,6 +40,7 @@ def split_url(argument: str) -> tuple[str, str | None]:
 
 
 def _checked(url: str) -> str:
+    """Return a URL without trailing slash; raises ConfigError for an invalid one, without showing credentials."""
     if "@" in url.partition("://")[2].partition("/")[0]:  # checked first, because later messages show the URL
         raise ConfigError("the URL of a server contains a user name or password; pass keys in the environment only")
     try:

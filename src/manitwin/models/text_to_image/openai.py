@@ -102,6 +102,7 @@ class OpenAiPictures:
         return Generated(path, self.model, {"model": self.model})
 
     def _picture(self, entry: dict[str, Any]) -> bytes:
+        """Return the bytes of a picture, decoded or downloaded; raises Unanswered for an unreadable entry."""
         encoded, url = entry.get("b64_json"), entry.get("url")
         if isinstance(encoded, str):
             try:

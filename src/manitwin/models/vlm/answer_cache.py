@@ -70,6 +70,7 @@ class Cached(Around):
 
 
 def _read(path: Path) -> tuple[Reply, bool] | None:
+    """Return a cached reply and whether it is a rehearsal's; None if the file is missing or invalid."""
     if not os.path.lexists(path):
         return None
     try:
@@ -84,6 +85,7 @@ def _read(path: Path) -> tuple[Reply, bool] | None:
 
 
 def _write(path: Path, reply: Reply, rehearsed: bool) -> None:
+    """Write a reply to the cache atomically."""
     path.parent.mkdir(parents=True, exist_ok=True)
     kept = {"text": reply.text, "model": reply.model, "tokens": [reply.usage.input_tokens, reply.usage.output_tokens]}
     marked = {**kept, "rehearsal": True} if rehearsed else kept

@@ -87,6 +87,7 @@ class AnthropicMessages(ServedChat):
                 return self._completion(answer, question).paid(self.price, self._who)
 
     def _does_without(self, complaint: str) -> bool:
+        """Drop the field that a complaint refuses from later requests; return whether there was one."""
         words = complaint.lower()
         # a refused schema is an error of this package and must be reported
         if "format.schema:" in words:

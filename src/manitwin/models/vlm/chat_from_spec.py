@@ -63,6 +63,7 @@ def replay_from_spec(argument: str, config: BuildConfig) -> ChatClient:
 def _served(
     kind: type[OpenAiChat] | type[AnthropicMessages], argument: str, default_url: str, config: BuildConfig
 ) -> ChatClient:
+    """Create the client of a served model, with cache and record as the settings say."""
     model, url = split_url(argument)
     if not model:
         raise ConfigError(

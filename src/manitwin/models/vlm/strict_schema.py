@@ -41,6 +41,7 @@ def strict_schema(answer: type[BaseModel]) -> dict[str, Any]:
 
 
 def _strict(schema: dict[str, Any], definitions: dict[str, Any], above: tuple[str, ...]) -> dict[str, Any]:
+    """Convert a schema recursively; ``above`` are the names of enclosing definitions, to detect recursion."""
     if "$ref" in schema:
         name = schema["$ref"].rpartition("/")[2]
         if name in above:

@@ -164,6 +164,7 @@ def _readable(value: Any) -> Any:
 
 
 def _object_in(text: str) -> dict[str, Any]:
+    """Return the last JSON object in a text: the text itself, a code fence, or an object within words."""
     for candidate in (text, *reversed(_fenced(text))):
         value = _parsed(candidate)
         if isinstance(value, dict):
@@ -201,6 +202,7 @@ def _parsed(text: str) -> Any:
 
 
 def _objects(text: str) -> Iterator[dict[str, Any]]:
+    """Yield the JSON objects that start at the braces of a text, at most MOST_STARTS attempts."""
     start, left = text.find("{"), MOST_STARTS
     while start >= 0 and left:
         left -= 1

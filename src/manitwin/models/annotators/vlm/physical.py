@@ -22,7 +22,7 @@ Matter = Literal[
     "plastic", "ceramic", "glass", "steel", "aluminium", "wood", "cardboard", "paper", "rubber", "foam", "textile",
     "leather", "food skin", "wax", "stone", "other", "unknown",
 ]  # fmt: skip
-"""The materials of ``data/priors/materials.toml``, any other one, and unknown."""
+"""The materials of the priors (``prior_tables/materials.toml``), any other one, and unknown."""
 
 Structure = Literal["solid", "open_container", "hollow_closed", "full_closed"]
 SameAsNamed = Literal["yes", "no", "unsure", "no name given"]

@@ -110,6 +110,7 @@ def reject_impossible(findings: list[PhysicalFinding]) -> None:
 
 
 def _density(answer: PhysicalAnswer, mesh: MeasuredMesh, settings: PhysicalConfig) -> list[PhysicalFinding]:
+    """Compare the mass per mesh volume with the configured limits and with the usual density of material and structure."""
     volume_m3 = mesh.volume * mesh.scale(answer) ** 3
     density = answer.mass_kg.typical / volume_m3
     said = f"{answer.mass_kg.typical:.3g} kg in a shape of {1e6 * volume_m3:.3g} cm3 is {density:.3g} kg/m3"
@@ -147,6 +148,7 @@ def _usual_density(answer: PhysicalAnswer, mesh: MeasuredMesh) -> tuple[float, f
 def _against_prior(
     answer: PhysicalAnswer, mesh: MeasuredMesh, name: str | None, settings: PhysicalConfig
 ) -> list[PhysicalFinding]:
+    """Compare longest side (unless the scale is declared) and mass with the prior's intervals."""
     prior = lookup(name) or lookup(answer.object)
     if prior is None:
         return []
@@ -173,6 +175,7 @@ def _beyond(
 
 
 def _proportions(answer: PhysicalAnswer, mesh: MeasuredMesh) -> list[PhysicalFinding]:
+    """Compare the proportions of the answered sides with those of the mesh."""
     said = np.array([side.typical for side in answer.sides_m])
     said, real = said / said[0], mesh.sides / mesh.sides[0]
     factor = np.maximum(said / real, real / said)
@@ -199,6 +202,7 @@ def _declared_size(answer: PhysicalAnswer, mesh: MeasuredMesh) -> list[PhysicalF
 
 
 def _walls(answer: PhysicalAnswer) -> list[PhysicalFinding]:
+    """Check that a hollow object has a wall thickness, and that the wall fits twice into the shortest side."""
     wall, shortest = answer.wall_thickness_m, answer.sides_m[2].typical
     if answer.structure in ("hollow_closed", "open_container") and wall == 0:
         return [
@@ -216,6 +220,7 @@ def _walls(answer: PhysicalAnswer) -> list[PhysicalFinding]:
 
 
 def _friction(answer: PhysicalAnswer) -> list[PhysicalFinding]:
+    """Check that friction is in the range of dry solids, and that dynamic friction does not exceed static friction."""
     findings = []
     low, high = FRICTION
     for what, said in (("friction_static", answer.friction_static), ("friction_dynamic", answer.friction_dynamic)):

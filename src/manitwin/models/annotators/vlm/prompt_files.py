@@ -85,6 +85,7 @@ def load_prompts(folder: Path | None) -> dict[str, Prompt]:
 
 
 def _parse(name: str, text: str) -> Prompt:
+    """Parse a prompt file; raises ConfigError for an invalid form or an unknown placeholder."""
     found = _FORM.fullmatch(text.replace("\r\n", "\n"))
     if found is None:
         raise ConfigError(

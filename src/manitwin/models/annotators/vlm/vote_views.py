@@ -55,6 +55,7 @@ def views_of_vote(request: PointsRequest, vote: int, votes: int) -> QueryViews:
 
 
 def _between(request: PointsRequest, vote: int, votes: int) -> QueryViews:
+    """Render views at azimuths between the object's own, with elevations shifted by vote, and find the visible candidates."""
     subject = request.subject
     own, parts = subject.cameras, list(subject.parts)
     elevations = [float(np.degrees(np.arcsin(camera.camera_to_object[2, 2]))) for camera in own]

@@ -31,7 +31,7 @@ Turntable photos reach 0.98 and more, handheld photos 0.94 at most.
 """
 _SUSPECTS = 3
 _MANY = 5
-"""Minimum number of photos from which on a consistent turntable camera is trusted: no set of so many handheld photos fits one."""
+"""Number of photos from which a consistent turntable camera is trusted: no set of this many handheld photos fits one."""
 _LEFT_OUT_OF = 4  # at most one of this many photos may be inconsistent with the others
 _ROUNDED_PX = 1.0  # tolerance for rounded sizes of scaled photos
 _LEAST_TURNED = 3

@@ -162,8 +162,10 @@ def inside_others(sights: Sequence[Sight], number: int, points: np.ndarray) -> n
 
 
 def passing_px(sights: Sequence[Sight]) -> float:
-    """Return the mean distance in pixels by which rays along all silhouettes miss the others', each limited to
-    MOST_PASSING_PX."""
+    """Return the mean distance in pixels by which rays along all silhouettes miss the others' silhouettes.
+
+    Each ray's distance is limited to MOST_PASSING_PX.
+    """
     surroundings = around(sights)
     passed = []
     for number, sight in enumerate(sights):

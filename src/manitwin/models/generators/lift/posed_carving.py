@@ -73,6 +73,7 @@ def _going_together(
 
 
 def _require_crossing(sights: Sequence[Sight]) -> None:
+    """Raise Rejected if all cameras look from the same or the opposite direction."""
     centre, _ = around(sights)
     toward = np.array([sight.position - centre for sight in sights])
     toward /= np.linalg.norm(toward, axis=1, keepdims=True)

@@ -89,6 +89,7 @@ def parallel_camera(mask_shape: tuple[int, int], *, elevation_deg: float = 0.0) 
 
 
 def _edge_support(creases: np.ndarray, object_px: np.ndarray, rgb: np.ndarray) -> float | None:
+    """Return the share of creases within NEAR_PX of strong edges of the photo; None if there are hardly any creases."""
     inside = cv2.erode(object_px.astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
     creases = creases & inside
     if creases.sum() < 0.02 * SIDE_PX:

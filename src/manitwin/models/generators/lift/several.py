@@ -101,6 +101,7 @@ def _wrong(found: SeveralFitted, views: Sequence[PhotoView], *, told_only: bool 
 
 
 def _from_fit(found: SeveralFitted, views: Sequence[PhotoView], name: str | None) -> MadeOfViews:
+    """Return the textured template fitted to all photos; a photo whose turn is unknown gives no colours."""
     stated = _stated(views) is not None
     # a photo with unknown turn may show any side, so its colours are not used
     shown = [number == 0 or stated or (found.told[0] and found.told[number]) for number in range(len(views))]
@@ -123,6 +124,7 @@ def _from_fit(found: SeveralFitted, views: Sequence[PhotoView], name: str | None
 
 
 def _carved(views: Sequence[PhotoView], hint: ShapeHint) -> MadeOfViews:
+    """Carve a solid from photos with stated turns, or lift a round object without them; raises Rejected otherwise."""
     photos = [(view.name, view.rgba) for view in views]
     turns = _stated(views)
     if turns is None:
