@@ -52,7 +52,7 @@ _FAMILIES: dict[str, str] = {
 _NEUTRAL = frozenset({"black", "dark grey", "grey", "light grey", "white"})
 _TELLING = (
     1 / 3
-)  # of the largest neutral colour's share: a colour of that much comes first, a red box with white letters is red
+)  # of the largest neutral colour's share: a chromatic colour of this share comes first; a red box with white letters is red
 _METALLIC = 0.5
 _GOLDEN_HUE_RAD, _GOLDEN_CHROMA = (np.deg2rad(75.0), np.deg2rad(97.0)), (29.0, 50.0)
 """CIELAB hue and chroma of gold and brass in photos, at any lightness (docs/measured/annotations.md).
@@ -76,7 +76,7 @@ _LIGHTNESS = 0.5  # weight of a difference in lightness relative to one in chrom
 _LEAST_OPEN = 1 / 3  # minimum open share of the surroundings; the bottom of a mug has less and is hardly visible
 _LEAST_SEEN = (
     1 / 50
-)  # of the samples: a book whose leaves are each modelled shows a twentieth; inside out, hardly any is seen
+)  # of the samples: minimum visible share; a book with modelled leaves shows a twentieth, an inside-out mesh hardly any
 _LEAST_SHARE = 0.12  # minimum share of the surface of a colour named besides the main one
 _MOST_NAMES = 3
 _MOST_OF = 2 / 3  # minimum share of a family for its largest member to give the name

@@ -124,5 +124,5 @@ def _left_open(options: Sequence[WallMaterial], thickness_m: float, within: Inte
     low, high = np.clip(ends, within.low, within.high)
     mean = float(
         np.clip(np.exp(shares @ np.log(typical)), low, high)
-    )  # rounding may carry the mean of equal ends past them
+    )  # rounding may move the mean of equal ends beyond them
     return Interval(low=float(low), typical=mean, high=float(high))

@@ -48,7 +48,7 @@ def classify(pictures: list[np.ndarray], min_probability: float, longest_m: floa
     The probability of a name is the sum over the ImageNet classes that it covers, at a fixed temperature (Guo et al. 2017,
     "On calibration of modern neural networks", eq. 9), averaged over pictures and backgrounds. If the object's longest side
     ``longest_m`` is known, class probabilities are weighted by the likelihood of that size (Bayes' rule). A name is accepted
-    if its probability reaches ``min_probability`` and exceeds the highest probability that any picture of another object has
+    if its probability reaches both ``min_probability`` and the highest probability that any picture of another object has
     given to that name: ImageNet has no classes for most tools and takes them for a spatula or a can opener. If no specific
     name is accepted, a general term may be. Raises Unavailable without the classifier's weights.
     """

@@ -21,9 +21,9 @@ OPAQUE = 250
 def foreground(pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray, Found]:
     """Return ``rgb (H, W, 3) uint8`` and the object mask ``(H, W) float32`` of ``pixels (H, W, 3 or 4) uint8``, and its source.
 
-    The alpha channel is used if a picture has transparency. Otherwise the border is taken as background and GrabCut (Rother,
-    Kolmogorov and Blake 2004) segments the object; for this, and in the result, a picture is scaled down to at most 192
-    pixels. If the result covers almost nothing or almost everything, the mask is the whole picture.
+    The alpha channel is used if a picture has transparency. Otherwise the picture is scaled down to at most 192 pixels, also
+    in the result; its border is taken as background, and GrabCut (Rother, Kolmogorov and Blake 2004) segments the object. If
+    the mask covers almost nothing or almost everything, it is replaced by the whole picture.
     """
     rgb = pixels[..., :3]
     if pixels.shape[2] == 4 and (pixels[..., 3] < OPAQUE).any():

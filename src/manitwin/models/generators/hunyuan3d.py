@@ -118,7 +118,7 @@ class Hunyuan3dGenerator:
         return JobState("running")
 
     def fetch(self, job_id: str, folder: Path) -> Generated:
-        """Write the GLB below ``folder``."""
+        """Write the GLB into ``folder``."""
         how, uid = self._parts(job_id)
         if how == "send" and job_id not in self._made:
             self._made[job_id] = _model(self._status(uid))

@@ -97,7 +97,7 @@ def _postures(
 
 
 def _palm_distance(caster: RayCaster, poses: np.ndarray, request: GraspRequest) -> np.ndarray:
-    """Return the distance ``(N,)`` in m from each frame's origin to the object's surface in direction -Z."""
+    """Return the distance ``(N,)`` in m from each frame's origin to the object's outermost surface in direction -Z."""
     far_m = float(np.linalg.norm(request.solid.extents))
     distance_m, _ = caster.first_hits(poses[:, :3, 3] - far_m * poses[:, :3, 2], poses[:, :3, 2])
     return np.clip(far_m - distance_m, 0.0, far_m)

@@ -115,7 +115,8 @@ def language_of(answer: CaptionsAnswer, name: str | None, extents_m: np.ndarray)
 
 def _faults(text: str, answer: CaptionsAnswer, name: str | None, extents_m: np.ndarray) -> list[str]:
     """Return why a text is inadmissible: it refers to the presentation of the object, or states an impossible length."""
-    own = f"{name or ''} {answer.category}".lower()  # a camera may be called a camera
+    # words of the name and category are admissible: a camera may be called a camera
+    own = f"{name or ''} {answer.category}".lower()
     faults = [
         f"{word!r} speaks of how the object is shown, not of the object"
         for word in dict.fromkeys(found.group(1).lower() for found in _NOT_THE_OBJECT.finditer(text))

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 FAR_PX = 24.0
-"""Clamp of the signed distance to a silhouette, in pixels of a ``Sight``."""
+"""Maximum distance outside a silhouette that is resolved, in pixels of a ``Sight``; larger distances are set to it."""
 RIM_RAYS, MOST_PASSING_PX = 48, 6.0
 _STEPS = 40  # samples of a ray through the object's surroundings
 _AROUND = 1.15  # times the object's radius estimated from the silhouettes
