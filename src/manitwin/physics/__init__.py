@@ -1,1 +1,1 @@
-"""Rigid-body simulation: trials of grasps, robustness, settling."""
+"""Rigid-body simulation: grasp trials, robustness tests, settling of bodies and scenes, and robot worlds."""

@@ -1,4 +1,4 @@
-"""A ball dropped into a vessel that stands fixed: where it starts, how large it is, and whether it is inside at the end."""
+"""Ball-drop test of a vessel: start pose, ball radius, and the criterion for a ball that ends inside."""
 
 from __future__ import annotations
 
@@ -16,9 +16,12 @@ BALL_SECONDS = 2.0
 
 @dataclass(frozen=True)
 class BallDrop:
-    """The vessel turned by ``turn (3, 3)`` so that its opening is up, and a ball of ``radius_m`` that starts at ``start_m``.
+    """A vessel rotated by ``turn (3, 3)`` so that its opening points up (+Z), and a ball of ``radius_m`` that starts at
+    ``start_m``.
 
-    The radius is a third of the rim's or of the depth, whichever is less; the ball starts above the middle of the rim.
+    The radius is a third of the rim radius or of the depth, whichever is smaller. The ball starts above the centre of
+    the rim, ``rim_m (3,)``. ``depth_m`` is the depth of the opening, ``widest_m`` the largest horizontal distance of a
+    hull vertex from the rim's centre. Positions are in the frame of the rotated vessel.
     """
 
     turn: np.ndarray
@@ -30,7 +33,7 @@ class BallDrop:
 
     @classmethod
     def of(cls, hulls: Sequence[np.ndarray], opening: Opening) -> BallDrop:
-        """Take the hulls of a vessel, each ``(V, 3)`` m, and its opening in the same frame."""
+        """Build the test from the hulls of a vessel, each ``(V, 3)`` m, and its opening in the same frame."""
         axis, up = opening.axis, np.array([0.0, 0, 1])
         turn = rotation_between(axis, up)
         radius_m = min(opening.rim_radius_m, opening.depth_m) / 3
@@ -41,9 +44,9 @@ class BallDrop:
         return cls(turn, radius_m, start_m, rim_m, opening.depth_m, widest_m)
 
     def is_inside(self, end_m: np.ndarray) -> bool:
-        """Tell whether a ball that ended at ``end_m (3,)`` is in the vessel.
+        """Tell whether a ball that came to rest with its centre at ``end_m (3,)`` is in the vessel.
 
-        Its centre is below the brim by no more than the depth, and no farther from the axis than the vessel's widest point.
+        The centre must be below the rim by at most the depth, and closer to the opening's axis than ``widest_m``.
         """
         below_brim_m = float(self.rim_m[2] - end_m[2])
         beside_m = float(np.linalg.norm((end_m - self.rim_m)[:2]))

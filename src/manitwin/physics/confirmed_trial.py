@@ -1,8 +1,9 @@
-"""Two engines for what is at the limit: a grasp in which the object moved counts as held only where both engines hold it.
+"""Grasp trial confirmed by a second engine: a grasp in which the object moved counts as held only if both engines hold it.
 
-What stays where it is in the hand is held by less than friction's limit, and engines agree about it. What turned or slid before
-it came to rest has reached that limit, where the verdict depends on how an engine spreads pressure over the pads: of 1,337
-grasps of 60 objects that one engine held, all that the other one dropped were among the 10 % that had moved.
+An object that does not move in the hand is held below the friction limit, and engines agree about it. An object that
+turned or slid before it came to rest has reached that limit, where the verdict depends on how an engine distributes
+pressure over the pads. Measured on 1,337 grasps of 60 objects that one engine held: all grasps that the other engine
+dropped were among the 10 % in which the object had moved.
 """
 
 from __future__ import annotations
@@ -16,14 +17,16 @@ from manitwin.physics.trial import GraspTrial, TrialResult, TrialSettings
 from manitwin.robots.grippers.gripper import Gripper
 
 MOVED_M, MOVED_RAD = 0.002, 0.05
-"""A fifth of what the slides allow, and three degrees."""
+"""Thresholds of visible motion: a fifth of the displacement that the slides allow, and about three degrees."""
 
 
 class ConfirmedTrial:
-    """Try grasps in one engine, and those that it holds though the object moved in a second one; it can overturn them."""
+    """Grasp trial in a first engine whose held grasps with a moved object are repeated in a second engine, which can
+    overturn them.
+    """
 
     def __init__(self, first: GraspTrial, second: GraspTrial):
-        """Take both engines; the trial is named after the first."""
+        """Take both engines. ``name`` is that of the first, ``confirmed_by`` that of the second."""
         self.first, self.second = first, second
         self.name = first.name
         self.confirmed_by = second.name
@@ -36,9 +39,10 @@ class ConfirmedTrial:
         settings: TrialSettings,
         joints_rad: np.ndarray | None = None,
     ) -> list[TrialResult]:
-        """Try the grasps ``gripper_to_object (N, 4, 4)``; a held one that the second engine refuses has its result.
+        """Try the grasps ``gripper_to_object (N, 4, 4)`` and return their results in the same order.
 
-        What the second engine says of those that it was asked about is their ``second_outcome``.
+        A held grasp that the second engine does not hold gets the second engine's result. ``second_outcome`` is set for
+        the grasps that the second engine tried.
         """
         results = list(self.first.run(body, gripper, gripper_to_object, settings, joints_rad))
         moved = [number for number, result in enumerate(results) if result.outcome == "held" and has_moved(result)]
@@ -52,5 +56,5 @@ class ConfirmedTrial:
 
 
 def has_moved(result: TrialResult) -> bool:
-    """Tell whether the object visibly turned in the closed hand, or slid in it."""
+    """Tell whether the object turned by more than ``MOVED_RAD`` or moved by more than ``MOVED_M`` in the closed hand."""
     return result.displacement_m > MOVED_M or result.rotation_rad > MOVED_RAD

@@ -1,8 +1,10 @@
-"""Filters of proposed grasps: the contact of the pads, the clearance of the open hand, and that from a supporting plane.
+"""Geometric filters of parallel-jaw grasp proposals: pad contact, and clearance of the open hand from object and support
+plane.
 
-Contact is found by a grid of rays from each open pad, inwards. A grasp that is proven in the air may have its fingertips
-below the plane that the object will be picked from: of the fork, the plate and the scissors of the test set every one had.
-The last millimetres of the pads hold flat things as well, so such a grasp is raised.
+Pad contact is found by casting a grid of rays from each open pad inwards. A grasp that holds in free space may have its
+fingertips below the plane from which the object will be picked; for the fork, the plate and the scissors of the test set this
+is the case for every grasp. Since the last millimetres of the pads hold flat objects as well, ``raised`` draws such a grasp
+back along its approach.
 """
 
 from __future__ import annotations
@@ -19,38 +21,39 @@ from manitwin.physics.pad_loads import PressedPads
 from manitwin.robots.grippers.hand_clearance import HandCollision
 from manitwin.robots.grippers.parallel import ParallelGripper
 
-ACROSS, ALONG = 3, 5  # cells of a pad
+ACROSS, ALONG = 3, 5  # rays per pad: across (Y) and along the approach (Z)
 PAD_CELLS = ACROSS * ALONG
-INSET = 0.87  # the outermost rays lie inside the pad's edge
-SAME_CONTACT_M = 0.0015  # cells this close behind the first one touch too, as soft pads do
+INSET = 0.87  # share of the pad's half extents that the grid of rays spans
+SAME_CONTACT_M = 0.0015  # cells within this depth of the first contact also touch, because soft pads conform
 PAD_GIVE_M = 0.0005
-"""What pads give under the closing force: cells this close touch before the object has turned flat to them."""
-# The pad filter: two cells of fifteen, contact centres at most 6 mm apart, normals inside the narrowed friction cone.
+"""Compression of the pads under the closing force: cells within this depth touch before the object has aligned with the pads."""
+# Pad filter: at least two of fifteen cells, contact centres at most 6 mm apart, normals inside the friction cone whose
+# coefficient is divided by CONE_SAFETY.
 MIN_CELLS, MAX_OFFSET_M, CONE_SAFETY = 2, 0.006, 1.5
 CLEARANCE_M = 0.0005
-# What the simulation is likely to hold, measured on 1,799 trials of 18 objects: of grasps with levers under 50 mm 98 %
-# held, beyond 80 mm 47 %; of those on 2 cells 73 %, on 6 and more 92 %.
+# Limits for grasps that are likely to hold in simulation, measured on 1,799 trials of 18 objects: 98 % of the grasps with
+# levers below 50 mm held, 47 % beyond 80 mm; 73 % of those with 2 touching cells held, 92 % with 6 and more.
 GOOD_CELLS = 3
-GOOD_LOAD_SHARE = 0.5  # half of what pads bear: of 4,385 trials of 96 templates 91 % held below it, 48 % beyond
-POOR_LEVER_M = 0.1  # costs as much as half of what pads bear
+GOOD_LOAD_SHARE = 0.5  # half of the load limit: of 4,385 trials of 96 templates 91 % held below it, 48 % above
+POOR_LEVER_M = 0.1  # a lever that costs as much as a load share of GOOD_LOAD_SHARE
 GOOD_COST = 0.5
 
 SUPPORT_CLEARANCE_M = 0.002
-"""Between the open hand and the plane."""
+"""Clearance between the open hand and the support plane."""
 MIN_DESCENT = 0.5
-"""The least cosine between the approach and straight down at which a hand is raised along it."""
+"""Smallest cosine between the approach and straight down for which a grasp is drawn back."""
 
 
 @dataclass(frozen=True)
 class PadContacts:
-    """The contacts of both pads of N grasps with an object.
+    """Contacts of both pads with the object, for N grasps.
 
-    ``width_m`` distance of the two contacts along the closing axis (inf where a pad meets nothing), ``cells`` the
-    smaller number of touching cells of the two pads, ``from_end_m`` the distance of a contact's centre from the end of its pad
-    along the approach, the smaller of two, ``offset_m`` the distance of the two contacts' centres across the closing
-    axis, ``alignment`` the smaller mean cosine of surface normal and closing axis, ``lever_m`` the distance of
-    the centre of mass from the line through the contacts, ``pads`` where they press once they are flat on the object,
-    ``unturned`` where before.
+    ``width_m`` is the distance of the two contacts along the closing axis (inf if a pad has no contact). ``cells`` is
+    the smaller number of touching cells of the two pads. ``from_end_m`` is the distance of the contact centre from the
+    distal end of its pad along the approach, the smaller of the two pads. ``offset_m`` is the distance of the two
+    contact centres across the closing axis. ``alignment`` is the smaller mean cosine between surface normals and
+    closing axis. ``lever_m`` is the distance of the centre of mass from the line through the contacts. ``pads`` are the
+    pressure regions once the object lies flat against the pads, ``unturned`` those before it has turned.
     """
 
     width_m: np.ndarray
@@ -63,7 +66,7 @@ class PadContacts:
     unturned: PressedPads
 
     def take(self, index: np.ndarray) -> PadContacts:
-        """Return the contacts at ``index``."""
+        """Return the contacts of the grasps at ``index``."""
         some = {f.name: getattr(self, f.name)[index] for f in fields(self) if f.name not in ("pads", "unturned")}
         return PadContacts(pads=self.pads.take(index), unturned=self.unturned.take(index), **some)
 
@@ -71,14 +74,18 @@ class PadContacts:
 def pad_contacts(
     gripper: ParallelGripper, gripper_to_object: np.ndarray, hulls: RayCaster, center_of_mass_m: np.ndarray
 ) -> PadContacts:
-    """Cast rays from both open pads of grasps ``(N, 4, 4)`` against the union of the hulls."""
+    """Return the pad contacts of grasps ``(N, 4, 4)`` with the union of the hulls, by casting rays from both open pads."""
     plus, minus = (_pad_hits(gripper, gripper_to_object, hulls, side) for side in (1, -1))
     return _both_pads(gripper, gripper_to_object, plus, minus, center_of_mass_m)
 
 
 @dataclass(frozen=True)
 class _Touched:
-    """``cells (N,)`` of a pad that touch, their ``center_m (N, 2)`` on the pad, ``least_m`` and ``most_m (N, 2)`` their ends."""
+    """Touching cells of one pad: their number ``cells (N,)``, centre ``center_m (N, 2)`` and bounds ``least_m``,
+    ``most_m (N, 2)``.
+
+    Coordinates are Y (across) and Z (along the approach) of the gripper frame.
+    """
 
     cells: np.ndarray
     center_m: np.ndarray
@@ -91,11 +98,11 @@ class _Touched:
 
 @dataclass(frozen=True)
 class _PadHits:
-    """What one pad of each of N grasps meets.
+    """Ray hits of one pad for each of N grasps.
 
-    ``depth_m (N,)`` of the first cell's contact (inf: nothing), ``soft`` and ``unturned`` the cells that touch as far as soft
-    pads conform and as far as they give before the object turns, ``alignment (N,)`` the mean cosine of the soft ones' normals and
-    the closing axis.
+    ``depth_m (N,)`` is the distance from the open pad to the first contact (inf if none). ``soft`` are the cells that
+    touch because soft pads conform, ``unturned`` those that touch before the object turns. ``alignment (N,)`` is the
+    mean cosine between the normals of the ``soft`` cells and the closing axis.
     """
 
     depth_m: np.ndarray
@@ -134,9 +141,9 @@ def _pad_hits(gripper: ParallelGripper, gripper_to_object: np.ndarray, hulls: Ra
 
 
 def _placed(points_m: np.ndarray, rotation: np.ndarray, origin_m: np.ndarray) -> np.ndarray:
-    """Return points ``(K, 3)`` of a hand at each of its poses, ``(N, 3, 3)`` and ``(N, 3)``: ``(N, K, 3)``.
+    """Transform points ``(K, 3)`` of the hand by N poses (``rotation (N, 3, 3)``, ``origin_m (N, 3)``) to ``(N, K, 3)``.
 
-    Axis by axis, ten times as fast as an einsum over axes of three, whose sums these are to the bit.
+    Written out axis by axis, which is ten times as fast as the equivalent einsum and gives bitwise the same sums.
     """
     placed = np.empty((len(rotation), len(points_m), 3))
     x, y, z = points_m.T
@@ -147,7 +154,7 @@ def _placed(points_m: np.ndarray, rotation: np.ndarray, origin_m: np.ndarray) ->
 
 
 def _touched(touching: np.ndarray, grid: np.ndarray) -> _Touched:
-    """Sum up which cells touch ``(N, C)`` of those at ``grid (C, 2)``."""
+    """Summarise the touching cells, ``touching (N, C)`` bool, of a pad with cell centres ``grid (C, 2)``."""
     count, least_m, most_m = _ends_of_cells(tuple(map(tuple, grid.tolist())))
     which = touching @ (1 << np.arange(len(grid)))
     return _Touched(
@@ -160,7 +167,9 @@ def _touched(touching: np.ndarray, grid: np.ndarray) -> _Touched:
 
 @lru_cache(maxsize=8)
 def _ends_of_cells(grid: tuple[tuple[float, float], ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return number ``(2^C,)``, least and most ``(2^C, 2)`` of every choice among a pad's cells ``(C, 2)``, by its bits."""
+    """Return the count ``(2^C,)`` and the lower and upper bounds ``(2^C, 2)`` of every subset of the cells ``(C, 2)``,
+    by bit mask.
+    """
     count: np.ndarray = np.zeros(1, dtype=np.int64)
     least, most = np.full((1, 2), np.inf), np.full((1, 2), -np.inf)
     for cell in grid:
@@ -209,7 +218,9 @@ def _pressed(plus: _Touched, minus: _Touched, width_m: np.ndarray, off_m: np.nda
 
 @dataclass(frozen=True)
 class FilteredGrasps:
-    """The indices of the grasps that are left with their contacts, and how many were left after the pads alone."""
+    """Result of ``GraspFilter``: indices of the remaining grasps, their contacts, and the number that passed the pad
+    filter alone.
+    """
 
     index: np.ndarray
     contacts: PadContacts
@@ -217,25 +228,25 @@ class FilteredGrasps:
 
 
 class GraspFilter:
-    """The filters of one gripper for one object."""
+    """Pad contact and collision filter of one gripper for one object."""
 
     def __init__(
         self, gripper: ParallelGripper, hulls: tuple[np.ndarray, ...], center_of_mass_m: np.ndarray, friction: float
     ):
-        """Prepare the convex hulls (each ``(V, 3)`` m); ``friction`` is that between finger and object."""
+        """Prepare the convex hulls (each ``(V, 3)`` m); ``friction`` is the coefficient between finger and object."""
         self._gripper, self._center_of_mass_m = gripper, center_of_mass_m
         self._caster = RayCaster.of_hulls(hulls)
         self._collision = HandCollision(hulls)
         self._min_alignment = 1 / np.hypot(1, friction / CONE_SAFETY)
 
     def __call__(self, gripper_to_object: np.ndarray) -> FilteredGrasps:
-        """Keep the grasps ``(N, 4, 4)`` whose pads would touch well and whose open hand is free of the object."""
+        """Keep the grasps ``(N, 4, 4)`` whose pads make good contact and whose open hand does not collide with the object."""
         gripper = self._gripper
         plus = _pad_hits(gripper, gripper_to_object, self._caster, 1)
         met = np.flatnonzero((plus.soft.cells >= MIN_CELLS) & (plus.alignment >= self._min_alignment))
         minus = _pad_hits(
             gripper, gripper_to_object[met], self._caster, -1
-        )  # half of all rays, where one pad is enough to tell
+        )  # only for grasps whose first pad touches, which saves half of all rays
         contacts = _both_pads(gripper, gripper_to_object[met], plus.take(met), minus, self._center_of_mass_m)
         touching = (contacts.width_m < gripper.opening_m) & (contacts.cells >= MIN_CELLS)
         facing = (contacts.offset_m <= MAX_OFFSET_M) & (contacts.alignment >= self._min_alignment)
@@ -248,9 +259,11 @@ class GraspFilter:
 
 
 def pad_merits(contacts: PadContacts, load_share: np.ndarray, jammed: np.ndarray) -> Merits:
-    """Rate grasps: fit ones touch with three cells or more and bear twice what is asked of them; levers and loads cost.
+    """Rate grasps by touching cells, load share and lever.
 
-    ``jammed (N,)`` are those that stay on the pads' edges and are not borne by them: they are weak.
+    Fit grasps touch with at least ``GOOD_CELLS`` cells per pad and use at most half of the pads' load limit.
+    ``load_share (N,)`` is that of ``pad_loads.load_share``. ``jammed (N,)`` marks grasps in which the object stays on
+    the pads' edges and these cannot carry it; they are weak.
     """
     weak = (contacts.cells < GOOD_CELLS) | jammed
     cost = np.hypot(contacts.lever_m / POOR_LEVER_M, load_share / GOOD_LOAD_SHARE)
@@ -258,7 +271,7 @@ def pad_merits(contacts: PadContacts, load_share: np.ndarray, jammed: np.ndarray
 
 
 def lowest_points_m(gripper: ParallelGripper, gripper_to_object: np.ndarray, object_to_plane: np.ndarray) -> np.ndarray:
-    """Return the least height ``(N,)`` of the wide open hand above the plane z = 0, for each pose ``(N, 4, 4)``."""
+    """Return the lowest height ``(N,)`` m of the fully open hand above the plane z = 0, for grasp poses ``(N, 4, 4)``."""
     corners = np.concatenate([box_corners(half_m, pose) for pose, half_m in gripper.boxes(gripper.opening_m)])
     upwards = object_to_plane[2, :3]
     along = np.einsum("i,nij->nj", upwards, gripper_to_object[:, :3, :3])
@@ -269,10 +282,11 @@ def lowest_points_m(gripper: ParallelGripper, gripper_to_object: np.ndarray, obj
 def raised(
     gripper: ParallelGripper, gripper_to_object: np.ndarray, object_to_plane: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the grasps from above whose hand is below the plane, drawn back along their approach until it is clear.
+    """Draw grasps whose hand penetrates the support plane back along their approach until it is clear.
 
-    ``(N, 4, 4)`` to ``(M, 4, 4)``, with the index ``(M,)`` of each in the second value. Not drawn back farther than the pads
-    are high: then nothing would be left between them.
+    Takes poses ``(N, 4, 4)`` and returns the corrected poses ``(M, 4, 4)`` with their indices ``(M,)``. Only grasps
+    from above are corrected (``MIN_DESCENT``), and only by less than the height of the pads, beyond which the object
+    would leave them.
     """
     missing_m = SUPPORT_CLEARANCE_M - lowest_points_m(gripper, gripper_to_object, object_to_plane)
     descent = -(gripper_to_object[:, :3, 2] @ object_to_plane[2, :3])

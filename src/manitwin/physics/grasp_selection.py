@@ -1,4 +1,4 @@
-"""The choice of grasps to try: those that are likely to hold, and different from each other."""
+"""Selection of the grasps to try in simulation: likely to hold, and diverse."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ MIN_OCTANTS = 4
 
 @dataclass(frozen=True)
 class Merits:
-    """The prospects of N grasps before the trial.
+    """Ratings of N grasps before the trial: ``fit (N,)`` bool, ``weak (N,)`` bool, ``cost (N,)``.
 
-    A grasp is likely to hold where it is ``fit`` and its ``cost`` at most ``good_cost``. Of the others those that are not
-    ``weak`` come first, then those that cost less.
+    A grasp is likely to hold if it is ``fit`` and its ``cost`` is at most ``good_cost``. The remaining grasps are
+    ordered by ``weak`` (weak ones last), then by increasing cost.
     """
 
     fit: np.ndarray
@@ -26,16 +26,16 @@ class Merits:
     good_cost: float
 
     def likely(self) -> np.ndarray:
-        """Tell which grasps are likely to hold, ``(N,)`` bool."""
+        """Return which grasps are likely to hold, ``(N,)`` bool."""
         return self.fit & (self.cost <= self.good_cost)
 
     def take(self, index: np.ndarray) -> Merits:
-        """Return the merits at ``index``."""
+        """Return the ratings of the grasps at ``index``."""
         return Merits(self.fit[index], self.weak[index], self.cost[index], self.good_cost)
 
     @staticmethod
     def joined(parts: list[Merits]) -> Merits:
-        """Return the merits of all parts, one after the other."""
+        """Concatenate the ratings of several sets of grasps; ``good_cost`` is that of the first."""
         return Merits(
             np.concatenate([p.fit for p in parts]),
             np.concatenate([p.weak for p in parts]),
@@ -45,11 +45,12 @@ class Merits:
 
 
 def select_likely(gripper_to_object: np.ndarray, depth_m: np.ndarray, merits: Merits, count: int) -> np.ndarray:
-    """Choose ``count`` diverse grasps among those that are likely to hold: indices into the N grasps.
+    """Choose up to ``count`` diverse grasps among those that are likely to hold, and return their sorted indices.
 
-    The likely ones are fit and cost little, or are among the cheapest 30 %. Where they are too few, the cheapest join;
-    where they point into less than four octants, the cheapest of the other octants join. Then the farthest grasps are
-    chosen.
+    Likely grasps are fit, and cost at most ``good_cost`` or the 30 % quantile of all costs, whichever is larger. If
+    there are fewer than ``count``, the best-ranked others are added. If the approach directions cover fewer than
+    ``MIN_OCTANTS`` octants, the best-ranked grasps of the missing octants are added. Farthest-point sampling then picks
+    ``count`` of them.
     """
     good_cost = max(merits.good_cost, float(np.quantile(merits.cost, LOW_COST_SHARE)))
     likely = merits.fit & (merits.cost <= good_cost)

@@ -1,9 +1,9 @@
-"""What weight and slides ask of two pads: the share of the wrench that they bear by friction and by where they press.
+"""Grasp wrench limits of two parallel pads: the share of their load limit that weight and slide accelerations use.
 
-About the closing axis pads bear a moment by friction alone. Across it they bear one by pressing with opposite ends, as far apart
-as what they touch reaches, and by friction that pulls up on one side and down on the other of what is wide. So a vessel that
-hangs by its wall, with its weight beside the pads along the closing axis, may tip out of a grasp whose axis passes near its
-centre of mass.
+About the closing axis, the pads resist a moment by torsional friction alone. About the two other axes they resist it by
+shifting their centres of pressure to opposite ends of the contact regions, and by friction forces of opposite sign on
+both sides of a wide object. A vessel held by its wall, whose weight lies beside the pads along the closing axis, can
+therefore tip out of a grasp even if the grasp axis passes close to its centre of mass.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ import numpy as np
 from manitwin.physics.trial import GRAVITY_M_S2
 from manitwin.physics.trial_phases import SLIDE_DIRECTIONS
 
-PEAK_SLIDE_ACCELERATION_M_S2 = 3.6  # of a quintic path of 0.1 m in 0.4 s: 5.77 d / t^2
-PAD_ARM_M = 0.007  # the arm of the friction torque that a whole pad can hold: about two thirds of its half width
-LEAST_MOMENT_NM = 1e-3  # pads that touch in a point bear as good as nothing
+PEAK_SLIDE_ACCELERATION_M_S2 = 3.6  # peak of a quintic path of 0.1 m in 0.4 s: 5.77 d / t^2
+PAD_ARM_M = 0.007  # effective radius of the friction torque of a whole pad: about two thirds of its half width
+LEAST_MOMENT_NM = 1e-3  # lower bound of the moment limits: pads with a point contact resist almost no moment
 
 
 @dataclass(frozen=True)
 class PressedPads:
-    """Where two pads press in N grasps, in the gripper's frame.
+    """Pressure regions of two pads in N grasps, in the gripper frame.
 
-    ``middle_m (N, 3)`` is the middle between the two contacts, ``width_m (N,)`` their distance along X. ``least_apart_m`` and
-    ``most_apart_m (N, 2)`` say along Y and Z how far the +X pad's centre of pressure can be from the -X pad's.
-    ``touching (N,)`` is the share of a pad's area that touches, of the pad with less.
+    ``middle_m (N, 3)`` is the midpoint of the two contacts, ``width_m (N,)`` their distance along X. ``least_apart_m``
+    and ``most_apart_m (N, 2)`` bound, along Y and Z, the offset of the +X pad's centre of pressure from that of the -X
+    pad. ``touching (N,)`` is the share of a pad's area that is in contact, for the pad with less.
     """
 
     middle_m: np.ndarray
@@ -36,12 +36,15 @@ class PressedPads:
     touching: np.ndarray
 
     def take(self, index: np.ndarray) -> PressedPads:
-        """Return the pads at ``index``."""
+        """Return the pressure regions of the grasps at ``index``."""
         return PressedPads(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
 
 
 def torque_ratio(lever_m: np.ndarray, *, mass_kg: float, force_n: float, friction: float) -> np.ndarray:
-    """Return the torque that weight and slides need about the pads, over what friction can hold."""
+    """Return the torque that weight and slides exert about the pads, divided by the torsional friction limit.
+
+    ``lever_m`` is the distance of the centre of mass from the grasp axis. The limit is 2 mu F r with r = ``PAD_ARM_M``.
+    """
     needed = mass_kg * (GRAVITY_M_S2 + PEAK_SLIDE_ACCELERATION_M_S2) * lever_m
     return needed / (2 * friction * force_n * PAD_ARM_M)
 
@@ -56,20 +59,25 @@ def load_share(
     friction: float,
     flat: bool = True,
 ) -> np.ndarray:
-    """Return the largest share ``(N,)`` of what the pads of grasps ``(N, 4, 4)`` bear that weight and slides ask of them.
+    """Return the share ``(N,)`` of the pads' load limit that weight and slides use in grasps ``(N, 4, 4)``, worst of
+    six directions.
 
-    Of each of the slides' six directions, sqrt(t^2 + mx^2 + my^2 + mz^2): the force across the closing axis over 2 mu F, and
-    each moment over its own limit. These are 2 mu F r about the closing axis, and F d + mu F w about the others, with the
-    distance d of the centres of pressure that the moment wants and the width w. The arm r is that of a whole pad where both are
-    taken to be ``flat`` on the object, else that of a disc of the area that touches. An ellipsoid stands for the limit surface
-    (Howe and Cutkosky, Practical force-motion models for sliding manipulation, 1996).
+    For each slide direction the share is sqrt(t^2 + mx^2 + my^2 + mz^2): the force across the closing axis over 2 mu F,
+    and each moment over its own limit. The limits are 2 mu F r about the closing axis and F d + mu F w about the two
+    other axes, with the available offset d of the centres of pressure and the width w. The radius r is that of a whole
+    pad if both pads are taken to lie ``flat`` on the object, otherwise that of a disc with the area in contact. The
+    ellipsoid approximates the limit surface (Howe and Cutkosky, Practical force-motion models for sliding manipulation,
+    1996).
+
+    ``gripper_to_object`` and ``center_of_mass_m (3,)`` are in the object frame, whose -Z is the direction of gravity.
     """
     rotation = gripper_to_object[:, :3, :3]
     away_m = np.einsum("nji,nj->ni", rotation, center_of_mass_m - gripper_to_object[:, :3, 3]) - pads.middle_m
     accelerations = [0.0, 0.0, -GRAVITY_M_S2] + PEAK_SLIDE_ACCELERATION_M_S2 * SLIDE_DIRECTIONS
     forces_n = mass_kg * np.einsum("nji,kj->nki", rotation, accelerations)
     moments_nm = np.cross(away_m[:, None], forces_n)
-    # the +X pad pushes along -X: with its centre of pressure (y, z) from the other's, both give the moment F (0, -z, y)
+    # The +X pad pushes along -X. With its centre of pressure offset by (y, z) from the other's, both give the moment F (0,
+    # -z, y).
     sides = np.stack([-moments_nm[:, :, 2], moments_nm[:, :, 1]], axis=2)  # along Y, along Z
     apart_m = np.where(sides > 0, pads.most_apart_m[:, None], -pads.least_apart_m[:, None])
     limits_nm = force_n * apart_m + friction * force_n * pads.width_m[:, None, None]
@@ -87,9 +95,10 @@ def load_share(
 
 
 def jams(width_m: np.ndarray, pad_m: float, friction: float) -> np.ndarray:
-    """Tell what does not turn flat between pads of ``pad_m`` that close on it, but stays on their edges.
+    """Tell which objects stay on the pads' edges instead of turning flat between pads of length ``pad_m`` that close on them.
 
-    Turned by a small t between them it is w + d t wide, with its width w and the pads' d: to turn by dt the closing force F
-    gives F d dt, and friction on two edges that slide by w/2 dt each takes mu F w dt. So it jams where w > d / mu.
+    Turned by a small angle t, an object of width w separates pads of length d by w + d t. Turning it by dt gains the
+    work F d dt of the closing force F, while friction on two edges that each slide by w/2 dt costs mu F w dt. The
+    object jams if w > d / mu.
     """
     return width_m > pad_m / friction

@@ -1,8 +1,9 @@
-"""Robustness of held grasps: perturbations by which reality may differ, and a sequential test that stops when it is clear.
+"""Robustness of held grasps: random perturbations of pose, friction, force and mass, and a sequential test of the
+success rate.
 
-Wald 1945, "Sequential tests of statistical hypotheses": after each trial the log likelihood ratio of "holds in
-``robust_share`` of the cases" against "holds in ``fragile_share``" is looked at; beyond ln((1 - error) / error) to either
-side the question is settled.
+The test is Wald's sequential probability ratio test (Wald, "Sequential tests of statistical hypotheses", 1945). After
+each trial it evaluates the log likelihood ratio of the success rates ``robust_share`` and ``fragile_share``, and stops
+when the absolute value exceeds ln((1 - error) / error).
 """
 
 from __future__ import annotations
@@ -19,12 +20,12 @@ from manitwin.geometry.poses import transform
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.physics.trial import TrialSettings
 
-ROUNDING = 1e-9  # of the sums of logarithms: a ratio that reaches the bound exactly is beyond it
+ROUNDING = 1e-9  # of the sums of logarithms: a ratio that equals the bound up to rounding counts as beyond it
 
 
 @dataclass(frozen=True)
 class SequentialTest:
-    """The two shares that are told apart, the chance of confusing them, and the most trials."""
+    """Parameters of the test: the two success rates to distinguish, the error probability, and the maximum number of trials."""
 
     robust_share: float
     fragile_share: float
@@ -32,41 +33,41 @@ class SequentialTest:
     max_trials: int
 
     def log_ratio(self, held: int, trials: int) -> float:
-        """Return the logarithm of how much likelier ``held`` of ``trials`` is for a robust grasp than for a fragile one."""
+        """Return the log likelihood ratio of robust over fragile, given ``held`` successes in ``trials``."""
         gain = math.log(self.robust_share / self.fragile_share)
         loss = math.log((1 - self.robust_share) / (1 - self.fragile_share))
         return held * gain + (trials - held) * loss
 
     def is_clear(self, held: int, trials: int) -> bool:
-        """Tell whether no further trial is needed."""
+        """Tell whether the test is decided or ``max_trials`` is reached."""
         bound = math.log((1 - self.error) / self.error)
         return trials >= self.max_trials or abs(self.log_ratio(held, trials)) >= bound - ROUNDING
 
     def is_robust(self, held: int, trials: int) -> bool:
-        """Tell whether what was seen is likelier for a robust grasp; also where ``max_trials`` ended it undecided."""
+        """Tell whether the outcomes are likelier for a robust grasp; also valid if ``max_trials`` ended an undecided test."""
         return self.log_ratio(held, trials) > 0
 
 
 @dataclass(frozen=True)
 class Robustness:
-    """The result of repeated trials of one grasp: how many held, of how many."""
+    """Outcome of repeated trials of one grasp: the number of successes and of trials."""
 
     held: int
     trials: int
 
     @property
     def share(self) -> float:
-        """The share of trials that held."""
+        """The success rate."""
         return self.held / self.trials
 
     @property
     def rank_value(self) -> float:
-        """The mean of the share's posterior under a uniform prior (Laplace): one that held 8 of 8 is before 4 of 4."""
+        """Posterior mean of the success rate under a uniform prior (Laplace), which ranks 8 of 8 above 4 of 4."""
         return (self.held + 1) / (self.trials + 2)
 
 
 def try_until_clear(holds: Callable[[int], bool], test: SequentialTest) -> Robustness:
-    """Call ``holds(0)``, ``holds(1)``, ... until the test is settled or ``max_trials`` are done."""
+    """Call ``holds(0)``, ``holds(1)``, ... until the test is decided or ``max_trials`` is reached."""
     held = 0
     for number in range(test.max_trials):
         held += holds(number)
@@ -77,10 +78,11 @@ def try_until_clear(holds: Callable[[int], bool], test: SequentialTest) -> Robus
 
 @dataclass(frozen=True)
 class Spread:
-    """The largest error of each quantity.
+    """Ranges from which perturbations are drawn.
 
-    ``pose_m`` and ``pose_deg`` are the largest shift and turn of the hand about its fingertips, ``friction`` and
-    ``force`` factors, ``mass_kg`` the interval of the twin's Estimate, ``center_of_mass_m`` the largest shift.
+    ``pose_m`` and ``pose_deg`` are the largest translation and rotation of the hand about its fingertips; ``friction``
+    and ``force`` are intervals of factors; ``mass_kg`` is the interval of the twin's Estimate; ``center_of_mass_m`` is
+    the largest shift of the centre of mass.
     """
 
     pose_m: float
@@ -93,10 +95,10 @@ class Spread:
 
 @dataclass(frozen=True)
 class FillCurve:
-    """How centre of mass and inertia of a vessel go with its mass, from empty to full.
+    """Centre of mass and inertia of a vessel as functions of its mass, from empty to full.
 
-    ``masses_kg (K,)`` rising, ``centers_m (K, 3)`` and ``inertias_kg_m2 (K, 3, 3)`` about them, object frame;
-    ``uncertainties_m (K,)``: how far each centre may be off.
+    ``masses_kg (K,)`` is increasing. ``centers_m (K, 3)`` are centres of mass and ``inertias_kg_m2 (K, 3, 3)`` the
+    inertia tensors about them, in the object frame. ``uncertainties_m (K,)`` bounds the error of each centre.
     """
 
     masses_kg: np.ndarray
@@ -105,14 +107,15 @@ class FillCurve:
     uncertainties_m: np.ndarray
 
     def uncertainty_share(self, mass_kg: float) -> float:
-        """Return how far the centre of mass of the vessel that weighs so much may be off, by that of the least certain state."""
+        """Return the uncertainty of the centre of mass at ``mass_kg``, relative to the largest uncertainty of the curve."""
         most_m = float(self.uncertainties_m.max())
         return float(np.interp(mass_kg, self.masses_kg, self.uncertainties_m)) / most_m if most_m > 0 else 0.0
 
     def filled(self, body: RigidBody, mass_kg: float) -> RigidBody:
-        """Return the body as the vessel is that weighs so much: states between two known ones are in line with both.
+        """Return the body with the mass properties of the vessel at ``mass_kg``, interpolated linearly between the
+        known states.
 
-        What weighs less than the empty one, or more than the full one, is spread as that is.
+        Below the empty and above the full mass, the properties of the nearest known state are scaled.
         """
         place = float(np.interp(mass_kg, self.masses_kg, np.arange(len(self.masses_kg))))
         below = min(int(place), len(self.masses_kg) - 2)
@@ -126,7 +129,9 @@ class FillCurve:
 
 @dataclass(frozen=True)
 class Perturbation:
-    """One draw: shift (m) and rotation vector (rad) of the hand in its own frame, factors, mass, shift of the centre of mass."""
+    """One sample: translation (m) and rotation vector (rad) of the hand in its own frame, factors, mass, shift of the
+    centre of mass.
+    """
 
     shift_m: np.ndarray
     turn_rad: np.ndarray
@@ -136,17 +141,19 @@ class Perturbation:
     center_of_mass_shift_m: np.ndarray
 
     def grasp(self, gripper_to_object: np.ndarray, depth_m: float) -> np.ndarray:
-        """Return the grasp ``(4, 4)``, moved and turned about its fingertips' centre."""
+        """Return the grasp ``(4, 4)`` translated, and rotated about the centre of the fingertips, ``depth_m`` along the
+        approach.
+        """
         rotation = gripper_to_object[:3, :3] @ Rotation.from_rotvec(self.turn_rad).as_matrix()
         tip = gripper_to_object[:3, 3] + depth_m * gripper_to_object[:3, 2]
         shift = gripper_to_object[:3, :3] @ self.shift_m
         return transform(rotation, tip + shift - depth_m * rotation[:, 2])
 
     def body(self, body: RigidBody, filling: FillCurve | None = None) -> RigidBody:
-        """Return the body with another mass, centre of mass and friction; the inertia goes with the mass.
+        """Return the body with perturbed mass, centre of mass and friction; the inertia scales with the mass.
 
-        Of a vessel the drawn mass says how full it is, and ``filling`` where its centre of mass then is, and how certainly; the
-        shift is that of its least certain state.
+        For a vessel, ``filling`` gives the centre of mass and its uncertainty at the sampled mass, and scales the
+        sampled shift, which was drawn for the least certain state.
         """
         shift_m = self.center_of_mass_shift_m
         if filling is not None:
@@ -162,20 +169,21 @@ class Perturbation:
         )
 
     def settings(self, settings: TrialSettings) -> TrialSettings:
-        """Return the settings with another force and finger friction."""
+        """Return the settings with perturbed closing force and finger friction."""
         return replace(
             settings, force_n=settings.force_n * self.force, finger_friction=settings.finger_friction * self.friction
         )
 
 
 def draw_perturbations(spread: Spread, count: int, seed: int) -> list[Perturbation]:
-    """Draw ``count`` perturbations, spread evenly (scrambled Sobol sequence), the same for every grasp of an object.
+    """Draw ``count`` perturbations from a scrambled Sobol sequence; the same for every grasp of an object.
 
-    Shifts and turns are uniform in their balls, factors uniform, masses uniform in their logarithm.
+    Translations and rotations are uniform in their balls, factors are uniform, masses are log-uniform.
     """
-    from scipy.stats import qmc  # a second or so of imports that only trials need
+    from scipy.stats import qmc  # imported here because it takes about a second and only trials need it
 
-    # a scrambled Sobol sequence is balanced at powers of two only; the first of a longer one are the same points
+    # A scrambled Sobol sequence is balanced only at powers of two, so the next power is drawn and its first points are
+    # used.
     unit = qmc.Sobol(d=15, scramble=True, seed=seed).random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count]
     low, high = np.log(spread.mass_kg)
     return [
@@ -196,7 +204,7 @@ def _between(interval: tuple[float, float], share: float) -> float:
 
 
 def _in_ball(unit: np.ndarray) -> np.ndarray:
-    """Turn four numbers in [0, 1] into a point ``(3,)`` uniform in the unit ball: a direction and a radius."""
+    """Map four numbers in [0, 1] to a point ``(3,)`` uniform in the unit ball: a direction and a radius."""
     direction = ndtri(np.clip(unit[:3], 1e-9, 1 - 1e-9))
     return np.asarray(direction / np.linalg.norm(direction) * np.cbrt(unit[3]))
 
@@ -204,10 +212,10 @@ def _in_ball(unit: np.ndarray) -> np.ndarray:
 def jittered(
     gripper_to_object: np.ndarray, depth_m: np.ndarray, rng: np.random.Generator, *, sigma_deg: float, sigma_m: float
 ) -> np.ndarray:
-    """Return grasps ``(N, 4, 4)``, each turned about its fingertips' centre and moved, all six by a normal deviate.
+    """Return grasps ``(N, 4, 4)`` with normally distributed rotation about the fingertips' centre and translation.
 
-    ``sigma_deg`` is per axis of the gripper's frame, ``sigma_m`` per axis of the object's. About the fingertips: turned
-    about the wrist, the same angles would carry most fingers off the object.
+    ``sigma_deg`` applies to each Euler angle in the gripper frame, ``sigma_m`` to each axis of the object frame. The
+    rotation is about the fingertips because the same angles about the wrist would move most fingers off the object.
     """
     turns = Rotation.from_euler(
         "xyz", rng.normal(0.0, sigma_deg, (len(gripper_to_object), 3)), degrees=True

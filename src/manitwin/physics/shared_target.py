@@ -1,23 +1,27 @@
-"""How a parallel hand closes, the same in every engine: one target of both fingers, which never presses too hard."""
+"""Closing control of a parallel hand, the same in every engine: one position target for both fingers, with limited force."""
 
 from __future__ import annotations
 
 from manitwin.physics.trial import TrialSettings
 
-STILL_SHARE = 0.01  # of the closing speed: slower fingers have been stopped, and do not just lag behind their target
-MET_M = 1e-6  # pads this close have met
+STILL_SHARE = (
+    0.01  # of the closing speed: slower fingers are stopped by the object, not merely lagging behind their target
+)
+MET_M = 1e-6  # pads closer than this are considered to have met
 
 
 class SharedTarget:
-    """The one position target of both fingers of a closing parallel hand; it never presses with more than the closing force.
+    """Position target shared by both fingers of a closing parallel hand, limited so that they press with at most the
+    closing force.
 
-    The mechanical coupling of the real hand does the same; two independently saturated fingers have no lateral stiffness
-    and drift by centimetres.
+    The mechanical coupling of a real hand has the same effect. Two independently saturated fingers would have no
+    lateral stiffness and drift by centimetres.
 
-    Coordinates are the distances (m) of the pads from the plane between them. Pads that meet (``met_m`` and less) have
-    nothing between them, whatever they overlap: the target goes back to where it was, as a gripper opens again that
-    reports an empty hand. Without this, fingers that have tunnelled into a thin and light object hold it. ``presses`` tells
-    whether the fingers have come to a stop, as far behind the target as the closing force pushes.
+    Coordinates are the distances (m) of the pads from the plane between them. If the pads meet (mean position at most
+    ``met_m``), there is nothing between them: the target returns to the open position, as a gripper opens again that
+    reports an empty hand. Without this rule, fingers that have tunnelled into a thin, light object would hold it.
+    ``presses`` tells whether the fingers have stopped and lag behind the target by the distance that yields the closing
+    force.
     """
 
     def __init__(self, opening_m: float, settings: TrialSettings, met_m: float = MET_M):
@@ -28,7 +32,7 @@ class SharedTarget:
         self._ramp_m = settings.close_speed_m_s * settings.frame_s
 
     def move_on(self, mean_position_m: float) -> float:
-        """Move on by one frame and return the target; ``mean_position_m`` is that of the two fingers."""
+        """Advance the target by one frame and return it (m); ``mean_position_m`` is the mean position of the two fingers."""
         self._met = self._met or mean_position_m <= self._met_m
         if self._met:
             self.value_m, self.presses = self._open_m, False

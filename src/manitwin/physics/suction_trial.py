@@ -1,8 +1,8 @@
-"""The grasp trial of a suction cup, in closed form: no solver, nothing to converge.
+"""Grasp trial of a suction cup, evaluated in closed form without a physics engine.
 
-A sealed object is as one with the cup, so what the lip must carry along the path follows from Newton and Euler: the
-object's weight and inertial force at its centre of mass. The bellows' own spring is left out. Where the lip lets go, the
-object moves on freely.
+A sealed object moves rigidly with the cup, so the load on the lip along the path follows from Newton's and Euler's
+equations: the object's weight and inertial force act at its centre of mass. The compliance of the bellows is neglected.
+After the lip detaches, the object moves freely.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from manitwin.robots.grippers.suction import SuctionGripper
 
 
 class SuctionTrial:
-    """Try grasps of a suction cup one by one, exactly."""
+    """Grasp trial of a suction cup by statics, one grasp at a time."""
 
     name = "statics"
 
@@ -37,9 +37,9 @@ class SuctionTrial:
         settings: TrialSettings,
         joints_rad: np.ndarray | None = None,
     ) -> list[TrialResult]:
-        """Try the grasps ``gripper_to_object (N, 4, 4)``; the vacuum's force is ``settings.force_n``.
+        """Try the grasps ``gripper_to_object (N, 4, 4)``; the vacuum force is ``settings.force_n``.
 
-        The cup seals on the body's ``surface``, and on its hulls where it has none.
+        The cup seals on the body's ``surface``, or on its hulls if it has no surface.
         """
         return [
             run_phases(scene, object_to_hand[:3, :3], settings)
@@ -63,7 +63,7 @@ class SuctionTrial:
     def _scenes(
         self, body: RigidBody, gripper: Gripper, gripper_to_object: np.ndarray, settings: TrialSettings
     ) -> list[tuple[_Scene, np.ndarray]]:
-        """Return a scene of each grasp, and where the object begins in it ``(4, 4)``."""
+        """Return the scene of each grasp with the object's initial pose ``(4, 4)`` in the hand's frame."""
         surface = RayCaster.of_hulls(body.hulls) if body.surface is None else body.surface
         cup = of_kind(gripper, SuctionGripper)
         found = seal(cup, gripper_to_object, surface)
@@ -87,14 +87,14 @@ class SuctionTrial:
         return scenes
 
     def _collision(self, hulls: tuple[np.ndarray, ...]) -> HandCollision:
-        """Prepare hulls, or return what was made of this very tuple: trials often are of one object."""
+        """Return the collision model of the hulls, cached for the last tuple because successive trials often share an object."""
         if self._last is None or self._last[0] is not hulls:
             self._last = hulls, HandCollision(hulls)
         return self._last[1]
 
 
 class _Scene:
-    """One cup and one object; the frame is the hand's."""
+    """Scene of one cup and one object (``TrialScene``), in the hand's frame."""
 
     def __init__(
         self,
@@ -138,29 +138,29 @@ class _Scene:
         self.velocity_m_s = velocity_m_s[-1]
 
     def squeeze(self) -> None:
-        """Switch the vacuum on."""
+        """Switch the vacuum on; it holds if the lip seals."""
         self.on = self.sealed
 
     def presses(self) -> bool:
-        """Tell whether the vacuum holds."""
+        """Tell whether the vacuum holds the object."""
         return self.on
 
     def contacts(self) -> HandContacts:
-        """Return how hard the lip presses unloaded; where the gripper's body is in the object, it is there without end."""
+        """Return the lip's force without load, and an infinite overlap if the gripper's body collides with the object."""
         return HandContacts((self.settings.force_n if self.on else 0.0,), np.inf if self.overlaps else 0.0)
 
     def object_to_hand(self) -> np.ndarray:
-        """Return the object's pose ``(4, 4)`` in the hand's frame; it does not turn."""
+        """Return the object's pose ``(4, 4)`` in the hand's frame; its rotation is constant."""
         return transform(self.rotation, self.center_m - self.rotation @ self.in_object_m)
 
     def hand_joints(self) -> np.ndarray:
-        """Return whether the vacuum holds, as 0 or 1 ``(1,)``."""
+        """Return whether the vacuum holds, as 0 or 1, ``(1,)``."""
         return np.array([float(self.on)])
 
     def object_rotation(self) -> np.ndarray:
-        """Return the object's rotation in the hand's frame."""
+        """Return the object's rotation ``(3, 3)`` in the hand's frame."""
         return self.rotation
 
     def center_of_mass_m(self) -> np.ndarray:
-        """Return the object's centre of mass in the hand's frame."""
+        """Return the object's centre of mass ``(3,)`` m in the hand's frame."""
         return self.center_m

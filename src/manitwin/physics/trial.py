@@ -1,7 +1,8 @@
-"""The grasp trial: its settings, its result, and the protocol that an engine fulfils.
+"""Grasp trial: its settings, its result, and the protocol that engines implement.
 
-The trial is the paper's ("Verification"): close, lift, wait for stable frames, slide along six directions. The numbers
-that the paper leaves open (force, friction, distances, solver) are settings, because the success rate depends on them.
+The trial is that of the paper ("Verification"): close, lift, wait for stable frames, slide along six directions.
+Numbers that the paper does not state (force, friction, distances, solver) are settings, because the success rate
+depends on them.
 """
 
 from __future__ import annotations
@@ -18,17 +19,17 @@ from manitwin.twin.grasp_summary import Outcome
 
 GRAVITY_M_S2 = 9.81
 
-_CONFIGURED = VerifyConfig()  # the defaults of what a user may set
+_CONFIGURED = VerifyConfig()  # defaults of the user's settings
 
 
 @dataclass(frozen=True)
 class TrialSettings:
-    """The numbers of the trial; each default is the one that was measured to be converged, or the paper's.
+    """Settings of the trial. Each default was measured to be converged, or is the paper's.
 
-    At 1/240 s, 20 iterations and 2 mm contact offset, nine of ten verdicts on hard grasps are those of a reference at
-    1/960 s and 40 iterations (two such references agree with each other no better); SAPIEN's default of 10 iterations
-    does not converge on several hulls. Where ``doubts_tried_again``, SAPIEN's trial of a parallel gripper tries what the
-    closed hand loses or just holds once more, at 1/960 s and with 40 iterations, and that verdict counts.
+    At 1/240 s, 20 iterations and 2 mm contact offset, nine of ten verdicts on difficult grasps agree with a reference
+    at 1/960 s and 40 iterations; two such references agree with each other no better. SAPIEN's default of 10 iterations
+    does not converge on objects of several hulls. If ``doubts_tried_again``, SAPIEN's trial of a parallel gripper
+    repeats grasps that the closed hand loses or barely holds at 1/960 s with 40 iterations, and that verdict counts.
     """
 
     force_n: float
@@ -58,19 +59,21 @@ class TrialSettings:
 
     @property
     def frame_s(self) -> float:
-        """The time between two looks at the hand: steps are the solver's matter, frames the protocol's."""
+        """Duration of a frame (s), the time between two updates of the hand: the solver works in steps, the protocol in
+        frames.
+        """
         return self.steps_per_frame * self.timestep_s
 
 
 @dataclass(frozen=True)
 class TrialResult:
-    """The outcome of one grasp.
+    """Outcome of one grasp trial.
 
-    ``displacement_m`` is the largest distance that the centre of mass moved in the hand during the phase that decided:
-    the slides of a held grasp, else the phase of its failure. ``rotation_rad`` is how far the object turned in the hand
-    since it was closed. ``penetration_m`` is the deepest overlap of finger and object, ``finger_forces_n`` the normal
-    forces of the fingers when closed, ``steps`` the simulated steps. ``second_outcome`` is that of a second engine, where one
-    was asked.
+    ``displacement_m`` is the largest displacement of the centre of mass in the hand during the deciding phase: the
+    slides of a held grasp, otherwise the phase in which the grasp failed. ``rotation_rad`` is the object's rotation in
+    the hand since it closed. ``penetration_m`` is the deepest overlap of hand and object, ``finger_forces_n`` the
+    normal forces of the closed fingers, ``steps`` the number of simulated steps. ``second_outcome`` is the outcome in a
+    second engine, if one tried the grasp.
     """
 
     outcome: Outcome
@@ -83,7 +86,7 @@ class TrialResult:
 
 
 class GraspTrial(Protocol):
-    """Try grasps on one object, each in a scene of its own. The same arguments give the same results."""
+    """Grasp trial of an engine: tries grasps on one object, each in its own scene, deterministically."""
 
     name: str
 
@@ -97,6 +100,7 @@ class GraspTrial(Protocol):
     ) -> list[TrialResult]:
         """Try the grasps ``gripper_to_object (N, 4, 4)`` and return their results in the same order.
 
-        ``joints_rad (N, 2, J)`` are given for hands with more joints: those before closing and those to close to.
+        ``joints_rad (N, 2, J)`` is required for multi-finger hands: the joint positions before closing and the closing
+        goal.
         """
         ...

@@ -1,9 +1,9 @@
-"""The phases of a grasp trial, the same in every engine: close, lift, stable frames, slides along six directions.
+"""Phases of a grasp trial, the same in every engine: close, lift, stable frames, slides along six directions.
 
 Source: paper, "Simulation Verification" (stable frames, slides, 1 cm, 2,000 steps).
 
-The scene's frame is the hand's, and moves with it without turning: the hand stays where it is, and what acts on the
-object is its weight and the inertial force of the path, -m a (Galilean relativity).
+The scene's frame is the hand's and translates with it. The hand therefore stays at rest in the scene, and the object is
+loaded by its weight and the inertial force of the path, -m a.
 """
 
 from __future__ import annotations
@@ -20,51 +20,52 @@ from manitwin.twin.grasp_summary import Outcome
 
 CHECK_EVERY_FRAMES = 4
 SLIDE_DIRECTIONS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1]], float)
-# A stroke speeds up and slows down, so one along +X loads the object along -X and +X: three out along X, Y and Z load all six
-# directions once, three out and back twice, and the whole twelve four times. Of 1,735 grasps (25 objects) that had moved less
-# than a fifth of the limit after six strokes, one failed in the other six, so such a grasp is not asked again. After three
-# strokes, half as much may have moved: the same rate of creep.
+# A stroke accelerates and decelerates, so one along +X loads the object along -X and +X: three strokes out along X, Y
+# and Z load all six directions once, three out and back twice, and all twelve four times. Of 1,735 grasps (25 objects)
+# in which the object had moved less than a fifth of the limit after six strokes, one failed in the other six, so the
+# other six are skipped for such grasps. After three strokes the threshold is half as large, which is the same rate of
+# creep.
 LOADED_ONCE, LOADED_TWICE, SURE_SHARE = (0, 2, 4), 6, 0.2
-# What comes to rest under the peak of the lift's load, before the hand slows down, has borne the most that a lift asks for: the
-# hand goes on at an even speed. Strokes of the same accelerations and a fifth of the time load it once along each direction.
-# What stays in them is held, what does not goes through whole strokes as well: a box heavier than friction carries moves by the
-# square of their time, so that less is allowed. What is lost so is no verdict: such a grasp goes through the whole trial. What
-# has turned far is not tried briefly.
-PEAK_SHARE, EVEN_SHARE, REST_M, REST_RAD = 0.25, 0.5, 0.0002, 0.02  # the last two between two looks
-BRIEF_STROKE_S = 0.0875  # of 21 steps of 1/240 s one is at the peak; of 24 none is nearer than 0.6 %
+# Brief trial. An object at rest under the peak load of the lift, before the hand decelerates, has carried the largest
+# load of the lift: the hand then continues at constant speed. Shorter strokes with the same accelerations load the
+# object once along each direction. If it does not move, it is held; otherwise it goes through whole strokes as well,
+# with a tighter limit because a box that friction cannot carry moves by the square of the stroke's time. A loss in a
+# brief trial is no verdict: the grasp goes through the whole trial. Objects that have turned far are not tried briefly.
+PEAK_SHARE, EVEN_SHARE, REST_M, REST_RAD = 0.25, 0.5, 0.0002, 0.02  # REST_M and REST_RAD are limits between two checks
+BRIEF_STROKE_S = 0.0875  # 21 steps of 1/240 s sample the peak acceleration exactly, 24 steps miss it by 0.6 %
 STEADY_SHARE, TURNED_RAD = 0.02, 0.15
 CLOSED_SPEED_M_S, CLOSED_SPEED_RAD_S = 0.001, 0.01
-"""What moves less in a hand that presses with all its force is at rest."""
+"""An object that moves more slowly than this in a hand that presses with the full closing force is at rest."""
 Phase = Literal["open", "close", "lift", "hold", "slide"]
 TrialWatch = Callable[[Phase, float, np.ndarray], None]
-"""Called after each advance with the phase, the time (s) and how far the hand was moved ``(3,)``, along the object's axes."""
+"""Callback after each advance: phase, time (s), and displacement ``(3,)`` m of the hand along the object's axes."""
 
 
 @dataclass(frozen=True)
 class HandContacts:
-    """The inward force (N) of each finger on the object, and the deepest overlap (m) of hand and object."""
+    """Inward force (N) of each finger on the object, and deepest overlap (m) of hand and object."""
 
     forces_n: tuple[float, ...]
     penetration_m: float
 
 
 class TrialScene(Protocol):
-    """One open hand and one object in an engine; poses and loads are in the scene's frame, that of the hand."""
+    """One open hand and one object in an engine; poses and loads are in the scene's frame, which is the hand's."""
 
     def advance(self, loads_m_s2: np.ndarray) -> None:
-        """Take one step for each row ``(N, 3)``: the acceleration that weight and path give the object in that step."""
+        """Take one step for each row ``(N, 3)`` m/s^2: the object's acceleration by weight and inertial force."""
         ...
 
     def squeeze(self) -> None:
-        """Move the fingers' common target on by one frame, until they press with the closing force."""
+        """Advance the fingers' common target by one frame, until they press with the closing force."""
         ...
 
     def presses(self) -> bool:
-        """Tell whether the fingers press with the closing force by now, as far as they know."""
+        """Tell whether the fingers press with the closing force, as far as the hand can measure it."""
         ...
 
     def contacts(self) -> HandContacts:
-        """Return what the fingers feel."""
+        """Return the contact forces of the fingers and the deepest overlap."""
         ...
 
     def object_rotation(self) -> np.ndarray:
@@ -72,12 +73,12 @@ class TrialScene(Protocol):
         ...
 
     def center_of_mass_m(self) -> np.ndarray:
-        """Return the object's centre of mass ``(3,)``."""
+        """Return the object's centre of mass ``(3,)`` m."""
         ...
 
 
 class _Failed(Exception):
-    """The grasp failed: ends the trial with its outcome."""
+    """The grasp failed; ends the trial with this outcome."""
 
     def __init__(self, outcome: Outcome):
         super().__init__(outcome)
@@ -87,16 +88,16 @@ class _Failed(Exception):
 def run_phases(
     scene: TrialScene, object_to_hand: np.ndarray, settings: TrialSettings, watch: TrialWatch | None = None
 ) -> TrialResult:
-    """Run the phases until one fails; ``object_to_hand (3, 3)`` turns the object's axes, along which the hand moves."""
+    """Run the phases until one fails; ``object_to_hand (3, 3)`` rotates the object's axes, along which the hand moves."""
     return _Phases(scene, object_to_hand, settings, watch).run()
 
 
 def run_brief_phases(
     scene: TrialScene, object_to_hand: np.ndarray, settings: TrialSettings, watch: TrialWatch | None = None
 ) -> TrialResult | None:
-    """Run the phases as ``run_phases`` does, but briefly for what comes to rest; None where that tells nothing.
+    """Run ``run_phases`` shortened for an object that comes to rest; return None if that is inconclusive.
 
-    The trial is then to be run again, from its beginning.
+    After None the trial has to be run again with ``run_phases``, in a new scene.
     """
     phases = _Phases(scene, object_to_hand, settings, watch, may_be_brief=True)
     result = phases.run()
@@ -154,7 +155,7 @@ class _Phases:
         self.closed_rotation = self.scene.object_rotation()
 
     def _rests_in_closed_hand(self) -> bool:
-        """Tell whether the hand has pressed for some frames and nothing has moved: what is left of the time changes nothing."""
+        """Tell whether the hand has pressed for ``stable_frames`` without motion of the object, so that closing can end early."""
         if not self.scene.presses():
             self.pressed = []
             return False
@@ -212,7 +213,7 @@ class _Phases:
         self._check_hold("slips")
 
     def _stays_in_brief_strokes(self, strokes: list[np.ndarray], reference: np.ndarray) -> bool:
-        """Load the object once along each direction by brief strokes, and tell whether it stays where it is."""
+        """Load the object once along each direction by brief strokes, and tell whether it stays in place."""
         settings, self.was_brief = self.settings, True
         shorter = min(1.0, BRIEF_STROKE_S / settings.slide_time_s)
         path, time_s, limit_m = shorter**2, shorter * settings.slide_time_s, settings.max_displacement_m
@@ -233,9 +234,9 @@ class _Phases:
         *,
         may_coast: bool = False,
     ) -> None:
-        """Move the hand along an object-frame path with a quintic profile; fail where the object lags behind it.
+        """Move the hand along a path ``(3,)`` m in the object's axes with a quintic profile; fail if the object lags behind.
 
-        Where it ``may_coast`` and the object is at rest after the peak, the hand keeps its speed from there on.
+        If ``may_coast`` and the object is at rest after the peak acceleration, the hand keeps its speed from there on.
         """
         count = round(time_s / self.settings.timestep_s)
         u = (np.arange(count) + 0.5) / count
@@ -262,22 +263,24 @@ class _Phases:
         return self.scene.center_of_mass_m(), self.scene.object_rotation()
 
     def _rests_since(self, before: tuple[np.ndarray, np.ndarray]) -> bool:
-        """Tell whether the object has hardly moved since a look."""
+        """Tell whether the object has moved less than ``REST_M`` and ``REST_RAD`` since a look."""
         (place, rotation), (now, turned) = before, self._look()
         return float(np.linalg.norm(now - place)) < REST_M and rotation_angle_rad(turned @ rotation.T) < REST_RAD
 
     def _turned_rad(self) -> float:
-        """Return how far the object has turned in the closed hand."""
+        """Return the object's rotation (rad) in the hand since it closed."""
         if self.closed_rotation is None:
             return 0.0
         return rotation_angle_rad(self.scene.object_rotation() @ self.closed_rotation.T)
 
     def _loads(self, acceleration_m_s2: np.ndarray) -> np.ndarray:
-        """Return what the object feels ``(N, 3)`` where the hand accelerates along the object's axes."""
+        """Return the loads ``(N, 3)`` m/s^2 on the object in the hand's frame, given the hand's accelerations along the
+        object's axes.
+        """
         return ([0, 0, -GRAVITY_M_S2] - acceleration_m_s2) @ self.object_to_hand.T
 
     def _check_hold(self, outcome: Outcome) -> None:
-        """Fail unless the fingers press the object towards each other without sinking into it."""
+        """Fail unless every finger presses inwards and none penetrates the object too deeply."""
         contacts = self.scene.contacts()
         self.penetration_m = max(self.penetration_m, contacts.penetration_m)
         if self.closed_rotation is None:
@@ -298,12 +301,12 @@ class _Phases:
 
 
 def _share_of_path(u: float) -> float:
-    """Return the share of a quintic path that is behind at the share ``u`` of its time."""
+    """Return the share of a quintic path covered at the share ``u`` of its duration."""
     return 10 * u**3 - 15 * u**4 + 6 * u**5
 
 
 def _speed_on_path(u: float) -> float:
-    """Return the slope of a quintic path at the share ``u`` of its time."""
+    """Return the derivative of the quintic path at the share ``u`` of its duration."""
     return 30 * u**2 * (1 - u) ** 2
 
 

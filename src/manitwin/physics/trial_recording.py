@@ -1,4 +1,4 @@
-"""A grasp trial as it can be watched again: where hand and object were, whenever the protocol looked at them."""
+"""Recording of a grasp trial for replay: the poses of hand and object after each advance of the protocol."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from manitwin.robots.grippers.gripper import Gripper
 
 @dataclass(frozen=True)
 class TrialRecording:
-    """The states of a trial, from its first step to the one that decided.
+    """States of a trial, from its first step to the deciding one.
 
-    ``time_s (S,)``; ``phases (S,)`` their names; ``hand_m (S, 3)`` how far the hand was moved, along the axes of the object
-    frame at the start; ``object_to_hand (S, 4, 4)``; ``joints (S, J)``: the distances (m) of both pads from the plane between
-    them, the joints (rad) of a hand with more of them, or whether the vacuum was on.
+    ``time_s (S,)``; ``phases (S,)``, their names; ``hand_m (S, 3)``, displacement of the hand along the axes of the
+    object frame at the start; ``object_to_hand (S, 4, 4)``; ``joints (S, J)``: the distances (m) of both pads from the
+    plane between them, the joint positions (rad) of a multi-finger hand, or whether the vacuum was on.
     """
 
     result: TrialResult
@@ -31,7 +31,7 @@ class TrialRecording:
 
 
 class RecordingTrial(Protocol):
-    """An engine's grasp trial that can be recorded; the same arguments give the result of its ``run``."""
+    """Grasp trial of an engine that can be recorded; the same arguments give the same result as ``run``."""
 
     def record(
         self,
@@ -41,24 +41,24 @@ class RecordingTrial(Protocol):
         settings: TrialSettings,
         joints_rad: np.ndarray | None = None,
     ) -> TrialRecording:
-        """Try one grasp ``gripper_to_object (4, 4)``; ``joints_rad (2, J)`` are given for hands with more joints."""
+        """Try one grasp ``gripper_to_object (4, 4)`` and record it; multi-finger hands need ``joints_rad (2, J)``."""
         ...
 
 
 class WatchedScene(TrialScene, Protocol):
-    """A scene that tells where things are; to ask changes nothing of the trial."""
+    """Scene that exposes poses and joints; reading them does not affect the trial."""
 
     def object_to_hand(self) -> np.ndarray:
         """Return the object's pose ``(4, 4)`` in the hand's frame."""
         ...
 
     def hand_joints(self) -> np.ndarray:
-        """Return the state ``(J,)`` of the hand, as ``TrialRecording.joints`` has it."""
+        """Return the state ``(J,)`` of the hand, as in ``TrialRecording.joints``."""
         ...
 
 
 class TrialRecorder:
-    """Collects the states of a trial; of one that begins again, those of the last."""
+    """Collects the states of a trial; if the trial is restarted, those of the last run."""
 
     def __init__(self) -> None:
         self._time_s: list[float] = []
@@ -66,7 +66,7 @@ class TrialRecorder:
         self._rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
 
     def watch(self, scene: WatchedScene) -> TrialWatch:
-        """Begin anew, and return what ``run_phases`` is to call."""
+        """Start a new recording and return the callback for ``run_phases``."""
         self._time_s, self._phases, self._rows = [], [], []
 
         def look(phase: Phase, time_s: float, hand_m: np.ndarray) -> None:
@@ -77,7 +77,9 @@ class TrialRecorder:
         return look
 
     def recording(self, result: TrialResult, object_to_hand: np.ndarray, joints: np.ndarray) -> TrialRecording:
-        """Return what was seen; where nothing was simulated, the one state that it would have begun with."""
+        """Return the recorded states; if nothing was simulated, the single initial state given by ``object_to_hand``
+        and ``joints``.
+        """
         rows = self._rows or [(np.zeros(3), object_to_hand, joints)]
         return TrialRecording(
             result,

@@ -1,1 +1,1 @@
-"""Robots as data: an arm from a URDF, a gripper from its TOML file, and what both need to be planned for and simulated."""
+"""Robot models: arms from URDF, grippers from TOML files, and the kinematics and collision data for planning and simulation."""

@@ -1,6 +1,7 @@
-"""A hand mounted on an arm, and its joints made what planner and simulation take: n revolute, two prismatic, the rest fixed.
+"""Assembly of arm and hand into one URDF, with the joint types that planner and simulation support.
 
-The hand is the links of another URDF, or links made of a parallel gripper's boxes.
+The result has n revolute arm joints and the joints of the hand; all others are fixed. The hand's links come from another URDF
+or are generated from the boxes of a parallel gripper.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ _GREY = "0.25 0.25 0.27 1"
 
 
 def mount(tree: UrdfTree, hand: UrdfTree, mount_link: str, root_link: str, root_to_mount: np.ndarray) -> None:
-    """Hang all links of ``hand`` below ``mount_link`` of the arm's tree, fixed at ``root_to_mount (4, 4)``.
+    """Attach all links of ``hand`` below ``mount_link`` of the arm's tree by a fixed joint at ``root_to_mount (4, 4)``.
 
-    Raises ConfigError where the link is not there, or a name is in both.
+    Raises ConfigError if ``mount_link`` does not exist, or if a link or joint name occurs in both trees.
     """
     tree.link(mount_link)
     for kind, mine, theirs in (("link", tree.links, hand.links), ("joint", tree.joints, hand.joints)):
@@ -43,9 +44,9 @@ def mount(tree: UrdfTree, hand: UrdfTree, mount_link: str, root_link: str, root_
 
 
 def generated_hand(gripper: ParallelGripper, mass_kg: float) -> UrdfTree:
-    """Return a gripper's boxes as a URDF of a palm and two prismatic fingers; the palm's frame is the grasp frame.
+    """Return a parallel gripper's boxes as a URDF of a palm and two prismatic fingers; the palm frame is the grasp frame.
 
-    The mass is shared out by the boxes' volumes: a hand's file has none.
+    The gripper's file has no masses, so ``mass_kg`` is distributed by the boxes' volumes.
     """
     name = gripper.name
     robot = new_element("robot", name=name)
@@ -64,12 +65,12 @@ def generated_hand(gripper: ParallelGripper, mass_kg: float) -> UrdfTree:
 
 
 def palm_link(gripper: str) -> str:
-    """Return the name of a generated hand's palm."""
+    """Return the name of a generated hand's palm link."""
     return f"{gripper}_palm"
 
 
 def finger_link(gripper: str, side: str) -> str:
-    """Return the name of a generated hand's finger on the ``plus`` or ``minus`` side of X."""
+    """Return the name of a generated hand's finger link on the ``plus`` or ``minus`` side of X."""
     return f"{gripper}_finger_{side}"
 
 
@@ -91,7 +92,7 @@ def add_joint(robot: etree._Element, name: str, kind: str, parent: str, child: s
 
 
 def add_box_link(robot: etree._Element, name: str, boxes: list[PlacedBox], density_kg_m3: float) -> None:
-    """Add a link of boxes of one density to a URDF."""
+    """Add a link of boxes of uniform density to a URDF, with visual, collision and inertial elements."""
     link = add(robot, "link", name=name)
     for box_to_link, half_m in boxes:
         for tag in ("visual", "collision"):
@@ -106,7 +107,7 @@ def add_box_link(robot: etree._Element, name: str, boxes: list[PlacedBox], densi
 
 
 def add_inertial(link: etree._Element, boxes: list[PlacedBox], density_kg_m3: float) -> None:
-    """Write the mass properties of boxes of one density (Steiner's theorem), overlaps counted twice."""
+    """Write the mass properties of boxes of uniform density (parallel axis theorem); overlapping volume counts twice."""
     masses = np.array([density_kg_m3 * 8 * half.prod() for _, half in boxes])
     centers = np.array([pose[:3, 3] for pose, _ in boxes])
     center = masses @ centers / masses.sum()
@@ -125,9 +126,9 @@ def add_inertial(link: etree._Element, boxes: list[PlacedBox], density_kg_m3: fl
 def settle_arm_joints(
     tree: UrdfTree, arm_joints: tuple[str, ...], tip_link: str, limits_rad: dict[str, tuple[float, float]]
 ) -> None:
-    """Check that the arm's joints are the way from the root to the tip, and narrow their limits in place.
+    """Check that ``arm_joints`` form the chain from the root to the tip, and narrow their limits in place.
 
-    A continuous joint becomes a revolute one of the limits that are given. Raises ConfigError naming what would be valid.
+    A continuous joint becomes revolute with the limits in ``limits_rad``. Raises ConfigError naming valid values.
     """
     unknown = sorted(set(limits_rad) - set(arm_joints))
     if unknown:
@@ -181,14 +182,15 @@ def _settle_arm_joint(tree: UrdfTree, name: str, given: tuple[float, float] | No
 
 
 def limits_of(tree: UrdfTree, names: tuple[str, ...], key: str) -> np.ndarray:
-    """Return one value of each joint's ``<limit>`` ``(n,)``: ``lower``, ``upper`` or ``velocity``."""
+    """Return one attribute of each joint's ``<limit>``, ``(n,)``: ``lower``, ``upper`` or ``velocity``."""
     return np.array([float(tree.joint(name).find("limit").get(key)) for name in names])
 
 
 def settle_finger_joints(tree: UrdfTree, names: tuple[str, str], half_opening_m: float) -> None:
-    """Check the two fingers' joints, free them of mimicry, and set their range to 0 to half of the opening.
+    """Check the joints of the two fingers, remove their ``<mimic>``, and set their range from 0 to half of the opening.
 
-    Raises ConfigError where one is not prismatic, does not reach that far, or follows other than its twin one to one.
+    Raises ConfigError if a joint is not prismatic, if its range is too small, or if it mimics anything other than the
+    opposite finger one to one.
     """
     if len(set(names)) != 2:
         raise ConfigError(f"{tree.name}: finger_joints names {names[0]} twice; name two joints")
@@ -216,7 +218,10 @@ def settle_finger_joints(tree: UrdfTree, names: tuple[str, str], half_opening_m:
 
 
 def fix_other_joints(tree: UrdfTree, moving: tuple[str, ...], fixed_joints: dict[str, float]) -> None:
-    """Fix every movable joint but ``moving`` where ``fixed_joints`` says (rad, or m); raises ConfigError for one it lacks."""
+    """Fix every movable joint except ``moving`` at its position in ``fixed_joints`` (rad or m).
+
+    Raises ConfigError if ``fixed_joints`` does not name exactly these joints.
+    """
     others = [name for name, joint in tree.joints.items() if joint.get("type") != "fixed" and name not in moving]
     wrong = sorted(set(fixed_joints) ^ set(others))
     if wrong:
@@ -229,7 +234,7 @@ def fix_other_joints(tree: UrdfTree, moving: tuple[str, ...], fixed_joints: dict
 
 
 def _fix(joint: etree._Element, position: float) -> None:
-    """Make a joint fixed at a position."""
+    """Convert a joint to a fixed joint at a position (rad or m)."""
     axis = joint.find("axis")
     direction = np.array([1.0, 0, 0]) if axis is None else values_of(axis, "xyz")
     direction = direction / np.linalg.norm(direction)

@@ -1,6 +1,6 @@
-"""A robot's TOML file: its URDF, joints, hand, home and speeds; and the files that it names.
+"""Robot definition files (TOML): URDF, joints, hand, home position and speeds, and the files they refer to.
 
-They lie below the TOML file's folder and nowhere else, or in an installed distribution.
+Referenced files must lie below the folder of the TOML file, or in an installed distribution.
 """
 
 from __future__ import annotations
@@ -26,25 +26,27 @@ from manitwin.robots.robot import Workspace
 
 PACKAGE, FILE = "package://", "file://"
 MAX_FILE_BYTES = 64 << 20
-"""The largest mesh of the shipped robots' 98 files is 1.4 MB."""
+"""Size limit of a mesh file; the largest of the 98 meshes of the shipped robots has 1.4 MB."""
 
 
 class PoseField(BaseModel):
-    """A rigid pose."""
+    """Rigid pose: position (m) and unit quaternion wxyz."""
 
     model_config = STRICT
     position_m: tuple[float, float, float]
     quaternion_wxyz: Rotation
 
     def matrix(self) -> np.ndarray:
-        """Return the pose ``(4, 4)``."""
+        """Return the pose as a homogeneous matrix ``(4, 4)``."""
         return transform(rotation_from_quaternion_wxyz(np.array(self.quaternion_wxyz)), np.array(self.position_m))
 
 
 class UrdfField(BaseModel):
-    """The location of a URDF: below the TOML file's folder, or in an installed distribution that an extra of this package brings.
+    """Location of a URDF: below the TOML file's folder, or in an installed ``distribution``, which an ``extra`` of this
+    package installs.
 
-    ``package://name/x`` is ``package_folder/name/x``; that folder is given as ``file`` is.
+    ``package://name/x`` resolves to ``package_folder/name/x``; ``package_folder`` and ``srdf`` are relative to the same root
+    as ``file``.
     """
 
     model_config = STRICT
@@ -56,7 +58,7 @@ class UrdfField(BaseModel):
 
 
 class OwnHand(BaseModel):
-    """A hand that the arm's URDF has already."""
+    """A parallel hand that is part of the arm's URDF."""
 
     model_config = STRICT
     kind: Literal["own"]
@@ -67,7 +69,7 @@ class OwnHand(BaseModel):
 
 
 class MergedHand(BaseModel):
-    """A hand of another URDF, mounted: the tree below its ``root_link``."""
+    """A hand from another URDF, mounted on the arm: the tree below its ``root_link``."""
 
     model_config = STRICT
     kind: Literal["merged"]
@@ -82,7 +84,7 @@ class MergedHand(BaseModel):
 
 
 class GeneratedHand(BaseModel):
-    """A hand made of the boxes of the file of a parallel gripper or a suction cup, mounted."""
+    """A hand generated from the boxes of a parallel gripper's or suction cup's file, mounted on the arm."""
 
     model_config = STRICT
     kind: Literal["generated"]
@@ -93,7 +95,7 @@ class GeneratedHand(BaseModel):
 
 
 class DescribedHand(BaseModel):
-    """A hand with many joints, mounted: the links of the URDF that its gripper's file names."""
+    """A multi-finger hand mounted on the arm, with the links of the URDF that its gripper file names."""
 
     model_config = STRICT
     kind: Literal["described"]
@@ -103,7 +105,7 @@ class DescribedHand(BaseModel):
 
 
 class RobotDefinition(BaseModel):
-    """The keys of a robot's file."""
+    """Schema of a robot definition file."""
 
     model_config = STRICT
     name: str
@@ -121,12 +123,12 @@ class RobotDefinition(BaseModel):
 
 
 def shipped_robots() -> list[str]:
-    """Return the names of the robots that come with the package."""
+    """Return the names of the single-arm robots in the package."""
     return sorted(path.stem for path in _shipped_folder().iterdir() if path.suffix == ".toml")
 
 
 def shipped_two_arms() -> list[str]:
-    """Return the names of the sets of two arms that come with the package."""
+    """Return the names of the two-arm robots in the package."""
     return sorted(path.stem for path in _two_arms_folder().iterdir() if path.suffix == ".toml")
 
 
@@ -139,7 +141,7 @@ def _two_arms_folder() -> Path:
 
 
 def definition_path(name_or_path: str) -> Path:
-    """Return the file of a robot given by its shipped name or by path; raises UsageError naming what would be valid."""
+    """Return the definition file of a robot given by shipped name or path; raises UsageError naming valid values."""
     shipped = [*shipped_robots(), *shipped_two_arms()]
     if name_or_path.endswith(".toml"):
         path = Path(name_or_path)
@@ -155,7 +157,7 @@ def definition_path(name_or_path: str) -> Path:
 
 
 def read_definition(path: Path) -> tuple[RobotDefinition, str]:
-    """Read a robot's file and its SHA-256; raises ConfigError naming the file and the key that is wrong."""
+    """Read a robot definition file and return it with its SHA-256; raises ConfigError naming the file and the invalid key."""
     content = read_bytes(path, MAX_TOML_BYTES, ConfigError, name=f"robot file {path}")
     try:
         definition = RobotDefinition.model_validate(parse_toml(content, f"robot file {path}", ConfigError))
@@ -170,9 +172,10 @@ def read_definition(path: Path) -> tuple[RobotDefinition, str]:
 
 @dataclass(frozen=True)
 class UrdfFiles:
-    """A URDF's own path, its SRDF's, the folder of its packages, and the folder that none of its files may leave.
+    """Resolved paths: the URDF, its SRDF, the folder of its packages, and the boundary folder that no referenced file may
+    leave.
 
-    The files of an ``installed`` distribution may be links into the installer's cache.
+    Files of an ``installed`` distribution may be symbolic links into the installer's cache.
     """
 
     urdf: Path
@@ -182,7 +185,7 @@ class UrdfFiles:
     installed: bool
 
     def mesh(self, name: str) -> Path:
-        """Return where a mesh of the URDF is; raises ConfigError where it is missing, too large or outside."""
+        """Return the path of a mesh of the URDF; raises ConfigError if it is missing, too large or outside the boundary."""
         if name.startswith(PACKAGE):
             wanted = self.package_folder / name.removeprefix(PACKAGE).lstrip("/")
         else:
@@ -191,9 +194,9 @@ class UrdfFiles:
 
 
 def urdf_files(field: UrdfField, folder: Path, robot: str) -> UrdfFiles:
-    """Return the places that a robot's file names.
+    """Resolve the paths in a URDF field of a robot file.
 
-    Raises Unavailable where the distribution is not installed, ConfigError where a file is not there or leaves its folder.
+    Raises Unavailable if the distribution is not installed, ConfigError if a file is missing or outside its folder.
     """
     installed = field.distribution is not None
     root = _distribution_folder(field, robot) if installed else folder
@@ -214,14 +217,17 @@ def _distribution_folder(field: UrdfField, robot: str) -> Path:
 
 
 def _inside(path: Path, boundary: Path, links_allowed: bool, what: str, directory: bool = False) -> Path:
-    """Return an absolute path below the boundary, where its links lead too unless they are allowed to; else raise ConfigError."""
+    """Return the absolute path if it lies below the boundary, also after resolving links unless ``links_allowed``.
+
+    Raises ConfigError if it does not, or if the file or ``directory`` is missing or too large.
+    """
     try:
         plain, limit = (Path(os.path.normpath(one.absolute())) for one in (path, boundary))
         inside = plain.is_relative_to(limit)
         inside = inside and (links_allowed or path.resolve().is_relative_to(boundary.resolve()))
         there = inside and (plain.is_dir() if directory else plain.is_file())
         too_large = there and plain.stat().st_size > MAX_FILE_BYTES
-    except (OSError, ValueError, RuntimeError) as error:  # a name that no file system can hold, or links in a circle
+    except (OSError, ValueError, RuntimeError) as error:  # invalid file name, or a cycle of symbolic links
         raise ConfigError(f"{what} is not a valid file name: {error}; correct the name") from error
     if not inside:
         raise ConfigError(f"{what} lies outside {boundary}; put it below that folder")

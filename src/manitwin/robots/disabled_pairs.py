@@ -1,7 +1,7 @@
-"""Pairs of links that need not be tested for collision with each other: an SRDF's, or found by random sampling.
+"""Collision filter of a robot: link pairs that are not tested for collision, from an SRDF or by random sampling.
 
-The criteria are those of MoveIt's setup assistant (Coleman et al. 2014): adjacent links, links in contact in the default
-state, and links in contact always (there 95 % of random states).
+The criteria are those of MoveIt's Setup Assistant (Coleman et al. 2014): adjacent links, links in collision in the default
+state, and links always in collision (there 95 % of random states; here ``CONTACT_SHARE``).
 """
 
 from __future__ import annotations
@@ -25,13 +25,16 @@ from manitwin.robots.urdf import UrdfTree, child_of, parent_of
 STATES = 300
 CONTACT_SHARE = 0.9
 MOST_PAIRS = 5_000
-"""A hundred shapes that all move against each other: each pair is tried in every state."""
+"""About a hundred shapes that all move relative to each other: each pair is tested in every state."""
 SEED = 0
 Pairs = tuple[tuple[str, str], ...]
 
 
 def disabled_pairs(tree: UrdfTree, srdf: Path | None, definition: RobotDefinition, palm: str) -> Pairs:
-    """Return the pairs, each sorted, all sorted; raises Unavailable without the extra that computes them."""
+    """Return the disabled pairs, each sorted, in sorted order.
+
+    Raises Unavailable if the extra that computes them is not installed.
+    """
     pairs = _adjacent(tree) | _within_hand(tree, palm)
     if srdf is not None:
         pairs |= _of_srdf(srdf, tree)
@@ -45,7 +48,7 @@ def _pair(first: str, second: str) -> tuple[str, str]:
 
 
 def _adjacent(tree: UrdfTree) -> set[tuple[str, str]]:
-    """Return links that a joint holds together; a link without shapes stands for what hangs from it by a fixed joint."""
+    """Return pairs of links connected by a joint; links without shapes are replaced by their nearest links with shapes."""
     return {
         _pair(first, second)
         for joint in tree.joints.values()
@@ -56,7 +59,7 @@ def _adjacent(tree: UrdfTree) -> set[tuple[str, str]]:
 
 
 def _solid(tree: UrdfTree, link: str, up: bool) -> Iterable[str]:
-    """Return the link itself, or the nearest links with shapes above or below it."""
+    """Return the link itself if it has shapes, otherwise the nearest links with shapes above or below it across fixed joints."""
     if tree.links[link].find("collision") is not None:
         return [link]
     near = [
@@ -68,7 +71,7 @@ def _solid(tree: UrdfTree, link: str, up: bool) -> Iterable[str]:
 
 
 def _within_hand(tree: UrdfTree, palm: str) -> set[tuple[str, str]]:
-    """Return the hand's own links: its fingers meet when it is closed."""
+    """Return all pairs within the hand, because the fingers touch when it closes."""
     hand = tree.below(palm)
     return {_pair(first, second) for first, second in combinations(hand, 2)}
 
@@ -85,7 +88,9 @@ def _of_srdf(path: Path, tree: UrdfTree) -> set[tuple[str, str]]:
 
 
 def _check_pairs(shapes: Counter[int], name: str) -> None:
-    """Raise ConfigError where shapes, so many for each joint, make too many pairs; those of one joint never meet."""
+    """Raise ConfigError if the shapes make too many pairs; ``shapes`` counts them per joint, and shapes of one joint form no
+    pairs.
+    """
     count = shapes.total()
     pairs = (count**2 - sum(each**2 for each in shapes.values())) // 2
     if pairs > MOST_PAIRS:
@@ -96,7 +101,7 @@ def _check_pairs(shapes: Counter[int], name: str) -> None:
 
 
 def _in_contact(tree: UrdfTree, definition: RobotDefinition) -> set[tuple[str, str]]:
-    """Return pairs in contact at home, or in most of many random states, of the links' convex hulls."""
+    """Return pairs whose convex hulls collide at home, or in at least 90 % of random joint states."""
     try:
         import coal
         import pinocchio as pin

@@ -1,4 +1,4 @@
-"""A suction cup as a URDF: the boxes of its gripper's file, and the lip on its spring plunger."""
+"""Suction cup as URDF: the boxes of its gripper file, and a lip on a spring-loaded plunger."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from manitwin.robots.assembly import add_box_link, add_inertial, add_joint, palm
 from manitwin.robots.grippers.suction import SuctionGripper
 from manitwin.robots.urdf import UrdfTree, set_origin
 
-LIP_M = 0.004  # of the lip's height: what the compressed bellows of the file leave in front of them
+LIP_M = 0.004  # height of the lip's link: the room that the compressed bellows of the file leave in front of them
 _DARK = "0.1 0.1 0.11 1"
 
 
 def cup_link(gripper: str) -> str:
-    """Return the name of the link that is the lip."""
+    """Return the name of the lip's link."""
     return f"{gripper}_lip"
 
 
@@ -27,8 +27,8 @@ def cup_joint(gripper: str) -> str:
 def generated_cup(gripper: SuctionGripper, mass_kg: float) -> UrdfTree:
     """Return a cup as a palm of boxes, whose frame is the grasp frame, and a lip on a prismatic joint along +Z.
 
-    The joint is 0 where the lip lies in the plane of ``tip_depth_m``, and runs ``reach_m`` to either side. The mass is shared
-    out by the volumes.
+    At joint position 0 the lip lies in the plane ``tip_depth_m``; the range is ``reach_m`` to either side. ``mass_kg`` is
+    distributed by volume.
     """
     name, radius_m = gripper.name, gripper.lip_radius_m
     robot = new_element("robot", name=name)
@@ -44,7 +44,7 @@ def generated_cup(gripper: SuctionGripper, mass_kg: float) -> UrdfTree:
         add(add(shape, "geometry"), "cylinder", radius=repr(radius_m), length=repr(LIP_M))
         if tag == "visual":
             add(add(shape, "material", name=f"{name}_dark"), "color", rgba=_DARK)
-    side_m = float(np.sqrt(np.pi) * radius_m / 2)  # a square plate of the disc's area
+    side_m = float(np.sqrt(np.pi) * radius_m / 2)  # half side of a square plate with the disc's area
     add_inertial(lip, [(lip_to_palm, np.array([side_m, side_m, LIP_M / 2]))], density)
     joint = add_joint(robot, cup_joint(name), "prismatic", palm_link(name), cup_link(name))
     set_origin(joint, np.eye(4))

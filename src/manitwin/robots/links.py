@@ -1,4 +1,4 @@
-"""The links of a robot or a hand as simulation takes them: joints, mass properties and convex collision shapes."""
+"""Links of a robot or hand for simulation: joints, mass properties and convex collision shapes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MESH_SUFFIXES = (".stl", ".obj", ".dae", ".ply", ".glb", ".gltf")
 
 @dataclass(frozen=True)
 class LinkShape:
-    """A convex collision shape of a link: a box (``half_extents_m``), a sphere (``radius_m``) or ``corners_m (V, 3)``."""
+    """Convex collision shape of a link: a box (``half_extents_m``), a sphere (``radius_m``) or a hull (``corners_m (V, 3)``)."""
 
     shape_to_link: np.ndarray
     half_extents_m: np.ndarray | None = None
@@ -30,7 +30,7 @@ class LinkShape:
     corners_m: np.ndarray | None = None
 
     def bounding_box(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return ``(box_to_link (4, 4), half_extents_m (3,))`` of a box around the shape."""
+        """Return ``(box_to_link (4, 4), half_extents_m (3,))`` of the shape's bounding box."""
         if self.half_extents_m is not None:
             return self.shape_to_link, self.half_extents_m
         if self.radius_m is not None:
@@ -41,7 +41,7 @@ class LinkShape:
         return self.shape_to_link @ transform(translation=(low + high) / 2), (high - low) / 2
 
     def solid(self) -> trimesh.Trimesh:
-        """Return the shape as a mesh in the link's frame; a sphere as 1280 triangles inside it."""
+        """Return the shape as a mesh in the link frame; a sphere as an inscribed icosphere of 1280 triangles."""
         if self.half_extents_m is not None:
             mesh = trimesh.creation.box(2 * self.half_extents_m)
         elif self.radius_m is not None:
@@ -55,11 +55,12 @@ class LinkShape:
 
 @dataclass(frozen=True)
 class Link:
-    """A link with the joint that holds it.
+    """A link with its parent joint.
 
-    ``parent`` is the index of its parent (-1: the root), ``joint_to_parent`` the joint's frame, whose X axis is the joint's
-    axis, in the parent's, and ``joint_to_link`` the same frame in the link's own. ``limits`` are rad, or m for a
-    prismatic joint.
+    ``parent`` is the index of the parent link (-1 for the root). ``joint_to_parent`` is the joint frame, whose X axis is the
+    joint axis, in the parent's frame; ``joint_to_link`` is the same frame in the link's own. ``limits`` are in rad, or m for
+    a prismatic joint. ``moments_kg_m2 (3,)`` are the principal moments about ``center_of_mass_m (3,)``, ``principal_axes (3,
+    3)`` their axes in the link frame.
     """
 
     name: str
@@ -77,14 +78,15 @@ class Link:
 
     @cached_property
     def link_to_joint(self) -> np.ndarray:
-        """The link's own frame in the joint's, ``(4, 4)``."""
+        """The link frame in the joint frame, ``(4, 4)``."""
         return np.linalg.inv(self.joint_to_link)
 
 
 def links_of(tree: UrdfTree, find_mesh: Callable[[str], Path]) -> tuple[Link, ...]:
-    """Return a checked URDF's links, parents before children; meshes, which ``find_mesh`` finds, become their convex hulls.
+    """Return the links of a checked URDF, parents before children; ``find_mesh`` maps mesh names to files.
 
-    Visuals are left. Raises the tree's error where a joint has no limits, or a mesh no hull.
+    Meshes become their convex hulls; visuals are ignored. Raises the tree's error if a joint has no limits or a mesh has no
+    convex hull.
     """
     holders = {child_of(joint): joint for joint in tree.joints.values()}
     links, order = tree.links, tree.below(*tree.roots())
@@ -116,7 +118,7 @@ def _link(
             raise tree.refuse(f"joint {holder!r}", "lacks lower or upper of its <limit>", "give both")
         limits = float(limit.get("lower")), float(limit.get("upper"))
     direction = np.zeros(3) if axis is None else values_of(axis, "xyz")
-    if not direction.any():  # without one it is X; a fixed joint may write zeros
+    if not direction.any():  # the default axis is X; a fixed joint may have zeros
         direction = np.array([1.0, 0, 0])
     along_axis = transform(rotation_between(np.array([1.0, 0, 0]), direction / np.linalg.norm(direction)))
     parent = order.index(parent_of(joint))
@@ -124,7 +126,7 @@ def _link(
 
 
 def _mass_properties(link: etree._Element) -> tuple[float, np.ndarray, np.ndarray]:
-    """Return a link's mass, centre of mass and inertia about it along the link's axes; zeros where it declares none."""
+    """Return a link's mass, centre of mass and inertia tensor about it along the link's axes; zeros without ``<inertial>``."""
     declared = inertial_of(link)
     if declared is None:
         return 0.0, np.zeros(3), np.zeros((3, 3))
@@ -147,14 +149,16 @@ def _shape(tree: UrdfTree, find_mesh: Callable[[str], Path], collision: etree._E
 
 
 def _hull(tree: UrdfTree, path: Path, where: str) -> np.ndarray:
-    """Return the corners of a mesh's convex hull ``(V, 3)``."""
+    """Return the vertices ``(V, 3)`` of a mesh's convex hull."""
     if path.suffix.lower() not in MESH_SUFFIXES:
         raise tree.refuse(f"the mesh of {where}", f"is {path}", f"valid are {', '.join(MESH_SUFFIXES)}")
     if path.suffix.lower() == ".dae":
-        read_xml(path, "COLLADA", name=str(path), refusal=tree.error)  # no entities for the library that reads it
+        read_xml(
+            path, "COLLADA", name=str(path), refusal=tree.error
+        )  # refuses XML entities before the mesh library reads it
     try:
         return np.asarray(trimesh.convex.convex_hull(trimesh.load_mesh(path)).vertices)
-    except Exception as error:  # mesh readers raise whatever they stumble over
+    except Exception as error:  # mesh readers raise arbitrary exceptions
         reason = " ".join(str(error).split())[:120]
         raise tree.refuse(
             f"the mesh of {where}, {path},", f"has no convex hull ({reason})", "repair or replace it"
@@ -163,22 +167,22 @@ def _hull(tree: UrdfTree, path: Path, where: str) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def links_of_urdf(urdf: str) -> tuple[Link, ...]:
-    """Return the links of a robot's URDF text, parents first; meshes, named by absolute path, as their convex hulls.
+    """Return the links of a URDF text, parents first; meshes, named by absolute path, become their convex hulls.
 
-    Raises ConfigError where a mesh cannot be read.
+    Raises ConfigError if a mesh cannot be read.
     """
     return links_of(UrdfTree.of_text(urdf), Path)
 
 
 def link_poses(links: tuple[Link, ...], joints: dict[str, float]) -> np.ndarray:
-    """Return the poses ``(L, 4, 4)`` of all links in the root's frame, at joint angles (rad, or m) by name, else zero."""
+    """Return the poses ``(L, 4, 4)`` of all links in the root frame at joint positions by name (rad or m; zero if omitted)."""
     poses = np.empty((len(links), 4, 4))
     for index, link in enumerate(links):
         moved = np.eye(4)
         value = joints.get(link.joint, 0.0)
         if link.joint_type == "prismatic":
             moved[0, 3] = value
-        elif link.joint_type != "fixed":  # about X of the joint's frame, which the link carries along
+        elif link.joint_type != "fixed":  # rotation about X of the joint frame
             moved[1, 1] = moved[2, 2] = math.cos(value)
             moved[2, 1] = math.sin(value)
             moved[1, 2] = -moved[2, 1]
@@ -188,16 +192,17 @@ def link_poses(links: tuple[Link, ...], joints: dict[str, float]) -> np.ndarray:
 
 
 def poses_at(links: tuple[Link, ...], joints: dict[str, float]) -> dict[str, np.ndarray]:
-    """Return each link's pose ``(4, 4)`` in the root's frame at joint positions by name (rad, or m), else zero."""
+    """Return each link's pose ``(4, 4)`` in the root frame at joint positions by name (rad or m; zero if omitted)."""
     return {link.name: pose for link, pose in zip(links, link_poses(links, joints), strict=True)}
 
 
 @lru_cache(maxsize=16)
 def bodies_of_urdf(urdf: str, palm: str) -> tuple[tuple[Link, ...], dict[str, tuple[str, np.ndarray]]]:
-    """Return the robot's bodies: every link with all that is fixed to it, but the palm apart from the wrist.
+    """Return the robot's bodies: each link merged with the links fixed to it, except the palm, which stays separate from the
+    wrist.
 
-    Each joint less saves a simulation time; the palm is a body of its own since it may touch what the wrist may not. Also
-    returns for every link the name of the body it is part of, and its pose ``(4, 4)`` in that.
+    Fewer joints make the simulation faster. The palm is a separate body because it may touch objects that the wrist may not.
+    Also returns, for every link, the name of its body and its pose ``(4, 4)`` in that body.
     """
     links = links_of_urdf(urdf)
     part_of: dict[str, tuple[str, np.ndarray]] = {}
@@ -220,7 +225,7 @@ def _joined(
     part_of: dict[str, tuple[str, np.ndarray]],
     order: list[str],
 ) -> Link:
-    """Return the first of the members as one body with the others (the parallel axis theorem)."""
+    """Return the first member merged with the others into one body (parallel axis theorem)."""
     first = members[0][0]
     shapes = tuple(
         replace(shape, shape_to_link=pose @ shape.shape_to_link) for link, pose in members for shape in link.shapes

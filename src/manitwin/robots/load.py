@@ -1,4 +1,4 @@
-"""Robots by name or by file."""
+"""Loading of robots by name or from a definition file."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ __all__ = ["load_robot", "shipped_robots", "shipped_two_arms"]
 
 AXIS_TOLERANCE = 1e-3
 TIP_TOLERANCE_M = 0.015
-"""Of the fingers' furthest point, against the gripper's file: a twisted or shifted hand is off by more."""
+"""Tolerance of the fingers' most distal point against the gripper file; a rotated or shifted hand deviates by more."""
 
 
 def load_robot(name_or_path: str) -> Robot:
     """Load a robot by its shipped name or from a TOML file.
 
-    Raises ConfigError naming the file, what is wrong and what would be valid; Unavailable where the robot's files come with
-    an extra that is not installed.
+    Raises ConfigError naming the file, the problem and valid values; Unavailable if the robot's files belong to an extra that
+    is not installed.
     """
     path = definition_path(name_or_path)
     return _load_shipped(path) if not name_or_path.endswith(".toml") else _load(path)
@@ -112,7 +112,9 @@ def _gripper(name: str, folder: Path) -> Gripper:
 
 
 def _beside(name: str, folder: Path, kind: str = "robot") -> str:
-    """Return a shipped name as it is, and of a file that is named its path below a folder; else raise ConfigError."""
+    """Return a shipped name unchanged, or the path of a named file below a folder; raises ConfigError if it does not exist
+    there.
+    """
     if not name.endswith(".toml"):
         return name
     path = (folder / name).resolve()
@@ -141,7 +143,7 @@ def _check_home(tree: UrdfTree, definition: RobotDefinition) -> None:
 
 
 def _check_jaws(robot: Robot, gripper: ParallelGripper) -> None:
-    """Raise ConfigError where the fingers do not close along X or do not end where the gripper's file says."""
+    """Raise ConfigError unless the fingers open along X and end where the gripper file says."""
     links = links_of_urdf(robot.urdf)
     poses = poses_at(links, {})
     to_grasp = inverse(poses[robot.tip_link] @ robot.gripper_to_tip)

@@ -1,4 +1,4 @@
-"""Hands mounted on an arm: where each kind of a robot's file has its links, joints and grasp frame in the whole tree."""
+"""Mounting of the hand on the arm, for each kind of hand in a robot file: its links, joints and grasp frame in the whole tree."""
 
 from __future__ import annotations
 
@@ -25,7 +25,10 @@ from manitwin.robots.urdf_reader import HAND, read_urdf
 
 @dataclass(frozen=True)
 class MountedHand:
-    """The hand's place in the whole tree; ``names_in_files`` is its URDF with the meshes' names as the file has them."""
+    """The hand's links and joints in the whole tree; ``names_in_files`` is its URDF with mesh names as in the file.
+
+    ``gripper_to_tip (4, 4)`` is the grasp frame in the frame of ``tip_link``.
+    """
 
     tip_link: str
     finger_joints: tuple[str, ...]
@@ -35,7 +38,9 @@ class MountedHand:
 
 
 def mount_hand(tree: UrdfTree, definition: RobotDefinition, gripper: Gripper, folder: Path) -> MountedHand:
-    """Add the hand to the arm's tree, in place; raises ConfigError where the gripper is not of the hand's kind."""
+    """Add the hand to the arm's tree, in place; raises ConfigError for invalid joints and UsageError for the wrong kind of
+    gripper.
+    """
     hand = definition.hand
     if isinstance(hand, DescribedHand):
         return _mount_described(tree, hand, of_kind(gripper, MultiFingerGripper))
@@ -65,7 +70,7 @@ def mount_hand(tree: UrdfTree, definition: RobotDefinition, gripper: Gripper, fo
 
 
 def read_arm(path: Path) -> UrdfTree:
-    """Read a URDF without its transmissions, plugins and controllers."""
+    """Read a URDF, keeping only links, joints and materials."""
     return _links_alone(read_urdf(path))
 
 
@@ -88,7 +93,7 @@ def _mount_described(tree: UrdfTree, hand: DescribedHand, gripper: MultiFingerGr
 
 
 def _find_meshes(tree: UrdfTree, find_mesh: Callable[[str], Path]) -> None:
-    """Write the meshes' absolute paths; a link whose visual meshes are not there is drawn as its collision shapes."""
+    """Write the meshes' absolute paths; a link whose visual meshes are missing is displayed by its collision shapes."""
     for link in tree.element.findall("link"):
         for shape in (*link.findall("visual"), *link.findall("collision")):
             for mesh in shape.iter("mesh"):

@@ -1,7 +1,7 @@
-"""A robot as data: an arm with a hand of any kind of gripper, as planner and simulation take it.
+"""Robot model: an arm with a hand of any kind of gripper, as planner and simulation use it.
 
-World frame: the arm's base link at the origin, +Z up, +X forward; the table's top is the plane z = 0 below it. Of two arms
-the first one's base is there.
+World frame: the arm's base link at the origin, +Z up, +X forward; the table top is the plane z = 0. For two arms, the origin
+is at the first arm's base.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ OPENING, VACUUM = "gripper_opening_m", "vacuum"
 
 @dataclass(frozen=True)
 class Workspace:
-    """The part of the table that is reached from above: an annular sector about the base's axis, +X in its middle."""
+    """Part of the table that is reachable from above: an annular sector about the base's axis, centred on +X."""
 
     __pydantic_config__ = STRICT
     min_radius_m: Annotated[float, Field(ge=0)]
@@ -34,20 +34,20 @@ class Workspace:
 
 @dataclass(frozen=True)
 class Robot:
-    """An arm of n revolute joints and a hand: two jaws that open by equal amounts, a suction cup, or fingers with joints.
+    """An arm of n revolute joints with a hand: two coupled jaws, a suction cup, or a multi-finger hand.
 
-    ``urdf`` is the whole robot as text, its meshes by absolute path. ``gripper_to_tip (4, 4)`` is the pose of the twin's grasp
-    frame (+Z approach, X closing) in the frame of ``tip_link``. ``finger_joints`` are all joints of the hand. Those of jaws
-    go from 0 (closed) to half of the opening, the first one's finger on the side of +X of the grasp frame; a cup's is that
-    of its spring plunger; those of a hand with more joints are in the order of its gripper's file. ``hand_links`` are the palm,
-    which comes first, and all that hangs from it: they may touch the held object. ``finger_links`` are those that press on
-    it. ``disabled_pairs`` are pairs of links that are not tested for collision with each other.
+    ``urdf`` is the whole robot as text, with meshes by absolute path. ``gripper_to_tip (4, 4)`` is the pose of the twin's
+    grasp frame (+Z approach, X closing) in the frame of ``tip_link``. ``finger_joints`` are all joints of the hand: those of
+    jaws range from 0 (closed) to half of the opening, and the first one's finger is on the +X side of the grasp frame; that
+    of a cup is its spring-loaded plunger; those of a multi-finger hand are in the order of its gripper file. ``hand_links``
+    are the palm, which comes first, and all links below it; they may touch the held object. ``finger_links`` are the links
+    that press on it. ``disabled_pairs`` are link pairs excluded from self-collision tests.
 
-    Two ``arms`` (``two_arms``) are robots of their own, each with its base in the world and the same hand of two jaws: joints,
-    links and limits are then those of the first, then of the second; ``tip_link``, ``gripper_to_tip`` and ``workspace`` those
-    of the first. A robot of one arm has none.
+    The two ``arms`` of a two-arm robot (``two_arms``) are robots of their own, each with its base in the world and the same
+    parallel hand. Joints, links and limits are then those of the first arm followed by those of the second; ``tip_link``,
+    ``gripper_to_tip`` and ``workspace`` are those of the first. A single-arm robot has no ``arms``.
 
-    ``velocity_limits_rad_s`` are those that plans keep within, ``fastest_rad_s`` the URDF's own, which no arm exceeds.
+    ``velocity_limits_rad_s`` are the limits for planning, ``fastest_rad_s`` the URDF's own, which the arm cannot exceed.
     """
 
     name: str
@@ -71,24 +71,24 @@ class Robot:
 
     @property
     def has_jaws(self) -> bool:
-        """Whether the hand is one of two jaws."""
+        """Whether the hand is a parallel gripper."""
         return isinstance(self.gripper, ParallelGripper)
 
     @property
     def hand_state_names(self) -> tuple[str, ...]:
-        """The names of what is recorded of the hand: the opening of jaws, else its joints (rad, or m)."""
+        """Names of the recorded hand state: the opening of jaws, otherwise the joints (rad or m)."""
         if self.arms:
             return tuple(f"{arm.name}_{OPENING}" for arm in self.arms)
         return (OPENING,) if self.has_jaws else self.finger_joints
 
     @property
     def hand_action_names(self) -> tuple[str, ...]:
-        """The names of what the hand is told: the opening of jaws, whether a cup's vacuum is on (0, 1), or its joints."""
+        """Names of the hand commands: the opening of jaws, whether a cup's vacuum is on (0 or 1), or the joints."""
         return (VACUUM,) if isinstance(self.gripper, SuctionGripper) else self.hand_state_names
 
     @property
     def open_hand(self) -> np.ndarray:
-        """The positions ``(J,)`` of ``finger_joints`` that a robot begins with: open; a cup where it is pressed on."""
+        """Initial positions ``(J,)`` of ``finger_joints``: the open hand; for a cup 0, where the lip is in its nominal plane."""
         if self.arms:
             return np.concatenate([arm.open_hand for arm in self.arms])
         if isinstance(self.gripper, MultiFingerGripper):
@@ -96,13 +96,13 @@ class Robot:
         return self.hand_joints(np.array([self.gripper.opening_m if self.has_jaws else 0.0]))
 
     def hand_joints(self, hand_state: np.ndarray) -> np.ndarray:
-        """Return the positions ``(J,)`` of ``finger_joints`` of a recorded state ``(h,)`` of the hand."""
+        """Return the positions ``(J,)`` of ``finger_joints`` for a recorded hand state ``(h,)``."""
         return np.repeat(hand_state / 2, 2) if self.has_jaws else np.asarray(hand_state, float)
 
     def side_of(self, link: str) -> int | None:
-        """Return on which of the two sides of what is held a link presses: 0 or 1; None: it is to press on neither.
+        """Return on which side of the held object a link presses, 0 or 1; None if it is not meant to press.
 
-        The first jaw, a cup, or thumb and palm are 0; the second jaw, or the other fingers, are 1.
+        Side 0 is the first jaw, a cup, or thumb and palm; side 1 is the second jaw or the other fingers.
         """
         if isinstance(self.gripper, MultiFingerGripper):
             owners = {

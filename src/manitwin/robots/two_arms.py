@@ -1,7 +1,7 @@
-"""Two arms in one world: a TOML file that names two robots and where their bases stand.
+"""Two-arm robots: a TOML file that names two robots and the poses of their bases.
 
-Each arm is a robot of its own, whose links and joints have the arm's name before theirs, and whose URDF begins in the world:
-planner and simulation take its base from there. World frame: +Z up, the table's top is the plane z = 0.
+Each arm is a robot of its own. Its link and joint names are prefixed with the arm's name, and its URDF has a world link as
+root, from which planner and simulation take the base pose. World frame: +Z up, the table top is the plane z = 0.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ WORLD = "world"
 
 
 class ArmField(BaseModel):
-    """One arm: its name, a robot of one arm, and the pose of that robot's base in the world."""
+    """One arm: its name, a single-arm robot, and the pose of that robot's base in the world."""
 
     model_config = STRICT
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,30}$")]
@@ -39,7 +39,7 @@ class ArmField(BaseModel):
 
 
 class TwoArmsDefinition(BaseModel):
-    """The keys of a file of two arms; the first one's base is where robots of one arm stand, at the origin."""
+    """Schema of a two-arm file; the first arm's base is at the origin, like that of a single-arm robot."""
 
     model_config = STRICT
     name: str
@@ -48,14 +48,14 @@ class TwoArmsDefinition(BaseModel):
 
 
 def is_of_two_arms(path: Path) -> bool:
-    """Tell whether a robot's file is one of two arms; raises ConfigError for a file that cannot be read."""
+    """Tell whether a robot file defines two arms; raises ConfigError if the file cannot be read."""
     return "arms" in parse_toml(_content(path), f"robot file {path}", ConfigError)
 
 
 def load_two_arms(path: Path, load: Callable[[str], Robot]) -> Robot:
-    """Return both arms as one robot, whose ``arms`` they are; ``load`` loads a robot of one arm by its name.
+    """Return both arms as one robot with ``arms``; ``load`` loads a single-arm robot by name.
 
-    Raises ConfigError naming the file, what is wrong and what would be valid.
+    Raises ConfigError naming the file, the problem and valid values.
     """
     content = _content(path)
     try:
@@ -84,7 +84,7 @@ def load_two_arms(path: Path, load: Callable[[str], Robot]) -> Robot:
 
 
 def placed_arm(robot: Robot, name: str, base_to_world: np.ndarray) -> Robot:
-    """Return a robot of one arm as the arm ``name``, its base fixed at a pose ``(4, 4)`` in the world."""
+    """Return a single-arm robot as the arm ``name``, with its base fixed at a pose ``(4, 4)`` in the world."""
     tree = UrdfTree.of_text(robot.urdf)
     (base,) = tree.roots()
     for element in (*tree.links.values(), *tree.joints.values()):
@@ -114,17 +114,17 @@ def placed_arm(robot: Robot, name: str, base_to_world: np.ndarray) -> Robot:
 
 
 def base_to_world(arm: Robot) -> np.ndarray:
-    """Return where the base of one of two arms stands ``(4, 4)``."""
+    """Return the base pose ``(4, 4)`` of one of two arms in the world."""
     return origin_of(UrdfTree.of_text(arm.urdf).joint(f"{named(arm.name, WORLD)}_joint"))
 
 
 def named(arm: str, name: str) -> str:
-    """Return the name that a link or joint has as one of an arm."""
+    """Return the name of a link or joint with its arm's prefix."""
     return f"{arm}_{name}"
 
 
 def _together(definition: TwoArmsDefinition, arms: list[Robot], sha256: str) -> Robot:
-    """Return arms as one robot: joints, links and limits of both, in their order; hand and workspace those of the first."""
+    """Return both arms as one robot: concatenated joints, links and limits; hand and workspace of the first."""
     first, second = arms
 
     def both(name: str) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""A URDF as a tree of links and joints, and what its elements say; ``urdf_reader`` checks a tree before it is used.
+"""URDF as a tree of links and joints, with accessors for its elements; ``urdf_reader`` validates a tree before use.
 
 Source: the URDF specification (http://wiki.ros.org/urdf/XML).
 """
@@ -22,7 +22,9 @@ MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 @dataclass
 class UrdfTree:
-    """A ``<robot>`` element with links and joints; ``name`` is what messages call it, ``error`` what they are raised as."""
+    """A ``<robot>`` element with its links and joints; ``name`` identifies it in messages, ``error`` is the exception type
+    raised.
+    """
 
     name: str
     element: etree._Element
@@ -30,7 +32,7 @@ class UrdfTree:
 
     @classmethod
     def of_text(cls, urdf: str) -> UrdfTree:
-        """Return the tree of a text that ``text`` has given."""
+        """Parse a URDF text written by ``text``."""
         element = parse_xml(urdf, "robot", "robot", refusal=ConfigError, comments=False)
         return cls(f"robot {element.get('name')}", element)
 
@@ -45,29 +47,29 @@ class UrdfTree:
         return {joint.get("name"): joint for joint in self.element.findall("joint")}
 
     def refuse(self, where: str, cause: str, remedy: str) -> ManiTwinError:
-        """Return the error of a part of the file, in one line."""
+        """Return the exception for an invalid part of the file, with a one-line message."""
         return self.error(f"{self.name}: {where}{' ' if where else ''}{cause}; {remedy}")
 
     def link(self, name: str) -> etree._Element:
-        """Return a link; raises the tree's error naming those there are."""
+        """Return a link; raises the tree's error naming the existing links."""
         if name not in self.links:
             raise self.error(f"{self.name}: {choose_from('link', name, self.links)}")
         return self.links[name]
 
     def joint(self, name: str) -> etree._Element:
-        """Return a joint; raises the tree's error naming the movable ones there are."""
+        """Return a joint; raises the tree's error naming the existing movable joints."""
         if name not in self.joints:
             movable = [key for key, joint in self.joints.items() if joint.get("type") != "fixed"]
             raise self.error(f"{self.name}: {choose_from('joint', name, movable)}")
         return self.joints[name]
 
     def roots(self) -> list[str]:
-        """Return the links that hang from no joint, in the file's order."""
+        """Return the links without a parent joint, in the file's order."""
         held = {child_of(joint) for joint in self.joints.values()}
         return [name for name in self.links if name not in held]
 
     def below(self, *links: str) -> tuple[str, ...]:
-        """Return links and all that hang from them, parents first; raises the tree's error where one is not there."""
+        """Return the given links and all their descendants, parents first; raises the tree's error for an unknown link."""
         for name in set(links) - set(self.links):
             self.link(name)
         children: dict[str, list[str]] = {}
@@ -79,7 +81,7 @@ class UrdfTree:
         return tuple(order)
 
     def keep_below(self, link: str) -> None:
-        """Drop every link that does not hang from ``link``, with its joint."""
+        """Remove every link that is not ``link`` or one of its descendants, with its joint."""
         kept = set(self.below(link))
         for name, element in self.links.items():
             if name not in kept:
@@ -89,16 +91,16 @@ class UrdfTree:
                 self.element.remove(joint)
 
     def use_meshes(self, find_mesh: Callable[[str], Path]) -> None:
-        """Write the meshes' absolute paths, which ``find_mesh`` returns of their names."""
+        """Replace mesh names by the absolute paths that ``find_mesh`` returns."""
         for mesh in self.element.iter("mesh"):
             mesh.set("filename", str(find_mesh(mesh.get("filename"))))
 
     def collision_meshes(self) -> list[Path]:
-        """Return the files of the collision meshes, in order."""
+        """Return the paths of the collision meshes, in document order."""
         return [Path(mesh.get("filename")) for part in self.element.iter("collision") for mesh in part.iter("mesh")]
 
     def text(self) -> str:
-        """Return the tree as XML."""
+        """Return the tree as XML text."""
         return xml_text(self.element)
 
 
@@ -113,14 +115,14 @@ def child_of(joint: etree._Element) -> str:
 
 
 def values_of(element: etree._Element, key: str, default: str = "") -> np.ndarray:
-    """Return the numbers of a checked attribute ``(n,)``."""
+    """Return the numbers of a validated attribute, ``(n,)``."""
     return np.array([float(word) for word in element.get(key, default).split()])
 
 
 def origin_of(element: etree._Element) -> np.ndarray:
-    """Return an element's ``<origin>`` as a pose ``(4, 4)``; identity where it has none.
+    """Return an element's ``<origin>`` as a pose ``(4, 4)``; identity if it has none.
 
-    Roll, pitch and yaw turn about fixed axes x, y, z in that order.
+    Roll, pitch and yaw are rotations about the fixed axes x, y, z in that order.
     """
     origin = element.find("origin")
     if origin is None:
@@ -130,7 +132,7 @@ def origin_of(element: etree._Element) -> np.ndarray:
 
 
 def set_origin(element: etree._Element, pose: np.ndarray) -> None:
-    """Write a pose as an element's ``<origin>``."""
+    """Write a pose ``(4, 4)`` as an element's ``<origin>``."""
     origin = element.find("origin")
     if origin is None:
         origin = add(element, "origin")
@@ -140,7 +142,7 @@ def set_origin(element: etree._Element, pose: np.ndarray) -> None:
 
 
 def roll_pitch_yaw(rotation: np.ndarray) -> np.ndarray:
-    """Return the angles about fixed x, y, z (rad) of a rotation; where the pitch is a quarter turn, the yaw is 0."""
+    """Return the angles about fixed x, y, z (rad) of a rotation; in gimbal lock (pitch of a quarter turn) the yaw is 0."""
     if np.hypot(rotation[0, 0], rotation[1, 0]) > 1e-6:
         return np.asarray(Rotation.from_matrix(rotation).as_euler("xyz"))
     sign = -float(np.sign(rotation[2, 0]))
@@ -148,14 +150,15 @@ def roll_pitch_yaw(rotation: np.ndarray) -> np.ndarray:
 
 
 def geometry_of(shape: etree._Element) -> etree._Element:
-    """Return the one geometry of a checked visual or collision element."""
+    """Return the single geometry of a validated visual or collision element."""
     return next(shape.iterfind("geometry/*"))
 
 
 def inertial_of(link: etree._Element) -> tuple[float | None, np.ndarray, np.ndarray | None] | None:
-    """Return what a link declares of mass: kg, the inertial's pose in the link ``(4, 4)``, and its tensor kg m2 ``(3, 3)``.
+    """Return a link's declared mass (kg), the pose ``(4, 4)`` of its inertial frame, and its tensor (kg m^2) ``(3, 3)``.
 
-    The tensor is along the inertial's own axes. None where there is no ``<inertial>``, or it leaves mass or inertia out.
+    The tensor is along the axes of the inertial frame. Returns None without ``<inertial>``; mass or tensor is None if it is
+    omitted.
     """
     inertial = link.find("inertial")
     if inertial is None:

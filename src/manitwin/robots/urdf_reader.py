@@ -1,4 +1,4 @@
-"""The reader of URDF files, for robots, hands and assets: all that the rules of its user say is read is checked.
+"""URDF reader with validation, for robots, hands and assets: every element that the caller's rules use is checked.
 
 Source: the URDF specification (http://wiki.ros.org/urdf/XML).
 """
@@ -18,7 +18,7 @@ from manitwin.formats.xml_file import MAX_NUMBER, read_xml
 from manitwin.robots.urdf import MOMENTS, UrdfTree, child_of, values_of
 
 XACRO = ("http://www.ros.org/wiki/xacro", "http://wiki.ros.org/xacro", "http://ros.org/wiki/xacro")
-"""The namespace of xacro's elements, as files have it."""
+"""Namespaces of xacro elements."""
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed")
 _COUNTS: dict[tuple[str, str], tuple[int, ...]] = {
     ("origin", "xyz"): (3,),
@@ -49,11 +49,11 @@ _SIZES = ("box", "sphere", "cylinder", "capsule")
 
 @dataclass(frozen=True)
 class UrdfRules:
-    """The URDFs that a user of them takes; ``error`` is raised of any other.
+    """Requirements on a URDF; ``error`` is raised for a file that does not meet them.
 
-    ``shapes`` are the elements of links that are read and checked. ``simulated``: all links form one tree, its joints move,
-    and an inertial is whole. Else one rigid object of the file is used: links may be joined to nothing, inertials may leave
-    things out, one number may scale a mesh, and comments are kept.
+    ``shapes`` are the link elements that are read and checked. If ``simulated``, all links must form one tree, joints move
+    and inertials are complete. Otherwise the file describes one rigid object: links may be unconnected, inertials may be
+    incomplete, a single number may scale a mesh, and comments are kept.
     """
 
     error: type[ManiTwinError] = ConfigError
@@ -65,7 +65,7 @@ class UrdfRules:
 
 ROBOT = UrdfRules()
 HAND = UrdfRules(shapes=("collision",))
-"""Many a hand's URDF names files for its visuals that are not there."""
+"""Visuals are not read, because many hand URDFs name visual mesh files that do not exist."""
 
 
 def read_urdf(
@@ -74,10 +74,10 @@ def read_urdf(
     name: str | None = None,
     prepare: Callable[[etree._Element], None] | None = None,
 ) -> UrdfTree:
-    """Read a URDF and check all of it that the rules say is read; ``prepare`` may change its root element first.
+    """Read a URDF and check everything that the rules use; ``prepare`` may modify its root element first.
 
-    Raises the rules' error, which names the file (``name``: as messages call it, else by its path), the element, the cause
-    and the remedy.
+    Raises the rules' error, which names the file (``name`` in messages, by default its path), the element, the cause and the
+    remedy.
     """
     name = name or str(path)
     root = read_xml(path, "robot", name=name, refusal=rules.error, comments=not rules.simulated)
@@ -106,7 +106,7 @@ def read_urdf(
 
 
 def _first_macro(root: etree._Element) -> str | None:
-    """Return the first element of xacro, by the name that the file gives it."""
+    """Return the qualified name of the first xacro element, or None."""
     for element in root.iter(etree.Element):
         if etree.QName(element).namespace in XACRO:
             return f"{element.prefix}:{etree.QName(element).localname}"
@@ -114,7 +114,7 @@ def _first_macro(root: etree._Element) -> str | None:
 
 
 def _check_tree(tree: UrdfTree, rules: UrdfRules) -> None:
-    """Check that links and joints have names of their own, and that the links form a tree."""
+    """Check that links and joints have unique names and that the links form a tree."""
     if tree.element.find("link") is None:
         raise tree.refuse("", "it has no <link>", "give a URDF with one")
     for tag in ("link", "joint"):
@@ -151,7 +151,7 @@ def _check_tree(tree: UrdfTree, rules: UrdfRules) -> None:
 
 
 def _check_link(tree: UrdfTree, rules: UrdfRules, where: str, link: etree._Element) -> None:
-    """Check a link's shapes, each of one geometry that is known, and its mass properties."""
+    """Check a link's shapes, each with one supported geometry, and its mass properties."""
     for tag in rules.shapes:
         for index, shape in enumerate(link.findall(tag)):
             at = f"{where} {tag} {index}"
@@ -174,7 +174,9 @@ def _check_link(tree: UrdfTree, rules: UrdfRules, where: str, link: etree._Eleme
 def _check_attributes(
     tree: UrdfTree, rules: UrdfRules, where: str, parent: etree._Element, paths: tuple[str, ...]
 ) -> None:
-    """Check that the elements at ``paths`` below ``parent`` have what they must have, and usable numbers."""
+    """Check the required attributes of the elements at ``paths`` below ``parent``, and that their numbers are finite and in
+    range.
+    """
     for element in (found for path in paths for found in parent.iterfind(path)):
         required = MOMENTS if element.tag == "inertia" and rules.simulated else _REQUIRED.get(element.tag, ())
         for key in required:

@@ -1,1 +1,1 @@
-"""MuJoCo: the second, independent engine."""
+"""MuJoCo simulations: grasp trial, settling, and articulated bodies, as the second, independent engine."""

@@ -1,4 +1,4 @@
-"""Links that joints hold together in MuJoCo, and what becomes of them when they are set down on a plane."""
+"""Articulated bodies in MuJoCo: model construction, and settling on a plane."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from manitwin.physics.mujoco.body import SOFT_SOLREF, TIMESTEP_S, contact_parame
 from manitwin.physics.mujoco.settle import PLANE_HALF_SIZE_M, STILL_M_S, STILL_RAD_S
 
 ROOT = "link_00"
-"""The body of the first link, and the joint that lets it go."""
+"""Name of the root link's body and of its free joint."""
 
 
 @dataclass(frozen=True)
 class ArticulatedRest:
-    """Where an articulated body came to rest: the pose of its root link, and ``positions (J,)`` of its joints.
+    """Resting state of an articulated body: pose of its root link and positions ``(J,)`` of its joints.
 
-    ``moved_m`` and ``turned_rad`` are how far the root link went from where it was set down; ``beyond`` is how far a joint was
-    past a limit at the most, rad or m.
+    ``moved_m`` and ``turned_rad`` are the motion of the root link from the pose in which it was set down. ``beyond`` is
+    the largest violation of a joint limit, rad or m.
     """
 
     root_to_plane: np.ndarray
@@ -35,7 +35,7 @@ class ArticulatedRest:
 
 
 def add_articulated(spec: mujoco.MjSpec, body: ArticulatedBody, object_to_world: np.ndarray) -> None:
-    """Add links and joints, the joints named as they are; links touch geoms of contact type 1, and not each other."""
+    """Add the links and named joints of a body to a model; links touch geoms of contact type 1, but not each other."""
     root = spec.worldbody.add_body(name=ROOT, pos=object_to_world[:3, 3], quat=quaternion_wxyz(object_to_world[:3, :3]))
     root.add_freejoint(name=ROOT)
     holders = [root]
@@ -65,7 +65,7 @@ def _add_joint(link: mujoco.MjsBody, joint: ArticulatedJoint) -> None:
 
 
 def _fill(spec: mujoco.MjSpec, link: mujoco.MjsBody, name: str, body: RigidBody, origin_m: np.ndarray) -> None:
-    """Give a link, whose frame has its origin at ``origin_m`` and the object's axes, its mass and its hulls."""
+    """Give a link its mass properties and hulls; the link frame has its origin at ``origin_m`` and the object's axes."""
     link.mass, link.explicitinertial = body.mass_kg, True
     link.ipos = body.center_of_mass_m - origin_m
     link.inertia, link.iquat = body.principal_inertia
@@ -85,7 +85,10 @@ def settle_articulated(
     positions: Sequence[float] | None = None,
     timestep_s: float = TIMESTEP_S,
 ) -> ArticulatedRest:
-    """Release a body ``drop_m`` above the plane z = 0 with its joints free, as it stands or at ``positions`` (J,)."""
+    """Release a body with free joints ``drop_m`` above the plane z = 0 and simulate for ``seconds``.
+
+    ``positions (J,)`` are the initial joint positions; None: those in which the body stands in its file.
+    """
     spec = new_spec(timestep_s)
     spec.compiler.degree = False
     friction = contact_parameters(body.links[0].friction_static, SOFT_SOLREF)

@@ -1,4 +1,4 @@
-"""Rigid bodies in MuJoCo: twins with their own mass properties and friction, and boxes."""
+"""Rigid bodies in MuJoCo: twins with their mass properties and friction, and boxes."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from manitwin.geometry.rigid_body import RigidBody
 TIMESTEP_S = 0.002
 OBJECT = "object"
 SOFT_SOLREF, STIFF_SOLREF = (0.02, 1.0), (0.005, 1.0)
-"""Time constant (s) and damping ratio: MuJoCo's default, and stiffer."""
-TORSIONAL_FRICTION_M, ROLLING_FRICTION_M = 0.005, 1e-4  # MuJoCo's own defaults
+"""``solref``: time constant (s) and damping ratio. MuJoCo's default, and a stiffer contact."""
+TORSIONAL_FRICTION_M, ROLLING_FRICTION_M = 0.005, 1e-4  # MuJoCo's defaults
 
 
 def contact_parameters(friction: float, solref: tuple[float, float]) -> dict[str, object]:
-    """Return the fields of a geom with this friction and stiffness; of two that touch, MuJoCo takes the larger friction."""
+    """Return the geom attributes for a friction and stiffness. MuJoCo uses the larger friction of two touching geoms."""
     slide_spin_roll = [friction, TORSIONAL_FRICTION_M, ROLLING_FRICTION_M]
     return {"friction": slide_spin_roll, "condim": 4, "solref": list(solref)}
 
 
 def add_hulls(spec: mujoco.MjSpec, name: str, body: RigidBody) -> list[str]:
-    """Add a body's hulls as meshes that begin with ``name``; return their names, for ``add_body``."""
+    """Add the hulls of a body as meshes with the prefix ``name``, and return the mesh names for ``add_body``."""
     names = [f"{name}_{number:02d}" for number in range(len(body.hulls))]
     for mesh, hull in zip(names, body.hulls, strict=True):
         spec.add_mesh(name=mesh, uservert=np.asarray(hull, np.float32).ravel())
@@ -39,7 +39,7 @@ def add_body(
     object_to_world: np.ndarray | None = None,
     contact_types: tuple[int, int] = (1, 1),
 ) -> None:
-    """Add a body of these hulls, free to move by a joint of its name; ``contact_types`` are its ``contype, conaffinity``."""
+    """Add a body of these meshes with a free joint of the same name; ``contact_types`` are ``contype`` and ``conaffinity``."""
     pose = np.eye(4) if object_to_world is None else object_to_world
     thing = spec.worldbody.add_body(name=name, pos=pose[:3, 3], quat=quaternion_wxyz(pose[:3, :3]))
     thing.add_freejoint(name=name)
@@ -58,7 +58,7 @@ def add_body(
 
 
 def add_object(spec: mujoco.MjSpec, body: RigidBody, contact: dict[str, object]) -> None:
-    """Add the one body ``OBJECT``, which touches geoms of contact type 1 and not itself."""
+    """Add the body ``OBJECT``, which touches geoms of contact type 1 but not itself."""
     add_body(spec, OBJECT, body, add_hulls(spec, "hull", body), contact, contact_types=(2, 1))
 
 
@@ -71,7 +71,7 @@ def add_box(
     name: str = "",
     contact_types: tuple[int, int] = (1, 1),
 ) -> None:
-    """Add a box at a pose ``(4, 4)`` in a body's frame."""
+    """Add a box geom at a pose ``(4, 4)`` in the frame of a body."""
     holder.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_BOX,
@@ -85,7 +85,7 @@ def add_box(
 
 
 def new_spec(timestep_s: float) -> mujoco.MjSpec:
-    """Return an empty model with implicit integration and elliptic friction cones."""
+    """Return an empty model with the implicitfast integrator and elliptic friction cones."""
     spec = mujoco.MjSpec()
     spec.option.timestep, spec.option.integrator = timestep_s, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC

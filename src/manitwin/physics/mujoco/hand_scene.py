@@ -1,4 +1,4 @@
-"""One object in front of one hand that stays in place in MuJoCo, and how soft their contacts are."""
+"""MuJoCo scene of a grasp trial: one object and one stationary parallel hand, and the softness of their contacts."""
 
 from __future__ import annotations
 
@@ -20,23 +20,25 @@ from manitwin.physics.trial import TrialSettings
 from manitwin.physics.trial_phases import HandContacts
 from manitwin.robots.grippers.parallel import ParallelGripper
 
-IMPEDANCE_RATIO = 1000.0  # of friction to normal force (MuJoCo's impratio): contacts hardly creep sideways
+IMPEDANCE_RATIO = 1000.0  # MuJoCo's impratio, frictional to normal impedance: high enough to suppress lateral creep
 FINGER_MASS_KG = 0.1
-MET_M = -0.001  # pads' distance from the middle once they met: contacts and stops give half a millimetre each at 50 N
-MAX_DRIVE_FORCE = 4.0  # the drives' limit, over the closing force: high enough never to cut that
+MET_M = -0.001  # mean pad distance at which the pads have met: contacts and stops each yield half a millimetre at 50 N
+MAX_DRIVE_FORCE = 4.0  # force limit of the drives over the closing force: never limits the closing force itself
 FINGERS = ("finger_plus", "finger_minus")
-SINK_M = 0.0005  # of one contact under the closing force: as of a heavy object at MuJoCo's default impedance
-LEAST_IMPEDANCE, MOST_IMPEDANCE = 0.95, 0.9999  # MuJoCo's default, and the most that it accepts (mjMAXIMP)
-IMPEDANCE_WIDTH_M, IMPEDANCE_MIDPOINT, IMPEDANCE_POWER = 0.001, 0.5, 2.0  # MuJoCo's own defaults
+SINK_M = 0.0005  # contact penetration under the closing force: that of a heavy object at MuJoCo's default impedance
+LEAST_IMPEDANCE, MOST_IMPEDANCE = 0.95, 0.9999  # MuJoCo's default, and the largest accepted value (mjMAXIMP)
+IMPEDANCE_WIDTH_M, IMPEDANCE_MIDPOINT, IMPEDANCE_POWER = 0.001, 0.5, 2.0  # MuJoCo's defaults
 
 
 class HandScene:
-    """One grasp in one scene; its frame is the hand's. The load is the scene's gravity, which the fingers do not feel."""
+    """MuJoCo scene of one grasp (``TrialScene``), in the hand's frame; the load is the scene's gravity, compensated on
+    the fingers.
+    """
 
     def __init__(
         self, model: mujoco.MjModel, gripper: ParallelGripper, object_to_hand: np.ndarray, settings: TrialSettings
     ):
-        """Put the object before the open hand of ``hand_model``."""
+        """Place the object in the open hand of a model made by ``hand_model``."""
         self.model, self.data = model, mujoco.MjData(model)
         self.target = SharedTarget(gripper.opening_m, settings, MET_M)
         self.reached_m = self.target.value_m
@@ -49,7 +51,7 @@ class HandScene:
         self.data.qpos[free + 3 : free + 7] = quaternion_wxyz(object_to_hand[:3, :3])
 
     def advance(self, loads_m_s2: np.ndarray) -> None:
-        """Take one step for each row of the accelerations ``(N, 3)`` m/s^2 in the hand's frame that load the object."""
+        """Take one step for each row of accelerations ``(N, 3)`` m/s^2 of the object in the hand's frame."""
         model, data, gravity = self.model, self.data, self.model.opt.gravity
         start, count = self.reached_m, len(loads_m_s2)
         for number, load in enumerate(loads_m_s2, start=1):
@@ -59,25 +61,27 @@ class HandScene:
         self.reached_m = self.target.value_m
 
     def squeeze(self) -> None:
-        """Move the fingers' shared target on; the next frame's steps lead there evenly.
+        """Advance the fingers' shared target by one frame; the steps of the frame interpolate to it linearly.
 
-        Fingers that leapt to each frame's target would be twice as fast in between, and kick away what is light.
+        Without interpolation the fingers would move twice as fast within a frame and knock light objects away.
         """
         self.target.move_on(float(self.data.qpos[self.joints].mean()))
 
     def presses(self) -> bool:
-        """Tell whether the fingers' target is so far ahead of them that they press with the closing force."""
+        """Tell whether the target is far enough ahead of the fingers that they press with the closing force."""
         return self.target.presses
 
     def contacts(self) -> HandContacts:
-        """Return the forces (N) with which the +X and the -X finger press inwards, and the deepest overlap (m) with the hand."""
+        """Return the inward forces (N) of the +X and the -X finger, and the deepest overlap (m) of hand and object."""
         forces, deepest, wrench = [0.0, 0.0], 0.0, np.zeros(6)
         for index, contact in enumerate(self.data.contact):
             bodies = self.model.geom_bodyid[list(contact.geom)]
             if self.object not in bodies:
                 continue
             deepest = max(deepest, -float(contact.dist))
-            towards_object = 1 if bodies[1] == self.object else -1  # the normal points from the first to the second
+            towards_object = (
+                1 if bodies[1] == self.object else -1
+            )  # a contact normal points from the first geom to the second
             for side, finger in enumerate(self.fingers):
                 if finger in bodies:
                     mujoco.mj_contactForce(self.model, self.data, index, wrench)
@@ -103,7 +107,7 @@ class HandScene:
 
 
 def hand_model(body: RigidBody, gripper: ParallelGripper, settings: TrialSettings) -> mujoco.MjModel:
-    """Compile hand and object once; contacts take the mean friction, as in SAPIEN (MuJoCo's own rule is the maximum)."""
+    """Compile the model of hand and object; contacts use the mean friction, as SAPIEN does (MuJoCo's own rule is the maximum)."""
     spec = new_spec(settings.timestep_s)
     spec.option.impratio = IMPEDANCE_RATIO
     contact = contact_parameters((settings.finger_friction + body.friction_static) / 2, STIFF_SOLREF)
@@ -114,16 +118,20 @@ def hand_model(body: RigidBody, gripper: ParallelGripper, settings: TrialSetting
 
 
 def even_impedance(mass_kg: float, force_n: float) -> list[float]:
-    """Return the ``solimp`` at which a contact of finger and object sinks ``SINK_M`` under the closing force, whatever its mass.
+    """Return the ``solimp`` for which a contact of finger and object penetrates by ``SINK_M`` at the closing force, for
+    any mass.
 
-    A contact at rest that carries f sinks by r = R f / k, with R = (1 - d) / d (1/m + 1/m_finger) and
-    k = 1 / (d timeconst dampratio)^2 (MuJoCo manual, "Computation", "Parameters"): at a fixed impedance d it sinks the
-    more the less the object weighs. Solved for d; the impedance of a first touch is as much softer as in MuJoCo's default.
+    A contact at rest that carries f penetrates by r = R f / k, with R = (1 - d) / d (1/m + 1/m_finger) and k = 1 / (d
+    timeconst dampratio)^2 (MuJoCo manual, "Computation", "Parameters"): at a fixed impedance d, lighter objects
+    penetrate more. The equation is solved for d. The impedance at first touch is lower in the same proportion as in
+    MuJoCo's default.
     """
     per_mass = 1 / mass_kg + 1 / FINGER_MASS_KG
     stiffness = 1 / (STIFF_SOLREF[0] * STIFF_SOLREF[1]) ** 2
     yielding = SINK_M * stiffness / (force_n * per_mass)
-    impedance = float(np.clip(1 / (1 + yielding), LEAST_IMPEDANCE, MOST_IMPEDANCE))  # k at d = 1: d is near it
+    impedance = float(
+        np.clip(1 / (1 + yielding), LEAST_IMPEDANCE, MOST_IMPEDANCE)
+    )  # uses k at d = 1, since d is close to 1
     return [1 - 2 * (1 - impedance), impedance, IMPEDANCE_WIDTH_M, IMPEDANCE_MIDPOINT, IMPEDANCE_POWER]
 
 

@@ -1,7 +1,7 @@
-"""Let a body come to rest on a plane in MuJoCo: what stays put there and in SAPIEN does not owe it to one solver.
+"""Settling on a plane and ball drop in MuJoCo, which confirm that rest poses do not depend on a single solver.
 
-Contacts are as soft as MuJoCo's default, for that is what a scene has into which a twin is loaded. A round body that lies on
-a narrow facet of its hulls stays on stiff contacts (5 ms) and rolls off on these.
+Contacts have MuJoCo's default softness, which is what a scene has into which a twin is loaded. A round body that lies
+on a narrow facet of its hulls stays there on stiff contacts (5 ms) and rolls off on these.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def settle_on_plane_in_mujoco(
     seconds: float,
     timestep_s: float = TIMESTEP_S,
 ) -> list[Settled]:
-    """Release a body ``drop_m`` above the plane z = 0 in each of several poses (4x4), and see where it comes to rest."""
+    """Release a body ``drop_m`` above the plane z = 0 in each of several poses ``(4, 4)`` and simulate for ``seconds`` each."""
     if not len(object_to_plane):
         return []
     model = _model(body, timestep_s)
@@ -68,7 +68,7 @@ def _settle(model: mujoco.MjModel, body: RigidBody, pose: np.ndarray, drop_m: fl
 
 
 def ball_stays_inside_in_mujoco(hulls: Sequence[np.ndarray], opening: Opening) -> bool:
-    """Drop a ball that fits into an opening and tell whether it goes in and stays there (``BallDrop``)."""
+    """Drop a ball that fits into an opening and tell whether it ends inside (``BallDrop``)."""
     drop = BallDrop.of(hulls, opening)
     spec = new_spec(TIMESTEP_S)
     contact = contact_parameters(_BALL_FRICTION, STIFF_SOLREF)

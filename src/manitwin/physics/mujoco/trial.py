@@ -1,16 +1,20 @@
-"""The grasp trial in MuJoCo: a second opinion by another contact model, on the same hulls, masses and friction.
+"""Grasp trial in MuJoCo: a second opinion with another contact model, on the same hulls, masses and friction.
 
-The settings are frozen: the share of grasps that hold can be moved from 12 to 96 % by them. Implicit integration at 1 ms,
-elliptic cones, torsional friction (condim 4), contacts of 5 ms, and an impedance ratio of 1000 against the creep of soft
-contacts (MuJoCo manual, "Preventing slip"): what is held by less than friction's limit gives no more than the fingers' drives
-do, where a ratio of 10 with five no-slip iterations let it creep by as much again, and kept some light things trembling.
+The engine settings are fixed, because they can move the share of held grasps from 12 to 96 %: implicit integration at 1
+ms, elliptic cones, torsional friction (condim 4), contact time constant 5 ms, and an impedance ratio of 1000 against
+the creep of soft contacts (MuJoCo manual, "Preventing slip"). With this ratio, an object held below the friction limit
+moves no more than the compliance of the finger drives allows. A ratio of 10 with five no-slip iterations doubled that
+motion by creep, and kept some light objects vibrating.
 
-MuJoCo's contacts are springs per mass: the same pads that sink half a millimetre into a hammer sink seven into a bar of two
-grams, pass through it and drop it. So the impedance is the one at which they sink as far into anything (``even_impedance``).
-At 2 ms pads that meet the faces of several hulls at once are pressed with anything from 0 to 1,500 N, at 1 ms with what they
-should be.
+MuJoCo's contact stiffness scales with mass: pads that penetrate a hammer by half a millimetre penetrate a bar of two
+grams by seven, pass through it and drop it. The impedance is therefore chosen for equal penetration
+(``even_impedance``).
 
-The engine is imported by the first trial: who only names this simulator, as the driver of a run does, does not wait for it.
+At 2 ms, pads that touch the faces of several hulls at once receive forces anywhere from 0 to 1,500 N; at 1 ms the
+forces are correct.
+
+The engine is imported by the first trial, so that a process that only refers to this simulator, such as the driver of a
+run, does not wait for the import.
 """
 
 from __future__ import annotations
@@ -37,7 +41,7 @@ TIMESTEP_S, STEPS_PER_FRAME = 0.001, 16
 
 
 class MujocoTrial:
-    """Try grasps one by one in MuJoCo on the CPU."""
+    """Grasp trial of a parallel gripper in MuJoCo on the CPU, one grasp at a time."""
 
     name = "mujoco"
 
@@ -49,7 +53,9 @@ class MujocoTrial:
         settings: TrialSettings,
         joints_rad: np.ndarray | None = None,
     ) -> list[TrialResult]:
-        """Try the grasps ``gripper_to_object (N, 4, 4)``; of ``settings``, the engine's own numbers are the frozen ones."""
+        """Try the grasps ``gripper_to_object (N, 4, 4)``; the time step of ``settings`` is replaced by MuJoCo's own
+        (``frozen``).
+        """
         if not len(gripper_to_object):
             return []
         settings, hand = frozen(settings), of_kind(gripper, ParallelGripper)
@@ -72,13 +78,15 @@ class MujocoTrial:
 
 
 class _HandModels:
-    """The last compiled model of each body, as long as the body is in use: compiling takes a fifth of the time of a trial."""
+    """Cache of the last compiled model of each body, kept while the body exists; compiling takes a fifth of the time of
+    a trial.
+    """
 
     def __init__(self) -> None:
         self._by_body: dict[int, tuple[ParallelGripper, TrialSettings, mujoco.MjModel]] = {}
 
     def of(self, body: RigidBody, gripper: ParallelGripper, settings: TrialSettings) -> mujoco.MjModel:
-        """Return the model of a hand and a body, compiled if the last one of this body was another."""
+        """Return the model of a gripper and a body; compile it if gripper or settings differ from the body's last model."""
         from manitwin.physics.mujoco.hand_scene import hand_model
 
         number = id(body)
@@ -93,7 +101,7 @@ class _HandModels:
 
 
 _MODELS = _HandModels()
-"""Those of this process."""
+"""The cache of this process."""
 
 
 def _try_one(
@@ -103,7 +111,7 @@ def _try_one(
     settings: TrialSettings,
     recorder: TrialRecorder | None = None,
 ) -> TrialResult:
-    """Try a grasp briefly, and where that tells nothing as a whole."""
+    """Run the brief trial of a grasp, and the whole trial if the brief one is inconclusive."""
     from manitwin.physics.mujoco.hand_scene import HandScene
 
     def scene() -> tuple[HandScene, TrialWatch | None]:
@@ -119,7 +127,7 @@ def _try_one(
 
 
 def frozen(settings: TrialSettings) -> TrialSettings:
-    """Return the settings with MuJoCo's step: the same protocol, the same time allowed."""
+    """Return the settings with MuJoCo's time step and the same total time."""
     most_s = settings.max_steps * settings.timestep_s
     return replace(
         settings,

@@ -1,1 +1,1 @@
-"""SAPIEN (PhysX): scenes, bodies, hands, trials."""
+"""SAPIEN (PhysX) simulations: bodies, hands, grasp trials, settling, and robot worlds."""

@@ -1,7 +1,7 @@
-"""Hands and robots in SAPIEN: the links of a URDF as an articulation that gravity does not act on.
+"""Articulations in SAPIEN: hands and robots built from the links of a URDF, without gravity on the links.
 
-It is built from the links, not by SAPIEN's URDF loader, which follows mimic joints, looks for meshes by itself and cooks
-them anew each time. Controllers compensate gravity.
+They are not built by SAPIEN's URDF loader, which couples mimic joints, resolves mesh paths itself and cooks meshes anew each
+time. Gravity is off because controllers compensate it.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from manitwin.physics.sapien.shapes import HAND_COLLISION_GROUPS, convex_shape, 
 from manitwin.robots.links import Link, LinkShape
 
 LEAST_MASS_KG, LEAST_MOMENT_KG_M2 = 0.01, 1e-6
-"""Of URDF's links without mass, which PhysX refuses."""
+"""Lower bounds for URDF links without mass, which PhysX rejects."""
 
 
 @dataclass(frozen=True)
 class LinkContact:
-    """The contact properties of a link: its material, whether it is a soft pad, and SAPIEN's collision groups."""
+    """Contact properties of a link: material, whether it is a soft pad, and SAPIEN collision groups."""
 
     material: physx.PhysxMaterial
     soft_pad: bool = False
@@ -37,7 +37,9 @@ def build_articulation(
     contact_offset_m: float,
     root_to_scene: np.ndarray | None = None,
 ) -> dict[str, physx.PhysxArticulationLinkComponent]:
-    """Build links, parents before children, into a scene, the root fixed at a pose ``(4, 4)``; return them by name."""
+    """Build links, parents before children, into a scene with the root fixed at a pose ``(4, 4)``; return the components by
+    name.
+    """
     built: list[physx.PhysxArticulationLinkComponent] = []
     entities = []
     for link in links:
@@ -75,7 +77,7 @@ def drive_joints(
     limit: float,
     armature: float,
 ) -> None:
-    """Give joints a spring and damper towards their targets, of limited force, and the inertia that their motors add.
+    """Give joints a PD drive of limited force, and the motors' armature inertia.
 
     Units are N m and rad, or N and m for prismatic joints.
     """
@@ -85,7 +87,7 @@ def drive_joints(
 
 
 def _link_shape(shape: LinkShape, material: physx.PhysxMaterial) -> physx.PhysxCollisionShape:
-    """Return a link's shape, in its own frame still."""
+    """Return a link's collision shape in the shape's own frame."""
     if shape.half_extents_m is not None:
         return physx.PhysxCollisionShapeBox(shape.half_extents_m.astype(np.float32), material)
     if shape.radius_m is not None:
@@ -96,7 +98,7 @@ def _link_shape(shape: LinkShape, material: physx.PhysxMaterial) -> physx.PhysxC
 
 
 def _set_joint_and_mass(component: physx.PhysxArticulationLinkComponent, link: Link) -> None:
-    """Give a component its name, joint and mass properties."""
+    """Set a component's name, joint and mass properties."""
     component.name = link.name
     component.joint.name = link.joint
     component.joint.type = "revolute_unwrapped" if link.joint_type == "continuous" else link.joint_type

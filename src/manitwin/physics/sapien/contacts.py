@@ -1,4 +1,6 @@
-"""Contacts of a robot's world: of the fingers with the target, the target with its support, the robot with what it should not."""
+"""Contact reading in a robot world: finger forces on the target, contact of target and support, and unplanned contacts of the
+robot.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,7 @@ from sapien import physx
 
 
 class Role(IntEnum):
-    """The role of a body in a task; the robot's parts come first."""
+    """Role of a body in a task; the robot's parts come first."""
 
     PLUS_FINGER = 0
     MINUS_FINGER = 1
@@ -28,10 +30,10 @@ ROBOT_NAME = "robot"
 
 @dataclass(frozen=True)
 class MeantContacts:
-    """The contacts that are meant for a while, by the names of bodies: of the fingers, and of the target in the hand.
+    """Contacts that are allowed during a phase, by names of bodies: of the fingers, and of the target in the hand.
 
-    Without ``target`` it is not asked what the target touches, as in pick-and-place. ``palm``: the target may touch the palm
-    though it is no longer in the hand, as what was let go in the air falls to some side.
+    ``target`` None: contacts of the target are not checked, as in pick-and-place. ``palm``: the target may touch the palm
+    although it is no longer in the hand, because an object released in the air may fall to either side.
     """
 
     fingers: frozenset[str] = frozenset()
@@ -44,7 +46,9 @@ NONE_MEANT = MeantContacts()
 
 @dataclass(frozen=True)
 class Push:
-    """What presses on a body: the force ``(3,)`` on it, N, along the contacts' normals, and its middle ``(3,)``, m; world."""
+    """Resultant contact force ``(3,)`` N on a body, along the contact normals, and its mean point ``(3,)`` m, in the world
+    frame.
+    """
 
     force_n: np.ndarray
     at_m: np.ndarray
@@ -52,14 +56,14 @@ class Push:
 
 @dataclass(frozen=True)
 class Touches:
-    """The force (N) of each finger on the target, of two arms the first's before the second's; and what else carries it."""
+    """Force (N) of each finger on the target, the first arm's before the second's; ``on_support``: something else supports it."""
 
     finger_forces_n: tuple[float, ...]
     on_support: bool
 
 
 class ContactReader:
-    """Reads the contacts of the last step."""
+    """Reads and classifies the contacts of the last step."""
 
     def __init__(
         self,
@@ -68,12 +72,11 @@ class ContactReader:
         max_contact_force_n: float,
         arms: Mapping[str, str] | None = None,
     ):
-        """Take every body with its name and role; ``arms`` names the arm that each link of two arms is of.
+        """Take every body with its name and role; for two arms, ``arms`` maps each link name to its arm.
 
-        Roles are then as one of the arms sees them: the other's hand is a HAND, the rest of it an ARM.
-
-        ``has_strangers`` is to be set where there are bodies without one (granules): their contacts are left out then, which
-        takes time where there are many.
+        Roles are then as seen by one of the arms: the other arm's hand is a HAND, the rest of it an ARM. Set
+        ``has_strangers`` if the scene has bodies without a role (granules). Their contacts are then left out, which takes
+        time if there are many.
         """
         self.has_strangers = False
         self._arms = arms or {}
@@ -85,21 +88,21 @@ class ContactReader:
 
     @property
     def names(self) -> frozenset[str]:
-        """The names of all bodies."""
+        """Names of all bodies."""
         return frozenset(self._names.values())
 
     def read(self) -> Sequence[physx.PhysxContact]:
-        """Return the contacts of the last step, of which the others tell; expensive where many hulls stand on a table."""
+        """Return the contacts of the last step, for the other methods; expensive if many hulls stand on a table."""
         contacts: Sequence[physx.PhysxContact] = self._system.get_contacts()
         if self.has_strangers:
             known = self._roles
             return [
                 each for each in contacts for one, two in (each.bodies,) if one in known and two in known
-            ]  # bodies are made anew each time they are asked for
+            ]  # SAPIEN creates the list of bodies anew on each access
         return contacts
 
     def push(self, contacts: Iterable[physx.PhysxContact], on: str, by: frozenset[str]) -> Push | None:
-        """Return how some bodies press on another one, all by their names; None where none does."""
+        """Return the resultant force of the bodies ``by`` on the body ``on``, all by name; None without contact."""
         impulse, places, weights = np.zeros(3), list[np.ndarray](), list[float]()
         for contact in contacts:
             first, second = (self._names[body] for body in contact.bodies)
@@ -116,7 +119,7 @@ class ContactReader:
         return Push(impulse / self._system.timestep, np.average(places, axis=0, weights=weights))
 
     def touches(self, contacts: Iterable[physx.PhysxContact]) -> Touches:
-        """Return what touches the target."""
+        """Return the finger forces on the target and whether it is supported."""
         impulses = [np.zeros(3), np.zeros(3)]
         on_support = False
         for contact in contacts:
@@ -134,9 +137,9 @@ class ContactReader:
         return Touches((plus_n, minus_n), on_support)
 
     def pressing(self, contacts: Iterable[physx.PhysxContact]) -> set[frozenset[str]]:
-        """Return the pairs of names of what presses on each other.
+        """Return the pairs of names of bodies that press on each other.
 
-        Every part of the robot goes by ``ROBOT_NAME``, of two arms each by its arm's name.
+        All parts of a robot are named ``ROBOT_NAME``; for two arms each part has its arm's name.
         """
         pairs = set()
         for contact in contacts:
@@ -155,10 +158,10 @@ class ContactReader:
     def unplanned(
         self, contacts: Iterable[physx.PhysxContact], *, in_hand: bool, meant: MeantContacts = NONE_MEANT
     ) -> set[tuple[str, str]]:
-        """Return the names of what touches with more than the allowed force and should not, the robot's part first.
+        """Return the pairs of names in unplanned contact with more than the allowed force, the robot's part first.
 
-        While the target is ``in_hand``, the palm may touch it. What is ``meant`` is allowed, pair by pair. Two arms must not
-        touch one another.
+        While the target is ``in_hand``, the palm may touch it. ``meant`` contacts are allowed pair by pair. Contacts between
+        two arms are always unplanned.
         """
         impulses: dict[tuple[str, str], np.ndarray] = {}
         forbidden = _FORBIDDEN_IN_HAND if in_hand else _FORBIDDEN
@@ -185,7 +188,9 @@ class ContactReader:
 
 
 def _forbidden(in_hand: bool) -> list[list[bool]]:
-    """Return, for two roles in either order, whether they must not touch: a table, as it is asked for every contact."""
+    """Return a table over two roles in either order: whether they must not touch. Precomputed, as it is read for every
+    contact.
+    """
 
     def is_forbidden(part: Role, other: Role) -> bool:
         if part >= Role.TARGET or other < Role.TARGET:
@@ -196,7 +201,7 @@ def _forbidden(in_hand: bool) -> list[list[bool]]:
 
 
 def _is_of_target(one: Role, other: Role) -> bool:
-    """Tell whether the target touches what is not of the robot."""
+    """Tell whether the pair is the target with a body that is not part of the robot."""
     return min(one, other) == Role.TARGET
 
 
@@ -208,5 +213,5 @@ _FORBIDDEN, _FORBIDDEN_IN_HAND = _forbidden(False), _forbidden(True)
 
 
 def _impulse(contact: physx.PhysxContact) -> np.ndarray:
-    """Return the impulse ``(3,)`` on the contact's first body."""
+    """Return the impulse ``(3,)`` N s on the contact's first body."""
     return sum((point.impulse for point in contact.points), start=np.zeros(3))

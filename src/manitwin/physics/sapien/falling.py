@@ -1,4 +1,6 @@
-"""Things that fall: contacts are seen ahead of them, and what drops into a floor all the same is pushed out of it gently."""
+"""Falling objects: larger contact offset and slow depenetration, so that they are neither missed by nor thrown out of a
+surface.
+"""
 
 from __future__ import annotations
 
@@ -10,27 +12,27 @@ from sapien import physx
 from manitwin.physics.sapien.body import MAX_DEPENETRATION_M_S
 from manitwin.physics.trial import GRAVITY_M_S2
 
-# After 10 cm a step of 1/120 s is 12 mm long. Pushed out at 5 m/s, a marker that fell 11 cm into a holder flew over its rim;
-# pushed out gently alone, another one stayed wedged in the holder's walls and shook there.
+# After a fall of 10 cm, a body moves 12 mm per step of 1/120 s. With depenetration at 5 m/s, a marker that fell 11 cm into a
+# holder flew over its rim; with slow depenetration alone, another one stayed wedged in the holder's walls and vibrated there.
 GENTLY_M_S = 0.5
 AHEAD_M = 0.012
-OFF_GRAVITY = 0.1  # of it: what accelerates so nearly as what falls is falling
+OFF_GRAVITY = 0.1  # relative tolerance of the acceleration for which a body counts as falling freely
 
 
 class Falling:
-    """Limits how fast bodies are pushed out of what they overlap, from when they fall freely until a hand closes again."""
+    """Limits the depenetration speed of bodies from when they fall freely until a hand closes again."""
 
     def __init__(
         self, bodies: Sequence[physx.PhysxRigidDynamicComponent], timestep_s: float, *, contact_offset_m: float
     ):
-        """Watch some bodies of a scene, which come down along its Z; ``contact_offset_m`` is that of their shapes else."""
+        """Watch bodies of a scene with gravity along -Z; ``contact_offset_m`` is their usual contact offset."""
         self._contact_offset_m = contact_offset_m
         self._bodies, self._step_m_s = bodies, np.array([0.0, 0, -GRAVITY_M_S2 * timestep_s])
         self._before_m_s = [np.array(body.linear_velocity, float) for body in bodies]
         self._falls = [False] * len(bodies)
 
     def look(self) -> None:
-        """See what the last step has done; to be called after each."""
+        """Detect bodies in free fall; call after each step."""
         for number, body in enumerate(self._bodies):
             velocity_m_s = np.array(body.linear_velocity, float)
             off_m_s = velocity_m_s - self._before_m_s[number] - self._step_m_s
@@ -39,7 +41,7 @@ class Falling:
                 self._limit(number, falls=True)
 
     def end(self) -> None:
-        """Take nothing for falling any more: a hand is about to close, and presses what is light out of its fingers fast."""
+        """Restore the usual limits: a closing hand needs fast depenetration to push light objects off its fingers."""
         for number, falls in enumerate(self._falls):
             if falls:
                 self._limit(number, falls=False)

@@ -1,8 +1,8 @@
-"""A hand with many joints in SAPIEN: an articulation whose palm stays in place, and the trial of its grasps.
+"""Multi-finger hand in SAPIEN: an articulation with a stationary palm, and its grasp trial.
 
-Each finger closes along its own straight line of joints and stops where a joint presses; from then on its targets stay:
-the drives' stiffness then resists what pulls at the object. (Fingers that are driven with constant torques have no
-lateral stiffness, see ``shared_target.SharedTarget``.)
+Each finger closes along its own straight line in joint space and stops when one of its joints presses. Its targets then stay
+fixed, so that the drives' stiffness resists forces on the object. (Fingers driven by constant torques have no lateral
+stiffness, see ``shared_target.SharedTarget``.)
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from manitwin.physics.trial_recording import TrialRecorder, TrialRecording
 from manitwin.robots.grippers.gripper import Gripper, of_kind
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 
-# Shapes with a common bit in the third word do not collide: the palm shares one with the thumb and one with the other
-# fingers; thumb and fingers have none in common, so that they stop one another.
+# Shapes with a common bit in the third word do not collide. The palm shares one bit with the thumb and one with the other
+# fingers; thumb and fingers have none in common, so that they collide with each other.
 PALM_BITS, THUMB_BITS, FINGER_BITS = 0b11, 0b01, 0b10
 THUMB = 0
 
 
 class ArticulatedTrial:
-    """Try grasps of a hand with many joints one by one in SAPIEN on the CPU."""
+    """Grasp trial of a multi-finger hand in SAPIEN on the CPU, one grasp at a time."""
 
     name = "sapien"
 
@@ -43,9 +43,10 @@ class ArticulatedTrial:
         settings: TrialSettings,
         joints_rad: np.ndarray | None = None,
     ) -> list[TrialResult]:
-        """Try the grasps ``gripper_to_object (N, 4, 4)`` with ``joints_rad (N, 2, J)`` before closing and to close to.
+        """Try the grasps ``gripper_to_object (N, 4, 4)``; ``joints_rad (N, 2, J)`` are the joints before closing and the
+        closing goal.
 
-        ``settings.force_n`` over the gripper's own scales what its joints press with.
+        The ratio of ``settings.force_n`` to the gripper's own force scales the torques with which its joints press.
         """
         hand = of_kind(gripper, MultiFingerGripper)
         with COOKED.lent([body.hulls]) as (shapes,):
@@ -94,7 +95,7 @@ def _try_one(
 
 
 class FingerClosing:
-    """How far each finger has come on its straight line of joints; it stops where a joint of it presses."""
+    """Progress of each finger along its straight line in joint space; a finger stops when one of its joints presses."""
 
     def __init__(
         self,
@@ -106,9 +107,9 @@ class FingerClosing:
         strength: float,
         frame_s: float,
     ):
-        """Take where it begins and where it leads ``(J,)``, joints in the ``order`` given by their numbers in the gripper's file.
+        """Take the start and goal ``(J,)`` rad; ``order`` gives the joints' numbers in the gripper's file.
 
-        ``strength`` is the share of the gripper's own torque that joints press with.
+        ``strength`` is the share of the gripper's own torque with which joints press.
         """
         self._press_nm, self._stiffness = strength * gripper.drive.press_nm, gripper.drive.stiffness_nm_rad
         self.target_rad, self._start, self._way = start_rad, start_rad, goal_rad - start_rad
@@ -121,7 +122,7 @@ class FingerClosing:
         self.all_press = False
 
     def move_on(self, positions_rad: np.ndarray) -> np.ndarray:
-        """Move on the targets of all fingers that do not press yet by one frame, and return all targets ``(J,)``."""
+        """Advance the targets of all fingers that do not press yet by one frame, and return all targets ``(J,)``."""
         torque_nm = np.abs(self._stiffness * (self.target_rad - positions_rad))
         presses = [
             torque_nm[self._finger_of_joint == finger].max() >= self._press_nm for finger in range(len(self._come))
@@ -135,7 +136,7 @@ class FingerClosing:
 
 
 class FingeredHand:
-    """A hand that can be closed: its articulation, each finger's way from open to closed, and how far it has come."""
+    """Multi-finger hand for the trial (``SapienHand``): its articulation and the closing progress of its fingers."""
 
     is_ahead = False
 
@@ -176,19 +177,19 @@ class FingeredHand:
         self._owner = {link.entity.per_scene_id: finger_of[name] for name, link in self._links.items()}
 
     def joints(self) -> np.ndarray:
-        """Return its joints (rad), in the order of the gripper's file."""
+        """Return the joint positions (rad), in the order of the gripper's file."""
         return np.asarray(self.articulation.get_qpos(), float)[self._place_of]
 
     def squeeze(self) -> None:
-        """Move on the targets of all fingers that do not press yet."""
+        """Advance the targets of all fingers that do not press yet."""
         self._drive_to(self._closing.move_on(np.asarray(self.articulation.get_qpos())))
 
     def presses(self) -> bool:
-        """Tell whether every finger presses or has come to its end."""
+        """Tell whether every finger presses or has reached its goal."""
         return self._closing.all_press
 
     def pressing_n(self, pushes: list[tuple[int, np.ndarray]]) -> tuple[float, ...]:
-        """Return how hard thumb and palm together, and the other fingers together, push the object (N)."""
+        """Return the contact forces (N) on the object of thumb and palm together, and of the other fingers together."""
         forces = [0.0, 0.0]
         for other, push_n in pushes:
             if other in self._owner:
@@ -201,5 +202,5 @@ class FingeredHand:
 
 
 def finger_collision_groups(finger: int) -> tuple[int, ...]:
-    """Return SAPIEN's collision groups of a finger's links, by its number: 0 the thumb, -1 the palm."""
+    """Return the SAPIEN collision groups of a finger's links, by its number: 0 the thumb, -1 the palm."""
     return (1, 1, PALM_BITS if finger < 0 else THUMB_BITS if finger == THUMB else FINGER_BITS, 0)

@@ -1,7 +1,6 @@
-"""Granules: equal spheres in a vessel that stand for what is poured or stirred.
+"""Granules: equal spheres in a vessel that represent the contents to pour or stir.
 
-What they are made of is measured: PhysX keeps 20 to 240 of them in thin hulls without one passing through, at 4 iterations of
-its solver.
+The parameters are measured: at 4 solver iterations PhysX keeps 20 to 240 granules inside thin hulls without tunnelling.
 """
 
 from __future__ import annotations
@@ -19,23 +18,26 @@ from manitwin.geometry.poses import rotation_between, transform_points
 from manitwin.physics.sapien.body import entity_at
 
 GRANULES = 60
-FILL_SHARE = 0.16  # of what a vessel holds to the brim: heaps of dry grains stay below its rim when it is carried
-PACKING = 0.55  # of spheres that were dropped and not shaken (loose random packing)
+FILL_SHARE = 0.16  # share of the vessel's volume to the rim: heaps of dry grains stay below the rim while it is carried
+PACKING = 0.55  # packing fraction of spheres that were dropped and not shaken (loose random packing)
 RADIUS_M = (0.003, 0.008)
-MOST_OF_RIM = 0.2  # of the rim's radius: larger ones jam
+MOST_OF_RIM = 0.2  # of the rim's radius: larger granules jam
 FALL_S = 0.6
 
 _DENSITY_KG_M3, _FRICTION, _RESTITUTION = 1000.0, 0.4, 0.1
-_LINEAR_DAMPING, _ANGULAR_DAMPING = 0.05, 1.0  # per s; spheres would roll for ever
-_OFFSET_SHARE = 0.2  # of the radius
-_ITERATIONS, _MAX_DEPENETRATION_M_S = 4, 0.5  # faster, and what is pressed against a wall shoots out of the vessel
-_SPACING = 2.15  # radii between two of the lattice
-_WIDTH_SHARE = 0.8  # of the rim's radius
+_LINEAR_DAMPING, _ANGULAR_DAMPING = 0.05, 1.0  # per s; spheres would otherwise roll forever
+_OFFSET_SHARE = 0.2  # contact offset over the radius
+_ITERATIONS, _MAX_DEPENETRATION_M_S = (
+    4,
+    0.5,
+)  # faster depenetration shoots granules pressed against a wall out of the vessel
+_SPACING = 2.15  # lattice spacing in radii
+_WIDTH_SHARE = 0.8  # lattice radius over the rim's radius
 
 
 @dataclass(frozen=True)
 class GranuleFill:
-    """Granules before they fall: their middles ``(N, 3)`` in the frame of the vessel ``name``, and their radius, m."""
+    """Initial granules: their centres ``(N, 3)`` m in the frame of the vessel ``name``, and their radius (m)."""
 
     name: str
     centers_m: np.ndarray
@@ -43,15 +45,15 @@ class GranuleFill:
 
     @property
     def volume_m3(self) -> float:
-        """The volume that they take in a heap, gaps included, m^3."""
+        """Volume of the granules as a heap, voids included, m^3."""
         return float(len(self.centers_m) * 4 / 3 * np.pi * self.radius_m**3 / PACKING)
 
 
 def fill(name: str, opening: Opening, hulls: Sequence[np.ndarray], rng: np.random.Generator) -> GranuleFill | None:
-    """Return 60 granules for a vessel, or fewer where they would be too small; None where it has no room for ten.
+    """Return 60 granules for a vessel, or fewer if they would be too small; None if it has no room for ten.
 
-    They take ``FILL_SHARE`` of its volume and stand in a loose lattice above its floor, clear of its ``hulls``, each
-    ``(V, 3)`` m.
+    They fill ``FILL_SHARE`` of its volume and start in a loose lattice above its floor, clear of its ``hulls``, each ``(V,
+    3)`` m.
     """
     content_m3 = FILL_SHARE * PACKING * opening.volume_m3
     most_m = min(RADIUS_M[1], MOST_OF_RIM * opening.rim_radius_m)
@@ -66,7 +68,9 @@ def fill(name: str, opening: Opening, hulls: Sequence[np.ndarray], rng: np.rando
 def _lattice(
     opening: Opening, hulls: Sequence[np.ndarray], count: int, radius_m: float, rng: np.random.Generator
 ) -> np.ndarray | None:
-    """Fill layers from below, each in a random order, until there are enough; None where they would heap over the rim."""
+    """Fill layers from the bottom, each in random order, until there are ``count``; None if they would rise too far above the
+    rim.
+    """
     wide_m, step_m = max(_WIDTH_SHARE * opening.rim_radius_m - radius_m, 1.01 * radius_m), _SPACING * radius_m
     planes = [ConvexHull(hull).equations for hull in hulls]
     to_object = rotation_between(np.array([0.0, 0, 1]), opening.axis)
@@ -92,15 +96,15 @@ def _lattice(
 
 
 def _within(points: np.ndarray, planes: np.ndarray, radius_m: float) -> np.ndarray:
-    """Tell which spheres reach into a hull, by the planes ``(F, 4)`` of its faces."""
+    """Tell which spheres overlap a hull, given the planes ``(F, 4)`` of its faces."""
     return np.asarray((points @ planes[:, :3].T + planes[:, 3]).max(1) < 1.02 * radius_m)
 
 
 class Granules:
-    """The bodies of granules, each an entity that no scene has yet."""
+    """Bodies of granules, as entities not yet in a scene."""
 
     def __init__(self, fill: GranuleFill, vessel_to_world: np.ndarray):
-        """Put them above the floor of their vessel at its pose ``(4, 4)``."""
+        """Place the granules above the floor of their vessel at its pose ``(4, 4)``."""
         self.radius_m = fill.radius_m
         material = physx.PhysxMaterial(_FRICTION, _FRICTION, _RESTITUTION)
         centers_m = transform_points(vessel_to_world, fill.centers_m)
@@ -111,7 +115,7 @@ class Granules:
         ]
 
     def positions_m(self) -> np.ndarray:
-        """Return their middles ``(N, 3)`` in the world."""
+        """Return the centres ``(N, 3)`` m in the world frame."""
         return np.array([body.entity_pose.p for body in self._bodies], float)
 
 

@@ -1,8 +1,7 @@
-"""A parallel hand in SAPIEN that stays in place: a static palm, and two fingers that share one target.
+"""Stationary parallel hand in SAPIEN: a static palm, and two fingers with a shared target.
 
-The scene's frame is the gripper's frame. The hand's motion acts on the object instead, as a load in the accelerated
-frame. The fingers are rigid bodies that can move along one axis only: a step costs about 0.65 of that with an
-articulation's links.
+The scene's frame is the gripper frame. The hand's motion acts on the object instead, as a load in the accelerated frame. The
+fingers are rigid bodies with one free axis: a step costs about 0.65 of that with articulation links.
 """
 
 from __future__ import annotations
@@ -25,30 +24,32 @@ from manitwin.physics.trial import TrialSettings
 from manitwin.robots.grippers.box import PlacedBox
 from manitwin.robots.grippers.parallel import ParallelGripper
 
-# PhysX stops a locked axis after every substep but solves contacts with the finger's mass along it too: friction of
-# fingers much lighter than the object needs more substeps than there are, and much heavier ones converge worse. Of 110
-# grasps 13 have verdicts that depend on it: with a reference of 1/960 s, 40 iterations and an articulation, 12 of them
-# agree at 0.5 kg, 3 at 1 kg; a box at 95 % of friction's limit slips at 0.1 kg.
+# PhysX stops a locked axis after every substep but includes the finger's mass along it in the contact solution. Friction on
+# fingers much lighter than the object needs more substeps than there are; much heavier fingers converge worse. Of 110 grasps
+# 13 have verdicts that depend on the finger mass. Compared with a reference of 1/960 s, 40 iterations and an articulation, 12
+# of them agree at 0.5 kg and 3 at 1 kg; a box at 95 % of the friction limit slips at 0.1 kg.
 FINGER_MASS_KG = 0.5
-LOCKED_INERTIA_KG_M2 = 1e9  # as good as infinite: the fingers do not turn
+LOCKED_INERTIA_KG_M2 = 1e9  # effectively infinite: the fingers do not rotate
 LOCKED_AXES = [False, True, True, True, True, True]  # translations x, y, z, then rotations
 LIMIT_SLACK_M = 1e-4  # keeps the open finger off its limit
-MAX_DRIVE_FORCE = 4.0  # the drive's limit, as a multiple of the closing force: it never cuts the closing force itself
+MAX_DRIVE_FORCE = 4.0  # force limit of the drive over the closing force: never limits the closing force itself
 
-# Rotations wxyz that turn the X axis, along which the fingers' drives work, into +X and -X.
+# Rotations wxyz that map the X axis, along which the finger drives act, to +X and -X.
 _ALONG_X, _ALONG_MINUS_X = (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
 class FreeFrame:
-    """Where a hand is after a frame in which it touched nothing: each finger's place (m) and speed (m/s) along X, the target."""
+    """State of a hand after a frame without contact: each finger's position (m) and speed (m/s) along X, and the shared
+    target.
+    """
 
     along_x: tuple[tuple[float, float], ...]
     target: SharedTarget
 
 
 class FixedHand:
-    """A parallel hand that can be closed.
+    """Stationary parallel hand for the trial (``SapienHand``).
 
     Finger coordinates are the distances (m) of the two pads from the plane x = 0.
     """
@@ -56,7 +57,7 @@ class FixedHand:
     def __init__(
         self, scene: sapien.Scene, gripper: ParallelGripper, settings: TrialSettings, approach: Sequence[FreeFrame] = ()
     ):
-        """Put the open hand into the scene; while it closes it is set to the states of ``approach``, and then goes on."""
+        """Put the open hand into the scene. While closing, it first replays the precomputed states ``approach``."""
         self._approach, self.is_ahead = iter(approach), False
         self._material = physx.PhysxMaterial(settings.finger_friction, settings.finger_friction, 0.0)
         self._contact_offset_m = settings.contact_offset_m
@@ -109,7 +110,7 @@ class FixedHand:
         return np.array([plus.entity_pose.p[0], -minus.entity_pose.p[0]], float)
 
     def squeeze(self) -> None:
-        """Move the fingers' shared target on by one frame."""
+        """Advance the fingers' shared target by one frame."""
         state = next(self._approach, None)
         self.is_ahead = state is not None
         if state is not None:
@@ -120,11 +121,11 @@ class FixedHand:
         self.close_to(self._target.move_on(float(mean_m)))
 
     def presses(self) -> bool:
-        """Tell whether the fingers' target is as far ahead of them as the closing force wants."""
+        """Tell whether the target is far enough ahead of the fingers to press with the closing force."""
         return self._target.presses
 
     def pressing_n(self, pushes: list[tuple[int, np.ndarray]]) -> tuple[float, ...]:
-        """Return how hard the +X and the -X finger press inwards on the object (N)."""
+        """Return the inward forces (N) of the +X and the -X finger on the object."""
         forces = [0.0, 0.0]
         fingers = [finger.entity.per_scene_id for finger in self.fingers]
         for other, push_n in pushes:
@@ -134,7 +135,7 @@ class FixedHand:
         return tuple(forces)
 
     def state(self) -> FreeFrame:
-        """Return where its fingers are, how fast they are, and what they close to."""
+        """Return positions and speeds of the fingers, and their target."""
         along_x = [(float(finger.entity_pose.p[0]), float(finger.linear_velocity[0])) for finger in self.fingers]
         return FreeFrame(tuple(along_x), copy(self._target))
 
@@ -146,16 +147,16 @@ class FixedHand:
         self.close_to(self._target.value_m)
 
     def close_to(self, target_m: float) -> None:
-        """Give both fingers one target; a target inside the object presses on it."""
+        """Set the target of both fingers (m); a target inside the object presses on it."""
         target = sapien.Pose([target_m, 0, 0])
         for drive in self._drives:
             drive.set_drive_target(target)
 
 
 def free_frames(gripper: ParallelGripper, settings: TrialSettings, travel_m: float) -> Sequence[FreeFrame]:
-    """Return the first frames of a closing hand, until its fingers have come as far as ``travel_m``, and touched nothing.
+    """Return the first frames of a closing hand, until its fingers have moved by ``travel_m`` without contact.
 
-    They are the same in every trial, so they are simulated once.
+    They are the same in every trial and therefore simulated once.
     """
 
     def is_clear(frame: FreeFrame) -> bool:
@@ -166,7 +167,7 @@ def free_frames(gripper: ParallelGripper, settings: TrialSettings, travel_m: flo
 
 @lru_cache(maxsize=64)
 def _empty_closing(gripper: ParallelGripper, settings: TrialSettings) -> tuple[FreeFrame, ...]:
-    """Return the frames of a hand that closes on nothing, after a first step in which it stays open."""
+    """Return the frames of an empty closing hand, after a first step in which it stays open."""
     system = weightless_system(settings.timestep_s)
     scene = sapien.Scene([system])
     hand, frames = FixedHand(scene, gripper, settings), []

@@ -1,11 +1,11 @@
-"""One object in front of one still hand in SAPIEN 3 (PhysX 5 on the CPU), in a scene of their own.
+"""SAPIEN 3 scene of a grasp trial: one object and one stationary hand (PhysX 5 on the CPU).
 
 Settings as measured: 20 solver iterations at 1/240 s, gravity from the lift on.
 
-PhysX would give weight and inertial force to the object at once when a step begins, while the closing force reaches the
-contacts in equal parts over the solver's substeps: the first of them would lack the normal force to resist, and a heavy
-object would creep (measured: 6 mm at 4 kg where friction carries 5.6 kg, 0.8 mm as below). So the load enters as a
-drive, which the solver applies in every substep as well.
+PhysX would apply weight and inertial force to the object at once when a step begins, while the closing force reaches the
+contacts in equal parts over the solver's substeps. The first substeps would lack the normal force to resist, and a heavy
+object would creep (measured: 6 mm at 4 kg where friction carries 5.6 kg, 0.8 mm as implemented here). The load is therefore
+applied by a drive, which the solver also distributes over the substeps.
 """
 
 from __future__ import annotations
@@ -25,33 +25,33 @@ from manitwin.physics.trial import TrialSettings
 from manitwin.physics.trial_phases import HandContacts
 
 NO_SPIN = np.zeros(3, np.float32)
-LOAD_RATE_PER_S = 0.01  # drag of the load's drive per mass: 1e-4 of the weight at 0.1 m/s in the hand
+LOAD_RATE_PER_S = 0.01  # damping of the load drive per mass: 1e-4 of the weight at 0.1 m/s in the hand
 
 
 class SapienHand(Protocol):
-    """A hand in a scene, which stays where it is; ``is_ahead`` where it is already as the steps to come would leave it."""
+    """Stationary hand in a scene; ``is_ahead``: its precomputed state already includes the steps to come."""
 
     is_ahead: bool
 
     def joints(self) -> np.ndarray:
-        """Return the positions ``(J,)`` of its joints, m or rad."""
+        """Return the joint positions ``(J,)``, m or rad."""
         ...
 
     def squeeze(self) -> None:
-        """Close by one frame, until it presses as hard as it should."""
+        """Close by one frame, until the hand presses with the closing force."""
         ...
 
     def presses(self) -> bool:
-        """Tell whether it presses as hard as it should."""
+        """Tell whether the hand presses with the closing force."""
         ...
 
     def pressing_n(self, pushes: list[tuple[int, np.ndarray]]) -> tuple[float, ...]:
-        """Return how hard each side presses, given which body (by ``per_scene_id``) pushes the object how (N, hand's frame)."""
+        """Return the force of each side, given the contact forces (N, hand's frame) on the object by body (``per_scene_id``)."""
         ...
 
 
 class HandScene:
-    """One grasp in one scene; its frame is the hand's."""
+    """Scene of one grasp (``TrialScene``), in the hand's frame."""
 
     def __init__(
         self,
@@ -61,17 +61,17 @@ class HandScene:
         settings: TrialSettings,
         make_hand: Callable[[sapien.Scene], SapienHand],
     ):
-        """Put the body, of these ``shapes``, before the hand."""
+        """Place the body, with these ``shapes``, in front of the hand."""
         self.settings = settings
         self.system = weightless_system(settings.timestep_s)
-        self.scene = scene = sapien.Scene([self.system])  # kept: bodies go with their scene
+        self.scene = scene = sapien.Scene([self.system])  # kept alive: bodies are destroyed with their scene
         self.object = graspable_component(
             body,
             shapes,
             contact_offset_m=settings.contact_offset_m,
             solver_iterations=settings.solver_iterations,
         )
-        self.object.set_sleep_threshold(0.0)  # at rest in the hand is not at rest
+        self.object.set_sleep_threshold(0.0)  # an object at rest in the hand must not sleep
         self.entity = entity_at(self.object, sapien.Pose(object_to_hand))
         self.load = _load(self.object)
         self.entity.add_component(self.load)
@@ -79,14 +79,14 @@ class HandScene:
         self.hand = make_hand(scene)
         self.in_object_m = body.center_of_mass_m
         self.looks = [object_to_hand]
-        self._pose: np.ndarray | None = None  # of the object, since the last step
-        # Loads of which each step has the same, as they were given last: while the hand closes, and where it waits.
+        self._pose: np.ndarray | None = None  # object pose, cached until the next step
+        # Last loads whose rows are all equal (while the hand closes, and while it waits): the drive target is then set once.
         self._even_loads: np.ndarray | None = None
 
     def advance(self, loads_m_s2: np.ndarray) -> None:
-        """Take one step for each row of accelerations ``(N, 3)``."""
+        """Take one step for each row of accelerations ``(N, 3)`` m/s^2."""
         self._pose = None
-        if self.hand.is_ahead and not loads_m_s2.any():  # nothing touches the object, and nothing else loads it
+        if self.hand.is_ahead and not loads_m_s2.any():  # no contact and no load, so the object does not move
             return
         set_target, step = self.load.set_drive_velocity_target, self.system.step
         if loads_m_s2 is not self._even_loads:
@@ -106,11 +106,11 @@ class HandScene:
         self.hand.squeeze()
 
     def presses(self) -> bool:
-        """Tell whether the hand presses with the closing force by now."""
+        """Tell whether the hand presses with the closing force."""
         return self.hand.presses()
 
     def contacts(self) -> HandContacts:
-        """Return how hard each side of the hand presses, and the deepest overlap with the hand."""
+        """Return the force of each side of the hand, and the deepest overlap (m) of hand and object."""
         pushes, deepest = [], 0.0
         target = self.entity.per_scene_id
         for contact in self.system.get_contacts():
@@ -124,11 +124,11 @@ class HandScene:
         return HandContacts(self.hand.pressing_n(pushes), deepest)
 
     def object_rotation(self) -> np.ndarray:
-        """Return the object's rotation in the hand's frame."""
+        """Return the object's rotation ``(3, 3)`` in the hand's frame."""
         return self._look()[:3, :3]
 
     def center_of_mass_m(self) -> np.ndarray:
-        """Return the object's centre of mass in the hand's frame."""
+        """Return the object's centre of mass ``(3,)`` m in the hand's frame."""
         pose = self._look()
         return pose[:3, :3] @ self.in_object_m + pose[:3, 3]
 
@@ -137,11 +137,11 @@ class HandScene:
         return np.asarray(self.object.entity_pose.to_transformation_matrix(), float)
 
     def hand_joints(self) -> np.ndarray:
-        """Return the hand's state ``(J,)``."""
+        """Return the hand's joint positions ``(J,)``."""
         return self.hand.joints()
 
     def _look(self) -> np.ndarray:
-        """Return the object's pose ``(4, 4)`` in the hand's frame, and keep it in ``looks``."""
+        """Return the object's pose ``(4, 4)`` in the hand's frame, and append it to ``looks``."""
         if self._pose is None:
             self._pose = self.object_to_hand()
             self.looks.append(self._pose)
@@ -149,9 +149,9 @@ class HandScene:
 
 
 def _load(target: physx.PhysxRigidDynamicComponent) -> physx.PhysxDriveComponent:
-    """Build the drive that loads the object at its centre of mass: a weak damper towards a far-off velocity.
+    """Return the drive that loads the object at its centre of mass: a weak damper with a very large velocity target.
 
-    It gives ``mass * LOAD_RATE_PER_S * (velocity target - velocity)``, which is constant but for a negligible drag.
+    Its force is ``mass * LOAD_RATE_PER_S * (velocity target - velocity)``, which is constant except for a negligible drag.
     """
     load = physx.PhysxDriveComponent(target)
     load.pose_in_child = target.cmass_local_pose

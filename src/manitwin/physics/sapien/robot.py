@@ -1,4 +1,4 @@
-"""A robot in a SAPIEN scene: an articulation whose arm and hand follow joint targets; two jaws share one target."""
+"""Robot in a SAPIEN scene: an articulation whose arm and hand follow joint targets; two jaws share one target."""
 
 from __future__ import annotations
 
@@ -17,29 +17,31 @@ from manitwin.robots.grippers.suction import SuctionGripper
 from manitwin.robots.links import Link, bodies_of_urdf
 from manitwin.robots.robot import Robot
 
-# Tracks its trajectories within 0.003 rad, with velocity feed-forward; 50 solver iterations and 50 N held 298 of 304 objects
-# on their way where 20 iterations let heavy ones turn between the fingers.
-# At 3000 and 300 the hand overshoots by 1.6 mm, where 1 mm is planned for: fingers touched the table in 26 of 1,200 episodes.
+# Trajectories are tracked within 0.003 rad with velocity feed-forward. 50 solver iterations and 50 N held 298 of 304 objects
+# in transit, while 20 iterations let heavy ones turn between the fingers. With gains of 3000 and 300 the hand overshoots by
+# 1.6 mm, where the plan allows 1 mm: fingers touched the table in 26 of 1,200 episodes.
 ARM_STIFFNESS_NM_RAD, ARM_DAMPING_NM_S_RAD, ARM_TORQUE_LIMIT_NM = 1e4, 1e3, 200.0
 FINGER_STIFFNESS_N_M, FINGER_DAMPING_N_S_M = 1e4, 100.0
-# What the motors add, as MuJoCo Menagerie has it for the Panda (arm and fingers) and the UR5e; a URDF does not say. Without it
-# contacts with fingers of 15 g are soft: 50 N press them 0.7 mm into a brick at 1/120 s and 32 iterations, with it 0.1 mm.
+# Armature inertia of the motors as in MuJoCo Menagerie for the Panda (arm and fingers) and the UR5e; a URDF does not state
+# it. Without it contacts of fingers of 15 g are soft: 50 N press them 0.7 mm into a brick at 1/120 s and 32 iterations, with
+# it 0.1 mm.
 ARM_ARMATURE_KG_M2, FINGER_ARMATURE_KG = 0.1, 0.1
-# A spring that gives way when the lip meets a surface: half pressed in, as a grasp has it, it presses with 2 N.
-# Under vacuum the plunger is blocked: sprung, it would run out to its stop with each thing heavier than 0.2 kg, and jerk it up.
+# Spring of the plunger: half compressed, as in a grasp, the lip presses with 2 N. Under vacuum the plunger is blocked;
+# otherwise it would extend to its stop with any object heavier than 0.2 kg, and jerk it up.
 PLUNGER_STIFFNESS_N_M, PLUNGER_DAMPING_N_S_M, PLUNGER_FORCE_N, PLUNGER_ARMATURE_KG = 200.0, 5.0, 200.0, 0.02
 BLOCKED_STIFFNESS_N_M = 2e4
 SOLVER_ITERATIONS = 50
 
 
 class SapienRobot:
-    """A robot of one arm, its base fixed where its URDF begins (at the world's origin), at home and with open fingers.
+    """A single-arm robot with its base at its URDF's root (the world's origin), initially at home with open hand.
 
-    ``links`` are its bodies by the names of their first links: what is fixed to a link is part of its body.
+    ``links`` are its bodies by the names of their first links; links fixed to a link are part of its body. Arm positions
+    ``(n,)`` rad are in the order of ``robot.arm_joints``; openings are the distance between the pads (m).
 
-    Arm positions ``(n,)`` rad are in the order of ``robot.arm_joints``; openings are the distance between the pads (m).
-    ``finger_force_n`` is the closing force; the fingers' drives give up at four times that. ``visual`` adds the meshes to
-    look at, which needs a scene with a renderer. ``second``: it is the second of two arms, which touches the first.
+    ``finger_force_n`` is the closing force; the limit of the finger drives is four times that. ``visual`` adds visual meshes,
+    which needs a scene with a renderer. ``second``: it is the second of two arms, which collides with the first. Raises
+    ValueError for a two-arm robot.
     """
 
     def __init__(
@@ -57,7 +59,7 @@ class SapienRobot:
         if robot.arms:
             raise ValueError(f"{robot.name} has two arms; put each of its ``arms`` into the scene")
         self.robot = robot
-        self._scene = scene  # kept: bodies go with their scene
+        self._scene = scene  # kept alive: bodies are destroyed with their scene
         friction = robot.gripper.finger_friction if finger_friction is None else finger_friction
         bodies, part_of = bodies_of_urdf(robot.urdf, robot.hand_links[0])
         pads = physx.PhysxMaterial(friction, friction, 0.0)
@@ -77,7 +79,7 @@ class SapienRobot:
         arm = [joints[name][1] for name in robot.arm_joints]
         fingers = [joints[name][1] for name in robot.finger_joints]
         self._finger_joints = fingers
-        # bound once: they are called at every step
+        # bound methods, because they are called at every step
         self._arm_setters = [(joint.set_drive_target, joint.set_drive_velocity_target) for joint in arm]
         self._finger_setters = [joint.set_drive_target for joint in fingers]
         drive_joints(
@@ -92,14 +94,16 @@ class SapienRobot:
             add_robot_visuals(robot.urdf, self.links, part_of)
         self.put(robot.home_rad, robot.open_hand)
         if isinstance(robot.gripper, SuctionGripper):
-            self.set_hand_targets(np.array([robot.gripper.reach_m]))  # the plunger's spring pushes the lip out
+            self.set_hand_targets(np.array([robot.gripper.reach_m]))  # the plunger's spring extends the lip
 
     def set_state(self, positions_rad: np.ndarray, opening_m: float) -> None:
-        """Put the arm and jaws where they are to be, at rest, with their targets there."""
+        """Set arm positions ``(n,)`` rad and the jaws' opening (m), at rest, with the targets there."""
         self.put(positions_rad, np.full(2, opening_m / 2))
 
     def put(self, positions_rad: np.ndarray, hand: np.ndarray) -> None:
-        """Put arm and hand, joints ``(n,)`` and ``(J,)``, where they are to be, at rest, with their targets there."""
+        """Set the positions of arm ``(n,)`` and hand joints ``(J,)``, clipped to their limits, at rest, with the targets
+        there.
+        """
         state = np.empty(len(self._arm_at) + len(self._fingers_at), np.float32)
         state[self._arm_at] = positions_rad
         state[self._fingers_at] = hand
@@ -110,7 +114,7 @@ class SapienRobot:
         self.set_hand_targets(hand)
 
     def set_targets(self, positions_rad: np.ndarray, velocities_rad_s: np.ndarray) -> None:
-        """Set the arm's targets: positions ``(n,)`` and the velocities ``(n,)`` that the drives' dampers follow."""
+        """Set the arm's targets: positions ``(n,)`` rad and feed-forward velocities ``(n,)`` rad/s."""
         for (set_position, set_velocity), position, velocity in zip(
             self._arm_setters, positions_rad.tolist(), velocities_rad_s.tolist(), strict=True
         ):
@@ -118,18 +122,18 @@ class SapienRobot:
             set_velocity(velocity)
 
     def set_opening_target(self, opening_m: float) -> None:
-        """Set the jaws' one target; one that is less than what is between them presses on it."""
+        """Set the jaws' common target; a target below the object's width presses on it."""
         for set_position in self._finger_setters:
             set_position(opening_m / 2)
 
     def set_hand_targets(self, targets: np.ndarray) -> None:
-        """Set the target of each of the hand's joints ``(J,)``, rad or m, in the order of ``robot.finger_joints``."""
+        """Set the targets of the hand's joints ``(J,)``, rad or m, in the order of ``robot.finger_joints``."""
         for set_position, target in zip(self._finger_setters, targets.tolist(), strict=True):
             set_position(target)
 
     @property
     def limits_rad(self) -> tuple[np.ndarray, np.ndarray]:
-        """The least and the largest positions ``(n,)`` of the arm's joints."""
+        """Lower and upper limits ``(n,)`` of the arm's joints."""
         low, high = np.asarray(self.articulation.get_qlimits(), float)[self._arm_at].T
         return low, high
 
@@ -138,7 +142,7 @@ class SapienRobot:
         return np.asarray(self.articulation.get_qpos()[self._arm_at], float)
 
     def block_plunger(self, blocked: bool) -> None:
-        """Hold a cup's plunger where it is, or let its spring push it out again."""
+        """Hold a cup's plunger in place, or release its spring."""
         assert isinstance(self.robot.gripper, SuctionGripper), "cups have plungers"
         here, out = self.hand_positions(), np.array([self.robot.gripper.reach_m])
         self.set_hand_targets(here if blocked else out)
@@ -149,7 +153,7 @@ class SapienRobot:
         return np.asarray(self.articulation.get_qpos()[self._fingers_at], float)
 
     def finger_positions_m(self) -> np.ndarray:
-        """Return each jaw's distance ``(2,)`` from where both meet."""
+        """Return each jaw's distance ``(2,)`` m from the closed position."""
         return self.hand_positions()
 
     def opening_m(self) -> float:
@@ -157,7 +161,7 @@ class SapienRobot:
         return float(self.finger_positions_m().sum())
 
     def tip_pose(self) -> np.ndarray:
-        """Return the pose ``(4, 4)`` of the tip's link in the world."""
+        """Return the pose ``(4, 4)`` of the tip link in the world."""
         return np.asarray((self._tip.entity_pose * self._tip_in_body).to_transformation_matrix(), float)
 
     def gripper_pose(self) -> np.ndarray:
@@ -166,20 +170,22 @@ class SapienRobot:
 
 
 def _contact_of(robot: Robot, link: Link, pads: physx.PhysxMaterial, *, second: bool) -> LinkContact:
-    """Return how a link touches: pads are soft, and fingers with joints stop one another as in the trial of their grasps."""
+    """Return a link's contact properties: pads are soft, and fingers of a multi-finger hand collide with each other as in its
+    trial.
+    """
     groups: tuple[int, ...] = SECOND_ARM_COLLISION_GROUPS if second else HAND_COLLISION_GROUPS
     if isinstance(robot.gripper, MultiFingerGripper):
         owners = {
             each.name: owner for each, owner in zip(robot.gripper.links, robot.gripper.finger_of_link, strict=True)
         }
-        groups = finger_collision_groups(int(owners.get(link.name, -1)))  # the arm's are the palm's
+        groups = finger_collision_groups(int(owners.get(link.name, -1)))  # links of the arm have the palm's groups
     if link.name in robot.finger_links:
         return LinkContact(pads, soft_pad=True, collision_groups=groups)
     return LinkContact(physx.get_default_material(), collision_groups=groups)
 
 
 def _drive_plunger(joints: list[physx.PhysxArticulationJoint], stiffness_n_m: float) -> None:
-    damping = PLUNGER_DAMPING_N_S_M * (stiffness_n_m / PLUNGER_STIFFNESS_N_M) ** 0.5  # as damped, stiff or soft
+    damping = PLUNGER_DAMPING_N_S_M * (stiffness_n_m / PLUNGER_STIFFNESS_N_M) ** 0.5  # keeps the damping ratio
     drive_joints(joints, stiffness=stiffness_n_m, damping=damping, limit=PLUNGER_FORCE_N, armature=PLUNGER_ARMATURE_KG)
 
 

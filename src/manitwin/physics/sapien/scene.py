@@ -1,4 +1,4 @@
-"""PhysX systems of SAPIEN with settings of their own, whatever the process-wide configuration says."""
+"""PhysX systems and scenes of SAPIEN with explicit settings, independent of the process-wide configuration."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from manitwin.physics.trial import GRAVITY_M_S2
 
 @contextmanager
 def scene_config(**values: object) -> Iterator[None]:
-    """Set SAPIEN's process-wide scene configuration, from which a new system is made, and set it back."""
+    """Set SAPIEN's process-wide scene configuration, which new systems use, and restore it at exit."""
     before = physx.get_scene_config()
     kept = {name: getattr(before, name) for name in values}
     config = physx.get_scene_config()
@@ -30,7 +30,7 @@ def scene_config(**values: object) -> Iterator[None]:
 
 
 def system_with_gravity(timestep_s: float) -> physx.PhysxCpuSystem:
-    """Return a system whose gravity points down along Z."""
+    """Return a system with gravity along -Z."""
     with scene_config(gravity=np.array([0, 0, -GRAVITY_M_S2], np.float32)):
         system = physx.PhysxCpuSystem()
     system.timestep = timestep_s
@@ -38,12 +38,12 @@ def system_with_gravity(timestep_s: float) -> physx.PhysxCpuSystem:
 
 
 def scene_with_gravity(timestep_s: float) -> sapien.Scene:
-    """Return a scene of such a system alone."""
+    """Return a scene whose only system has gravity along -Z."""
     return sapien.Scene([system_with_gravity(timestep_s)])
 
 
 def weightless_system(timestep_s: float) -> physx.PhysxCpuSystem:
-    """Return a system without gravity, for a hand that stands still and what it holds."""
+    """Return a system without gravity, for a stationary hand and its object."""
     with scene_config(gravity=[0, 0, 0], bounce_threshold=2.0, enable_enhanced_determinism=False):
         system = physx.PhysxCpuSystem()
     system.timestep = timestep_s

@@ -1,4 +1,4 @@
-"""Let bodies come to rest in SAPIEN: copies of one on a plane, a scene of many on furniture, and a ball in a vessel."""
+"""Settling in SAPIEN: copies of a body on a plane, a scene of bodies on furniture, and a ball in a vessel."""
 
 from __future__ import annotations
 
@@ -26,41 +26,41 @@ from manitwin.physics.sapien.scene import scene_with_gravity
 from manitwin.physics.sapien.shapes import COOKED, HullShapes, convex_shape, hull_shapes, set_contact
 
 TIMESTEP_S = 1 / 240
-TOUCHING_M = 5e-4  # solvers leave a gap of some tenths of a millimetre where there is weight on it
+TOUCHING_M = 5e-4  # solvers leave a gap of some tenths of a millimetre under load
 _BALL_TIMESTEP_S = 1 / 480
 
 
 @dataclass(frozen=True)
 class RestLimits:
-    """The limits of rest: slower than both speeds, for so many looks in a row.
+    """Criterion of rest: both speeds below their limits for ``looks`` consecutive checks.
 
-    Its speeds are those between two looks: at rest on many hulls, its velocity of one step is noise. ``by_velocity`` takes the
-    velocities after the last step instead.
+    Speeds are mean speeds between two checks, because the instantaneous velocity of a body at rest on many hulls is noisy.
+    ``by_velocity`` uses the velocities after the last step instead.
     """
 
     speed_m_s: float = 1e-3
     turn_rad_s: float = 1e-2
     between_s: float = 0.05
-    looks: int = 3  # one slow look can be a turning point
+    looks: int = 3  # a single slow check can be a turning point
     by_velocity: bool = False
 
 
 class RestWatch:
-    """Tells from look to look which bodies have come to rest."""
+    """Determines by repeated checks which bodies have come to rest."""
 
     def __init__(self, bodies: Sequence[physx.PhysxRigidDynamicComponent], limits: RestLimits):
-        """Take the first look, from which motions are measured."""
+        """Record the initial poses, from which motions are measured."""
         self._bodies, self._limits = bodies, limits
         self.start = self._before = poses_of(bodies)
         self.looks = np.zeros(len(bodies), dtype=int)
 
     @property
     def all_rest(self) -> bool:
-        """True where every body has been still for the looks that are asked for."""
+        """Whether every body has been still for the required number of checks."""
         return bool((self.looks >= self._limits.looks).all())
 
     def look(self) -> np.ndarray:
-        """Look again, ``between_s`` after the look before; return the poses ``(N, 4, 4)``."""
+        """Check again, ``between_s`` after the last check; return the poses ``(N, 4, 4)``."""
         now, limits = poses_of(self._bodies), self._limits
         speed_m_s, turn_rad_s = self._last_speeds() if limits.by_velocity else self._mean_speeds(now)
         still = (speed_m_s < limits.speed_m_s) & (turn_rad_s < limits.turn_rad_s)
@@ -71,7 +71,7 @@ class RestWatch:
         moved_m = np.linalg.norm((now - self._before)[:, :3, 3], axis=1)
         turned_rad = np.linalg.norm((now - self._before)[:, :3, :3], axis=(1, 2)) / np.sqrt(
             2
-        )  # |R - I| for small angles
+        )  # |R - I| = sqrt(2) angle for small angles
         return moved_m / self._limits.between_s, turned_rad / self._limits.between_s
 
     def _last_speeds(self) -> tuple[np.ndarray, np.ndarray]:
@@ -83,9 +83,9 @@ class RestWatch:
 
 @dataclass(frozen=True)
 class Rest:
-    """Bodies after settling: ``object_to_world (N, 4, 4)``, ``at_rest (N,)``, and the steps that it took.
+    """Bodies after settling: ``object_to_world (N, 4, 4)``, ``at_rest (N,)``, and the number of steps.
 
-    ``lost (N,)`` went so far that the rest was not waited for.
+    ``lost (N,)`` marks bodies that moved so far that settling was aborted.
     """
 
     object_to_world: np.ndarray
@@ -104,9 +104,9 @@ def settle(
     limits: RestLimits = RestLimits(),
     give_up_m: Sequence[float] | None = None,
 ) -> Rest:
-    """Step until all bodies are at rest, not before ``at_least_s`` nor after ``seconds``.
+    """Step until all bodies are at rest, for at least ``at_least_s`` and at most ``seconds``.
 
-    ``give_up_m`` is how far the origin of each may move before the rest is not worth waiting for.
+    ``give_up_m`` is the displacement of each body's origin at which settling is aborted.
     """
     watch, lost = RestWatch(bodies, limits), np.zeros(len(bodies), dtype=bool)
     limits_m = np.full(len(bodies), np.inf) if give_up_m is None else np.array(give_up_m, dtype=float)
@@ -126,10 +126,7 @@ def settle(
 
 @dataclass(frozen=True)
 class Settled:
-    """A body after it was set down: its pose, how far its centre of mass moved, and whether it is at rest.
-
-    The drop itself does not count as having moved.
-    """
+    """A body after it was set down: pose, displacement of its centre of mass, and whether it is at rest."""
 
     object_to_plane: np.ndarray
     moved_m: float
@@ -137,7 +134,7 @@ class Settled:
 
     @staticmethod
     def of(body: RigidBody, start: np.ndarray, end: np.ndarray, at_rest: bool) -> Settled:
-        """Return what lies between two poses ``(4, 4)`` of the object frame."""
+        """Return the result for the initial and final pose ``(4, 4)`` of the object frame."""
         before, after = (transform_points(p, body.center_of_mass_m[None])[0] for p in (start, end))
         return Settled(end, float(np.linalg.norm(after - before)), at_rest)
 
@@ -150,10 +147,10 @@ def settle_on_plane(
     seconds: float,
     timestep_s: float = TIMESTEP_S,
 ) -> list[Settled]:
-    """Release a body ``drop_m`` above the plane z = 0 in each of several poses (4x4), and see where it comes to rest.
+    """Release a body ``drop_m`` above the plane z = 0 in each of several poses ``(4, 4)`` and simulate until it rests.
 
-    No poses, nothing to do. All copies share one scene, far enough apart never to meet. Ends when all are still,
-    after ``seconds`` at the latest.
+    All copies share one scene, far enough apart never to touch. Ends when all are at rest, after ``seconds`` at the latest.
+    Returns an empty list for no poses.
     """
     if not len(object_to_plane):
         return []
@@ -162,7 +159,8 @@ def settle_on_plane(
     reach = max(float(np.linalg.norm(hull - body.center_of_mass_m, axis=1).max()) for hull in body.hulls)
     spacing = 8 * reach + 1.0
     offsets = [np.array([spacing * i, 0.0, drop_m]) for i in range(len(object_to_plane))]
-    # copies may sleep, for a fifth of the time: no contacts are asked for, and the 25 test objects rest the same without
+    # Copies may sleep, which takes a fifth of the time: contacts are not read, and the 25 test objects rest the same without
+    # sleeping.
     bodies = [
         _release(scene, body, hull_shapes(body.hulls), pose[:3, 3] + offset, pose[:3, :3], may_sleep=True)
         for pose, offset in zip(object_to_plane, offsets, strict=True)
@@ -179,14 +177,14 @@ def settle_on_plane(
 class SettledScene(Rest):
     """A scene after its objects came to rest.
 
-    ``touching`` are pairs of names (objects and boxes) that press on each other, the earlier added first, with the deepest
-    overlap (m, 0 where none) that the solver has left between them.
+    ``touching`` maps pairs of names (objects and boxes) in contact, in order of addition, to the deepest overlap (m, 0 if
+    none) that the solver has left between them.
     """
 
     touching: dict[tuple[str, str], float]
 
     def neighbours(self, name: str) -> set[str]:
-        """Return what touches an object."""
+        """Return the names of all objects and boxes in contact with ``name``."""
         return {other for pair in self.touching if name in pair for other in pair if other != name}
 
 
@@ -198,7 +196,7 @@ def settle_scene(
     at_least_s: float = 0.0,
     give_up_m: Sequence[float] | None = None,
 ) -> SettledScene:
-    """Release all objects at their poses at once, and see where they come to rest and what touches what.
+    """Release all objects at their poses at once, and simulate until they rest.
 
     ``seconds``, ``at_least_s`` and ``give_up_m`` are those of ``settle``.
     """
@@ -212,7 +210,7 @@ def settle_scene(
         bodies, counts = [], iterations_beside([each.body.mass_kg for each in objects], SOLVER_ITERATIONS)
         for placed, own, count in zip(objects, shapes, counts, strict=True):
             pose = placed.object_to_world
-            # what sleeps reports no contacts
+            # sleeping bodies report no contacts
             component = _release(scene, placed.body, own, pose[:3, 3], pose[:3, :3], may_sleep=False)
             component.set_solver_position_iterations(count)
             names[component.entity.per_scene_id] = placed.name
@@ -265,7 +263,7 @@ def _touching(scene: sapien.Scene, names: dict[int, str]) -> dict[tuple[str, str
 
 
 def ball_stays_inside(hulls: Sequence[np.ndarray], opening: Opening, *, seconds: float = BALL_SECONDS) -> bool:
-    """Drop a ball that fits into an opening and tell whether it goes in and stays there (``BallDrop``)."""
+    """Drop a ball that fits into an opening and tell whether it ends inside (``BallDrop``)."""
     drop = BallDrop.of(hulls, opening)
     scene = scene_with_gravity(_BALL_TIMESTEP_S)
     material = physx.PhysxMaterial(0.5, 0.5, 0.0)
@@ -281,7 +279,7 @@ def ball_stays_inside(hulls: Sequence[np.ndarray], opening: Opening, *, seconds:
     ball.attach(shape)
     ball.set_mass(BALL_KG)
     ball.set_inertia(np.full(3, 0.4 * BALL_KG * drop.radius_m**2, dtype=np.float32))
-    ball.set_linear_damping(1.0)  # takes the bouncing out: only where it ends counts
+    ball.set_linear_damping(1.0)  # damps bouncing: only the final position counts
     scene.add_entity(entity_at(ball, sapien.Pose(drop.start_m)))
     for _ in range(round(seconds / _BALL_TIMESTEP_S)):
         scene.step()

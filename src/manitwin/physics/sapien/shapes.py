@@ -1,4 +1,4 @@
-"""Collision shapes in SAPIEN: how they touch, convex hulls that keep their corners, and the one cache of cooked hulls."""
+"""Collision shapes in SAPIEN: contact properties, convex hulls that keep their vertices, and a cache of cooked hulls."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ Hulls = tuple[np.ndarray, ...]
 HullShapes = list[physx.PhysxCollisionShapeConvexMesh]
 
 COOKING_SCALE = 100.0
-"""PhysX drops corners within 0.7 mm of the hull of the others (PxCookingParams::planeTolerance, measured on prisms): a marker
-would roll on a coarser polygon than its own, and a fork be thinner than it is. Cooked this much larger and scaled back, a
-hull keeps all corners beyond 7 um."""
-KEPT_HULLS = 8192  # 72 MB at 64 corners each: those of 300 twins of 26 hulls, as the 25 test objects have in the mean
+"""Scale at which hulls are cooked before they are scaled back. PhysX drops vertices within 0.7 mm of the hull of the others
+(PxCookingParams::planeTolerance, measured on prisms): a marker would roll on a coarser polygon, and a fork would be thinner.
+At this scale a hull keeps all vertices beyond 7 um.
+"""
+KEPT_HULLS = 8192  # 72 MB at 64 vertices each: the hulls of 300 twins of 26 hulls, the mean of the 25 test objects
 PATCH_RADIUS_M, MIN_PATCH_RADIUS_M = 0.01, 0.005  # of PhysX's torsional friction: that of a soft pad
-# Of SAPIEN's four words: shapes whose first and second words have common bits collide, unless their third words have one too.
+# SAPIEN's four words: shapes collide if their first and second words share a bit, unless their third words share one too.
 COLLIDE_WITH_ALL = (1, 1, 0, 0)
-HAND_COLLISION_GROUPS = (1, 1, 2, 0)  # those of one hand or robot do not collide with one another
-SECOND_ARM_COLLISION_GROUPS = (1, 1, 4, 0)  # of a second arm, which collides with the first
+HAND_COLLISION_GROUPS = (1, 1, 2, 0)  # shapes of one hand or robot do not collide with each other
+SECOND_ARM_COLLISION_GROUPS = (1, 1, 4, 0)  # a second arm collides with the first
 
 
 def set_contact(
@@ -32,7 +33,7 @@ def set_contact(
     soft_pad: bool = False,
     collision_groups: Sequence[int] = COLLIDE_WITH_ALL,
 ) -> None:
-    """Set all that decides how a shape touches but its material; without ``contact_offset_m`` its own applies.
+    """Set the contact properties of a shape except its material; without ``contact_offset_m`` the shape's own value is kept.
 
     ``soft_pad`` gives its contacts the torsional friction of a soft fingertip.
     """
@@ -43,23 +44,24 @@ def set_contact(
 
 
 def convex_shape(vertices: np.ndarray, material: physx.PhysxMaterial) -> physx.PhysxCollisionShapeConvexMesh:
-    """Return the convex hull of vertices ``(V, 3)`` (m) as a collision shape."""
+    """Return the convex hull of vertices ``(V, 3)`` m as a collision shape."""
     corners = np.asarray(vertices * COOKING_SCALE, dtype=np.float32)
     return physx.PhysxCollisionShapeConvexMesh(corners, np.full(3, 1 / COOKING_SCALE, np.float32), material)
 
 
 def hull_shapes(hulls: Hulls) -> HullShapes:
-    """Cook hulls, each ``(V, 3)`` m, at 0.2 ms a hull; the component that takes them gives them its material.
+    """Cook hulls, each ``(V, 3)`` m, at 0.2 ms per hull; the component that takes them sets their material.
 
-    A shape belongs to one component at a time, and is free again when that is gone.
+    A shape belongs to one component at a time, and is free again when that component is destroyed.
     """
     return [convex_shape(hull, physx.get_default_material()) for hull in hulls]
 
 
 class HullCache:
-    """Cooked hulls by their content, lent to one scene after the other: cooking costs more than many a step.
+    """Cache of cooked hulls by content, lent to one scene after another, because cooking costs more than many simulation
+    steps.
 
-    Of the bodies that were not asked for lately the shapes go first, so that no more than ``KEPT_HULLS`` lie here.
+    Shapes of the least recently used bodies are dropped first, so that at most ``KEPT_HULLS`` are cached.
     """
 
     def __init__(self) -> None:
@@ -68,9 +70,9 @@ class HullCache:
 
     @contextmanager
     def lent(self, bodies: Sequence[Hulls]) -> Iterator[list[HullShapes]]:
-        """Lend shapes for each body's hulls, each ``(V, 3)`` m; a body that comes twice gets two sets.
+        """Lend shapes for each body's hulls, each ``(V, 3)`` m; a body that occurs twice gets two sets.
 
-        When the block ends, nothing may step the scene that had them any more. After an exception they are not lent again.
+        After the block ends, the scene that used them must not be stepped any more. After an exception they are not reused.
         """
         keys = [_digest(hulls) for hulls in bodies]
         shapes = [self._take(key, hulls) for key, hulls in zip(keys, bodies, strict=True)]

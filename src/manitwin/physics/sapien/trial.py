@@ -1,6 +1,7 @@
-"""The grasp trial of a parallel gripper in SAPIEN 3: two fingers that share one target.
+"""Grasp trial of a parallel gripper in SAPIEN 3: two fingers with a shared target.
 
-The engine is imported by the first trial: who only names this simulator, as the driver of a run does, does not wait for it.
+The engine is imported by the first trial, so that a process that only refers to this simulator, such as the driver of a run,
+does not wait for the import.
 """
 
 from __future__ import annotations
@@ -25,23 +26,25 @@ if TYPE_CHECKING:
     from manitwin.physics.sapien.shapes import HullShapes
 
 REACH_MARGIN_M = 0.015  # hulls farther than this from the closing hand are left out
-# A trial counts only where none of them came this near whenever it was looked: the contact offset of 2 mm, and what the
-# object may do between two looks.
+# A trial counts only if no omitted hull came this near at any check: the contact offset of 2 mm, plus the object's possible
+# motion between two checks.
 LOOK_MARGIN_M = 0.005
-CLEAR_M = 0.0005  # beyond the contact offsets of both: until then no finger feels the object
-# What the closing force may change the object's speed by in a step. Of things below 65 g 86 % of verdicts at 1/240 s are those
-# of the reference at 1/960 s and 40 iterations: pads kick them about, or out of the hand. At 1/480 s 94 %, at 1/960 s 96 %.
+CLEAR_M = 0.0005  # beyond the contact offsets of both: until then no finger touches the object
+# Largest speed change of the object by the closing force in a step. Of objects below 65 g, 86 % of the verdicts at 1/240 s
+# agree with the reference at 1/960 s and 40 iterations, because pads knock them about or out of the hand; 94 % at 1/480 s, 96
+# % at 1/960 s.
 MOST_JUMP_M_S = 4.0
 LEAST_TIMESTEP_S = 1 / 960
-# What the closed hand loses, or holds only after this share of what the slides allow, is at the limit of friction, or trembles
-# between pads. Of 86 such falls at 1/240 s and 20 iterations a reference at 1/960 s and 40 iterations holds 30.
+# A grasp that the closed hand loses, or holds with a displacement above this share of the slides' limit, is at the friction
+# limit or vibrates between the pads. Of 86 such losses at 1/240 s and 20 iterations, a reference at 1/960 s and 40 iterations
+# holds 30.
 FALLS: frozenset[Outcome] = frozenset({"drops", "unstable", "slips"})
 DOUBTFUL_SHARE = 0.5
 REFERENCE_ITERATIONS = 40
 
 
 class SapienTrial:
-    """Try grasps one by one in SAPIEN on the CPU."""
+    """Grasp trial of a parallel gripper in SAPIEN on the CPU, one grasp at a time."""
 
     name = "sapien"
 
@@ -82,7 +85,7 @@ class SapienTrial:
 
 
 def finer_for_what_is_light(settings: TrialSettings, mass_kg: float) -> TrialSettings:
-    """Return the same protocol with a step that is halved until F dt / m is at most ``MOST_JUMP_M_S``, or the step the least."""
+    """Return settings whose time step is halved until F dt / m is at most ``MOST_JUMP_M_S``, down to ``LEAST_TIMESTEP_S``."""
     while settings.force_n * settings.timestep_s > MOST_JUMP_M_S * mass_kg and _may_be_halved(settings):
         settings = _with_half_the_step(settings)
     return settings
@@ -102,7 +105,7 @@ def _with_half_the_step(settings: TrialSettings) -> TrialSettings:
 
 
 def _reference(settings: TrialSettings) -> TrialSettings:
-    """Return the same protocol at the least step and the iterations of the reference, or more where more are asked for."""
+    """Return the settings with the smallest time step and at least the reference's iterations."""
     while _may_be_halved(settings):
         settings = _with_half_the_step(settings)
     return replace(settings, solver_iterations=max(settings.solver_iterations, REFERENCE_ITERATIONS))
@@ -110,7 +113,7 @@ def _reference(settings: TrialSettings) -> TrialSettings:
 
 @dataclass(frozen=True)
 class _Grasp:
-    """What is tried: a body with the engine's shapes of its hulls, and a hand at a pose ``(4, 4)``."""
+    """Inputs of one trial: a body with the engine's shapes of its hulls, and a hand with the object at a pose ``(4, 4)``."""
 
     body: RigidBody
     shapes: HullShapes
@@ -120,18 +123,18 @@ class _Grasp:
 
 
 def _verdict(grasp: _Grasp, settings: TrialSettings, recorder: TrialRecorder | None = None) -> TrialResult:
-    """Try a grasp briefly, and as a whole where that tells nothing; where it is doubtful, as the reference does."""
+    """Run the brief trial, the whole trial if that is inconclusive, and the reference trial if the verdict is doubtful."""
     result, reference = _try_once(grasp, settings, recorder, briefly=True), _reference(settings)
     if settings.doubts_tried_again and reference != settings and (result is None or _is_doubtful(result, settings)):
         result, settings = None, reference
     if result is None:
         result = _try_once(grasp, settings, recorder, briefly=False)
-    assert result is not None  # a whole trial has a result
+    assert result is not None  # a whole trial always has a result
     return result
 
 
 def _is_doubtful(result: TrialResult, settings: TrialSettings) -> bool:
-    """Tell whether the hand lost the object within the trial's time, or held it although it moved far."""
+    """Tell whether the hand lost the object within the trial's time, or held it with a large displacement."""
     if result.outcome == "held":
         return result.displacement_m >= DOUBTFUL_SHARE * settings.max_displacement_m
     return result.outcome in FALLS and result.steps < settings.max_steps
@@ -140,9 +143,9 @@ def _is_doubtful(result: TrialResult, settings: TrialSettings) -> bool:
 def _try_once(
     grasp: _Grasp, settings: TrialSettings, recorder: TrialRecorder | None, *, briefly: bool
 ) -> TrialResult | None:
-    """Try a grasp on the hulls that the hand can reach; where the object turned others towards it, on all.
+    """Try a grasp on the hulls within reach of the hand, or on all if the motion brought others near.
 
-    None where a brief trial tells nothing.
+    Returns None if a brief trial is inconclusive.
     """
     from manitwin.physics.sapien.hand import FixedHand, free_frames
     from manitwin.physics.sapien.hand_scene import HandScene
@@ -151,7 +154,7 @@ def _try_once(
     gaps = reach.gaps_m(gripper, object_to_hand[None])[0]
     near = gaps <= REACH_MARGIN_M
     if not near.any():
-        return TrialResult("misses", 0.0, 0.0, 0.0, (0.0, 0.0), 0)  # nothing to simulate: nothing touches the object
+        return TrialResult("misses", 0.0, 0.0, 0.0, (0.0, 0.0), 0)  # nothing touches the object
 
     def simulate(some: np.ndarray) -> tuple[TrialResult | None, np.ndarray]:
         """Return what became of the object with some of its shapes, and the poses at which it was looked at."""
@@ -172,6 +175,6 @@ def _try_once(
 
 
 def _stayed_out(reach: HandReach, gaps: np.ndarray, gripper: ParallelGripper, looks: np.ndarray) -> bool:
-    """Tell whether no hull that was left out came near the hand in any look ``(P, 4, 4)``; the cheap bound goes first."""
+    """Tell whether no omitted hull came near the hand at any recorded pose ``(P, 4, 4)``; the cheap bound is tested first."""
     unsure = (gaps > REACH_MARGIN_M) & (gaps - reach.motions_m(looks) <= LOOK_MARGIN_M)
     return not unsure.any() or not (reach.of(unsure).gaps_m(gripper, looks) <= LOOK_MARGIN_M).any()

@@ -1,6 +1,7 @@
 """Visuals of SAPIEN scenes: a twin's GLB file, plain boxes, and the visual shapes of a robot's URDF.
 
-SAPIEN reads the files itself here. The pictures of this package upload prepared arrays instead: ``manitwin.render.surfaces``.
+SAPIEN reads the files itself here. The rendered pictures of this package upload prepared arrays instead
+(``manitwin.render.surfaces``).
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ _X_TO_Z = np.array([[0.0, 0, -1, 0], [0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
 
 
 def glb_visual(path: Path) -> Any:
-    """Return a Y-up glTF file as a component in the object frame (+Z up)."""
+    """Return a Y-up glTF file as a render component in the object frame (+Z up)."""
     from sapien import render
 
     shape = render.RenderShapeTriangleMesh(str(path))
@@ -32,7 +33,7 @@ def glb_visual(path: Path) -> Any:
 
 
 def box_visual(half_extents_m: np.ndarray, rgb: tuple[float, float, float]) -> Any:
-    """Return a box of one colour (linear RGB) as a component."""
+    """Return a box of one colour (linear RGB) as a render component."""
     from sapien import render
 
     return _component([render.RenderShapeBox(half_extents_m, _plain_material((*rgb, 1.0), roughness=0.7))])
@@ -43,7 +44,7 @@ def add_robot_visuals(
     bodies: dict[str, physx.PhysxArticulationLinkComponent],
     part_of: dict[str, tuple[str, np.ndarray]],
 ) -> None:
-    """Give the bodies in a scene the visuals of their links; ``part_of`` has each link's body and pose in it."""
+    """Attach the visuals of a robot's links to its bodies; ``part_of`` maps each link to its body and its pose there."""
     shapes: dict[str, list[Any]] = {}
     for link, shape_to_link, geometry, rgba in _visuals(urdf):
         body, link_to_body = part_of[link]
@@ -75,7 +76,7 @@ def _shape(geometry: etree._Element, rgba: tuple[float, ...] | None) -> Any:
     material = _plain_material(rgba or _GREY, roughness=0.6)
     if geometry.tag == "mesh":
         path, scale = geometry.get("filename"), values_of(geometry, "scale", "1 1 1").astype(np.float32)
-        if rgba is None and not path.lower().endswith(".stl"):  # an STL has no colours of its own
+        if rgba is None and not path.lower().endswith(".stl"):  # STL files have no colours
             return render.RenderShapeTriangleMesh(path, scale)
         return render.RenderShapeTriangleMesh(path, scale, material)
     if geometry.tag == "box":
@@ -88,7 +89,7 @@ def _shape(geometry: etree._Element, rgba: tuple[float, ...] | None) -> Any:
 
 @lru_cache(maxsize=16)
 def _visuals(urdf: str) -> tuple[tuple[str, np.ndarray, etree._Element, tuple[float, ...] | None], ...]:
-    """Return the link, the pose in it, the geometry and the colour of each visual, in SAPIEN's axes."""
+    """Return link, pose in the link, geometry and colour of each visual, in SAPIEN's axes."""
     tree = UrdfTree.of_text(urdf)
     named = {one.get("name"): _color(one) for one in tree.element.findall("material")}
     found = []
@@ -96,7 +97,7 @@ def _visuals(urdf: str) -> tuple[tuple[str, np.ndarray, etree._Element, tuple[fl
         for visual in link.findall("visual"):
             material, geometry = visual.find("material"), geometry_of(visual)
             rgba = None if material is None else (_color(material) or named.get(material.get("name")))
-            # URDF's cylinder lies along Z, SAPIEN's along X
+            # URDF's cylinder is along Z, SAPIEN's along X
             pose = origin_of(visual) @ (_X_TO_Z if geometry.tag == "cylinder" else np.eye(4))
             found.append((name, pose, geometry, rgba))
     return tuple(found)

@@ -1,7 +1,7 @@
-"""The physics of a task in SAPIEN: a robot, the target, the other objects, the furniture and fixtures.
+"""Robot world in SAPIEN: a robot, the target, the other objects, furniture and fixtures.
 
-Weight acts as SAPIEN has it: the drive that ``hand_scene`` replaces it with gains nothing here (42 episodes with heavy
-things turned by 5.0 degrees in the hand with it and by 3.4 without, at 50 solver iterations).
+Gravity acts as SAPIEN applies it. The load drive that ``hand_scene`` uses instead gains nothing here: in 42 episodes with
+heavy objects, these turned by 5.0 degrees in the hand with it and by 3.4 without, at 50 solver iterations.
 """
 
 from __future__ import annotations
@@ -25,22 +25,23 @@ from manitwin.physics.sapien.settle import Rest, RestLimits, RestWatch, settle
 from manitwin.physics.sapien.shapes import COOKED, HullShapes
 from manitwin.robots.robot import Robot
 
-# Velocities, and twice as high ones as elsewhere, end the waiting here; whether a start or a placement stays is judged by poses.
-# Judged by the way between looks, 50 of 50 episodes had the same outcome, and rested up to 0.25 s sooner or later.
+# Rest is judged by velocities, with limits twice as high as elsewhere, because it only ends a wait here; whether a start or a
+# placement is stable is judged by poses. Judged by mean speeds, 50 of 50 episodes had the same outcome and rested up to 0.25
+# s sooner or later.
 RESTS = RestLimits(speed_m_s=2e-3, turn_rad_s=2e-2, looks=2, by_velocity=True)
 
 SLENDER_M, SLENDER_FACTOR = 0.01, 2
-"""Least radius of gyration of what is held, about half a pad's width: contacts that are farther from its axis than that push
-each other away through it as they are solved one after the other, and take more rounds. At 24 iterations knives of 38 and 104 g
-trembled in the jaws by a degree a step and sprang out of them; with twice as many they are at rest."""
+"""Radius of gyration, about half a pad's width, below which a held object needs more iterations: contacts farther from its
+axis than that push each other away through it as they are solved one after the other. At 24 iterations knives of 38 and 104 g
+vibrated in the jaws by a degree per step and sprang out; with twice as many they are at rest.
+"""
 
 
 class RobotWorld:
-    """A robot before a scene; its objects are in the order of their names, the target at ``target``; ``granules``, if any.
+    """A robot in a scene. Its objects are sorted by name; ``target`` is the target's index; ``granules`` are optional.
 
-    ``robots`` are its arms, one or two; ``robot`` and ``contacts`` are those of the one that is ``used``.
-
-    To be used in a ``with`` statement: at its end the cooked hulls are lent to other scenes, and nothing of it may be used.
+    ``robots`` are its arms, one or two; ``robot`` and ``contacts`` are those of the arm selected by ``use``. Use it in a
+    ``with`` statement: at exit the cooked hulls return to the cache, and no part of it may be used any more.
     """
 
     def __init__(
@@ -59,9 +60,9 @@ class RobotWorld:
         max_contact_force_n: float,
         furniture_friction: float = FURNITURE_FRICTION,
     ):
-        """Put everything at its pose, the robot at its home with the hand open.
+        """Place everything at its pose, with the robot at home and its hand open.
 
-        ``solver_iterations_held`` are those while something is held; a contact counts as unplanned beyond
+        ``solver_iterations_held`` are the iterations while an object is held; a contact counts as unplanned above
         ``max_contact_force_n``.
         """
         self.timestep_s, self._contact_offset_m = timestep_s, contact_offset_m
@@ -122,38 +123,42 @@ class RobotWorld:
         self._loan.__exit__(kind, error, trace)
 
     def add_strangers(self, entities: Sequence[sapien.Entity]) -> None:
-        """Add bodies that have no name and no role; contacts leave them out."""
+        """Add bodies without name or role; contact reading ignores them."""
         for entity in entities:
             self._scene.add_entity(entity)
         for reader in self.readers:
             reader.has_strangers = True
 
     def add_granules(self, fill: GranuleFill) -> None:
-        """Put granules into the vessel that they are for, and let them fall."""
+        """Put granules into their vessel and let them fall for ``FALL_S``."""
         number = [placed.name for placed in self.placed].index(fill.name)
         self.granules = Granules(fill, self.object_to_world(number))
         self.add_strangers(self.granules.entities)
         self.step(round(FALL_S / self.timestep_s))
 
     def step(self, count: int = 1) -> None:
-        """Let ``count`` timesteps pass."""
+        """Advance by ``count`` time steps."""
         step, look = self._system.step, self._falling.look
         for _ in range(count):
             step()
             look()
 
     def expect_load(self, held: bool) -> None:
-        """Choose the solver's iterations for a hand that holds something, or is empty; as it closes, nothing falls any more."""
+        """Select the solver iterations for a hand that holds an object or is empty; a closing hand ends the treatment of
+        falling objects.
+        """
         if held and not self._expects_load:
             self._falling.end()
         self._expects_load = held
         held_count = self._iterations_held * (SLENDER_FACTOR if self._holds_slender else 1)
         iterations = held_count if held else self._iterations
         for robot in self.robots:
-            robot.articulation.set_solver_position_iterations(iterations)  # also for all that the robot touches
+            robot.articulation.set_solver_position_iterations(
+                iterations
+            )  # also applies to everything that touches the robot
 
     def will_hold(self, names: Collection[str]) -> None:
-        """Say which objects the hand will hold, one after the other; without this the target alone."""
+        """Declare which objects the hand will hold in turn; by default the target alone."""
         self._holds_slender = any(_is_slender(placed.body) for placed in self.placed if placed.name in names)
 
     def take(self, number: int) -> None:
@@ -166,7 +171,7 @@ class RobotWorld:
         self.contacts = self.readers[used]
 
     def use(self, arm: int) -> None:
-        """Make another arm, by its number, the ``robot`` whose fingers ``contacts`` tells of."""
+        """Select the arm, by number, that ``robot`` and ``contacts`` refer to."""
         self.robot, self.contacts = self.robots[arm], self.readers[arm]
 
     def object_to_world(self, number: int) -> np.ndarray:
@@ -174,15 +179,15 @@ class RobotWorld:
         return self.bodies[number].entity_pose.to_transformation_matrix().astype(float)
 
     def pose_of(self, name: str) -> np.ndarray:
-        """Return the pose ``(4, 4)`` of the frame of an object by name, whichever of them is the target by now."""
+        """Return the pose ``(4, 4)`` of an object's frame by name."""
         return self.object_to_world([placed.name for placed in self.placed].index(name))
 
     def settle(self, seconds: float) -> Rest:
-        """Let the objects come to rest; the robot stays where it is told to be."""
+        """Step until the objects rest; the robot holds its targets."""
         return settle(self._system, self.bodies, timestep_s=self.timestep_s, seconds=seconds, limits=RESTS)
 
     def rest_watch(self, looks: int) -> RestWatch:
-        """Return a watch for the rest of all objects over so many looks, for a caller that steps the world itself."""
+        """Return a watch for the rest of all objects over ``looks`` checks, for a caller that steps the world itself."""
         return RestWatch(self.bodies, replace(RESTS, looks=looks))
 
     def _add_box(self, box: StaticBox, friction: float) -> physx.PhysxRigidStaticComponent:
@@ -208,13 +213,13 @@ class RobotWorld:
         return component
 
     def _readers(self) -> list[ContactReader]:
-        """Return a reader for each arm."""
+        """Return a contact reader for each arm."""
         links = [(each.robot.name, name) for each in self.robots for name in each.links]
         arms = {name: arm for arm, name in links} if len(self.robots) > 1 else None
         return [ContactReader(self._system, self._roles(each), self._max_contact_force_n, arms) for each in self.robots]
 
     def _roles(self, used: SapienRobot) -> list[tuple[physx.PhysxBaseComponent, str, Role]]:
-        """Give every body its name and role, as one arm sees them; a base does not move and touches nothing by accident."""
+        """Return every body with its name and role as seen by one arm; a base has no role because it does not move."""
         roles: list[tuple[physx.PhysxBaseComponent, str, Role]] = list(self._fixed)
         for number, (body, placed) in enumerate(zip(self.bodies, self.placed, strict=True)):
             roles.append((body, placed.name, Role.TARGET if number == self.target else Role.OTHER))

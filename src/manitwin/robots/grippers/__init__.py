@@ -1,1 +1,1 @@
-"""The kinds of grippers, each a small table of numbers read from a TOML file."""
+"""Gripper models (parallel, suction, multi-finger), read from TOML files."""

@@ -1,4 +1,4 @@
-"""Checks of grippers that are described by boxes: where these lie in the grasp frame, against what the numbers say."""
+"""Consistency checks of grippers described by boxes: position of the boxes in the grasp frame versus the stated dimensions."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.robots.grippers.suction import SuctionGripper
 
 TOLERANCE_M = 0.001
-"""Drawings and collision boxes are rounded to less; the width of a grasp would be off by twice as much."""
+"""Rounding of drawings and collision boxes is smaller; the error of a grasp's width would be twice as large."""
 
 
 def box_bounds(boxes: Sequence[Box]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the least and the greatest corner of each box along the axes of the grasp frame, ``(B, 3)`` both."""
+    """Return the lower and upper corners of the boxes along the axes of the grasp frame, each ``(B, 3)``."""
     bounds = []
     for box in boxes:
         pose, half_m = box.placed()
@@ -26,7 +26,7 @@ def box_bounds(boxes: Sequence[Box]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def check_jaws(gripper: ParallelGripper) -> None:
-    """Raise ValueError where the closed +X finger does not begin at x = 0, or has no pad where the numbers place it."""
+    """Raise ValueError unless the closed +X finger has its inner face at x = 0 and covers the pad given by the dimensions."""
     if not gripper.finger_boxes:
         raise ValueError("finger_boxes: is empty: give the boxes of the +X finger, closed")
     low, high = box_bounds(gripper.finger_boxes)
@@ -59,7 +59,7 @@ def check_jaws(gripper: ParallelGripper) -> None:
 
 
 def check_cup(gripper: SuctionGripper) -> None:
-    """Raise ValueError where a box of the body reaches past the plane of the lip."""
+    """Raise ValueError if a body box extends beyond the plane of the lip."""
     if gripper.body_boxes:
         end_m = float(box_bounds(gripper.body_boxes)[1][:, 2].max())
         if end_m > gripper.tip_depth_m + TOLERANCE_M:

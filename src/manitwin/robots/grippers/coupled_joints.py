@@ -1,4 +1,4 @@
-"""Joints of a hand that follow others: ``<mimic>`` of a URDF (http://wiki.ros.org/urdf/XML/joint)."""
+"""Mimic joints of a hand: ``<mimic>`` of a URDF (http://wiki.ros.org/urdf/XML/joint)."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from manitwin.robots.links import Link
 from manitwin.robots.urdf import UrdfTree
 
 FOLLOWS_WITHIN_RAD = 0.005
-"""Positions in a gripper's file are rounded to two or three digits."""
+"""Tolerance, because positions in gripper files are rounded to two or three digits."""
 
 
 @dataclass(frozen=True)
 class Coupling:
-    """A joint that is at ``ratio`` times the position of its leader, plus ``offset``."""
+    """Mimic joint at ``ratio`` times the position of its leader, plus ``offset``."""
 
     leader: str
     ratio: float
@@ -23,9 +23,9 @@ class Coupling:
 
 
 def couplings_of(tree: UrdfTree) -> dict[str, Coupling]:
-    """Return the joints of a checked URDF that follow another, by name, with a leader that follows none.
+    """Return the mimic joints of a checked URDF by name, each resolved to a leader that is not a mimic joint itself.
 
-    Raises the tree's error where a leader is not there, or joints follow one another in a circle.
+    Raises the tree's error if a leader does not exist or if joints mimic each other in a cycle.
     """
     given = {
         name: Coupling(mimic.get("joint", ""), float(mimic.get("multiplier", "1")), float(mimic.get("offset", "0")))
@@ -51,10 +51,11 @@ def _resolved(tree: UrdfTree, given: dict[str, Coupling], name: str) -> Coupling
 def with_followers(
     named: tuple[str, ...], positions_rad: np.ndarray, links: tuple[Link, ...], couplings: dict[str, Coupling]
 ) -> tuple[tuple[str, ...], np.ndarray]:
-    """Return all movable joints, those that are ``named`` first, and their positions ``(K, J)`` from those ``(K, N)``.
+    """Return all movable joints, the ``named`` ones first, and their positions ``(K, J)`` given those of the named, ``(K,
+    N)``.
 
-    A follower that is not named is where its leader puts it, within its limits. Raises ValueError where one is named at
-    another position, or a leader is not named.
+    A mimic joint that is not named follows its leader, clipped to its limits. Raises ValueError if a mimic joint is named
+    with a different position, or if a leader is not named.
     """
     left_out = [link.joint for link in links if link.joint in couplings and link.joint not in named]
     limits = {link.joint: link.limits for link in links}

@@ -1,4 +1,4 @@
-"""The distance between thumb and fingers of a hand with many joints, as the links of its URDF have it."""
+"""Distances between thumb and fingers of a multi-finger hand, from the collision shapes of its URDF."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 
 
 class Fingertips:
-    """The last link with a shape of each finger, the thumb's first: the corners of its shapes."""
+    """Fingertips of a hand: for each finger, thumb first, the vertices of its most distal link with a collision shape."""
 
     def __init__(self, hand: MultiFingerGripper):
-        """Take a hand; raises ValueError where a finger has no collision shape."""
+        """Take a hand; raises ValueError if a finger has no collision shape."""
         self._hand, names = hand, [link.name for link in hand.links]
         self.links: list[int] = []
         for number, finger in enumerate(hand.fingers):
@@ -28,27 +28,31 @@ class Fingertips:
         ]
 
     def bounds_m(self, joints_rad: np.ndarray) -> np.ndarray:
-        """Return the least and the greatest corner of each fingertip ``(F, 2, 3)`` in the grasp frame, at joints ``(J,)``."""
+        """Return the lower and upper corner of each fingertip's bounding box, ``(F, 2, 3)`` in the grasp frame, at joints
+        ``(J,)``.
+        """
         poses = self._hand.link_poses(joints_rad)[self.links]
         corners_m = [transform_points(pose, points) for pose, points in zip(poses, self._corners_m, strict=True)]
         return np.array([(points.min(0), points.max(0)) for points in corners_m])
 
     def gaps_m(self, joints_rad: np.ndarray) -> np.ndarray:
-        """Return the room along X between the thumb's tip and each other fingertip ``(F - 1,)``; negative where they pass."""
+        """Return the gap along X between the thumb's tip and each other fingertip, ``(F - 1,)``; negative if they overlap
+        along X.
+        """
         bounds_m = self.bounds_m(joints_rad)
         return np.asarray(bounds_m[1:, 0, 0] - bounds_m[0, 1, 0])
 
     def reach_m(self, joints_rad: np.ndarray) -> np.ndarray:
-        """Return how far along +Z of the grasp frame each fingertip reaches ``(F,)``, the thumb's first."""
+        """Return the largest coordinate along +Z of the grasp frame of each fingertip, ``(F,)``, thumb first."""
         return np.asarray(self.bounds_m(joints_rad)[:, 1, 2])
 
     def centers_m(self, joints_rad: np.ndarray) -> np.ndarray:
-        """Return the middle of each fingertip ``(F, 3)`` in the grasp frame, the thumb's first."""
+        """Return the bounding-box centre of each fingertip, ``(F, 3)`` in the grasp frame, thumb first."""
         return np.asarray(self.bounds_m(joints_rad).mean(axis=1))
 
 
 def _depth(hand: MultiFingerGripper, index: int) -> int:
-    """Return how many links there are from a link to the root."""
+    """Return the number of links between a link and the root."""
     depth = 0
     while (index := hand.links[index].parent) >= 0:
         depth += 1

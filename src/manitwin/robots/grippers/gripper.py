@@ -1,7 +1,7 @@
-"""A gripper as data: a TOML file of dimensions, not code.
+"""Grippers as data: a TOML file of dimensions for each gripper, without code.
 
-Grasp frame (that of GraspGen, ACRONYM and Contact-GraspNet): origin at the gripper's base link, +Z the approach direction,
-X the closing direction. The finger on +X is the first one.
+Grasp frame (that of GraspGen, ACRONYM and Contact-GraspNet): origin at the gripper's base link, +Z the approach direction, X
+the closing direction. The first finger is the one on +X.
 """
 
 from __future__ import annotations
@@ -27,63 +27,63 @@ Kind = TypeVar("Kind")
 
 
 class Gripper(Protocol):
-    """The common part of all kinds of grippers.
+    """Interface common to all kinds of grippers.
 
-    ``tip_depth_m`` is the fingertips' centre along +Z, ``opening_m`` the widest thing that fits, ``force_n`` the force it
-    holds with.
+    ``tip_depth_m`` is the coordinate of the fingertips' centre along +Z, ``opening_m`` the largest width that fits,
+    ``force_n`` the holding force.
     """
 
     @property
     def kind(self) -> str:
-        """Its kind, one of ``KINDS``."""
+        """The kind, one of ``KINDS``."""
         ...
 
     @property
     def name(self) -> str:
-        """Its name in the rows of ``grasps.parquet``."""
+        """The name in the rows of ``grasps.parquet``."""
         ...
 
     @property
     def sha256(self) -> str:
-        """The digest of its definition."""
+        """The digest of the definition."""
         ...
 
     @property
     def opening_m(self) -> float:
-        """The widest thing that fits."""
+        """The largest width that fits."""
         ...
 
     @property
     def tip_depth_m(self) -> float:
-        """The fingertips' centre along +Z."""
+        """The coordinate of the fingertips' centre along +Z."""
         ...
 
     @property
     def force_n(self) -> float:
-        """The force that it holds with."""
+        """The holding force."""
         ...
 
     @property
     def finger_friction(self) -> float:
-        """The friction coefficient of what touches the object."""
+        """The friction coefficient of the surfaces that touch the object."""
         ...
 
     @property
     def source(self) -> str:
-        """The source of its numbers."""
+        """The source of the dimensions."""
         ...
 
     def boxes(self, opening_m: float) -> list[PlacedBox]:
-        """Return boxes around all of it, at a given opening."""
+        """Return boxes that enclose the whole gripper at a given opening."""
         ...
 
     def symbol(self, width_m: float) -> list[PlacedBox]:
-        """Return few boxes that stand for it in a drawing of many grasps."""
+        """Return a few boxes that represent the gripper in drawings of many grasps."""
         ...
 
 
 def of_kind(gripper: Gripper, kind: type[Kind]) -> Kind:
-    """Return a gripper as one of the class that is wanted; raises UsageError where it is another."""
+    """Return the gripper if it is of class ``kind``; raises UsageError otherwise."""
     if not isinstance(gripper, kind):
         raise UsageError(f"gripper {gripper.name} is of the kind {gripper.kind}, not a {kind.__name__}; choose another")
     return gripper
@@ -113,11 +113,11 @@ KINDS: dict[str, Loader] = {
     "suction": _load_cup,
     "multi_finger": load_multi_finger,
 }
-"""How each kind is made of its file's content and folder, checked whether its shapes are where its numbers say or not."""
+"""Loaders by kind: each takes the file's content, its folder, and whether to check shapes against dimensions."""
 
 
 def shipped_grippers() -> list[str]:
-    """Return the names of the grippers that come with the package."""
+    """Return the names of the grippers in the package."""
     return sorted(path.stem for path in _shipped_folder().iterdir() if path.suffix == ".toml")
 
 
@@ -126,10 +126,10 @@ def _shipped_folder() -> Path:
 
 
 def load_gripper(name_or_path: str | Path, *, checked: bool = True) -> Gripper:
-    """Load a gripper by its shipped name or from a TOML file; raises UsageError naming what is wrong and what would be valid.
+    """Load a gripper by its shipped name or from a TOML file; raises UsageError naming the problem and valid values.
 
-    Unless ``checked`` its shapes may be elsewhere than its numbers say, so that it can be looked at, and nothing else: the
-    openings of a hand's postures may be missing.
+    With ``checked`` False the shapes are not compared with the dimensions, and the openings of a hand's postures may be
+    missing. Such a gripper is only suitable for display.
     """
     name_or_path = str(name_or_path)
     if name_or_path.endswith(".toml"):
@@ -161,19 +161,21 @@ def load_gripper(name_or_path: str | Path, *, checked: bool = True) -> Gripper:
         return gripper
     except ValidationError as error:
         raise UsageError(f"gripper file {path}: {_first_of(error)}") from error
-    except ValueError as error:  # a check's own words
+    except ValueError as error:  # raised by a check
         raise UsageError(f"gripper file {path}: {error}") from error
 
 
 def _check_name(name: str, path: Path, content: bytes) -> None:
-    """Raise ValueError where another gripper has the name of a shipped one, for which exports, pages and robots would take it."""
+    """Raise ValueError if a different gripper has the name of a shipped one, since exports, pages and robots refer to it by
+    name.
+    """
     shipped = _shipped_folder() / f"{name}.toml"
     if content != read_bytes(shipped, MAX_TOML_BYTES, UsageError, name=str(shipped)):
         raise ValueError(f"name: {name!r} is the name of a shipped gripper; choose another name")
 
 
 def _first_of(error: ValidationError) -> str:
-    """Return the first complaint, an unknown key before a missing one: a key that is misspelt is both."""
+    """Return the first validation error, unknown keys before missing ones, because a misspelt key is both."""
     complaints = error.errors()
     unknown = [each for each in complaints if each["type"] in ("extra_forbidden", "unexpected_keyword_argument")]
     missing = [str(each["loc"][-1]) for each in complaints if each["type"] == "missing"]

@@ -1,6 +1,6 @@
-"""The clearance of a hand's boxes from an object's convex hulls: overlap of the open hand, and reach of the closing one.
+"""Clearance between a hand's boxes and an object's convex hulls: collision of the open hand, and reach of the closing hand.
 
-Hulls that a closing hand cannot reach cost time in every step of a trial and touch nothing.
+Hulls that a closing hand cannot reach are left out of a trial, because they cost time in every step and touch nothing.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ PAIRS_AT_ONCE = 20_000
 _SLOPES = [(0.0, 0.0), *((s * a, s * b) for s in (0.3, 1.0, 3.0, 12.0) for a, b in ((1, 0), (-1, 0), (0, 1), (0, -1)))]
 _SLOPES += [(a, b) for s in (0.5, 2.0) for a in (s, -s) for b in (s, -s)]
 _FACING = np.array([(1.0, *slope) for slope in _SLOPES])
-"""Normals of planes that may stand between a finger and what it closes on ``(25, 3)``, their X parts one."""
+"""Normals ``(25, 3)`` of candidate separating planes between a finger and the object, with X component 1."""
 
 
 class HandCollision:
-    """The hulls of an object, prepared to be tested against many hand poses."""
+    """Collision test of an object's hulls against many hand poses."""
 
     def __init__(self, hulls: tuple[np.ndarray, ...]):
-        """Take convex vertices, each ``(V, 3)`` m in the object frame."""
+        """Take the vertices of convex hulls, each ``(V, 3)`` m in the object frame."""
         self._hulls = []
         for vertices in hulls:
             equations = np.unique(ConvexHull(vertices).equations.round(9), axis=0)
@@ -36,15 +36,15 @@ class HandCollision:
     def overlaps(
         self, gripper: Gripper, gripper_to_object: np.ndarray, *, opening_m: float, clearance_m: float
     ) -> np.ndarray:
-        """Tell for each grasp ``(N, 4, 4)`` whether the hand at an opening comes closer than ``clearance_m`` to a hull."""
+        """Tell for each grasp ``(N, 4, 4)`` whether the hand at an opening is closer than ``clearance_m`` to a hull."""
         return self.boxes_overlap(gripper.boxes(opening_m), gripper_to_object, clearance_m)
 
     def boxes_overlap(self, boxes: list[PlacedBox], gripper_to_object: np.ndarray, clearance_m: float) -> np.ndarray:
-        """Tell for each grasp ``(N, 4, 4)`` whether one of the boxes comes closer than ``clearance_m`` to a hull.
+        """Tell for each grasp ``(N, 4, 4)`` whether one of the boxes is closer than ``clearance_m`` to a hull.
 
-        The separating axes tried are the normals of box and hull, not the products of their edges (Gottschalk et al.
-        1996, section 5): no overlap is missed, and near misses of edge by edge, less than a hull's rounding, count as
-        overlaps.
+        The separating axes tested are the face normals of box and hull, without the cross products of edges (Gottschalk et
+        al. 1996, section 5). The test is conservative: no overlap is missed, and edge-to-edge near misses smaller than a
+        hull's rounding count as overlaps.
         """
         result = np.zeros(len(gripper_to_object), dtype=bool)
         for box_to_gripper, half_extents_m in boxes:
@@ -57,7 +57,7 @@ class HandCollision:
         axes, center = box_to_object[:, :3, :3].astype(np.float32), box_to_object[:, :3, 3].astype(np.float32)
         reach = np.abs(axes) @ half_m.astype(np.float32)
         near: np.ndarray = np.ones((len(center), len(self._hulls)), dtype=bool)
-        for axis in range(3):  # one by one: NumPy is slow over a last axis of three
+        for axis in range(3):  # axis by axis, because NumPy is slow over a last axis of length three
             near &= (center[:, axis] + reach[:, axis])[:, None] >= self._low[:, axis]
             near &= (center[:, axis] - reach[:, axis])[:, None] <= self._high[:, axis]
         hit = np.zeros(len(center), dtype=bool)
@@ -73,7 +73,7 @@ class HandCollision:
 def _overlap(
     axes: np.ndarray, center: np.ndarray, half_m: np.ndarray, vertices: np.ndarray, equations: np.ndarray
 ) -> np.ndarray:
-    """Tell whether no normal of the boxes ``(P)`` or of the hull separates them."""
+    """Tell for which of P boxes no face normal of box or hull is a separating axis, ``(P,)`` bool."""
     normals, offsets = equations[:, :3], equations[:, 3]
     gap = center @ normals.T + offsets - np.abs(np.swapaxes(axes, 1, 2) @ normals.T).transpose(0, 2, 1) @ half_m
     apart = (gap > 0).any(1)
@@ -84,10 +84,10 @@ def _overlap(
 
 
 class HandReach:
-    """The hulls of an object, prepared to be told how far they are from many hands."""
+    """Distances between an object's hulls and a closing hand, for many poses."""
 
     def __init__(self, hulls: tuple[np.ndarray, ...]):
-        """Take convex vertices, each ``(V, 3)`` m in the object frame."""
+        """Take the vertices of convex hulls, each ``(V, 3)`` m in the object frame."""
         self._hulls, self._corners = hulls, np.concatenate(hulls)
         self._counts = np.array([len(hull) for hull in hulls])
         self._starts = np.cumsum(self._counts) - self._counts
@@ -95,14 +95,15 @@ class HandReach:
         self._centers, self._radii_m = (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2
 
     def of(self, some: np.ndarray) -> HandReach:
-        """Return that of some of the hulls, ``(H,)`` bool."""
+        """Return the ``HandReach`` of a subset of the hulls, ``some (H,)`` bool."""
         return HandReach(tuple(self._hulls[index] for index in np.flatnonzero(some)))
 
     def gaps_m(self, gripper: ParallelGripper, object_to_gripper: np.ndarray) -> np.ndarray:
-        """Return how far palm and moving fingers stay off each hull at poses ``(P, 4, 4)`` of the object: ``(P, H)``.
+        """Return lower bounds ``(P, H)`` on the distance of palm and closing fingers from each hull, for object poses ``(P,
+        4, 4)``.
 
-        Never too much: along the gripper's axes, between boxes around the hulls and boxes around what the hand sweeps as
-        it closes. It is negative where these overlap.
+        Measured along the gripper's axes, between bounding boxes of the hulls and of the volumes that the hand sweeps as it
+        closes. Negative if these boxes overlap.
         """
         rotations, origins = object_to_gripper[:, :3, :3].transpose(0, 2, 1), object_to_gripper[:, None, :3, 3]
         corners = self._corners @ rotations + origins
@@ -113,10 +114,11 @@ class HandReach:
     def free_travel_m(
         self, gripper: ParallelGripper, object_to_gripper: np.ndarray, some: np.ndarray, clear_m: float
     ) -> float:
-        """Return how far both fingers can close and stay ``clear_m`` off some hulls ``(H,)`` of the object at ``(4, 4)``.
+        """Return a lower bound on how far both fingers can close and stay ``clear_m`` from the hulls ``some (H,)``.
 
-        Never too much: a plane that a hull lies behind bounds how far it reaches towards a finger within what the finger
-        sweeps, and the nearest of several planes is taken. What lies wholly at a finger's back is left behind.
+        ``object_to_gripper (4, 4)`` is the object's pose. A plane that bounds a hull limits how far the hull reaches towards
+        a finger within the volume that the finger sweeps; the tightest of several planes is used. Hulls entirely behind a
+        finger are ignored.
         """
         counts = self._counts[some]
         corners = self._corners[np.repeat(some, self._counts)] @ object_to_gripper[:3, :3].T + object_to_gripper[:3, 3]
@@ -130,10 +132,10 @@ class HandReach:
         return travel_m
 
     def motions_m(self, object_to_gripper: np.ndarray) -> np.ndarray:
-        """Return bounds ``(H,)`` on how far a corner of each hull is in any of the poses ``(P, 4, 4)`` from where it is first.
+        """Return bounds ``(H,)`` on the motion of any vertex of each hull from the first to any of the poses ``(P, 4, 4)``.
 
-        A ball around the hull moves as its centre does, and by its radius times the norm of the change of rotation:
-        the largest singular value of a difference of rotations is its Frobenius norm over the root of two.
+        A bounding sphere moves by the displacement of its centre plus its radius times the norm of the change of rotation.
+        The largest singular value of a difference of two rotations is its Frobenius norm divided by sqrt(2).
         """
         change = object_to_gripper - object_to_gripper[0]
         moved = self._centers @ change[:, :3, :3].transpose(0, 2, 1) + change[:, None, :3, 3]
@@ -141,14 +143,19 @@ class HandReach:
         return np.asarray((np.linalg.norm(moved, axis=2) + turned[:, None] * self._radii_m).max(0))
 
 
-_MIRRORS = (np.array([1.0, 1.0, 1.0]), np.array([-1.0, 1.0, 1.0]))  # seen from the +X finger, and from the other one
+_MIRRORS = (
+    np.array([1.0, 1.0, 1.0]),
+    np.array([-1.0, 1.0, 1.0]),
+)  # seen from the +X finger, and mirrored for the -X finger
 
 
 @lru_cache(maxsize=8)
 def _facing_fingers(gripper: ParallelGripper, clear_m: float) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Return of each finger of the open hand, seen from it, where its boxes begin and end ``(B,)``, and planes' least heights.
+    """Return, for each finger of the open hand seen from it, the start and end of its boxes along X ``(B,)`` and plane
+    offsets ``(B, 25)``.
 
-    Those are of ``_FACING`` without their X parts, over what each box sweeps ``(B, 25)``, all ``clear_m`` larger.
+    The offsets are the minima of the Y and Z terms of ``_FACING`` over the volume that each box sweeps. All boxes are
+    enlarged by ``clear_m``.
     """
     boxes, first, count = gripper.boxes(gripper.opening_m), len(gripper.palm_boxes), len(gripper.finger_boxes)
     fingers = []
@@ -162,7 +169,7 @@ def _facing_fingers(gripper: ParallelGripper, clear_m: float) -> list[tuple[np.n
 
 @lru_cache(maxsize=8)
 def _swept_boxes(gripper: ParallelGripper) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners ``(B, 3)`` of boxes around what each box of the hand sweeps between open and closed."""
+    """Return the lower and upper corners ``(B, 3)`` of the volumes that the hand's boxes sweep between open and closed."""
     ends = [[_bounds(*box) for box in gripper.boxes(opening_m)] for opening_m in (gripper.opening_m, 0.0)]
     low, high = np.moveaxis(np.array(ends), 2, 0)
     return low.min(0), high.max(0)

@@ -1,4 +1,4 @@
-"""A hand with many joints: its URDF, how its joints are driven, and the postures in which it takes hold."""
+"""Multi-finger hand: its URDF, joint drives, and grasp postures."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from manitwin.robots.grippers.box import Box, PlacedBox
 from manitwin.robots.grippers.quantities import Gap, Length, Name, NotNegative, Positive, Source
 from manitwin.robots.links import Link, link_poses
 
-BALL_AS_CUBE = (4 * np.pi / 3) ** (1 / 3) / 2  # half the side of the cube of a ball's volume, in radii
+BALL_AS_CUBE = (4 * np.pi / 3) ** (1 / 3) / 2  # half side, in radii, of the cube with a ball's volume
 SYMBOL_HALF_WIDTH_M = 0.004
 PACKAGE = "package://"
 
 
 @dataclass(frozen=True)
 class Posture:
-    """A way to take hold, by its fingertips at several openings; between these it is interpolated.
+    """Grasp posture: joint positions at several openings, with linear interpolation between them.
 
-    ``openings_m (K,)`` ascending are the distances between the pads of thumb and fingers, ``joints_rad (K, J)`` the joints.
-    ``depth_m`` is the nearest and the farthest that the middle of what is held may be along +Z of the grasp frame.
-    ``grasp_types`` are the twin's types of grasp points that it suits.
+    ``openings_m (K,)`` is increasing and gives the gap between the pads of thumb and fingers; ``joints_rad (K, J)`` are the
+    joint positions. ``depth_m`` is the smallest and largest coordinate along +Z of the grasp frame for the centre of the held
+    object. ``grasp_types`` are the types of grasp points of a twin that the posture suits.
     """
 
     name: str
@@ -35,16 +35,16 @@ class Posture:
     joints_rad: tuple[tuple[float, ...], ...]
 
     def joints_at(self, opening_m: np.ndarray) -> np.ndarray:
-        """Return the joints ``(N, J)`` at openings ``(N,)``; beyond the ends, those of the ends."""
+        """Return the joint positions ``(N, J)`` at openings ``(N,)``, clamped at both ends."""
         columns = np.array(self.joints_rad).T
         return np.stack([np.interp(opening_m, self.openings_m, column) for column in columns], axis=-1)
 
 
 @dataclass(frozen=True)
 class Drive:
-    """The drive of each joint: a spring and damper towards its target, of limited torque.
+    """Joint drive: spring and damper towards the target, with limited torque.
 
-    A finger's target runs towards the closed posture at ``speed_rad_s``, until a joint of it presses with ``press_nm``.
+    A finger's target moves towards the closed posture at ``speed_rad_s`` until one of its joints presses with ``press_nm``.
     """
 
     stiffness_nm_rad: Positive
@@ -57,7 +57,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class HandNumbers:
-    """The part of the gripper's file that is taken as it is."""
+    """Fields of the gripper file that are used unchanged."""
 
     name: Name
     sha256: str
@@ -74,11 +74,11 @@ class HandNumbers:
 
 @dataclass(frozen=True)
 class MultiFingerGripper(HandNumbers):
-    """A hand of a thumb and fingers, in the grasp frame: +Z out of the palm, the fingers on +X, the thumb on -X.
+    """Hand with a thumb and fingers. Grasp frame: +Z out of the palm, the fingers on +X, the thumb on -X.
 
-    ``joints (J,)`` names the joints in the order of all postures and of a twin's table; ``fingers`` names the links of
-    each finger, the thumb first. ``palm_front_m`` is the palm's surface along +Z, ``clearance_m`` how much wider than the
-    object it opens on each side.
+    ``joints (J,)`` names the joints in the order of all postures and of a twin's grasp table. ``fingers`` names the links of
+    each finger, thumb first. ``palm_front_m`` is the palm's surface along +Z; ``clearance_m`` is the extra opening on each
+    side of the object.
     """
 
     kind: ClassVar[str] = "multi_finger"
@@ -90,27 +90,27 @@ class MultiFingerGripper(HandNumbers):
     urdf_root: Path
 
     def mesh_path(self, name: str) -> Path:
-        """Return where a mesh of its URDF is; raises ConfigError where it is not there."""
+        """Return the path of a mesh of the URDF; raises ConfigError if it does not exist."""
         return find_mesh(self.urdf_path, self.urdf_root, name)
 
     @property
     def opening_m(self) -> float:
-        """The widest thing that fits between thumb and fingers."""
+        """The largest width that fits between thumb and fingers."""
         return max(posture.openings_m[-1] for posture in self.postures) - 2 * self.clearance_m
 
     @cached_property
     def finger_of_link(self) -> np.ndarray:
-        """The finger that each link belongs to ``(L,)``; -1: the palm."""
+        """The finger index of each link, ``(L,)``; -1 for the palm."""
         owner = {name: number for number, names in enumerate(self.fingers) for name in names}
         return np.array([owner.get(link.name, -1) for link in self.links])
 
     def link_poses(self, joints_rad: np.ndarray) -> np.ndarray:
-        """Return the poses ``(L, 4, 4)`` of the links in the grasp frame at joints ``(J,)``."""
+        """Return the poses ``(L, 4, 4)`` of the links in the grasp frame at joint positions ``(J,)``."""
         poses = link_poses(self.links, dict(zip(self.joints, joints_rad.tolist(), strict=True)))
         return np.asarray(self.root_to_gripper @ poses)
 
     def boxes_at(self, joints_rad: np.ndarray) -> list[PlacedBox]:
-        """Return ``(box_to_gripper, half_extents_m)`` of all shapes at joints ``(J,)``; a ball is a cube of its volume."""
+        """Return ``(box_to_gripper, half_extents_m)`` of all shapes at joints ``(J,)``; balls become cubes of equal volume."""
         placed = []
         for pose, link in zip(self.link_poses(joints_rad), self.links, strict=True):
             for shape in link.shapes:
@@ -123,7 +123,7 @@ class MultiFingerGripper(HandNumbers):
         return self.boxes_at(self.postures[0].joints_at(np.array(opening_m)))
 
     def symbol(self, width_m: float) -> list[PlacedBox]:
-        """Return the boxes that stand for the hand in a drawing of many grasps: a palm, a thumb, a finger."""
+        """Return the boxes that represent the hand in drawings of many grasps: a palm, a thumb, a finger."""
         half = SYMBOL_HALF_WIDTH_M
         reach = (self.tip_depth_m - self.palm_front_m) / 2
         finger = Box((half, 0, self.palm_front_m + reach), (half, half, reach))
@@ -132,7 +132,11 @@ class MultiFingerGripper(HandNumbers):
 
 
 def find_mesh(path: Path, root: Path, name: str) -> Path:
-    """Return where a mesh is: beside the URDF, or for ``package://`` below the nearest folder above it that has it."""
+    """Return the path of a mesh: relative to the URDF's folder, or for ``package://`` to the nearest parent folder that
+    contains it.
+
+    Raises ConfigError if the mesh does not exist below ``root``.
+    """
     relative = name.removeprefix(PACKAGE).removeprefix("file://")
     folders = [path.parent, *path.parent.parents] if name.startswith(PACKAGE) else [path.parent]
     for folder in folders:
@@ -140,6 +144,6 @@ def find_mesh(path: Path, root: Path, name: str) -> Path:
             found = (folder / relative).resolve()
             if found.is_relative_to(root.resolve()) and found.is_file():
                 return found
-        except (OSError, ValueError):  # a name that no file system can hold
+        except (OSError, ValueError):  # invalid file name
             continue
     raise ConfigError(f"{path}: mesh {name[:120]!r} is not below {root}; put it there, or correct its name in the URDF")

@@ -1,4 +1,4 @@
-"""The file of a hand with many joints: its keys, the URDF that it names, and what is checked of both."""
+"""Reader of multi-finger gripper files: schema, URDF, and consistency checks of both."""
 
 from __future__ import annotations
 
@@ -29,7 +29,9 @@ MAX_MESH_BYTES = 64 << 20
 
 
 class _UrdfField(BaseModel):
-    """The place of the URDF: beside the gripper's file, or in an installed distribution that an extra of this package brings."""
+    """Location of the URDF: below the gripper file's folder, or in an installed distribution, which an extra of this package
+    installs.
+    """
 
     model_config = STRICT
     file: str
@@ -38,7 +40,7 @@ class _UrdfField(BaseModel):
 
 
 class _RootField(BaseModel):
-    """The pose of the URDF's root link in the grasp frame."""
+    """Pose of the URDF's root link in the grasp frame."""
 
     model_config = STRICT
     position_m: tuple[Position, Position, Position]
@@ -47,7 +49,7 @@ class _RootField(BaseModel):
 
 @dataclass(frozen=True)
 class _PostureField:
-    """A posture: rows of joints at openings, or a closed and an open one between which the openings are measured."""
+    """Posture given as joint rows at openings, or as a closed and an open row between which openings are measured."""
 
     __pydantic_config__ = STRICT
     name: str
@@ -61,7 +63,7 @@ class _PostureField:
 
 @dataclass(frozen=True)
 class _File(HandNumbers):
-    """The keys of a gripper file of this kind."""
+    """Schema of a multi-finger gripper file."""
 
     __pydantic_config__ = STRICT
     urdf: _UrdfField
@@ -70,9 +72,10 @@ class _File(HandNumbers):
 
 
 def load_multi_finger(data: dict[str, Any], folder: Path, checked: bool) -> MultiFingerGripper:
-    """Make a hand of its file's content; raises UsageError or ValueError where file and URDF do not agree.
+    """Build a hand from its file's content.
 
-    ConfigError where the URDF cannot be read. Unless ``checked`` its postures are as the file has them.
+    Raises UsageError or ValueError if file and URDF are inconsistent, ConfigError if the URDF cannot be read. With
+    ``checked`` False the postures are taken from the file without checks.
     """
     file = TypeAdapter(_File).validate_python(data)
     path, root = _urdf_path(file.name, file.urdf, folder)
@@ -109,7 +112,7 @@ def load_multi_finger(data: dict[str, Any], folder: Path, checked: bool) -> Mult
 
 
 def _settled(hand: MultiFingerGripper) -> MultiFingerGripper:
-    """Return the hand with its openings measured where its file leaves them, all postures checked."""
+    """Return the hand with all postures checked, and openings measured where the file omits them."""
     check_fingers(hand)
     tips = Fingertips(hand)
     settled = []
@@ -128,7 +131,7 @@ def _settled(hand: MultiFingerGripper) -> MultiFingerGripper:
 
 
 def _rows(where: str, posture: _PostureField, joints: int) -> tuple[tuple[float, ...], np.ndarray]:
-    """Return a posture's openings ``(K,)``, none where they are to be measured, and its positions ``(K, N)``."""
+    """Return a posture's openings ``(K,)``, empty if they are to be measured, and its joint positions ``(K, N)``."""
     listed = posture.openings_m, posture.joints_rad
     ends = posture.closed_rad, posture.open_rad
     if posture.openings_m is not None and posture.joints_rad is not None and ends == (None, None):
@@ -154,7 +157,7 @@ def _rows(where: str, posture: _PostureField, joints: int) -> tuple[tuple[float,
 
 
 def _digest(file_sha256: str, urdf: Path, meshes: dict[str, Path]) -> str:
-    """Return the digest of the gripper's file, its URDF and the meshes of this: a changed one is another gripper."""
+    """Return the digest of the gripper file, its URDF and its meshes: any change makes a different gripper."""
     digest = hashlib.sha256(file_sha256.encode())
     digest.update(read_bytes(urdf, MAX_XML_BYTES, UsageError, name=str(urdf)))
     for name in sorted(meshes):
@@ -163,7 +166,7 @@ def _digest(file_sha256: str, urdf: Path, meshes: dict[str, Path]) -> str:
 
 
 def _urdf_path(name: str, urdf: _UrdfField, folder: Path) -> tuple[Path, Path]:
-    """Return the URDF's path and the folder that its meshes may not leave."""
+    """Return the URDF's path and the boundary folder of its meshes."""
     if urdf.distribution is None:
         path = (folder / urdf.file).resolve()
         if not path.is_relative_to(folder.resolve()):
@@ -189,7 +192,7 @@ def _urdf_path(name: str, urdf: _UrdfField, folder: Path) -> tuple[Path, Path]:
 
 
 def _check_names(file: _File, links: tuple[Link, ...], couplings: dict[str, Coupling]) -> None:
-    """Raise ValueError where names of joints or links are not the URDF's, or one that moves is left out."""
+    """Raise ValueError if a joint or link name is not in the URDF, or if a movable joint is missing."""
     moving = [link.joint for link in links if link.joint_type != "fixed"]
     for name in file.joints:
         if name not in moving:

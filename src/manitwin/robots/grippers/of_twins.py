@@ -1,4 +1,4 @@
-"""The gripper that a twin's grasps are of: a twin has its name and the digest of its file, not the file."""
+"""Lookup of the gripper for a twin's grasps: a twin stores the gripper's name and file digest, not the file."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from manitwin.robots.grippers.gripper import Gripper, load_gripper, shipped_grip
 
 
 def gripper_of(name: str, sha256: str, given: Sequence[Gripper] = ()) -> Gripper:
-    """Return the gripper of this name among those ``given`` and those that are shipped.
+    """Return the gripper of this name among those ``given`` and the shipped ones.
 
-    Raises UsageError where it is neither, and where the one that is given is another than that of the grasps.
+    Raises UsageError if there is none, or if the given gripper's digest differs from that of the grasps.
     """
     for gripper in given:
         if gripper.name == name:
@@ -31,9 +31,10 @@ def gripper_of(name: str, sha256: str, given: Sequence[Gripper] = ()) -> Gripper
 
 
 def is_another(gripper: Gripper, grippers: Mapping[str, str]) -> bool:
-    """Tell whether a twin has grasps of another gripper of the same name; ``grippers`` are the digests of its grippers by name.
+    """Tell whether a twin has grasps of a different gripper with the same name; ``grippers`` maps its gripper names to
+    digests.
 
-    The name of one that comes with the package no other file can have, so its numbers alone may be those of another version.
+    A different digest of a shipped gripper is accepted: no other file can have its name, so it can only be another version.
     """
     return (
         gripper.name in grippers and grippers[gripper.name] != gripper.sha256 and gripper.name not in shipped_grippers()
@@ -41,9 +42,10 @@ def is_another(gripper: Gripper, grippers: Mapping[str, str]) -> bool:
 
 
 def require_same(gripper: Gripper, twins: Iterable[tuple[str, Mapping[str, str]]], carrier: str = "") -> None:
-    """Raise UsageError where twins, each with the digests of its grippers by name, have grasps of another of the same name.
+    """Raise UsageError if a twin has grasps of a different gripper with the same name, since they were verified with other
+    dimensions.
 
-    ``carrier`` is the robot that has the gripper. What was verified with other numbers would be executed as if with these.
+    ``twins`` are pairs of a twin's identity and its gripper digests by name; ``carrier`` is the robot that has the gripper.
     """
     given = list(twins)
     others = [twin for twin, grippers in given if is_another(gripper, grippers)]

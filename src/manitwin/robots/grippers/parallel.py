@@ -1,4 +1,4 @@
-"""A parallel-jaw gripper: two fingers that close along X."""
+"""Parallel-jaw gripper: two fingers that close along X."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from manitwin.robots.grippers.quantities import Length, Name, Positive, Source
 
 @dataclass(frozen=True)
 class ParallelGripper:
-    """A parallel-jaw gripper.
+    """Parallel-jaw gripper.
 
     ``finger_boxes`` are those of the +X finger when closed (its inner face touches x = 0); the other finger is its half turn
-    about Z. ``opening_m`` is the full stroke; ``tip_depth_m`` is the fingertips' centre along +Z; ``pad_half_extents_m`` is
-    half of the pad's width (Y) and height (Z), centred on the tip depth.
+    about Z. ``opening_m`` is the full stroke, ``tip_depth_m`` the coordinate of the fingertips' centre along +Z, and
+    ``pad_half_extents_m`` half of the pad's width (Y) and height (Z), centred on the tip depth.
     """
 
     __pydantic_config__ = STRICT
@@ -33,12 +33,14 @@ class ParallelGripper:
     source: Source
 
     def boxes(self, opening_m: float) -> list[PlacedBox]:
-        """Return ``(box_to_gripper 4x4, half_extents_m (3,))`` of palm and both fingers at a given opening between the pads."""
+        """Return ``(box_to_gripper (4, 4), half_extents_m (3,))`` of palm and both fingers at a given opening between the
+        pads.
+        """
         placed = [box.placed() for box in self.palm_boxes]
         for side in (1, -1):
             placed += [box.placed(opening_m / 2, side) for box in self.finger_boxes]
         return placed
 
     def symbol(self, width_m: float) -> list[PlacedBox]:
-        """Return the boxes that stand for the gripper in a drawing of many grasps: its own."""
+        """Return the gripper's own boxes, which represent it in drawings of many grasps."""
         return self.boxes(width_m)

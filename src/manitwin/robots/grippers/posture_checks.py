@@ -1,4 +1,4 @@
-"""Postures of a hand with many joints: made of an open and a closed hand, and checked against the links of its URDF."""
+"""Postures of a multi-finger hand: construction from a closed and an open row, and checks against the links of its URDF."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from manitwin.robots.grippers.fingertip_gaps import Fingertips
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper, Posture
 
 STEPS = 24
-"""Of the way between open and closed; between two the gap is taken to change evenly."""
+"""Samples between open and closed; the gap is assumed to change linearly between two samples."""
 LIMIT_TOLERANCE = 1e-3
-"""Positions and limits are rounded to three digits."""
+"""Tolerance, because positions and limits are rounded to three digits."""
 LEAST_TRAVEL_M = 0.001
 
 
 def measured_posture(tips: Fingertips, posture: Posture) -> Posture:
-    """Return a posture of two rows, closed and open, with the openings that the fingertips have between these.
+    """Return a posture of two rows, closed and open, with openings measured between the fingertips at samples in between.
 
-    Raises ValueError where they do not come nearer.
+    Raises ValueError if thumb and fingers do not approach each other.
     """
     closed, opened = np.array(posture.joints_rad)
     rows = closed + np.linspace(0, 1, STEPS + 1)[:, None] * (opened - closed)
@@ -37,24 +37,25 @@ def measured_posture(tips: Fingertips, posture: Posture) -> Posture:
 
 
 def posture_gaps_m(tips: Fingertips, joints_rad: np.ndarray) -> np.ndarray:
-    """Return the least room along X between the thumb and the fingers that take part, in each row ``(K,)`` of ``(K, J)``.
+    """Return the smallest gap along X between the thumb and the active fingers, for each row ``(K,)`` of joints ``(K, J)``.
 
-    A finger takes part whose tip moves most from the first to the last row, or half as far; others stand aside.
+    A finger is active if its tip moves at least half as far from the first to the last row as that of the finger that moves
+    most.
     """
     gaps_m = np.array([tips.gaps_m(row) for row in joints_rad])
     return np.asarray(gaps_m[:, _taking_part(tips, joints_rad)].min(axis=1))
 
 
 def posture_reach_m(tips: Fingertips, joints_rad: np.ndarray) -> np.ndarray:
-    """Return how far along +Z both the thumb and the fingers that take part reach, in each row ``(K,)``."""
+    """Return how far along +Z both the thumb and the active fingers reach, for each row, ``(K,)``."""
     reach_m = np.array([tips.reach_m(row) for row in joints_rad])
     return np.minimum(reach_m[:, 0], reach_m[:, 1:][:, _taking_part(tips, joints_rad)].max(axis=1))
 
 
 def opposition_tilt_rad(tips: Fingertips, joints_rad: np.ndarray) -> float:
-    """Return how far the line from the thumb to the fingers that take part is turned from X towards Z, in the middle row.
+    """Return the angle from X towards Z of the line from the thumb to the active fingers, in the middle row.
 
-    A turn of ``root_to_gripper`` by this about Y lays it along X, along which things are held.
+    Rotating ``root_to_gripper`` by this angle about Y aligns the line with X, the closing direction.
     """
     centers_m = tips.centers_m(joints_rad[len(joints_rad) // 2])
     across_m = centers_m[1:][_taking_part(tips, joints_rad)].mean(0) - centers_m[0]
@@ -62,14 +63,14 @@ def opposition_tilt_rad(tips: Fingertips, joints_rad: np.ndarray) -> float:
 
 
 def _taking_part(tips: Fingertips, joints_rad: np.ndarray) -> np.ndarray:
-    """Tell which fingers but the thumb take part ``(F - 1,)``."""
+    """Tell which fingers except the thumb are active, ``(F - 1,)`` bool."""
     moved = np.ptp(np.array([tips.centers_m(row) for row in (joints_rad[0], joints_rad[-1])]), axis=0)
     travel = np.linalg.norm(moved[1:], axis=-1)
     return np.asarray(travel >= travel.max() / 2)
 
 
 def check_fingers(hand: MultiFingerGripper) -> None:
-    """Raise ValueError where fingers share a link, or have no joint that turns."""
+    """Raise ValueError if there are fewer than two fingers, if fingers share a link, or if one has no movable joint."""
     if len(hand.fingers) < 2:
         raise ValueError("fingers: there are fewer than two; name the links of the thumb, then those of each finger")
     twice = [name for name, count in Counter(name for finger in hand.fingers for name in finger).items() if count > 1]
@@ -85,7 +86,7 @@ def check_fingers(hand: MultiFingerGripper) -> None:
 
 
 def check_positions(hand: MultiFingerGripper, tips: Fingertips, posture: Posture) -> None:
-    """Raise ValueError where a posture is beyond its joints' limits, moves the palm, or has the thumb on the wrong side."""
+    """Raise ValueError if a posture exceeds joint limits, moves the palm, or has the thumb on the wrong side."""
     rows = np.array(posture.joints_rad)
     owner = dict(zip((link.joint for link in hand.links), hand.finger_of_link, strict=True))
     limits = {link.joint: link.limits for link in hand.links}
@@ -118,7 +119,7 @@ def check_positions(hand: MultiFingerGripper, tips: Fingertips, posture: Posture
 
 
 def check_closing(hand: MultiFingerGripper, tips: Fingertips, posture: Posture) -> None:
-    """Raise ValueError where a posture does not close, opens less than it says, or holds deeper than its tips reach."""
+    """Raise ValueError if a posture does not close, opens less than stated, or holds deeper than its fingertips reach."""
     where, rows = f"posture {posture.name!r}", np.array(posture.joints_rad)
     closed_m, open_m = posture_gaps_m(tips, rows[[0, -1]])
     if open_m - closed_m < LEAST_TRAVEL_M:

@@ -1,4 +1,4 @@
-"""The quantities of grippers' and robots' files: what each may be, and the unit a value out of its range was likely given in."""
+"""Validated quantities of gripper and robot files: valid ranges, and hints at the likely unit of a value out of range."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import numpy as np
 from pydantic import AfterValidator
 
 MAX_LENGTH_M = 1.0
-"""No gripper is larger than the largest object that is held (``ShapeConfig.max_longest_side_m``)."""
+"""No gripper is larger than the largest object that is accepted (``ShapeConfig.max_longest_side_m``)."""
 MAX_VACUUM_PA = 101_325.0
-"""The standard atmosphere: outside there is no more that could press."""
+"""Standard atmosphere: the largest possible pressure difference."""
 KILOPASCALS = MAX_VACUUM_PA / 1000
-"""What is no more than this is a vacuum in kilopascals."""
+"""A value of at most this number was given in kilopascals."""
 UNIT_TOLERANCE = 1e-6
 MAX_NAME = 64
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 
 
 def _number(least: float, most: float, remedy: str, *, least_too: bool = False) -> Callable[[float], float]:
-    """Return a validator of numbers above ``least`` (``least_too``: or equal to it) and up to ``most``."""
+    """Return a validator for numbers above ``least`` (``least_too``: or equal to it) and at most ``most``."""
     above = f"at least {least:g}" if least_too else f"above {least:g}"
     wanted = above if np.isinf(most) else f"{above} and at most {most:g}"
 
@@ -72,21 +72,21 @@ _SENSE = "give its size, without a sign"
 _RADIANS = "give radians, not degrees"
 
 Length = Annotated[float, AfterValidator(_number(0, MAX_LENGTH_M, _METRES))]
-"""A size in metres."""
+"""Positive length in metres."""
 Gap = Annotated[float, AfterValidator(_number(0, MAX_LENGTH_M, _METRES, least_too=True))]
-"""A size in metres that may be zero."""
+"""Non-negative length in metres."""
 Position = Annotated[float, AfterValidator(_position)]
-"""A coordinate in metres."""
+"""Coordinate in metres."""
 Rotation = Annotated[tuple[float, float, float, float], AfterValidator(_of_unit_length)]
-"""A quaternion wxyz of length 1."""
+"""Unit quaternion wxyz."""
 Positive = Annotated[float, AfterValidator(_number(0, np.inf, _SENSE))]
-"""A force, a friction coefficient, a gain or a speed."""
+"""Positive number: a force, a friction coefficient, a gain or a speed."""
 NotNegative = Annotated[float, AfterValidator(_number(0, np.inf, _SENSE, least_too=True))]
 Turn = Annotated[float, AfterValidator(_number(-2 * np.pi, 2 * np.pi, _RADIANS, least_too=True))]
-"""An angle in radians."""
+"""Angle in radians."""
 Slope = Annotated[float, AfterValidator(_number(0, np.pi / 2, _RADIANS, least_too=True))]
-"""An angle in radians from flat to upright."""
+"""Angle in radians from horizontal (0) to vertical (pi / 2)."""
 Vacuum = Annotated[float, AfterValidator(_vacuum)]
-"""A pressure difference in pascals."""
+"""Pressure difference in pascals."""
 Name = Annotated[str, AfterValidator(_name)]
 Source = Annotated[str, AfterValidator(_said)]

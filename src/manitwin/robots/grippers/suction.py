@@ -1,4 +1,4 @@
-"""A suction cup: its vacuum, how far its lip gives way, and the boxes around it."""
+"""Suction cup: vacuum, compliance of its lip, and the boxes of its body."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ SYMBOL_HALF_WIDTH_M = 0.002
 
 @dataclass(frozen=True)
 class SuctionGripper:
-    """A suction cup whose lip lies in the plane z = ``tip_depth_m`` of the grasp frame, around the Z axis.
+    """Suction cup whose lip lies in the plane z = ``tip_depth_m`` of the grasp frame, centred on the Z axis.
 
-    ``vacuum_pa`` is the pressure difference over the disc of ``lip_radius_m``. The cup is pressed on until it stops: a surface
-    may lie ``reach_m`` before or behind the lip's plane. ``max_tilt_rad`` is how far the bellows turn, ``lip_travel_m`` how
-    far the lip bends to a surface that is no plane, ``max_surface_angle_rad`` the steepest surface against its plane that
-    it seals on, ``ceiling_m`` how far a bump may rise into the cup or a dent sink away from it. ``finger_friction`` is the
-    lip's. ``body_boxes`` are what else there is of the gripper, the compressed cup included.
+    ``vacuum_pa`` is the pressure difference over the disc of ``lip_radius_m``. The cup is pressed on until it stops: the
+    surface may lie up to ``reach_m`` before or behind the lip's plane. ``max_tilt_rad`` is the largest tilt of the bellows,
+    ``lip_travel_m`` the deformation of the lip that follows a non-planar surface, ``max_surface_angle_rad`` the largest angle
+    of the surface against its plane, and ``ceiling_m`` how far a bump may rise into the cup or a dent recede from it.
+    ``finger_friction`` is the lip's friction coefficient. ``body_boxes`` are the rest of the gripper, including the
+    compressed cup.
     """
 
     __pydantic_config__ = STRICT
@@ -43,20 +44,22 @@ class SuctionGripper:
 
     @property
     def force_n(self) -> float:
-        """The force that pulls the cup off: pressure difference times area."""
+        """The vacuum force: pressure difference times the lip's area."""
         return float(self.vacuum_pa * np.pi * self.lip_radius_m**2)
 
     @property
     def opening_m(self) -> float:
-        """The thickest thing that it can hold: any, so the size of the largest object there is (``GateConfig``)."""
+        """Largest thickness of an object: unlimited for a cup, so the size of the largest accepted object (``GateConfig``)."""
         return 1.0
 
     def boxes(self, opening_m: float) -> list[PlacedBox]:
-        """Return ``(box_to_gripper 4x4, half_extents_m (3,))`` of all that may not touch; there is nothing to open."""
+        """Return ``(box_to_gripper (4, 4), half_extents_m (3,))`` of the body, which must not touch the object; the opening
+        is unused.
+        """
         return [box.placed() for box in self.body_boxes]
 
     def symbol(self, width_m: float) -> list[PlacedBox]:
-        """Return the boxes that stand for the gripper in a drawing of many grasps: a stem and a disc."""
+        """Return the boxes that represent the gripper in drawings of many grasps: a stem and a disc."""
         rod, half = SYMBOL_HALF_WIDTH_M, self.tip_depth_m / 2
         stem = Box((0, 0, half), (rod, rod, half))
         disc = Box((0, 0, self.tip_depth_m - rod), (self.lip_radius_m, self.lip_radius_m, rod))

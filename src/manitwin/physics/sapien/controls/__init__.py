@@ -1,1 +1,1 @@
-"""Hands of robots as episodes close and open them: jaws, fingers with joints, a suction cup."""
+"""Hand controllers of robots in episodes: parallel jaws, multi-finger hands, suction cups."""

@@ -1,4 +1,4 @@
-"""What the hands of robots have in common: frame by frame they are shaped for a grasp, closed until they press, and opened."""
+"""Interface of hand controllers: shape the hand for a grasp, close it frame by frame until it presses, and open it."""
 
 from __future__ import annotations
 
@@ -16,61 +16,61 @@ from manitwin.robots.grippers.suction import SuctionGripper
 
 
 class HandControl(Protocol):
-    """A robot's hand. ``told (h,)`` are its targets and ``state (h,)`` its positions, in the units of ``Robot``.
+    """Controller of a robot's hand. ``told (h,)`` are its targets and ``state (h,)`` its positions, in the units of ``Robot``.
 
-    What it is to be told next is chosen here, one frame of ``TrialSettings`` at a time; nothing moves before ``tell``.
+    Its methods choose the next targets, one frame of ``TrialSettings`` at a time; nothing moves until ``tell``.
     """
 
     @property
     def told(self) -> np.ndarray:
-        """The present targets ``(h,)``."""
+        """Current targets ``(h,)``."""
         ...
 
     @property
     def state(self) -> np.ndarray:
-        """The present positions ``(h,)``."""
+        """Current positions ``(h,)``."""
         ...
 
     @property
     def presses(self) -> bool:
-        """Whether it holds what it closes on as hard as it should."""
+        """Whether the hand presses on the object with the closing force."""
         ...
 
     def tell(self, told: np.ndarray) -> None:
-        """Tell it ``(h,)``, as a policy does; what it held it lets go of where that says so."""
+        """Set the targets ``(h,)``, as a policy does; targets that open the hand release the object."""
         ...
 
     def shaping(self, grasp_joints_rad: np.ndarray | None, opening_m: float | None = None) -> Iterator[np.ndarray]:
-        """Get ready for a grasp, and let go so wide from then on.
+        """Yield targets that prepare for a grasp, and remember the opening to which the hand releases.
 
-        Fingers take the first of a grasp's joints ``(2, J)``, those before closing and those to close to; jaws its opening
-        (None: as wide as they go); a cup does nothing.
+        A multi-finger hand moves to the first row of the grasp's joints ``(2, J)``, which are those before closing and the
+        closing goal. Jaws move to ``opening_m`` (None: fully open). A cup does nothing.
         """
         ...
 
     def squeeze(self) -> np.ndarray:
-        """Choose what closes it by one frame; once it presses, what goes on pressing."""
+        """Return the targets that close the hand by one frame; once it presses, targets that keep pressing."""
         ...
 
     def closing_empty(self) -> Iterator[np.ndarray]:
-        """Yield the targets ``(h,)``, one a frame, that close it on nothing."""
+        """Yield the targets ``(h,)``, one per frame, that close the empty hand."""
         ...
 
     def opening(self) -> Iterator[np.ndarray]:
-        """Yield the targets ``(h,)``, one a frame, that let go."""
+        """Yield the targets ``(h,)``, one per frame, that release the object."""
         ...
 
     def look(self, contacts: Sequence[physx.PhysxContact]) -> None:
-        """See what the last step has done."""
+        """Process the contacts of the last step."""
         ...
 
     def touches(self, touches: Touches) -> Touches:
-        """Return what presses on the target, given what its contacts tell."""
+        """Return the forces on the target, given those from its contacts."""
         ...
 
 
 def control_of(world: RobotWorld, settings: TrialSettings) -> HandControl:
-    """Return the control of a world's robot."""
+    """Return the controller of the world's current robot."""
     from manitwin.physics.sapien.controls.cup import CupControl
     from manitwin.physics.sapien.controls.fingers import FingersControl
     from manitwin.physics.sapien.controls.jaws import JawsControl

@@ -1,8 +1,10 @@
-"""A suction cup: where its lip touches and its vacuum is on it seals, and it lets go of what loads the lip beyond its limits.
+"""Suction cup controller: the cup seals where its lip touches with vacuum on, and detaches when the lip's load limits are
+exceeded.
 
-In physics the lip must press on the object, and its ring must seal on the true surface from where it is (``suction.seal``); so
-held, the object hangs from the lip by a stiff spring of limited force. What the lip must carry is the object's weight and
-inertial force, less what else bears it (Newton, Euler); beyond ``suction.lip_load`` of 1 it lets go, as in the trial.
+To seal, the lip must be in contact with the object, and its ring must seal on the true surface at that pose
+(``suction.seal``). The object is then attached to the lip by a stiff spring of limited force. The load on the lip is the
+object's weight and inertial force less the other contact forces (Newton, Euler). If ``suction.lip_load`` exceeds 1, the cup
+detaches, as in the trial.
 """
 
 from __future__ import annotations
@@ -22,15 +24,17 @@ from manitwin.physics.suction import lip_load, seal
 from manitwin.physics.trial import GRAVITY_M_S2, TrialSettings
 from manitwin.robots.grippers.suction import SuctionGripper
 
-# Of the sealed bellows: 1 kg hangs 1 mm lower, and turns by 1 degree with its weight 9 cm beside the lip.
+# Stiffness of the sealed bellows: 1 kg lowers the lip by 1 mm, and tilts it by 1 degree if its weight is 9 cm off the axis.
 STIFFNESS_N_M, DAMPING_N_S_M = 1e4, 100.0
-VACUUM_ON = 0.5  # what is told of the vacuum is 0 or 1
+VACUUM_ON = 0.5  # threshold of the vacuum command, which is 0 or 1
 TURN_STIFFNESS_NM_RAD, TURN_DAMPING_NM_S_RAD = 50.0, 1.0
 
 
 @dataclass
 class _Sealed:
-    """What hangs from the lip, by its number in the world; ``center_m`` and ``inward (3,)`` of the lip's plane in its frame."""
+    """Object attached to the lip, by its number in the world; ``center_m`` and ``inward (3,)`` of the lip's plane in its
+    frame.
+    """
 
     number: int
     drive: physx.PhysxDriveComponent
@@ -40,10 +44,10 @@ class _Sealed:
 
 
 class CupControl:
-    """The cup of a robot; it is told whether its vacuum is on (1) or off (0), and is where its plunger is (m)."""
+    """Controller of a suction cup; its target is vacuum on (1) or off (0), its state the plunger's position (m)."""
 
     def __init__(self, world: RobotWorld, gripper: SuctionGripper, settings: TrialSettings):
-        """Take a robot whose vacuum is off."""
+        """Take a world whose robot has its vacuum off."""
         self._world, self._gripper, self._settings = world, gripper, settings
         (self._lip_name,) = world.robot.robot.finger_links
         self._on, self._pressure_n = False, 0.0
@@ -52,44 +56,44 @@ class CupControl:
 
     @property
     def told(self) -> np.ndarray:
-        """Whether the vacuum is on."""
+        """Whether the vacuum is on, ``(1,)``."""
         return np.array([float(self._on)])
 
     @property
     def state(self) -> np.ndarray:
-        """How far the plunger is out (m)."""
+        """The plunger's position ``(1,)`` m."""
         return self._world.robot.hand_positions()
 
     @property
     def presses(self) -> bool:
-        """Whether it has sealed."""
+        """Whether the cup has sealed."""
         return self._sealed is not None
 
     def tell(self, told: np.ndarray) -> None:
-        """Switch the vacuum on where more than a half is told, else off."""
+        """Switch the vacuum on for a target above one half, otherwise off."""
         on = float(told[0]) > VACUUM_ON
         if self._on and not on:
             self._let_go()
         self._on = on
 
     def shaping(self, grasp_joints_rad: np.ndarray | None, opening_m: float | None = None) -> Iterator[np.ndarray]:
-        """Stay as it is."""
+        """Do nothing."""
         return iter(())
 
     def squeeze(self) -> np.ndarray:
-        """Switch the vacuum on."""
+        """Return the target that switches the vacuum on."""
         return np.ones(1)
 
     def closing_empty(self) -> Iterator[np.ndarray]:
-        """Stay as it is: only jaws are used as a tool."""
+        """Do nothing: only jaws are used as a tool."""
         return iter(())
 
     def opening(self) -> Iterator[np.ndarray]:
-        """Switch the vacuum off."""
+        """Yield the target that switches the vacuum off."""
         yield np.zeros(1)
 
     def look(self, contacts: Sequence[physx.PhysxContact]) -> None:
-        """Seal on what the lip touches, or let go of what is too much for it."""
+        """Seal on an object that the lip touches, or detach if the sealed lip is overloaded."""
         if self._sealed is not None:
             self._bear(self._sealed, contacts)
         elif self._on:
@@ -99,7 +103,7 @@ class CupControl:
                     break
 
     def touches(self, touches: Touches) -> Touches:
-        """Return how hard the lip presses on the target: the vacuum's force less what pulls at it; 0 where it is not sealed."""
+        """Return the pressing force of the lip: the vacuum force less the pull on it; 0 if it is not sealed."""
         return Touches((self._pressure_n, self._pressure_n), touches.on_support)
 
     def _try_to_seal(self, number: int) -> bool:
@@ -125,7 +129,7 @@ class CupControl:
         return True
 
     def _bear(self, held: _Sealed, contacts: Sequence[physx.PhysxContact]) -> None:
-        """Take down how the lip is loaded, and let go where it is too much."""
+        """Compute the load on the lip, and detach if it exceeds the limits."""
         placed, body = self._world.placed[held.number], self._world.bodies[held.number]
         object_to_world = self._world.object_to_world(held.number)
         rotation, velocity_m_s = object_to_world[:3, :3], np.array(body.linear_velocity, float)

@@ -1,4 +1,4 @@
-"""Fingers with joints of their own: each closes along its line of joints, as in the trial of the grasp."""
+"""Multi-finger hand controller: each finger closes along its straight line in joint space, as in the grasp trial."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 
 
 class FingersControl:
-    """The fingers of a robot; what they are told, and what they are, are the positions of the hand's joints (rad)."""
+    """Controller of a multi-finger hand; targets and state are the positions of the hand's joints (rad)."""
 
     def __init__(self, world: RobotWorld, gripper: MultiFingerGripper, settings: TrialSettings):
-        """Take a world whose robot's hand is open."""
+        """Take a world whose robot has its hand open."""
         self._world, self._gripper, self._settings = world, gripper, settings
         self._told = self._before = world.robot.robot.open_hand
         self._goal: np.ndarray | None = None
@@ -27,26 +27,26 @@ class FingersControl:
 
     @property
     def told(self) -> np.ndarray:
-        """The joints' targets ``(J,)``."""
+        """Joint targets ``(J,)`` rad."""
         return self._told
 
     @property
     def state(self) -> np.ndarray:
-        """The joints' positions ``(J,)``."""
+        """Joint positions ``(J,)`` rad."""
         return self._world.robot.hand_positions()
 
     @property
     def presses(self) -> bool:
-        """Whether every finger presses, or has come to the end of its way."""
+        """Whether every finger presses or has reached its goal."""
         return self._closing is not None and self._closing.all_press
 
     def tell(self, told: np.ndarray) -> None:
-        """Tell the joints' targets."""
+        """Set the joint targets."""
         self._told = np.asarray(told, float)
         self._world.robot.set_hand_targets(self._told)
 
     def shaping(self, grasp_joints_rad: np.ndarray | None, opening_m: float | None = None) -> Iterator[np.ndarray]:
-        """Move to the joints before closing; those to close to are kept for ``squeeze``."""
+        """Yield targets to the joints before closing, and keep the closing goal for ``squeeze``."""
         if grasp_joints_rad is None:
             raise ValueError(f"a grasp of {self._gripper.name} needs its joints before closing and those to close to")
         self._before, self._goal = grasp_joints_rad
@@ -54,7 +54,7 @@ class FingersControl:
         return self._from(self._told, self._before)
 
     def squeeze(self) -> np.ndarray:
-        """Move on the targets of all fingers that do not press yet."""
+        """Return joint targets that advance all fingers that do not press yet."""
         if self._closing is None:
             assert self._goal is not None, "a hand closes on a grasp that it was shaped for"
             self._closing = FingerClosing(
@@ -68,20 +68,22 @@ class FingersControl:
         return self._closing.move_on(self._world.robot.hand_positions())
 
     def closing_empty(self) -> Iterator[np.ndarray]:
-        """Stay as it is: only jaws are used as a tool."""
+        """Do nothing: only jaws are used as a tool."""
         return iter(())
 
     def opening(self) -> Iterator[np.ndarray]:
-        """Stop pressing all at once, so that no finger pushes the thing over, then go back to the joints before closing."""
+        """Release all fingers at once, so that none pushes the object over, then yield targets back to the joints before
+        closing.
+        """
         self._closing = None
         here_rad = self._world.robot.hand_positions().copy()
         return chain([here_rad], self._from(here_rad, self._before))
 
     def look(self, contacts: Sequence[physx.PhysxContact]) -> None:
-        """See nothing: fingers feel what they press on."""
+        """Do nothing: fingers measure their own contact torque."""
 
     def touches(self, touches: Touches) -> Touches:
-        """Return what the contacts tell."""
+        """Return the forces from the contacts."""
         return touches
 
     def _from(self, start_rad: np.ndarray, end_rad: np.ndarray) -> Iterator[np.ndarray]:

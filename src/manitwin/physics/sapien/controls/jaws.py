@@ -1,4 +1,6 @@
-"""Two jaws with one target: they close until they press with the closing force, and go on pressing whatever gives way."""
+"""Parallel jaw controller: one target for both jaws, which close until they press with the closing force and follow
+compliance.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +15,14 @@ from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.shared_target import SharedTarget
 from manitwin.physics.trial import TrialSettings
 
-PRESSING_SHARE = 0.98  # of the closing force, at which the target has come as far as it goes
+PRESSING_SHARE = 0.98  # share of the closing force at which the target has stopped advancing
 
 
 class JawsControl:
-    """The jaws of a robot; what they are told, and what they are, is the opening (m)."""
+    """Controller of parallel jaws; target and state are the opening (m)."""
 
     def __init__(self, world: RobotWorld, settings: TrialSettings):
-        """Take a world whose robot (of two arms, the one that is used now) has open jaws."""
+        """Take a world whose current robot has open jaws."""
         self._world, self._settings = world, settings
         self._number = world.robots.index(world.robot)
         self._full_m = self._open_m = self._target_m = world.robot.robot.gripper.opening_m
@@ -28,22 +30,22 @@ class JawsControl:
 
     @property
     def _robot(self) -> SapienRobot:
-        """The robot, which goes with its world: whoever has this control does not keep it."""
+        """The robot, looked up in the world so that this controller does not keep it alive."""
         return self._world.robots[self._number]
 
     @property
     def told(self) -> np.ndarray:
-        """The target of the opening ``(1,)``, m."""
+        """Target of the opening ``(1,)`` m."""
         return np.array([self._target_m])
 
     @property
     def state(self) -> np.ndarray:
-        """The opening ``(1,)``, m."""
+        """Opening ``(1,)`` m."""
         return np.array([self._robot.opening_m()])
 
     @property
     def presses(self) -> bool:
-        """Whether the target is so far within what the jaws hold that they press on it with about the closing force."""
+        """Whether the target is far enough inside the held object to press with about the closing force."""
         pressing_n = (self._robot.opening_m() - self._target_m) / 2 * self._settings.finger_stiffness_n_m
         return pressing_n > PRESSING_SHARE * self._settings.force_n
 
@@ -53,23 +55,23 @@ class JawsControl:
         self._robot.set_opening_target(self._target_m)
 
     def shaping(self, grasp_joints_rad: np.ndarray | None, opening_m: float | None = None) -> Iterator[np.ndarray]:
-        """Go to a grasp's opening, at the closing speed."""
+        """Yield targets to a grasp's opening, at the closing speed."""
         self._open_m = self._full_m if opening_m is None else opening_m
         return self.opening()
 
     def squeeze(self) -> np.ndarray:
-        """Move the target on by one frame."""
+        """Return the target advanced by one frame."""
         return np.array([2 * self._shared.move_on(self._robot.opening_m() / 2)])
 
     def closing_empty(self) -> Iterator[np.ndarray]:
-        """Close at the closing speed; what they do not hold they do not press."""
+        """Yield targets that close the jaws at the closing speed, without a pressing force."""
         target_m = self._target_m
         while target_m > 0:
             target_m = max(0.0, target_m - self._way_m)
             yield np.array([target_m])
 
     def opening(self) -> Iterator[np.ndarray]:
-        """Open at the closing speed; they close again from there."""
+        """Yield targets to the release opening at the closing speed; the next closing starts from there."""
         self._shared = SharedTarget(self._open_m, self._settings)
         target_m = max(self._target_m, 0.0)
         while target_m != self._open_m:
@@ -77,10 +79,10 @@ class JawsControl:
             yield np.array([target_m])
 
     def look(self, contacts: Sequence[physx.PhysxContact]) -> None:
-        """See nothing: jaws feel what they press on."""
+        """Do nothing: jaws measure their own force."""
 
     def touches(self, touches: Touches) -> Touches:
-        """Return what the contacts tell."""
+        """Return the forces from the contacts."""
         return touches
 
     @property
