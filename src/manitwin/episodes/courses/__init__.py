@@ -1,1 +1,1 @@
-"""What the robot does in an episode, from the plan to the last motion: a course for each kind of skill, of shared parts."""
+"""Courses of episodes: planning and execution of one skill, a class for each kind of skill."""

@@ -1,4 +1,4 @@
-"""What courses share: where an episode starts from, how an object is grasped and lifted, and how an episode ends early."""
+"""Base of all courses: start of an episode, grasping and lifting, putting back, and early termination."""
 
 from __future__ import annotations
 
@@ -26,58 +26,61 @@ from manitwin.physics.sapien.world import RobotWorld
 _Chosen = TypeVar("_Chosen")
 
 ANOTHER_GRASP = "another_grasp"
-TURNED_M, TURNED_RAD = 0.01, np.radians(10.0)  # in the hand: what was planned with another pose there hardly serves
-FIRST_SHARE = 0.75  # of grasps: those that tend to be good
-LEAST_LIFT_SHARE = 0.5  # of what the hand rose: less, and the object was left behind
+TURNED_M, TURNED_RAD = (
+    0.01,
+    np.radians(10.0),
+)  # in the hand: beyond this, a plan made for another pose in the hand is hardly usable
+FIRST_SHARE = 0.75  # share of the grasps whose order is kept: those that tend to be good
+LEAST_LIFT_SHARE = 0.5  # of the hand's rise: below this, the object was left behind
 
 
 def first_and_last(grasps: Sequence[_Chosen]) -> tuple[Sequence[_Chosen], Sequence[_Chosen]]:
-    """Return the first three quarters of grasps, and the rest.
+    """Split grasps into the first three quarters and the rest.
 
-    Their order is drawn, good ones tend to come sooner (``target_grasps.shuffled``): what is asked of grasps beside that they
-    hold is asked of the rest last, or the one at the end of a handle would be taken again and again that hardly holds.
+    Their order is random with a bias towards good grasps (``target_grasps.shuffled``). Other criteria reorder each part
+    separately; otherwise a barely holding grasp at the end of a handle could be chosen again and again.
     """
     count = int(np.ceil(FIRST_SHARE * len(grasps)))
     return grasps[:count], grasps[count:]
 
 
 class Ended(Exception):
-    """The episode ends here, with its outcome."""
+    """Ends the episode with an outcome."""
 
 
 class NotTaken(Ended):
-    """The episode ends here unless the target, which stands again without the hand, is taken by another grasp."""
+    """Ends the episode unless the target, which stands again without the hand, can be taken by another grasp."""
 
 
 class Turned(NotTaken):
-    """The target turned in the hand as it was lifted, and has been put back: the same grasp serves where no other does."""
+    """The target turned in the hand during the lift and has been put back: the same grasp is used if there is no other."""
 
 
 class Planner(Protocol):
-    """The protocol of an episode's planner (``planning.pick_place.PickPlacePlanner``)."""
+    """Interface of an episode's planner (``planning.pick_place.PickPlacePlanner``)."""
 
     def plan(self, problem: PickPlaceProblem) -> PlanReport:
-        """Plan the whole of a problem, from the start to the placement and back."""
+        """Plan a problem completely, from the start to the placement and the retreat."""
         ...
 
     def plan_place(
         self, problem: PickPlaceProblem, plan: Grasped, joint_positions_rad: np.ndarray,
         gripper_to_object_measured: np.ndarray, goal: np.ndarray, with_carry: bool,
     ) -> tuple[Motion | None, Motion, Motion] | None:  # fmt: skip
-        """Plan carry, lower and retreat again."""
+        """Plan carry (if ``with_carry``), lower and retreat from the current joints; None if there is no plan."""
         ...
 
     def tip_pose(self, q: np.ndarray) -> np.ndarray:
-        """Return the pose ``(4, 4)`` of the grasp frame in the world."""
+        """Return the pose ``(4, 4)`` of the grasp frame in the world at joint positions ``q``."""
         ...
 
 
 @dataclass
 class Start:
-    """What an episode starts from: the problem and all ``objects`` (in the world's order) where they have come to rest.
+    """Start of an episode: the problem, and all ``objects`` (in the world's order) at their resting poses.
 
-    ``granules_in`` says how many granules each of them holds. Of a goal of several literals, ``moved`` are the names of all
-    that are taken, ``partners`` of all that it is about beside those.
+    ``granules_in`` maps objects to the number of granules they hold. For a goal of several literals, ``moved`` are the names
+    of all objects that are taken, ``partners`` those of all other objects in the goal.
     """
 
     problem: PickPlaceProblem
@@ -91,7 +94,7 @@ class Start:
 
 
 def tiers_of(start: Start) -> list[tuple[Grasp, ...]]:
-    """Return the grasps that can be planned with, those first in which the target bears to be lifted where it is."""
+    """Return the usable grasps in tiers, first those in which the target can be lifted without turning."""
     problem = start.problem
     if not isinstance(start.planner, PickPlacePlanner):
         return [problem.grasps]
@@ -99,43 +102,46 @@ def tiers_of(start: Start) -> list[tuple[Grasp, ...]]:
 
 
 class Course(ABC):
-    """What the robot does; ``facts`` are filled in on the way.
+    """Plan and execution of one skill; ``facts`` are filled in along the way.
 
-    ``lifts_steadily``: what turns in the hand as it is lifted does not serve, if another grasp does.
+    ``lifts_steadily``: a grasp in which the object turns during the lift is rejected if there is another grasp.
     """
 
     lifts_steadily: ClassVar[bool] = False
 
     def __init__(self, start: Start, facts: EpisodeFacts):
-        """Take where the episode starts from."""
+        """Take the start of the episode."""
         self.start, self.facts = start, facts
         self.problem = start.problem
         self.goal_object_to_world = start.problem.goal_object_to_world
 
     @abstractmethod
     def plan(self) -> bool:
-        """Plan all of it; False where there is no plan."""
+        """Plan the whole course; return False if there is no plan."""
 
     @abstractmethod
     def execute(self, execution: Execution) -> None:
-        """Carry the plan out; raises Ended where it cannot go on."""
+        """Execute the plan; raises Ended if it cannot be completed."""
 
     @property
     def ends_at(self) -> np.ndarray | None:
-        """Where the plan leaves the target ``(4, 4)``; None: in the hand."""
+        """Planned final pose ``(4, 4)`` of the target; None if it stays in the hand."""
         return self.goal_object_to_world
 
     @property
     def putting_back(self) -> Planner:
-        """The planner of how the target is put back."""
+        """Planner used to put the target back."""
         return self.start.planner
 
     def watches(self, world: RobotWorld) -> Sequence[EventWatch]:
-        """Return what is to be watched for events."""
+        """Return the event watches of this course."""
         return ()
 
     def grasp_and_lift(self, execution: Execution, reach: Motion, approach: Motion, lift: Motion) -> None:
-        """Reach, approach, close and lift; raises NotTaken where the object is left behind, Turned where it has been put back."""
+        """Reach, approach, close and lift.
+
+        Raises NotTaken if the object is left behind, Turned if it turned in the hand and was put back.
+        """
         tip_pose = self.start.planner.tip_pose
         execution.shape(self.facts.grasp)
         execution.follow(reach)
@@ -149,9 +155,10 @@ class Course(ABC):
             raise NotTaken("not_lifted")
 
     def _lift(self, lift: Motion, execution: Execution) -> None:
-        """Lift; what turns far in the hand is let down as it was lifted and let go of, and then Turned is raised.
+        """Lift the target. If it turns far in the hand, retrace the lift, release it, and raise Turned.
 
-        So the arm is not hit by what turns. What has been taken by another grasp already is lifted as it turns.
+        This keeps a turning object from hitting the arm. After a change of grasp, the lift is completed even if the object
+        turns.
         """
         closed = execution.gripper_to_object()
         guarded = self.lifts_steadily and not self.facts.replans[ANOTHER_GRASP]
@@ -168,10 +175,9 @@ class Course(ABC):
         raise Turned("not_lifted")
 
     def set_down_again(self, plan: Grasped, execution: Execution) -> None:
-        """Set the target down where it was, which has turned so far in the hand that what was planned does not serve.
+        """Put the target back where it was if it has turned so far in the hand that the plan is unusable, and raise NotTaken.
 
-        Raises NotTaken once it stands. Nothing happens where it has turned little or cannot be set down, and to what has been
-        taken by another grasp already.
+        Does nothing if it has turned little, if it cannot be put back, or after a change of grasp.
         """
         planned, measured = inverse(plan.gripper_to_object), inverse(execution.gripper_to_object())
         center = self.problem.target.body.center_of_mass_m
@@ -195,7 +201,7 @@ class Course(ABC):
         raise NotTaken("replan_failed")
 
     def tiers(self) -> list[tuple[Grasp, ...]]:
-        """Return the grasps that can be planned with (``tiers_of``), and count those that the target's weight would turn in."""
+        """Return the usable grasps (``tiers_of``), and count those rejected because the target's weight would turn it."""
         self.tell_no_grasp()
         tiers = tiers_of(self.start)
         if turning := len(self.start.problem.grasps) - sum(map(len, tiers)):
@@ -203,21 +209,21 @@ class Course(ABC):
         return tiers
 
     def tell_no_grasp(self) -> None:
-        """Have the outcome say so where the target has no grasp for this hand: that is not for want of a plan."""
+        """Set the outcome to ``no_grasp`` if the target has no grasp for this hand, to distinguish it from a planning failure."""
         if not self.start.problem.grasps:
             self.facts.outcome = "no_grasp"
 
     def height_m(self, execution: Execution) -> float:
-        """Return how high the target's centre of mass is."""
+        """Return the height of the target's centre of mass (m)."""
         center = self.problem.target.body.center_of_mass_m[None]
         return float(transform_points(execution.target_to_world(), center)[0, 2])
 
     def check_held(self, execution: Execution) -> None:
-        """Raise Ended where the fingers have lost the target."""
+        """Raise Ended if the fingers have lost the target."""
         if not min(execution.touches.finger_forces_n) > 0:
             raise Ended("dropped")
 
     def measure_slip(self, plan: Grasped, execution: Execution) -> None:
-        """Take down how far the target has moved in the hand."""
+        """Record how far the target has moved in the hand."""
         planned, measured = inverse(plan.gripper_to_object), inverse(execution.gripper_to_object())
         self.facts.slip_m = moved_m(planned, measured, self.problem.target.body.center_of_mass_m)

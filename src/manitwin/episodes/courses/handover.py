@@ -1,4 +1,4 @@
-"""From hand to hand: the first arm brings the target to a meeting place, the second takes it there and puts it down before it."""
+"""Handover course: the first arm brings the target to a meeting place, the second takes it and puts it down on its own side."""
 
 from __future__ import annotations
 
@@ -27,21 +27,25 @@ from manitwin.robots.two_arms import base_to_world
 
 GIVER, TAKER = 0, 1
 MEETINGS = 24
-OTHER_MEETINGS = 12  # that are tried with what has turned in the first hand
-HEIGHTS_M, ASIDE_M, ALONG_M = (0.35, 0.55), 0.15, 0.08  # of the middle of the object, about half way between the bases
+OTHER_MEETINGS = 12  # number of meeting places tried if the target has turned in the first hand
+HEIGHTS_M, ASIDE_M, ALONG_M = (
+    (0.35, 0.55),
+    0.15,
+    0.08,
+)  # ranges of the meeting point relative to the midpoint between the bases
 TILTED_SHARE, TILT_RAD = 0.7, np.radians(100)
-RISEN_M = 0.03  # over which the meeting place is come up to
+RISEN_M = 0.03  # the meeting place is approached from this far below
 MEET_S, LONGEST_S = 0.8, 3.0
 BOTH_HOLD_S, HOLD_S = 0.2, 0.5
 
 
 class HandoverCourse(Course):
-    """Gives with the first arm, takes with the second, which puts the target down on its side of the table."""
+    """Hands the target from the first arm to the second, which puts it down on its side of the table."""
 
     lifts_steadily = True
 
     def __init__(self, start: Start, facts: EpisodeFacts):
-        """Draw where the arms may meet, and where the target may be put down."""
+        """Sample meeting places and placements."""
         super().__init__(start, facts)
         assert isinstance(start.planner, TwoArmPlanner), "a handover is planned for two arms"
         self._arms = start.planner
@@ -62,16 +66,16 @@ class HandoverCourse(Course):
 
     @property
     def ends_at(self) -> np.ndarray | None:
-        """Where the second arm is to put it down."""
+        """Pose ``(4, 4)`` at which the second arm puts the target down."""
         return self._goal
 
     @property
     def putting_back(self) -> Planner:
-        """The planner of the first arm alone, the second one at home."""
+        """Planner of the first arm alone, with the second one at home."""
         return self._arms.alone
 
     def watches(self, world: RobotWorld) -> Sequence[EventWatch]:
-        """Return the watch of who holds the target."""
+        """Return the watch of which arm holds the target."""
         target = self.problem.target
         giver, taker = (each.robot.name for each in world.robots)
 
@@ -81,7 +85,7 @@ class HandoverCourse(Course):
         return (HandoverWatch(target.name, giver, taker, center),)
 
     def plan(self) -> bool:
-        """Plan both halves with the first pair of grasps and the first meeting that serve."""
+        """Plan both halves with the first feasible pair of grasps and meeting place."""
         self.tell_no_grasp()
         plan, report = self._arms.plan_handover(self.problem, self._meetings, self._put_down, longest_s=LONGEST_S)
         self.facts.grasps_tried += report.tried
@@ -96,7 +100,7 @@ class HandoverCourse(Course):
         return True
 
     def execute(self, execution: Execution) -> None:
-        """Give, take, let go, withdraw, hold, and put down; raises Ended where a hand loses the target, or there is no way."""
+        """Give, take, release, withdraw, hold, and put down; raises Ended if a hand loses the target or no motion is found."""
         execution.use(GIVER)
         self._bring(self._plan, execution)
         take = self._take_from(execution, self._plan.take.grasp)
@@ -119,7 +123,7 @@ class HandoverCourse(Course):
         self._set_down(take, execution)
 
     def _take_from(self, execution: Execution, first: Grasp) -> Take | None:
-        """Plan how the second arm takes the target from where the first one holds it now, by ``first`` if it can."""
+        """Plan how the second arm takes the target from its current pose in the first hand, preferring the grasp ``first``."""
         width_m, there = self._plan.give.grasp.width_m, execution.target_to_world()
         return self._arms.plan_take(
             self.problem,
@@ -132,7 +136,7 @@ class HandoverCourse(Course):
         )
 
     def _meet_elsewhere(self, execution: Execution) -> Take | None:
-        """Bring the target, as it is in the first hand now, to another meeting place where the second arm can take it."""
+        """Move the target, as it lies in the first hand now, to another meeting place where the second arm can take it."""
         held, give, measured = HeldPathPlanner(self._arms.parts), self._plan.give, execution.gripper_to_object()
         asked = self._arms.with_taker_at(self.problem, self._arms.taker.arm.home, None)
         for meeting in [each for each in self._meetings if each is not give.held][:OTHER_MEETINGS]:
@@ -154,7 +158,7 @@ class HandoverCourse(Course):
         return None
 
     def _set_down(self, take: Take, execution: Execution) -> None:
-        """Carry the target to the table before the second arm, let go and go home; raises Ended where there is no way."""
+        """Carry the target to the table on the second arm's side, release it and go home; raises Ended if there is no plan."""
         held = Held(take.grasp, take.gripper_to_object)
         placement = self._placement(held, execution) if self._giver_is_home else None
         if placement is None:
@@ -191,7 +195,7 @@ class HandoverCourse(Course):
         execution.use(GIVER)
 
     def _placement(self, held: Held, execution: Execution, most: int = MOST_PLANNED) -> Placement | None:
-        """Plan where to put the target down, of up to ``most`` places, and the way there, from where the second arm is."""
+        """Plan a placement out of up to ``most`` places, and the motion there from the second arm's current joints."""
         asked = self._arms.with_giver_at(self.problem, self._giver_rad)
         found = self._put_down.plan(asked, held, execution.commanded_rad, execution.gripper_to_object(), most)
         self.facts.replans["put_down" if found is not None else "put_down_failed"] += 1
@@ -201,7 +205,7 @@ class HandoverCourse(Course):
         return placement
 
     def _bring_home(self, execution: Execution) -> None:
-        """Bring the target out of the way that the second arm is in: to its home, or straight up."""
+        """Move the target out of the way: with the second arm to its home, or straight up."""
         carry = self._arms.plan_bring_home(
             self.problem, execution.gripper_to_object(), execution.commanded_rad, self._giver_rad
         )
@@ -210,7 +214,7 @@ class HandoverCourse(Course):
             execution.follow(carry)
 
     def _bring(self, plan: HandoverPlan, execution: Execution) -> None:
-        """Grasp, lift, measure the object in the hand, plan carry and meeting anew, and go there."""
+        """Grasp, lift, measure the object in the hand, replan carry and meeting, and move to the meeting place."""
         give = plan.give
         self.grasp_and_lift(execution, give.reach, give.approach, give.lift)
         execution.meant = MeantContacts(target=frozenset())
@@ -236,7 +240,7 @@ class HandoverCourse(Course):
         return np.random.default_rng((self.problem.seed, purpose))
 
     def _let_go(self, take: Take, execution: Execution) -> None:
-        """Open the first hand, withdraw it and bring its arm home, as far as there is a way."""
+        """Open the first hand, withdraw it and bring its arm home, as far as a motion is found."""
         execution.open()
         where = self.problem, execution.target_to_world(), execution.commanded_rad, take.joints_rad, take.grasp
         back = self._arms.plan_withdrawal(*where)
@@ -247,7 +251,7 @@ class HandoverCourse(Course):
         self._giver_rad = execution.commanded_rad
 
     def _bring_giver_home(self, taker_rad: np.ndarray, take: Take, execution: Execution) -> None:
-        """Bring the first arm home around the second, which holds the target, if there is a way."""
+        """Bring the first arm home around the second, which holds the target, if a motion is found."""
         where = self.problem, execution.target_to_world(), execution.commanded_rad, taker_rad, take.grasp
         home = self._arms.plan_home(*where)
         self.facts.replans["home" if home is not None else "not_home"] += 1
@@ -257,9 +261,10 @@ class HandoverCourse(Course):
 
 
 def meetings(target: PlacedObject, middle_m: np.ndarray, rng: np.random.Generator) -> tuple[HeldPath, ...]:
-    """Return ways to bring a target's middle to some place in the air near ``middle_m (3,)``, turned as drawn.
+    """Return sampled paths that bring the target's centre to places in the air near ``middle_m (3,)``, with random
+    orientation.
 
-    Some leave it as it lay but for its heading, most tilt it by up to 100 degrees.
+    Some keep the target's tilt and change its heading only; most tilt it by up to 100 degrees.
     """
     center = np.mean([points.mean(0) for points in target.body.hulls], axis=0)
     offset = target.object_to_world[:3, :3] @ center

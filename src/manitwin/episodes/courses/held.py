@@ -1,4 +1,4 @@
-"""Held paths in physics: grasp, lift, then follow what the skill says, planned again from what is measured in the hand."""
+"""Held-object course: grasp, lift, then follow the skill's path, replanned from the measured pose in the hand."""
 
 from __future__ import annotations
 
@@ -31,22 +31,24 @@ from manitwin.physics.sapien.contacts import MeantContacts
 from manitwin.physics.sapien.world import RobotWorld
 
 BACK_S = 1.2
-YIELDED_S, PRESSED_S = 0.1, 0.2  # after the touch of a blow, and of a press
-RISEN_M = (0.01, 0.03)  # straight up, before the way back
-PUT_BACK_RAD = np.radians([0.0, 45, -45, 90, -90, 135, -135, 180])  # what has turned in the hand comes back as it can
-PEAK_OF_QUINTIC = 1.875  # its largest by its mean speed
+YIELDED_S, PRESSED_S = 0.1, 0.2  # hold time after contact, for a blow and for a press
+RISEN_M = (0.01, 0.03)  # heights of a straight rise before the way back
+PUT_BACK_RAD = np.radians(
+    [0.0, 45, -45, 90, -90, 135, -135, 180]
+)  # an object that turned in the hand is put back in the first feasible heading
+PEAK_OF_QUINTIC = 1.875  # ratio of peak to mean speed
 MADE_UP_RAD, MADE_UP_TIMES, MADE_UP_S = np.radians(4.0), 3, 0.4
-"""What has turned in the hand is turned on to the path's end, but for so much, so often and so fast."""
-CREEPS_M = 0.002  # before the touch: as far as things are from where they were measured to be, and a little more
+"""Correction of an object that turned in the hand at the path's end: tolerance, most repetitions, and duration of each."""
+CREEPS_M = 0.002  # distance before contact at which a press creeps: the error of measured object poses, and a margin
 
 
 class HeldCourse(Course):
-    """Follows a skill's held path; where nothing can be planned anew, what was planned before is followed."""
+    """Follows a skill's held path; if replanning fails, the original plan is followed."""
 
     lifts_steadily = True
 
     def __init__(self, start: Start, facts: EpisodeFacts):
-        """Ask the skill for its task."""
+        """Create the skill's task."""
         super().__init__(start, facts)
         goal, planner = start.skill_goal, start.planner
         assert goal is not None
@@ -79,19 +81,19 @@ class HeldCourse(Course):
 
     @property
     def ends_at(self) -> np.ndarray | None:
-        """Where the plan leaves the target: at the path's end, or where it was; None: in the hand."""
+        """Planned final pose of the target: at the path's end or where it started; None if it stays in the hand."""
         if self.task.ending == "keep" and not self.task.empty:
             return None
         let_go = self.task.ending == "let_go" and not self.task.empty
         return self._held.poses[-1] if let_go else self.problem.target.object_to_world
 
     def watches(self, world: RobotWorld) -> Sequence[EventWatch]:
-        """Return the task's watch."""
+        """Return the task's watch, if it has one."""
         self._watch = None if self.task.watch is None else self.task.watch(world)
         return () if self._watch is None else (self._watch,)
 
     def plan(self) -> bool:
-        """Plan with the grasps that leave the function free."""
+        """Plan with the grasps that do not block the function."""
         task = self.task
         if task.empty:
             found = self._planner.plan_empty(self.problem, task.paths, longest_s=task.longest_s)
@@ -120,7 +122,7 @@ class HeldCourse(Course):
         return True
 
     def execute(self, execution: Execution) -> None:
-        """Grasp and lift (or close the hand), carry, follow the path, and end as the task says."""
+        """Grasp and lift (or close the empty hand), carry, follow the path, and end as the task specifies."""
         if self.task.empty:
             execution.close_empty()
             execution.follow(self._reach)
@@ -140,7 +142,9 @@ class HeldCourse(Course):
             self._put_back(execution)
 
     def _take(self, plan: HeldPlan, execution: Execution) -> None:
-        """Grasp, lift, measure the object in the hand, plan carry and path anew, and carry; again if it has turned meanwhile."""
+        """Grasp, lift, measure the object in the hand, replan carry and path, and carry; replan again if it turned in the
+        meantime.
+        """
         self.grasp_and_lift(execution, plan.reach, plan.approach, plan.lift)
         self._grasp_now = plan.gripper_to_object
         carry = self._plan_again(plan.held, plan.joints, execution)
@@ -162,7 +166,7 @@ class HeldCourse(Course):
                 self.check_held(execution)
 
     def _plan_again(self, held: HeldPath, joints: CubicSpline, execution: Execution) -> Motion | None:
-        """Plan path and carry from here with the pose in the hand that is measured, this path before all others; None: no way."""
+        """Replan path and carry from here with the measured pose in the hand, trying ``held`` first; None if there is no plan."""
         measured = execution.gripper_to_object()
         found = self._planner.again(
             self.problem,
@@ -180,7 +184,7 @@ class HeldCourse(Course):
         return carry
 
     def _act(self, execution: Execution) -> list[np.ndarray]:
-        """Follow the path; returns the joint positions ``(n,)`` that it went through, for the way back."""
+        """Follow the path; return the joint positions ``(n,)`` along it, for the way back."""
         task, count, meant = self.task, len(self._held.poses), self._held.meant
         execution.meant = MeantContacts(fingers=meant) if task.empty else MeantContacts(target=meant)
         been = [execution.commanded_rad]
@@ -205,7 +209,11 @@ class HeldCourse(Course):
         return been
 
     def _onward(self, part: HeldPath, execution: Execution, place: float) -> CubicSpline:
-        """Plan through some poses from where the arm is: as measured, else as before, else straight to where it was to be."""
+        """Plan a spline through poses from the current joints.
+
+        Uses the measured pose in the hand, then the previous one, and finally a straight joint motion to the planned position
+        at ``place``.
+        """
         grasps = [self._grasp_now] if self.task.empty else [execution.gripper_to_object(), self._grasp_now]
         for grasp, name in zip(grasps, ("onward", "onward_unmeasured"), strict=False):
             found = self._planner.onward(
@@ -218,10 +226,10 @@ class HeldCourse(Course):
         return joint_spline(np.array([execution.commanded_rad, self._joints(place)]))
 
     def _guarded(self, guard: Guard, part: HeldPath, execution: Execution) -> None:
-        """Move on until what is watched presses with the guard's force, then hold still (or yield, after a blow).
+        """Move until the watched force reaches the guard's limit, then hold still (or yield, after a blow).
 
-        The arm goes on until the row ends. So what presses creeps where it is to touch, and a blow is begun at such a time that a
-        row ends as it touches; what has not touched by then goes on slowly.
+        The arm completes the current row of samples after contact. A press therefore creeps close to the expected contact,
+        and a blow is delayed such that a row ends at contact. If a blow has not made contact by then, it continues slowly.
         """
         watch = self._watch
         assert watch is not None, "a guarded move asks its watch for the force"
@@ -249,9 +257,9 @@ class HeldCourse(Course):
         execution.wait_s(Phase.HOLD, YIELDED_S)
 
     def _under_force(self, regulated: Regulated, part: HeldPath, execution: Execution) -> None:
-        """Slide along a path's places from where the target touches now, yielding and following along the normal; then rise.
+        """Slide along a path from the current contact with force control along the normal, then rise.
 
-        Raises Ended where there is no way from there.
+        Raises Ended if there is no plan from here.
         """
         watch, arm = self._watch, self._own.parts.arm
         assert watch is not None, "a move under force asks its watch for it"
@@ -292,7 +300,7 @@ class HeldCourse(Course):
             execution.follow(away)
 
     def _go_back(self, execution: Execution, been: list[np.ndarray]) -> None:
-        """Go back along the path as planned from here, else as the arm came."""
+        """Go back along the path, replanned from here, or else along the joint positions of the way there."""
         poses = self._held.poses[:1] if self.task.guard is not None else self._held.poses[::-1][1:]
         if self.task.rises:
             here = execution.target_to_world()
@@ -308,7 +316,7 @@ class HeldCourse(Course):
         execution.follow(self._planner.timed(joints, BACK_S, Phase.RETURN))
 
     def _put_back(self, execution: Execution) -> None:
-        """Set the target down where it was, else turned about the upright there; raises Ended where that cannot be planned."""
+        """Put the target down where it was, or there with another heading; raises Ended if none can be planned."""
         execution.meant = MeantContacts()
         here, measured = execution.commanded_rad, execution.gripper_to_object()
         for angle_rad in PUT_BACK_RAD:
@@ -329,7 +337,7 @@ class HeldCourse(Course):
 
 
 def turned_in_place(placed: PlacedObject, angle_rad: float) -> np.ndarray:
-    """Return the pose ``(4, 4)`` of an object turned about the vertical through its centre of mass."""
+    """Return the pose ``(4, 4)`` of an object rotated about the vertical axis through its centre of mass."""
     center = transform_points(placed.object_to_world, placed.body.center_of_mass_m[None])[0]
     turn = Rotation.from_euler("z", angle_rad).as_matrix()
     return np.asarray(transform(None, center) @ transform(turn) @ transform(None, -center) @ placed.object_to_world)

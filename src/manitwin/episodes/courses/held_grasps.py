@@ -1,4 +1,4 @@
-"""Which grasps a held path is planned with, and in what order: those that leave its function free, and bear what they hold."""
+"""Selection and order of grasps for a held path: they must leave the function free and carry the object's weight."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from manitwin.robots.grippers.gripper import Gripper
 def grasps_of_task(
     tiers: Sequence[Sequence[Grasp]], task: HeldTask, body: RigidBody, gripper: Gripper
 ) -> tuple[tuple[Grasp, ...], Counter[PlanFailure]]:
-    """Return the grasps of all tiers that serve, each tier's best first, and how many were left out of what.
+    """Return the usable grasps of all tiers, the best of each tier first, and the number of rejected grasps by reason.
 
-    Of a task that must be held ``steady`` those are left out in which the weight turns the thing on its way, and what bears it
-    on a line goes before what needs a face to.
+    For a ``steady`` task, grasps in which the weight would turn the object along the path are rejected, and grasps that carry
+    it by a line contact rank before those that need a face contact.
     """
     ranked = [grasp for tier in tiers for grasp in _ranked(tier, task, body, gripper)]
     left_out = Counter[PlanFailure]({"blocks_function": sum(map(len, tiers)) - len(ranked)})
@@ -31,9 +31,9 @@ def grasps_of_task(
 
 
 def _ranked(grasps: Sequence[Grasp], task: HeldTask, body: RigidBody, gripper: Gripper) -> list[Grasp]:
-    """Return the grasps that leave the function free, but for the last quarter those first that do so best.
+    """Return the grasps that leave the function free, best first, separately for the first three quarters and the rest.
 
-    Of equal ones those go first whose pads touch broadly.
+    Among equal ranks, grasps with broad pad contact come first.
     """
     narrow = touch_narrowly(grasps, body, gripper)
     ranks = [(task.rank(grasp), late, grasp) for grasp, late in zip(grasps, narrow, strict=True)]

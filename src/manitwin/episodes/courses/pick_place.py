@@ -1,4 +1,4 @@
-"""Pick and place: grasp, lift, carry, lower, let go; the placement is planned again from what is measured in the hand."""
+"""Pick-and-place course: grasp, lift, carry, lower, release; the placement is replanned from the measured pose in the hand."""
 
 from __future__ import annotations
 
@@ -18,15 +18,22 @@ from manitwin.geometry.poses import inverse
 from manitwin.physics.sapien.contacts import NONE_MEANT, MeantContacts
 from manitwin.physics.sapien.world import RobotWorld
 
-SMALL_SLIP_M, SMALL_SLIP_RAD = 0.004, np.radians(2.0)  # a fifth of what a placement may be off: no reason to give up
+SMALL_SLIP_M, SMALL_SLIP_RAD = (
+    0.004,
+    np.radians(2.0),
+)  # a fifth of the tolerance of a placement: a smaller slip is no reason to give up
 
-LIES_ROWS, STILL_M, STILL_RAD = 12, 0.001, np.radians(1.0)  # 0.6 s at most, and what it moves in a row then
-ARRIVED_N = 3.0  # what is to fall into a vessel and presses so hard on it is there, and is let go
+LIES_ROWS, STILL_M, STILL_RAD = (
+    12,
+    0.001,
+    np.radians(1.0),
+)  # wait of at most 0.6 s until the object lies still, and the motion per row that counts as still
+ARRIVED_N = 3.0  # contact force at which an object to be dropped into a vessel counts as arrived, and is released
 
 
 @dataclass(frozen=True)
 class _Placement:
-    """The motions that place an object which is in the hand as ``gripper_to_object`` says."""
+    """Motions that place the object, for its pose in the hand ``gripper_to_object (4, 4)``."""
 
     gripper_to_object: np.ndarray
     carry: Motion | None
@@ -35,12 +42,12 @@ class _Placement:
 
 
 class PickPlaceCourse(Course):
-    """Moves the target to the first of the goal's poses that can be planned."""
+    """Moves the target to the first feasible goal pose."""
 
     _touch: ContactWatch | None = None
 
     def watches(self, world: RobotWorld) -> Sequence[EventWatch]:
-        """Return what tells that a target which is to be let go in the air has touched something before."""
+        """Return a contact watch for a target that is to be released in the air."""
         goal, problem = self.start.skill_goal, self.problem
         if goal is None or not goal.lets_fall:
             return ()
@@ -50,11 +57,11 @@ class PickPlaceCourse(Course):
         return (self._touch,)
 
     def plan(self) -> bool:
-        """Plan for the first goal pose that can be reached; the problem becomes that of this pose."""
+        """Plan for the first reachable goal pose; the problem becomes that of this pose."""
         return any(self.plan_with(grasps) for grasps in self.tiers())
 
     def plan_with(self, grasps: Sequence[Grasp]) -> bool:
-        """Plan with some of the grasps."""
+        """Plan with a subset of the grasps."""
         facts, start = self.facts, self.start
         poses = (self.goal_object_to_world,) if start.skill_goal is None else start.skill_goal.poses
         for pose in poses:
@@ -71,7 +78,7 @@ class PickPlaceCourse(Course):
         return False
 
     def execute(self, execution: Execution) -> None:
-        """Pick and place; raises Ended where the object is lost or cannot be placed."""
+        """Pick and place; raises Ended if the object is lost or cannot be placed."""
         plan = self._plan
         self.grasp_and_lift(execution, plan.reach, plan.approach, plan.lift)
         placement = _Placement(plan.gripper_to_object, plan.carry, plan.lower, plan.retreat)
@@ -96,7 +103,7 @@ class PickPlaceCourse(Course):
         execution.follow(placement.retreat)
 
     def _lower(self, lower: Motion, execution: Execution) -> bool:
-        """Lower the target, until it touches something where it is to fall; returns whether it went all the way."""
+        """Lower the target, for a drop until it touches something; return whether the motion was completed."""
         touch = self._touch
         if touch is None:
             return execution.follow(lower)
@@ -106,9 +113,10 @@ class PickPlaceCourse(Course):
         return arrived
 
     def _let_fall(self, retreat: Motion | None, execution: Execution) -> None:
-        """Let go, wait until the target lies, which a hand that moves would drag along, and withdraw.
+        """Release the target, wait until it lies still so that the moving hand does not drag it along, and withdraw.
 
-        ``retreat`` None: the way to where it was planned from ended early. Once more from what has come to lean on the hand.
+        ``retreat`` None: lowering ended early, so the planned retreat does not apply. The hand withdraws a second time if the
+        object leans on it.
         """
         execution.meant = MeantContacts(palm=True)
         execution.open()
@@ -143,17 +151,16 @@ class PickPlaceCourse(Course):
     def _placed_anew(
         self, plan: PickPlacePlan, execution: Execution, *, with_carry: bool, at: np.ndarray | None = None
     ) -> _Placement | None:
-        """Plan the placement from the pose in the hand, ``at`` another pose of the target than the one that was planned for."""
+        """Replan the placement with the measured pose in the hand; ``at`` replaces the planned goal pose of the target."""
         measured = execution.gripper_to_object()
         goal = self.problem.goal_object_to_world if at is None else raised(at, self.start.settings.release_height_m)
         found = self.start.planner.plan_place(self.problem, plan, execution.commanded_rad, measured, goal, with_carry)
         return None if found is None else _Placement(measured, *found)
 
     def _placed_late(self, plan: PickPlacePlan, execution: Execution, before: _Placement) -> _Placement:
-        """Plan the lowering anew, by another way where it does not work from here, to another pose that reaches the goal.
+        """Replan the lowering from here, then with another carry, then to another pose that reaches the goal.
 
-        What was planned ``before`` serves too where the object has moved little in the hand since. Raises Ended where nothing
-        does.
+        The plan ``before`` is kept if the object has moved little in the hand since. Raises Ended if nothing is feasible.
         """
         self.measure_slip(plan, execution)
         for with_carry in (False, True):
@@ -176,7 +183,7 @@ class PickPlaceCourse(Course):
 
 
 def raised(pose: np.ndarray, height_m: float) -> np.ndarray:
-    """Return a pose ``(4, 4)`` that is so much higher."""
+    """Return a pose ``(4, 4)`` translated upwards by ``height_m``."""
     result = np.array(pose, float)
     result[2, 3] += height_m
     return result

@@ -1,4 +1,4 @@
-"""Pushing in physics: strokes of the closed hand, each planned from where the object has come to rest, each with a guard."""
+"""Pushing course: guarded strokes of the closed hand, each planned from where the object came to rest."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from manitwin.physics.sapien.contacts import NONE_MEANT, MeantContacts
 from manitwin.physics.sapien.world import RobotWorld
 
 STROKES = 8
-NEAR_M = 0.012  # of the place: no further stroke
-NEAR_ENOUGH_M = 0.018  # where no further stroke can be planned
+NEAR_M = 0.012  # distance to the place at which no further stroke is made
+NEAR_ENOUGH_M = 0.018  # accepted distance if no further stroke can be planned
 STOP_SHORT_M = 0.002
-ASTRAY_M = 0.012  # beside the line: the stroke ends, the next one aims anew
+ASTRAY_M = 0.012  # lateral deviation at which a stroke ends, so that the next one corrects it
 TOPPLING_RAD = np.radians(20)
 SPEED_M_S, LONGEST_S = 0.06, 12.0
 SETTLES_S, BACK_S = 0.25, 1.0
 
 
 class PushCourse(Course):
-    """Strokes until the object is there, or none can be planned."""
+    """Strokes until the object has arrived, or none can be planned."""
 
     def __init__(self, start: Start, facts: EpisodeFacts):
         """Take the place that the goal marks."""
@@ -52,13 +52,13 @@ class PushCourse(Course):
 
     @property
     def ends_at(self) -> np.ndarray | None:
-        """Where the plan leaves the target: over the place, turned as it is."""
+        """Planned final pose of the target: at the place, with its current orientation."""
         target = self.problem.target
         way = self._place_m - transform_points(target.object_to_world, target.body.center_of_mass_m[None])[0]
         return transform(translation=np.array([*way[:2], 0.0])) @ target.object_to_world
 
     def watches(self, world: RobotWorld) -> Sequence[EventWatch]:
-        """Return the watch of what the hand touches."""
+        """Return the watch of the hand's contacts."""
         target = self.problem.target
 
         def center() -> np.ndarray:
@@ -75,7 +75,7 @@ class PushCourse(Course):
         return True
 
     def execute(self, execution: Execution) -> None:
-        """Push, look, and push again; raises Ended where the object falls over or cannot be pushed on."""
+        """Push, measure, and push again; raises Ended if the object topples or no stroke can be planned."""
         execution.close_empty()
         found: tuple[Motion, HeldPath, CubicSpline] | None = self._first
         for number in range(STROKES):
@@ -105,7 +105,7 @@ class PushCourse(Course):
         return None
 
     def _push(self, execution: Execution, reach: Motion, path: HeldPath, joints: CubicSpline) -> None:
-        """Go behind the object, push until it is there or astray, and go back."""
+        """Move behind the object, push until it has arrived or deviates, and go back."""
         execution.follow(reach)
         execution.meant = MeantContacts(fingers=path.meant)
         upright = execution.target_to_world()[:3, :3]
@@ -129,7 +129,7 @@ class PushCourse(Course):
         execution.meant = NONE_MEANT
 
     def _back(self, execution: Execution, path: HeldPath, joints: CubicSpline) -> None:
-        """Go back behind the object and up, as planned from here, else as the hand came."""
+        """Move back behind the object and up, replanned from here, or else along the way there."""
         here = replace(self.problem, target=replace(self.problem.target, object_to_world=execution.target_to_world()))
         now = self.start.planner.tip_pose(execution.commanded_rad)
         away = HeldPath(np.array(arc_to(now, _direction(path))[::-1]), path.meant)
@@ -151,6 +151,6 @@ class PushCourse(Course):
 
 
 def _direction(path: HeldPath) -> np.ndarray:
-    """Return the way ``(2,)`` of a stroke."""
+    """Return the unit direction ``(2,)`` of a stroke."""
     way = path.poses[-1, :2, 3] - path.poses[-2, :2, 3]
     return np.asarray(way / max(float(np.linalg.norm(way)), 1e-9))

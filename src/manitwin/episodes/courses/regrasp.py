@@ -1,4 +1,4 @@
-"""Put down on the way and taken anew: where no grasp serves both the start and the goal, two serve with a pose between them."""
+"""Regrasp course: if no grasp serves both start and goal, the target is put down at an intermediate pose and grasped again."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Grasp, PickPlacePlan, PickPlaceProblem
 from manitwin.physics.sapien.contacts import NONE_MEANT
 
-WAYS, GOALS = 8, 3  # so many poses on the way are planned for, with so many of the goal's
+WAYS, GOALS = 8, 3  # most intermediate poses, and most goal poses for each
 
 
 class RegraspCourse(PickPlaceCourse):
-    """Pick and place, at once or by way of a pose at rest; planned again from where the target has come to lie there."""
+    """Pick and place, directly or via an intermediate resting pose; replanned from where the target comes to rest there."""
 
     _way: tuple[PickPlacePlan, PickPlaceProblem] | None = None
 
     def plan(self) -> bool:
-        """Plan at once; else to a pose on the way: the goal from there, then the way there."""
+        """Plan directly; otherwise via an intermediate pose: the goal from there, then the way there."""
         return any(self.plan_with(grasps) or self._plan_by_a_way(grasps) for grasps in self.tiers())
 
     def _plan_by_a_way(self, grasps: Sequence[Grasp]) -> bool:
+        """Plan the goal from an intermediate pose and the motion to that pose; return whether both were found."""
         start = self.start
         goal = start.skill_goal
         for way in islice(() if goal is None or goal.ways is None else goal.ways, WAYS):
@@ -48,7 +49,7 @@ class RegraspCourse(PickPlaceCourse):
         return False
 
     def execute(self, execution: Execution) -> None:
-        """Pick and place, twice where there is a way; raises Ended where the target cannot be taken anew."""
+        """Pick and place, twice if via an intermediate pose; raises Ended if the target cannot be grasped again."""
         if self._way is not None:
             self._plan, self.problem = self._way
             super().execute(execution)
@@ -57,7 +58,7 @@ class RegraspCourse(PickPlaceCourse):
         super().execute(execution)
 
     def _goal_from(self, problem: PickPlaceProblem) -> np.ndarray | None:
-        """Return the first of the goal's poses that can be planned from a pose on the way; None: none can."""
+        """Return the first goal pose that can be planned from an intermediate pose, or None."""
         goal, settings = self.start.skill_goal, self.start.settings
         for pose in islice(() if goal is None else goal.poses, GOALS):
             asked = replace(problem, goal_object_to_world=raised(pose, settings.release_height_m))
@@ -66,7 +67,7 @@ class RegraspCourse(PickPlaceCourse):
         return None
 
     def _plan_from_there(self, execution: Execution) -> None:
-        """Let the target come to rest, bring the arm home, and plan from where it is; raises Ended where nothing can be."""
+        """Let the target settle, bring the arm home, and plan from there; raises Ended if planning fails."""
         settings, planner = self.start.settings, self.start.planner
         execution.rest(round(settings.max_rest_s / settings.timestep_s))
         execution.meant = NONE_MEANT

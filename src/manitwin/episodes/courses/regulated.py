@@ -1,8 +1,8 @@
-"""Moving under force: how slowly to go until a force is there, and an admittance from the measured force to the hand's height.
+"""Force control: approach speed until contact, and an admittance from the measured force to the hand's height.
 
-The height moves at a speed in proportion to what the force lacks (Villani and De Schutter 2016, Springer Handbook of
-Robotics, section 9.2: indirect force control, here with damping alone), so that it follows a slope and
-settles at the force that is asked for. The arm's own stiffness, 20 to 40 N/mm as measured, closes the loop within 0.3 s.
+The speed of the height is proportional to the force error (Villani and De Schutter 2016, Springer Handbook of Robotics,
+section 9.2: indirect force control, here with damping alone), so that the hand follows a slope and settles at the commanded
+force. The measured stiffness of the arm, 20 to 40 N/mm, closes the loop within 0.3 s.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from manitwin.geometry.poses import transform
 
 GAIN_M_S_N = 1.5e-4
 FASTEST_M_S, FARTHEST_M = 0.02, 0.02
-RISE_M = 0.005  # from which the joints' change with the height is taken
+RISE_M = 0.005  # step over which the joints' change with height is computed
 
 
 @dataclass
 class Admittance:
-    """Keeps a height (m) over a path such that ``force_n`` is near ``wanted_n``: lower where it is less."""
+    """Adjusts a height (m) above a path so that ``force_n`` approaches ``wanted_n``: lower if the force is too small."""
 
     force_n: Callable[[], float]
     wanted_n: float
@@ -32,7 +32,7 @@ class Admittance:
     height_m: float = 0.0
 
     def next_change(self, per_metre: np.ndarray) -> np.ndarray:
-        """Move on by a timestep; returns what it adds to positions ``(n,)``, given the change for a metre."""
+        """Advance by a time step and return the offset of the positions ``(n,)``, given their change per metre."""
         speed_m_s = GAIN_M_S_N * (self.force_n() - self.wanted_n)
         moved_m = self.height_m + float(np.clip(speed_m_s, -FASTEST_M_S, FASTEST_M_S)) * self.timestep_s
         self.height_m = float(np.clip(moved_m, -FARTHEST_M, FARTHEST_M))
@@ -40,18 +40,20 @@ class Admittance:
 
 
 def pace_of_press(watch: EventWatch, stop_n: float, creeps: int) -> Callable[[int], float]:
-    """Return the share of a row by which a press goes on from a sample, see ``Execution.follow``.
+    """Return the pace of a press, the share of a row to advance from a sample (see ``Execution.follow``).
 
-    The less, the nearer the watched force is to ``stop_n``; from the sample ``creeps`` on one sample a row. What the arm is told
-    in a row in which it touches can no longer be changed: a whole row at 4 mm/s pressed stiff things with up to 18 N.
+    The pace decreases linearly with the watched force and is 0 at ``stop_n``; from sample ``creeps`` on it is one sample per
+    row. Commands of the row in which contact occurs cannot be changed any more: a whole row at 4 mm/s pressed stiff objects
+    with up to 18 N.
     """
     return lambda first: 0.0 if first >= creeps else max(0.0, 1 - watch.force_n / stop_n)
 
 
 def with_heights(joints: CubicSpline, arm: ArmKinematics, normal: np.ndarray) -> CubicSpline | None:
-    """Return the path of ``(2 n)`` values: the joints, and their change for a metre along ``normal (3,)``; None: no way.
+    """Return a spline of ``(2 n)`` values: the joints, and their change per metre along ``normal (3,)``; None without
+    solution.
 
-    Both are exact at the knots. The change is that for 5 mm up, or down where an arm near its limits cannot go up.
+    Both are exact at the knots. The change is computed for 5 mm up, or down if an arm near its limits cannot move up.
     """
     changes = []
     for place in joints.x:

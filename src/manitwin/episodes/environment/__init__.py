@@ -1,1 +1,1 @@
-"""A task as a Gymnasium environment."""
+"""Gymnasium environment of a task."""

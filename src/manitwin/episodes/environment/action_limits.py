@@ -1,4 +1,4 @@
-"""What an environment takes: an arm's joints, and what its hand is told; the least and the largest, and what is no action."""
+"""Action limits of an environment: bounds of arm joints and hand commands, and validation of actions."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from manitwin.robots.robot import Robot
 
 
 def action_limits(robot: Robot, planner: PickPlacePlanner) -> tuple[np.ndarray, np.ndarray]:
-    """Return the limits ``(n + h,) float32`` of the joints of all arms (rad), then of all hands.
+    """Return the lower and upper limits ``(n + h,) float32`` of the joints of all arms (rad), followed by those of all hands.
 
-    Joints have those of the URDF, not what plans keep within: an arm that follows a spline may go a little beyond that.
-    Jaws may be told less than nothing, which presses; a cup's vacuum is 0 or 1, other hands have their joints' limits.
+    Joint limits are those of the URDF, not the narrower ones of planning, because an arm that follows a spline may exceed the
+    latter slightly. Jaws accept negative openings, which increase the pressing force. A cup's vacuum is 0 or 1; other hands
+    have their joint limits.
     """
     planners = (planner, planner.taker) if isinstance(planner, TwoArmPlanner) else (planner,)
     hands = [_hand_limits(each) for each in robot.arms or (robot,)]
@@ -28,9 +29,9 @@ def action_limits(robot: Robot, planner: PickPlacePlanner) -> tuple[np.ndarray, 
 
 
 def checked_action(action: object, names: Sequence[str]) -> np.ndarray:
-    """Return an action ``(n + h,)`` as floats; ``names`` are those of its numbers.
+    """Return an action ``(n + h,)`` as floats; ``names`` are those of its components.
 
-    Raises UsageError for another shape and for what is no finite number: physics that is told so much as one has no state left.
+    Raises UsageError for another shape or non-finite values, which would leave the simulation without a valid state.
     """
     try:
         told = np.asarray(action, float)

@@ -1,4 +1,4 @@
-"""The Gymnasium environment of a task: the physics of episodes, actions at a rate, success by the evaluator of episodes."""
+"""Gymnasium environment of a task: the physics of episodes, actions at a fixed rate, and success by the goal evaluator."""
 
 from __future__ import annotations
 
@@ -37,32 +37,36 @@ from manitwin.physics.sapien.world import RobotWorld
 from manitwin.robots.robot import Robot
 
 MOST_METRES, MOST_SPEED = 10.0, 100.0
-STARTS_TRIED = 8  # with noise: settled, and refused where something falls or the goal is true already
+STARTS_TRIED = 8  # with noise: a start is settled, and rejected if something falls or the goal is already true
 
 
 class Painter(Protocol):
-    """The protocol of what draws an environment's state: ``(size, size, 3) uint8`` of each camera."""
+    """Interface for rendering an environment's state: ``(size, size, 3) uint8`` for each camera."""
 
     def paint(self, world: RobotWorld) -> dict[str, np.ndarray]:
-        """Return the pictures by camera."""
+        """Return the pictures by camera name."""
         ...
 
     def close(self) -> None:
-        """Give back what the driver holds."""
+        """Release the driver's resources."""
         ...
 
 
 class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
-    """A task in physics: what the joints of arm and hand are told in, states out, 1 for success.
+    """A task in physics: joint and hand targets as actions, states as observations, reward 1 for success.
 
-    ``action (n + h,) float32``: what the arm's n joints are to be at the end of the step, rad, in the order of
-    ``robot.arm_joints``, and what the hand is told, by ``robot.hand_action_names``: the distance between jaws (m), more than
-    0.5 for a cup's vacuum, or the targets of a hand's joints (rad). Of two arms there are the joints of both, then what both
-    hands are told. What is beyond the limits is clipped, and a joint goes no faster than ``robot.fastest_rad_s``. Within a step
-    joints move as ``JointTargets`` says, hands evenly from what they were told. Jaws that close on something press the harder
-    the smaller their target is (``FINGER_STIFFNESS_N_M``). ``observation``: see docs/policies.md. ``info``: ``success``,
-    ``failure`` (the first literal that is not true, and why), ``literals`` (each with whether it holds). Pickles and copies are
-    what ``made_by`` makes anew, as it is before ``reset``: a simulation cannot be sent to another process.
+    ``action (n + h,) float32``: targets of the arm's n joints at the end of the step, rad, in the order of
+    ``robot.arm_joints``, followed by the hand commands, named by ``robot.hand_action_names``: the distance between jaws (m),
+    above 0.5 for a cup's vacuum, or the targets of a hand's joints (rad). For two arms, the joints of both precede the
+    commands of both hands. Values beyond the limits are clipped, and no joint moves faster than ``robot.fastest_rad_s``.
+    Within a step joints move as ``JointTargets`` specifies, and hand commands are interpolated linearly. Closed jaws press
+    harder the smaller their target is (``FINGER_STIFFNESS_N_M``).
+
+    ``observation``: see docs/policies.md. ``info``: ``success``, ``failure`` (the first literal that is not true, and why),
+    ``literals`` (each with whether it holds).
+
+    Pickling and copying recreate the environment by ``made_by``, in its state before ``reset``, because a simulation cannot
+    be sent to another process.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": RATE_HZ}  # noqa: RUF012 (Gymnasium declares it so)
@@ -82,7 +86,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         start_noise: StartNoise | None = None,
         made_by: Callable[[], TaskEnvironment] | None = None,
     ):
-        """Take a task that is set up, and how many actions a second there are; nothing is simulated before ``reset``."""
+        """Take a task's setting and the number of actions per second; nothing is simulated before ``reset``."""
         self._made_by = made_by
         self.task, self.instructions = setting.task, setting.task.instructions
         self.render_mode = "rgb_array" if painter is not None else None
@@ -113,7 +117,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         self.observation_space = spaces.Dict(seen)
 
     def __reduce__(self) -> tuple[Callable[[], TaskEnvironment], tuple[()]]:
-        """Return what makes the environment anew; raises PicklingError for one that was put together by hand."""
+        """Return the function that recreates the environment; raises PicklingError if it was not made by ``make_env``."""
         if self._made_by is None:
             raise PicklingError(
                 "an environment that was not made by make_env cannot be pickled; make one in each process"
@@ -122,38 +126,38 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
 
     @property
     def _hand_name(self) -> str:
-        """What the hand's state is called in observations."""
+        """Name of the hand's state in observations."""
         return "gripper_opening_m" if self._robot.has_jaws else "hand"
 
     @property
     def object_names(self) -> tuple[str, ...]:
-        """The names of the objects in the order of ``object_poses``."""
+        """Names of the objects in the order of ``object_poses``."""
         return self._setting.scene.names
 
     @property
     def fixtures(self) -> tuple[dict[str, Any], ...]:
-        """The fixtures beside the objects (pegs, holders, boards), which stay, as recorded episodes have them in their facts."""
+        """Static fixtures of the scene (pegs, holders, boards), in the format of an episode's facts."""
         return tuple(to_json(fixture) for fixture in self._setting.goal.fixtures)
 
     @property
     def cameras(self) -> dict[str, dict[str, Any]]:
-        """What relates the pixels of ``pictures`` to the world, by camera: ``NamedCamera.to_json``."""
+        """Intrinsics and pose of each camera of ``pictures``, by name: ``NamedCamera.to_json``."""
         size = self._picture_px
         return {each.name: each.to_json(size, size) for each in named_cameras(self._camera_names, self._robot)}
 
     @property
     def places_m(self) -> dict[str, np.ndarray]:
-        """The marked places ``(3,)`` of the goal in the world, by name."""
+        """Marked places ``(3,)`` m of the goal in the world, by name."""
         return {name: np.array(place_m) for name, place_m in self._setting.goal.places_m.items()}
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Put everything where the scene has it, let it come to rest, and return the first observation.
+        """Place everything as in the scene, let it settle, and return the first observation.
 
-        A task begins in one way: ``seed`` draws nothing but what ``np_random`` gives. With noise of the start ``np_random``
-        draws another start each time, and ``info["start_noise"]`` says which. Raises UsageError where the scene does not stay,
-        no start is found, or there are no cameras any more since ``close``.
+        The start of a task is deterministic: ``seed`` only affects ``np_random``. With start noise, ``np_random`` draws a new
+        start each time, described in ``info["start_noise"]``. Raises UsageError if the scene is not stable, if no start is
+        found, or if the cameras were released by ``close``.
         """
         if self._camera_names and self._painter is None:
             raise UsageError("reset after close; make the environment again")
@@ -171,9 +175,10 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         return self._observation(), info if drawn is None else info | {"start_noise": drawn.info}
 
     def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """Carry out an action for ``1 / rate_hz`` s; the episode ends with success, or is cut off after the most steps.
+        """Execute an action for ``1 / rate_hz`` s; the episode terminates with success, or is truncated after ``max_steps``.
 
-        Raises UsageError before ``reset``, and for an action of another shape or that is not finite; nothing moves then.
+        Raises UsageError before ``reset``, and for an action of another shape or with non-finite values; nothing moves in
+        that case.
         """
         world = self._world
         if world is None:
@@ -195,14 +200,14 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         return next(iter(self._painter.paint(self._world).values()))
 
     def close(self) -> None:
-        """Leave the simulation."""
+        """Release simulation and renderer."""
         self._leave()
         if self._painter is not None:
             self._painter.close()
             self._painter = None
 
     def _begun(self) -> tuple[Start, RobotWorld, DrawnStart | None]:
-        """Put a start into physics, with noise the first of those drawn that stays and of which the goal is not true yet."""
+        """Return a settled start; with noise the first drawn one that is stable and whose goal is not true yet."""
         if self._noise is None:
             start, world = self._settled(self._setting.problem, None)
             if start is None:
@@ -220,7 +225,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         )
 
     def _settled(self, problem: PickPlaceProblem, joints_rad: np.ndarray | None) -> tuple[Start | None, RobotWorld]:
-        """Leave the world before, and let a problem come to rest in another, the arm at home or with its joints elsewhere."""
+        """Replace the world by one of this problem and let it settle, with the arm at home or at ``joints_rad``."""
         self._leave()
         self._world = world = world_of(problem, self._robot, self._settings, self._closing.force_n)
         self._observed = ObservedPoses(world)
@@ -247,14 +252,14 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
                 arms.look(contacts)
                 for watch in self._watches:
                     watch.look(world.contacts, contacts, self._steps / self._rate_hz + number * dt)
-            if number % self._row_substeps == 0:  # rest is judged of the rows of a recording, whatever the rate
+            if number % self._row_substeps == 0:  # rest is judged at the recording rate, whatever the rate of actions
                 self._poses.append(self._object_poses())
                 self._pressing.append(self._pairs())
             if last is not None:
                 self._velocities = (arms.joint_positions() - last) / dt
 
     def _event_watches(self, start: Start, world: RobotWorld) -> list[EventWatch]:
-        """Return what latches the events of every step's goal, as its course in an episode would."""
+        """Return the watches for the events of every step's goal, as its course in an episode uses them."""
         watches: list[EventWatch] = []
         for step in self._setting.sequence.steps:
             if not step.goal.is_of_a_path:

@@ -1,4 +1,4 @@
-"""Making the environment of a task from a file of tasks."""
+"""Construction of a task's environment from a tasks file."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def make_env(
     rate_hz: int = RATE_HZ,
     start_noise: StartNoise | None = None,
 ) -> TaskEnvironment:
-    """Return a task's environment, as ``manitwin.make_env`` says; raises UsageError for what is not there."""
+    """Return a task's environment, as described in ``manitwin.make_env``; raises UsageError for missing or invalid inputs."""
     for name, number in (("max_steps", max_steps), ("picture_px", picture_px)):
         if isinstance(number, bool) or not isinstance(number, Integral) or number < 1:
             raise UsageError(f"{name} is {number!r}; give a whole number, 1 or more")
@@ -92,7 +92,7 @@ def make_env(
         start_noise=start_noise,
         made_by=partial(
             make_env,
-            Path(tasks).absolute(),  # who makes it again may run in another folder
+            Path(tasks).absolute(),  # absolute, because it may be recreated in another working folder
             task.task_id,
             twins=None if twins is None else dataset,
             robot=str(Path(robot).absolute()) if robot is not None and robot.endswith(".toml") else robot,

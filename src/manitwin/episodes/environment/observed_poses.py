@@ -1,4 +1,4 @@
-"""The poses that an environment shows, with the signs of quaternions that recorded episodes have."""
+"""Observed poses of an environment, with the quaternion signs of recorded episodes."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from manitwin.physics.sapien.world import RobotWorld
 
 
 class ObservedPoses:
-    """Reads tips and objects ``(k, 7)`` (m, quaternion wxyz) of a world; quaternions never change their sign on the way.
+    """Reads poses ``(k, 7)`` (m, quaternion wxyz) of tips and objects; quaternion signs are continuous over time.
 
-    They begin as near as can be to those of the world as it is first seen, whose signs are those with which recordings begin:
-    arms at home, objects where the scene has them. So a start that differs a little has numbers that differ a little.
+    The initial signs are those closest to the world's first state, which recordings also start from: arms at home, objects as
+    in the scene. A slightly different start therefore has slightly different numbers.
     """
 
     def __init__(self, world: RobotWorld):
-        """Take a world before anything of it has moved."""
+        """Take a world before anything has moved."""
         self._last = without_sign_changes(_poses(world)[None, :, 3:])[0]
 
     def read(self, world: RobotWorld) -> tuple[np.ndarray, np.ndarray]:
-        """Return the poses of all tips and of all objects as they are now."""
+        """Return the current poses of all tips and of all objects."""
         poses = _poses(world)
         self._last = poses[:, 3:] = without_sign_changes(poses[None, :, 3:], self._last)[0]
         tips, objects = np.split(poses, [len(world.robots)])

@@ -1,4 +1,4 @@
-"""Pictures of an environment's state, drawn as recorded episodes are."""
+"""Renderer of an environment's state, with the same pictures as recorded episodes."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from manitwin.twin.loaded_twin import TwinSource
 
 
 class WorldPainter:
-    """Draws a world of a task from named cameras. Raises RendererMissing, and UsageError for an unknown camera."""
+    """Renders the world of a task from named cameras. Raises RendererMissing, and UsageError for an unknown camera."""
 
     def __init__(self, setting: TaskSetting, source: TwinSource, robot: Robot, cameras: Sequence[str], size_px: int):
-        """Upload the scene's looks."""
+        """Upload meshes and textures of the scene."""
         self._cameras, self._size_px = named_cameras(cameras, robot), size_px
         require_renderer()
         record = setting.scene.scene.record
@@ -35,7 +35,7 @@ class WorldPainter:
         )
 
     def paint(self, world: RobotWorld) -> dict[str, np.ndarray]:
-        """Return ``(size, size, 3) uint8`` of each camera."""
+        """Return the pictures ``(size, size, 3) uint8`` by camera name."""
         poses = [world.object_to_world(number) for number in range(len(world.placed))]
         pictures = self._replay.picture(
             poses,
@@ -47,10 +47,10 @@ class WorldPainter:
         return {camera.name: picture for camera, picture in zip(self._cameras, pictures, strict=True)}
 
     def close(self) -> None:
-        """Give back what the driver holds."""
+        """Release the driver's resources."""
         self._replay.close()
 
 
 def _hand_of(arm: SapienRobot) -> np.ndarray:
-    """Return a hand's state ``(h,)`` as recordings have it."""
+    """Return a hand's state ``(h,)`` as in recordings."""
     return np.array([arm.opening_m()]) if arm.robot.has_jaws else arm.hand_positions()

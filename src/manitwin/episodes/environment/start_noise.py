@@ -1,4 +1,4 @@
-"""Other starts of a task: the arm's joints and the objects on surfaces, drawn around where the scene has them."""
+"""Start noise of a task: arm joints and objects on surfaces, sampled around their pose in the scene."""
 
 from __future__ import annotations
 
@@ -17,18 +17,21 @@ from manitwin.geometry.poses import transform, transform_points
 from manitwin.scenes.layouts.placing import Obstacles, in_workspace, is_within
 
 MOST = {"joints_rad": 0.5, "position_m": 0.5, "yaw_rad": np.pi}
-"""Beyond these nothing of a start would be left: objects cross their table, joints leave the sector before the robot."""
+"""Largest accepted values; beyond these the start is unrelated to the scene's: objects cross the table, joints leave the
+workspace.
+"""
 DRAWS_TRIED = 200  # for the arm, and for each object
-LEAST_GAP_M = 1e-3  # to what stands around; the densest layouts are sampled with 3 mm
+LEAST_GAP_M = 1e-3  # clearance from surrounding objects; the densest layouts are sampled with 3 mm
 
 
 @dataclass(frozen=True)
 class StartNoise:
-    """How much the start of a task varies with the seed of ``reset``; what is 0 stays as the scene has it.
+    """Variation of a task's start with the seed of ``reset``; a value of 0 keeps the scene's state.
 
-    ``joints_rad`` is the standard deviation of the normal distribution of each joint of the arm around its home (as ManiSkill's
-    ``robot_init_qpos_noise``). Objects move by up to ``position_m`` along x and along y, and turn by up to ``yaw_rad`` about
-    the vertical through their centre of mass, evenly. Raises UsageError for what is no number from 0 to 0.5 rad, 0.5 m and pi.
+    ``joints_rad`` is the standard deviation of a normal distribution for each arm joint around its home (as ManiSkill's
+    ``robot_init_qpos_noise``). Objects are translated uniformly by up to ``position_m`` along x and along y, and rotated
+    uniformly by up to ``yaw_rad`` about the vertical axis through their centre of mass. Raises UsageError unless the values
+    are numbers from 0 to 0.5 rad, 0.5 m and pi.
     """
 
     joints_rad: float = 0.0
@@ -36,7 +39,7 @@ class StartNoise:
     yaw_rad: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no such number."""
+        """Validate the values."""
         for each in fields(self):
             value = getattr(self, each.name)
             if not isinstance(value, Real) or isinstance(value, bool) or not 0 <= float(value) <= MOST[each.name]:
@@ -47,9 +50,10 @@ class StartNoise:
 
 @dataclass(frozen=True)
 class DrawnStart:
-    """A start that was drawn: its problem, the arm's joints ``(n,)`` rad, and what was added to joints and objects.
+    """A sampled start: its problem, the arm's joints ``(n,)`` rad, and the offsets of joints and objects.
 
-    ``moves (k, 3)``: of each object, in the order of names, the way along x and y (m) and the turn about the vertical (rad).
+    ``moves (k, 3)``: for each object, in the order of names, the translation along x and y (m) and the rotation about the
+    vertical (rad).
     """
 
     problem: PickPlaceProblem
@@ -59,18 +63,18 @@ class DrawnStart:
 
     @property
     def info(self) -> dict[str, Any]:
-        """What ``reset`` says of it."""
+        """Entry of the start in ``reset``'s ``info``."""
         return {"joint_offsets_rad": self.joint_offsets_rad, "object_moves": self.moves}
 
 
 def draw_start(
     noise: StartNoise, setting: TaskSetting, planner: PickPlacePlanner, rng: np.random.Generator
 ) -> DrawnStart:
-    """Draw where the objects stand and how the arm is held, clear of each other.
+    """Sample object poses and arm joints without collisions.
 
-    Objects that stand on the furniture and carry nothing move, one after the other: each stays on its surface, clear of all
-    else, and in the workspace where it was in it. Joints stay within their limits, the arm clear of everything as it is on
-    its free ways. Raises UsageError where so many draws were all refused.
+    Objects that stand on furniture and support nothing are moved one after the other: each stays on its surface, clear of
+    everything else, and in the workspace if it was in it. Joints stay within their limits, and the arm is as clear of
+    everything as in free motions. Raises UsageError if ``DRAWS_TRIED`` samples were all rejected.
     """
     problem, moves = _with_objects_moved(noise, setting, planner, rng)
     joints_rad, home_rad = _joints(noise, problem, planner, rng)
@@ -121,14 +125,16 @@ def _with_objects_moved(
 
 
 def _movable(setting: TaskSetting) -> dict[str, str]:
-    """Return the surfaces of the objects that stand on furniture and carry nothing, by the objects' names."""
+    """Return the surface name of each object that stands on furniture and supports nothing, by object name."""
     objects = setting.scene.scene.record.objects
     carrying = {each.supported_by for each in objects}
     return {each.name: each.surface for each in objects if each.supported_by is None and each.name not in carrying}
 
 
 def _moved(object_to_world: np.ndarray, center_of_mass_m: np.ndarray, move: np.ndarray) -> np.ndarray:
-    """Return a pose ``(4, 4)`` after a move: along x and y (m), turned about the vertical through the centre of mass (rad)."""
+    """Return a pose ``(4, 4)`` translated along x and y (m) and rotated about the vertical axis through the centre of mass
+    (rad).
+    """
     along_x_m, along_y_m, yaw_rad = move
     cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
     turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
@@ -146,7 +152,7 @@ def _in_reach(object_to_world: np.ndarray, center_of_mass_m: np.ndarray, planner
 def _joints(
     noise: StartNoise, problem: PickPlaceProblem, planner: PickPlacePlanner, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the joints of all arms, and where they are at home."""
+    """Return the sampled joints of all arms, and their home positions."""
     if not isinstance(planner, TwoArmPlanner):
         return _of_one_arm(noise, problem, planner, rng), planner.arm.home
     taker = planner.taker

@@ -1,1 +1,1 @@
-"""Goals in words that a program can judge: literals over the objects of a scene, measured on the state of the world."""
+"""Goal language and its evaluation: literals over the objects of a scene, measured on the state of the world."""

@@ -1,4 +1,4 @@
-"""The one evaluator of goals: for the planner's checks, for recorded episodes, and for any policy in the environment."""
+"""Goal evaluator, used for planner checks, recorded episodes, and policies in the environment."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ assert JUDGES.keys() == SIGNATURES.keys(), "every predicate has a judge"
 
 @dataclass(frozen=True)
 class Evaluation:
-    """A goal on a state: the judgement of each literal, of those that come true and of those that stay."""
+    """Evaluation of a goal on a state: the judgement of each literal in ``literals`` and in ``stays``."""
 
     goal: Goal
     literals: tuple[Judgement, ...]
@@ -46,12 +46,12 @@ class Evaluation:
 
     @property
     def reached(self) -> bool:
-        """True where every literal holds."""
+        """True if every literal holds."""
         return all(each.holds for each in (*self.literals, *self.stays))
 
     @property
     def true_already(self) -> tuple[Literal, ...]:
-        """The literals that are to come true and hold: at a beginning there should be none."""
+        """Literals of ``goal.literals`` that hold; at the start there should be none."""
         return tuple(literal for literal, judged in zip(self.goal.literals, self.literals, strict=True) if judged.holds)
 
     @property
@@ -80,12 +80,12 @@ class Evaluation:
 
 
 def judge(state: WorldState, literal: Literal) -> Judgement:
-    """Judge one literal; raises UsageError for objects, places or fixtures that the state does not have."""
+    """Judge one literal; raises UsageError for objects, places or fixtures that the state does not contain."""
     return JUDGES[literal.predicate](state, literal)
 
 
 def evaluate(state: WorldState, goal: Goal) -> Evaluation:
-    """Judge every literal of a goal on a state; raises UsageError for objects that the state does not have."""
+    """Judge every literal of a goal on a state; raises UsageError for objects that the state does not contain."""
     return Evaluation(
         goal,
         tuple(judge(state, each) for each in goal.literals),

@@ -1,4 +1,4 @@
-"""What was done with an object: poured, pressed, struck, hung, handed over; measured on granules, contacts and holes."""
+"""Judges of functional predicates (poured, pressed, struck, hung, inserted, handed over), from granules, contacts and holes."""
 
 from __future__ import annotations
 
@@ -15,18 +15,21 @@ from manitwin.geometry.poses import inverse, transform_points
 MOST_SPILT = 0.05
 PRESS_RADIUS_M, PRESS_RAD = 0.012, np.radians(30)
 MOST_PRESSED = 3.0
-"""Of the force that is asked for: what is pressed harder might break, and may be an artefact of the solver."""
+"""Upper bound over the requested force: a higher force might break the object, and may be an artefact of the solver."""
 STRIKE_RAD = np.radians(15)
-CORNER_OF_SQUARE = np.sqrt(np.pi / 2)  # 1.25: half a square's diagonal by the radius of the circle with its area
+CORNER_OF_SQUARE = np.sqrt(np.pi / 2)  # 1.25: half a square's diagonal over the radius of the circle of equal area
 HANG_SLACK_M = 0.006
-INSERTED_RAD, INSERTED_SLACK_M = np.radians(45), 0.002  # what a bore is wide for leans on its rim, tip down
-BELLY = 1.5  # rim radii
-FELL_M = 0.02  # what is let go with some tilt comes to lie by its own weight
-OBLONG, CLOSED_SHARE, LEAST_SLOPE = 4.5, 0.9, 0.3  # as holes are taken for holes (geometry.frames.hole)
+INSERTED_RAD, INSERTED_SLACK_M = (
+    np.radians(45),
+    0.002,
+)  # an object leans on the rim of a bore wider than itself, tip down
+BELLY = 1.5  # width of a belly below the neck, in rim radii
+FELL_M = 0.02  # an object released with some tilt settles by its own weight
+OBLONG, CLOSED_SHARE, LEAST_SLOPE = 4.5, 0.9, 0.3  # thresholds of hole detection (geometry.frames.hole)
 
 
 def granules_in(vessel: ObjectState, granules: Granules) -> np.ndarray:
-    """Return for each granule whether it lies in a vessel's cavity."""
+    """Return for each granule whether it lies in a vessel's cavity, ``(N,)`` bool."""
     if vessel.opening is None:
         return np.zeros(len(granules.positions_m), bool)
     positions_m = transform_points(inverse(vessel.object_to_world), granules.positions_m)
@@ -36,10 +39,10 @@ def granules_in(vessel: ObjectState, granules: Granules) -> np.ndarray:
 def cavity_holds(
     opening: Opening, corners_m: np.ndarray, positions_m: np.ndarray, granule_radius_m: float
 ) -> np.ndarray:
-    """Return for granules ``(..., 3)`` in a vessel's frame whether they lie in its cavity, ``(...)``.
+    """Return which granules ``(..., 3)`` in a vessel's frame lie in its cavity, ``(...)`` bool.
 
-    That is the cylinder of its rim, down to its deepest point, and below the rim all that is within the convex hull of the
-    vessel's ``corners_m (V, 3)`` and half as far again from the axis as the rim: what lies in a belly below a neck.
+    The cavity is the cylinder of the rim down to the deepest point, and, below the rim, the part of the convex hull of the
+    vessel's ``corners_m (V, 3)`` within ``BELLY`` rim radii of the axis, which covers a belly below a neck.
     """
     from_rim_m = positions_m - opening.center_m
     along_m = from_rim_m @ opening.axis
@@ -56,7 +59,7 @@ def cavity_holds(
 
 
 def poured(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that the value's share of what an object held is in another one, and 5 % at most in neither."""
+    """Judge that the value's share of an object's granules is in another object, and at most 5 % in neither."""
     assert literal.value is not None and literal.second is not None
     source, vessel = state.of(literal.subject), state.of(literal.second)
     held = state.granules_at_start.get(literal.subject, 0)
@@ -74,10 +77,11 @@ def poured(state: WorldState, literal: Literal) -> Judgement:
 
 
 def pressed(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that a point was pressed with one to three times the value's force, within 12 mm of it and 30 degrees of its normal.
+    """Judge that a point was pressed with one to three times the value's force, within 12 mm of it and 30 degrees of its
+    normal.
 
-    The normal is the inward one. One touch has to do all that, in its hardest moment; others, as of fingers that grasp, do no
-    harm. What fails is said of the hardest touch.
+    The normal points inwards. A single contact must meet all conditions at its force peak; other contacts, such as those of
+    grasping fingers, do not matter. The failure reported is that of the hardest contact.
     """
     assert literal.value is not None
     found = _events(state, "pressed", literal)
@@ -99,10 +103,11 @@ def pressed(state: WorldState, literal: Literal) -> Judgement:
 
 
 def struck(state: WorldState, literal: Literal) -> Judgement:
-    """Judge the first touch of an object's face with another: on the face, within 15 degrees, as fast as the value.
+    """Judge the first contact of an object's face with another object: on the face, within 15 degrees, at least at the
+    value's speed.
 
-    A face that comes down level touches by its rim first, and the corners of a square are that far outside of the circle
-    with its area.
+    A level face touches with its edge first, and the corners of a square lie outside the circle of equal area by
+    ``CORNER_OF_SQUARE``.
     """
     assert literal.value is not None
     found = _events(state, "struck", literal)
@@ -120,9 +125,10 @@ def struck(state: WorldState, literal: Literal) -> Judgement:
 
 
 def hung(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that an object hangs by its hole on a peg: the peg passes through the hole, and nothing else bears it.
+    """Judge that an object hangs by its hole on a peg: the peg passes through the hole, and no furniture supports the object.
 
-    Through a hole: near its middle, or at a place farther out that the object encloses (a scissors' ring is oblong).
+    The peg passes through the hole near its centre, or at a place farther out that the object encloses (the ring of scissors
+    is oblong).
     """
     assert literal.second is not None
     thing, peg = state.of(literal.subject), state.peg(literal.second)
@@ -145,7 +151,7 @@ def hung(state: WorldState, literal: Literal) -> Judgement:
 
 
 def inserted(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that an object stands in a holder with its tip down, the tip the value below the rim, borne by nothing else."""
+    """Judge that an object stands in a holder tip down, its tip at least the value below the rim, supported by nothing else."""
     assert literal.second is not None and literal.value is not None
     thing, into = state.of(literal.subject), state.holder(literal.second)
     if thing.tip is None:
@@ -172,9 +178,9 @@ def inserted(state: WorldState, literal: Literal) -> Judgement:
 
 
 def handed_over(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that the second arm took an object from the first, held it alone the value higher than it lay, and put it down.
+    """Judge that the second arm took an object from the first, held it alone the value above its start, and put it down.
 
-    Down is: let go by both, at rest on the furniture alone, and no more than 2 cm lower than where it was let go.
+    It is put down if both arms have released it and it rests on furniture alone, at most 2 cm below where it was released.
     """
     assert literal.value is not None
     thing, touched = state.of(literal.subject), state.neighbours(literal.subject)
@@ -197,7 +203,7 @@ def handed_over(state: WorldState, literal: Literal) -> Judgement:
 
 
 def _encloses(thing: ObjectState, hole: Hole, peg: Peg) -> bool:
-    """Tell whether the peg crosses the plane of an object's hole at a place that its hulls enclose."""
+    """Tell whether the peg crosses the plane of an object's hole at a point that its hulls enclose."""
     to_object = inverse(thing.object_to_world)
     foot_m, along = transform_points(to_object, peg.foot_m[None])[0], to_object[:3, :3] @ peg.direction
     slope = float(along @ hole.axis)

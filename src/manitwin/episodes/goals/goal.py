@@ -1,4 +1,4 @@
-"""The goal language: a goal is a conjunction of literals that come true, and of literals that stay true."""
+"""Goal language: a goal is a conjunction of literals to achieve and of literals to preserve."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from manitwin.errors import UsageError, choose_from
 
 @dataclass(frozen=True)
 class Signature:
-    """How a predicate is written: what its second argument is, and the unit and default of its value; None: it has none.
+    """Signature of a predicate: kind of its second argument, and unit and default of its value; None: it has none.
 
     ``second`` is ``object`` (another object of the scene), ``fixture`` (a peg, a plate) or ``place`` (a marked position).
     """
@@ -46,12 +46,12 @@ SIGNATURES: Mapping[str, Signature] = {
     "aimed": Signature("object", "rad", 0.15),
     "handed_over": Signature(None, "m", 0.05),
 }
-"""Every predicate of the language; ``docs/skills.md`` says what each measures."""
+"""All predicates of the language; ``docs/skills.md`` specifies what each measures."""
 
 
 @dataclass(frozen=True)
 class Literal:
-    """One predicate of an object: ``in(object_00, object_01)``, ``near(object_00, object_02, 0.1)``."""
+    """A predicate applied to an object: ``in(object_00, object_01)``, ``near(object_00, object_02, 0.1)``."""
 
     predicate: str
     subject: str
@@ -59,7 +59,7 @@ class Literal:
     value: float | None = None
 
     def __post_init__(self) -> None:
-        """Raise UsageError for an unknown predicate, or arguments that it does not take; fill in its default value."""
+        """Fill in the default value; raises UsageError for an unknown predicate or invalid arguments."""
         signature = SIGNATURES.get(self.predicate)
         if signature is None:
             raise UsageError(choose_from("predicate", self.predicate, SIGNATURES))
@@ -85,7 +85,7 @@ class Literal:
         return f"{self.predicate}({', '.join(arguments)})"
 
     def to_json(self) -> dict[str, Any]:
-        """Return its fields, without those that are not given."""
+        """Return the fields that are set."""
         said = {
             "predicate": self.predicate,
             "subject": self.subject,
@@ -97,13 +97,13 @@ class Literal:
 
 @dataclass(frozen=True)
 class Goal:
-    """What is to come true, all of it, none of it true at the beginning; and what stays true, judged at the end as well."""
+    """``literals`` must all become true and none may be true at the start; ``stays`` must still be true at the end."""
 
     literals: tuple[Literal, ...]
     stays: tuple[Literal, ...] = ()
 
     def __post_init__(self) -> None:
-        """Raise UsageError for a goal that asks for nothing, or twice for the same."""
+        """Raise UsageError for an empty goal or a repeated literal."""
         if not self.literals:
             raise UsageError("the goal has no literal; give one or more")
         everything = self.literals + self.stays
@@ -123,7 +123,7 @@ class Goal:
 
     @classmethod
     def from_json(cls, said: Mapping[str, Any]) -> Goal:
-        """Read what ``to_json`` wrote; raises UsageError for anything else."""
+        """Read the output of ``to_json``; raises UsageError for anything else."""
         try:
             unknown = sorted(set(said) - {"literals", "stays"})
             if unknown:

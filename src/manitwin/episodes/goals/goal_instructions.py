@@ -1,4 +1,4 @@
-"""Instructions of a goal as a person would give them: templates by predicate, filled with names that tell objects apart."""
+"""Natural-language instructions of goals: templates by predicate, filled with names that distinguish the objects."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ TEMPLATES: Mapping[str, tuple[str, ...]] = {
         "pick up {a} and hit the block with {it}", "knock on the block with {a}", "please give the block a blow with {a}",
     ),
 }  # fmt: skip
-"""The templates of each predicate; the last one of each is held out for tests of policies (``held_out``)."""
+"""Templates of each predicate; the last one of each is held out for tests of policies (``held_out``)."""
 
 
 def goal_instructions(
@@ -116,11 +116,11 @@ def goal_instructions(
     count: int = 6,
     held_out: bool = False,
 ) -> tuple[str, ...]:
-    """Return up to ``count`` different instructions in English for one literal.
+    """Return up to ``count`` different English instructions for one literal.
 
-    ``words`` are those of all objects in the scene by name: a name that fits two of them is used only where none tells
-    them apart. ``held_out``: only the template that the others never use. The same arguments give the same words. Raises
-    UsageError for a predicate that has no templates.
+    ``words`` maps all objects in the scene to their language: an ambiguous name is used only if no name distinguishes the
+    object. ``held_out``: use only the template that is otherwise never used. Deterministic for equal arguments. Raises
+    UsageError for a predicate without templates.
     """
     if literal.predicate not in TEMPLATES:
         raise UsageError(f"no instructions for {literal.predicate!r}; there are some for {', '.join(TEMPLATES)}")

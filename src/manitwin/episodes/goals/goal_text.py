@@ -1,4 +1,4 @@
-"""Goals as text and back: ``in(a, c) and near(b, c, 0.1), with undisturbed(d)``, the form that attempts and tasks have."""
+"""Text form of goals, as in attempts and tasks: ``in(a, c) and near(b, c, 0.1), with undisturbed(d)``."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _EXAMPLE = "give literals such as in(object_00, object_01), joined by and"
 
 
 def parse_goal(text: str) -> Goal:
-    """Read what ``str`` of a goal wrote; raises UsageError naming what cannot be read, in one line."""
+    """Parse the ``str`` of a goal; raises UsageError with a one-line message naming the invalid part."""
     if len(text) > MOST_CHARACTERS:
         raise UsageError(f"the goal has {len(text)} characters; give at most {MOST_CHARACTERS}")
     come_true, with_, stay = text.strip().partition(STAYS)
@@ -37,7 +37,7 @@ def _literal(text: str, whole: str) -> Literal:
     predicate, arguments = found[1], [each.strip() for each in found[2].split(",")]
     signature = SIGNATURES.get(predicate)
     if signature is None:
-        return Literal(predicate, arguments[0])  # which says what there is
+        return Literal(predicate, arguments[0])  # raises with the valid predicates
     value = None
     if signature.unit is not None and len(arguments) > 1 and _NUMBER.fullmatch(arguments[-1]):
         value = float(arguments.pop())

@@ -1,7 +1,7 @@
-"""Where one object is with respect to another: beside it, on it, in it, near it; upright, lifted, pushed, undisturbed.
+"""Judges of spatial predicates: beside, on, in, near, away from, upright, lifted, touching, pushed, undisturbed.
 
-The sides are those that the robot sees: it stands at the origin of the world and looks along +X, so that left is +Y and
-behind is +X. Every judge returns what it measured, whether that is true or not.
+Sides are seen by the robot: it stands at the origin of the world and looks along +X, so that left is +Y and behind is +X.
+Every judge returns its measurements, whether the literal holds or not.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ DISTURBED_M, DISTURBED_RAD = 0.01, np.radians(5)
 
 @dataclass(frozen=True)
 class Judgement:
-    """Whether a literal is true, by what it fails first if not, and what was measured (SI)."""
+    """Whether a literal holds, the first condition that fails if not, and the measured values (SI)."""
 
     holds: bool
     failure: str | None
@@ -41,13 +41,13 @@ class Judgement:
 
 
 def judged(conditions: Mapping[str, bool], measured: Mapping[str, float]) -> Judgement:
-    """Return a judgement by conditions in their order: the first that is not met names the failure."""
+    """Return a judgement from ordered conditions: the first that is not met names the failure."""
     failure = next((name for name, met in conditions.items() if not met), None)
     return Judgement(failure is None, failure, {name: float(value) for name, value in measured.items()})
 
 
 def beside(state: WorldState, literal: Literal) -> Judgement:
-    """Judge a side: the centre of mass in a sector of 45 degrees either way, the footprints at most 14 cm apart."""
+    """Judge a side: centre of mass within 45 degrees of the side's direction, footprints disjoint and at most 14 cm apart."""
     moved, other = _both(state, literal)
     offset = moved.center_of_mass_m[:2] - other.center_of_mass_m[:2]
     distance_m = float(np.linalg.norm(offset))
@@ -66,7 +66,7 @@ def beside(state: WorldState, literal: Literal) -> Judgement:
 
 
 def near(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that the footprints are apart by no more than the value."""
+    """Judge that the distance of the footprints is at most the value."""
     assert literal.value is not None
     moved, other = _both(state, literal)
     gap_m = separation_m(moved.footprint_m, other.footprint_m)
@@ -74,7 +74,7 @@ def near(state: WorldState, literal: Literal) -> Judgement:
 
 
 def away_from(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that the footprints are apart by the value or more, and that the object is let go and still."""
+    """Judge that the distance of the footprints is at least the value, and that the object is released and at rest."""
     assert literal.value is not None
     moved, other = _both(state, literal)
     gap_m = separation_m(moved.footprint_m, other.footprint_m)
@@ -82,7 +82,9 @@ def away_from(state: WorldState, literal: Literal) -> Judgement:
 
 
 def on(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that an object stands on another alone: it presses on nothing else, its centre of mass over the other."""
+    """Judge that an object is supported by another alone: no other contact, and its centre of mass above the other's
+    footprint.
+    """
     moved, other = _both(state, literal)
     base = other.footprint_m
     outside_m = separation_m(base, moved.center_of_mass_m[None, :2] + _DOT_M)
@@ -101,9 +103,10 @@ def on(state: WorldState, literal: Literal) -> Judgement:
 
 
 def inside(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that an object lies in another: its centre of mass over the opening, its lowest point below the rim.
+    """Judge that an object lies in another: centre of mass within the opening, lowest point below the rim.
 
-    Below by a quarter of the depth, 2 cm at most; it presses on the vessel (or on what lies in it), and on no furniture.
+    The lowest point must be a quarter of the depth below the rim, at most 2 cm. The object touches the vessel (or its
+    contents) and no furniture.
     """
     moved, vessel = _both(state, literal)
     opening = vessel.opening
@@ -128,13 +131,13 @@ def inside(state: WorldState, literal: Literal) -> Judgement:
 
 
 def upright(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that an object's up (+Z of its frame) is within 10 degrees of the world's."""
+    """Judge that an object's up axis (+Z of its frame) is within 10 degrees of the vertical."""
     turned_rad = float(np.arccos(np.clip(state.of(literal.subject).object_to_world[2, 2], -1, 1)))
     return judged({"tilted": turned_rad <= UPRIGHT_RAD, **_set_down(state, literal.subject)}, {"tilt_rad": turned_rad})
 
 
 def lifted(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that an object is in the hand, its centre of mass higher than at the beginning by the value."""
+    """Judge that an object is in the hand, with its centre of mass at least the value above its start."""
     assert literal.value is not None
     moved = state.of(literal.subject)
     start_m = transform_points(moved.start_object_to_world, moved.body.center_of_mass_m[None])[0, 2]
@@ -151,7 +154,7 @@ def touching(state: WorldState, literal: Literal) -> Judgement:
 
 
 def undisturbed(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that an object is where it was: moved by 1 cm and turned by 5 degrees at most."""
+    """Judge that an object has moved by at most 1 cm and turned by at most 5 degrees since the start."""
     thing = state.of(literal.subject)
     start = transform_points(thing.start_object_to_world, thing.body.center_of_mass_m[None])[0]
     moved_m = float(np.linalg.norm(thing.center_of_mass_m - start))
@@ -163,9 +166,10 @@ def undisturbed(state: WorldState, literal: Literal) -> Judgement:
 
 
 def pushed_to(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that an object was pushed over a place, its centre of mass the value away at most, and rests there.
+    """Judge that an object was pushed to a place: centre of mass within the value of it, and at rest.
 
-    Pushed is what the robot's hand touched (an event) and what went 3 cm or more since without rising by more than 1 cm.
+    An object counts as pushed if the robot's hand touched it (an event) and it then moved at least 3 cm without rising by
+    more than 1 cm.
     """
     assert literal.value is not None and literal.second is not None
     thing = state.of(literal.subject)
@@ -185,7 +189,7 @@ def pushed_to(state: WorldState, literal: Literal) -> Judgement:
     )
 
 
-_DOT_M = 1e-4 * np.array([[1.0, 0], [-0.5, 0.8], [-0.5, -0.8]])  # a point as the smallest polygon
+_DOT_M = 1e-4 * np.array([[1.0, 0], [-0.5, 0.8], [-0.5, -0.8]])  # a point as a very small polygon
 
 
 def _both(state: WorldState, literal: Literal) -> tuple[ObjectState, ObjectState]:
@@ -194,5 +198,5 @@ def _both(state: WorldState, literal: Literal) -> tuple[ObjectState, ObjectState
 
 
 def _set_down(state: WorldState, name: str) -> dict[str, bool]:
-    """Return the conditions of whatever was put somewhere: let go, and still."""
+    """Return the conditions of a placed object: released and at rest."""
     return {"not_released": not state.is_handled(name), "moving": state.of(name).at_rest}

@@ -1,4 +1,4 @@
-"""What was done with a tool: stirred, wiped, moved along a cut, aimed; each measured by a watch while it happened."""
+"""Judges of tool use (stirred, wiped, cut motion, aimed), from values that watches measured during the motion."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from manitwin.episodes.goals.goal import Literal
 from manitwin.episodes.goals.spatial import Judgement, judged
 from manitwin.episodes.goals.world_state import Event, WorldState
 
-LEAST_STIRRED = 0.3  # of the granules, moved by more than their own width
-LEAST_BY_FACE, LEAST_IN_BAND = 0.5, 0.7  # of the time in which a tool touches what it wipes
+LEAST_STIRRED = 0.3  # share of the granules moved by more than their own diameter
+LEAST_BY_FACE, LEAST_IN_BAND = 0.5, 0.7  # shares of the time in which the tool touches the wiped surface
 AIMED_M = (0.03, 0.30)
 AIMED_S = 0.25
 
 
 def stirred(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that a tool's end went through the value's share of a vessel's sectors and moved three tenths of what is in it."""
+    """Judge that a tool's end passed through the value's share of a vessel's sectors and moved 30 % of its granules."""
     assert literal.value is not None and literal.second is not None
     if not state.granules_at_start.get(literal.second, 0):
         return Judgement(False, "nothing_to_stir", {"granules": 0.0})
@@ -27,7 +27,7 @@ def stirred(state: WorldState, literal: Literal) -> Judgement:
 
 
 def wiped(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that the value's share of a patch was swept by a tool's face that pressed on it with 1 to 5 N."""
+    """Judge that the value's share of a patch was swept by a tool's face pressing with 1 to 5 N."""
     assert literal.value is not None
     values = _last(state, "wiped", literal)
     if values is None:
@@ -43,7 +43,9 @@ def wiped(state: WorldState, literal: Literal) -> Judgement:
 
 
 def cut_motion(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that an edge went along the value's share of a line, within 5 mm and 10 degrees, drawn as far; nothing is divided."""
+    """Judge that an edge moved along the value's share of a line, within 5 mm and 10 degrees, and was drawn as far; nothing
+    is divided.
+    """
     assert literal.value is not None
     values = _last(state, "cut_motion", literal)
     if values is None:
@@ -54,7 +56,7 @@ def cut_motion(state: WorldState, literal: Literal) -> Judgement:
 
 
 def aimed(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that a nozzle pointed at an object for a quarter of a second, 3 to 30 cm away, within the value (rad)."""
+    """Judge that a nozzle pointed at an object for at least 0.25 s, from 3 to 30 cm away, within the value (rad)."""
     assert literal.value is not None
     values = _last(state, "aimed", literal)
     if values is None:
@@ -71,7 +73,7 @@ def aimed(state: WorldState, literal: Literal) -> Judgement:
 
 
 def _last(state: WorldState, kind: str, literal: Literal) -> dict[str, float] | None:
-    """Return the values of the last such event of a literal's things; a watch tells of one at most."""
+    """Return the values of the last event of this kind for the literal's objects; a watch emits at most one."""
     found: list[Event] = [
         event
         for event in state.events

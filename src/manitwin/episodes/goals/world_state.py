@@ -1,4 +1,4 @@
-"""The state of a world as goals are judged on it: objects at their poses, what touches what, and what has happened."""
+"""World state on which goals are judged: object poses, contacts, and past events."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from manitwin.physics.sapien.contacts import ROBOT_NAME
 Thing = TypeVar("Thing")
 
 ROBOT = ROBOT_NAME
-"""The name of the robot, whichever of its parts touches."""
+"""Name of the robot in contacts, for all of its parts."""
 
 
 @dataclass(frozen=True)
 class Hole:
-    """A hole through an object that a peg fits: its middle ``(3,)``, its axis ``(3,)`` and its radius, object frame, m."""
+    """A through hole that fits a peg: centre ``(3,)``, axis ``(3,)`` and radius, object frame, m."""
 
     center_m: np.ndarray
     axis: np.ndarray
@@ -33,7 +33,7 @@ class Hole:
 
 @dataclass(frozen=True)
 class Tip:
-    """The end of a slender object that goes into a holder first: its place ``(3,)`` and direction ``(3,)``, object frame, m."""
+    """The end of a slender object that enters a holder first: position ``(3,)`` and direction ``(3,)``, object frame, m."""
 
     position_m: np.ndarray
     direction: np.ndarray
@@ -41,7 +41,7 @@ class Tip:
 
 @dataclass(frozen=True)
 class ObjectState:
-    """One object: its body, its pose ``(4, 4)`` now and at the beginning, whether it rests, its opening, hole and tip."""
+    """One object: body, pose ``(4, 4)`` now and at the start, whether it is at rest, and its opening, hole and tip."""
 
     body: RigidBody
     object_to_world: np.ndarray
@@ -53,23 +53,23 @@ class ObjectState:
 
     @cached_property
     def points_m(self) -> np.ndarray:
-        """The corners ``(N, 3)`` of its hulls in the world."""
+        """Vertices ``(N, 3)`` of its hulls in the world."""
         return transform_points(self.object_to_world, np.concatenate(self.body.hulls))
 
     @cached_property
     def footprint_m(self) -> np.ndarray:
-        """The corners ``(K, 2)`` of what it covers, seen from above."""
+        """Vertices ``(K, 2)`` of its footprint, seen from above."""
         return footprint(self.points_m)
 
     @cached_property
     def center_of_mass_m(self) -> np.ndarray:
-        """Its centre of mass ``(3,)`` in the world."""
+        """Centre of mass ``(3,)`` in the world."""
         return np.asarray(transform_points(self.object_to_world, self.body.center_of_mass_m[None])[0])
 
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened to ``subject``, with ``second`` where two took part, and its measured values (SI)."""
+    """An event involving ``subject``, and ``second`` if two objects took part, with its measured values (SI)."""
 
     kind: str
     subject: str
@@ -79,7 +79,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Peg:
-    """A peg that things hang on: its foot, the direction to its tip, its length and radius (m, world frame)."""
+    """A peg for hanging objects: foot, direction to the tip, length and radius (m, world frame)."""
 
     foot_m: np.ndarray
     direction: np.ndarray
@@ -89,7 +89,9 @@ class Peg:
 
 @dataclass(frozen=True)
 class Holder:
-    """A bore: its rim's middle with Z out of it ``(4, 4)``, its half widths ``(2,)`` and depth (m), the names of its boxes."""
+    """A bore: the pose of its rim's centre with Z pointing out ``(4, 4)``, half widths ``(2,)`` and depth (m), names of its
+    boxes.
+    """
 
     rim_to_world: np.ndarray
     half_m: np.ndarray
@@ -99,7 +101,7 @@ class Holder:
 
 @dataclass(frozen=True)
 class Granules:
-    """Small spheres that stand for what is poured: their middles ``(N, 3)`` in the world and their radius, m."""
+    """Small spheres that represent poured contents: their centres ``(N, 3)`` in the world and their radius, m."""
 
     positions_m: np.ndarray
     radius_m: float
@@ -107,10 +109,10 @@ class Granules:
 
 @dataclass(frozen=True)
 class WorldState:
-    """Objects by name; ``touching``: pairs of names (objects, furniture, fixtures, the robot) that press on each other.
+    """Objects by name, and ``touching``: pairs of names (objects, furniture, fixtures, the robot) in contact.
 
-    ``granules_at_start``: how many granules each object held at the beginning. ``arms``: the names of two arms, the
-    one that gives first; each then touches under its own name.
+    ``granules_at_start``: number of granules in each object at the start. ``arms``: the names of two arms, the giving arm
+    first; contacts then use the arm's own name.
     """
 
     objects: Mapping[str, ObjectState]
@@ -125,24 +127,24 @@ class WorldState:
     arms: tuple[str, ...] = ()
 
     def of(self, name: str) -> ObjectState:
-        """Return an object's state; raises UsageError naming those that there are."""
+        """Return an object's state; raises UsageError naming the existing objects."""
         return self._named(self.objects, name, "object")
 
     def place(self, name: str) -> np.ndarray:
-        """Return a marked place ``(3,)``; raises UsageError naming those that there are."""
+        """Return a marked place ``(3,)``; raises UsageError naming the existing places."""
         return self._named(self.places_m, name, "place")
 
     def peg(self, name: str) -> Peg:
-        """Return a peg; raises UsageError naming those that there are."""
+        """Return a peg; raises UsageError naming the existing pegs."""
         return self._named(self.pegs, name, "peg")
 
     def holder(self, name: str) -> Holder:
-        """Return a holder; raises UsageError naming those that there are."""
+        """Return a holder; raises UsageError naming the existing holders."""
         return self._named(self.holders, name, "holder")
 
     @property
     def robots(self) -> frozenset[str]:
-        """The names that robots touch under: those of two arms, or that of the only one."""
+        """Names of robots in contacts: those of two arms, or that of the single robot."""
         return frozenset(self.arms or (ROBOT,))
 
     def is_handled(self, name: str) -> bool:
@@ -154,7 +156,7 @@ class WorldState:
         return frozenset((first, second)) in self.touching
 
     def neighbours(self, name: str) -> frozenset[str]:
-        """Return the names of all that press on an object."""
+        """Return the names of all bodies in contact with an object."""
         return frozenset(other for pair in self.touching if name in pair for other in pair if other != name)
 
     @staticmethod

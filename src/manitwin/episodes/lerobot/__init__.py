@@ -1,1 +1,1 @@
-"""Episodes as a LeRobotDataset v3.0: its writer, and a reader that checks what LeRobot's own relies on."""
+"""LeRobotDataset v3.0: writer of episodes, and a reader that checks what LeRobot's own reader relies on."""

@@ -1,4 +1,4 @@
-"""Checks of a LeRobotDataset: its data files and videos against the rows of its episodes, its statistics against both."""
+"""Consistency checks of a LeRobotDataset: data files and videos against the episode rows, statistics against both."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from manitwin.formats.parquet_file import read_parquet
 
 _REMEDY = "write the set again"
 _ROUNDING = 1e-6
-"""Of a statistic against its numbers, relative to their size."""
+"""Relative tolerance of a statistic."""
 
 
 EpisodeStatistics = dict[str, np.ndarray]
@@ -27,7 +27,7 @@ EpisodeStatistics = dict[str, np.ndarray]
 
 
 def statistics_of(path: Path, table: pa.Table, name: str, feature: dict[str, Any]) -> EpisodeStatistics:
-    """Return what the rows of a file of episodes say of a feature; raises EpisodesError for lists of another length."""
+    """Return the statistics of a feature in an episodes file; raises EpisodesError for lists of the wrong length or type."""
     result = {}
     for kind in ("min", "max", "mean", "count"):
         shape = (1,) if kind == "count" else _shape(feature)
@@ -135,7 +135,7 @@ def _check_episode(
 
 
 def check_statistics(path: Path, features: dict[str, dict[str, Any]], statistics: dict[str, EpisodeStatistics]) -> None:
-    """Check that stats.json has all features, and says of them what the episodes' statistics say together."""
+    """Check that stats.json has all features and agrees with the pooled statistics of the episodes; raises EpisodesError."""
     stats = read_json_object(path, EpisodesError, inside=path.parent.parent, name=str(path), remedy=_REMEDY)
     for name, feature in features.items():
         if not isinstance(stats.get(name), dict) or set(stats[name]) != set(STATISTICS):
@@ -170,10 +170,10 @@ def _close(one: np.ndarray, other: np.ndarray) -> bool:
 
 
 def check_videos(root: Path, info: dict[str, Any], episodes: Sequence[dict[str, Any]], *, decode: bool) -> None:
-    """Check every episode's place in every camera's files; with ``decode`` every frame is decoded.
+    """Check every episode's span in every camera's files; with ``decode`` every frame is decoded.
 
-    Raises EpisodesError for a file that is missing, of another size or rate or too short, for an episode off the grid of
-    frames or longer in pictures than in rows, and for two episodes that share frames.
+    Raises EpisodesError for a file that is missing, too short, or of another size or rate, for an episode off the frame grid
+    or longer in pictures than in rows, and for two episodes that share frames.
     """
     for key, feature in info["features"].items():
         if feature["dtype"] == "video":

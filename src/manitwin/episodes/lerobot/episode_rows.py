@@ -1,4 +1,4 @@
-"""The rows of meta/episodes: where an episode is, what it is of, and the statistics of its features."""
+"""Rows of meta/episodes: location of an episode's data, its facts, and the statistics of its features."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ FACTS: dict[str, pa.DataType] = {
     "yaw_error_rad": pa.float64(),
     "slip_m": pa.float64(),
 }
-"""Columns of ours beside LeRobot's: fields of Attempt."""
+"""Columns added to LeRobot's: fields of Attempt."""
 
 _WAITING = 500
 
 
 class EpisodeRows:
-    """Writes rows, some hundred at a time; a new file where one has grown too large."""
+    """Writes rows in batches, and starts a new file when one exceeds the size limit."""
 
     def __init__(self, root: Path, features: Sequence[Feature], video_keys: Sequence[str], size_mb: int):
         self.root, self.most_bytes = root, size_mb << 20
@@ -51,7 +51,7 @@ class EpisodeRows:
         self._quantiles = {key: (0, np.zeros((len(QUANTILES), 3, 1, 1))) for key in video_keys}
 
     def write(self, row: dict[str, Any], attempt: Attempt, statistics: dict[str, Statistics]) -> None:
-        """Add a row."""
+        """Append a row."""
         if self._writer is None:
             self._open()
         chunk, file = place_of(self._files - 1)
@@ -70,13 +70,13 @@ class EpisodeRows:
                 self.close()
 
     def mean_quantiles(self, key: str) -> np.ndarray:
-        """Return the mean of the episodes' quantiles ``(5, 3, 1, 1)`` of a camera, by their numbers of pictures."""
+        """Return the mean of the episodes' quantiles ``(5, 3, 1, 1)`` of a camera, weighted by their numbers of pictures."""
         count, total = self._quantiles[key]
         mean: np.ndarray = total / count
         return mean
 
     def close(self) -> None:
-        """Write what waits and finish the file."""
+        """Write the pending rows and finish the file."""
         if self._writer is not None:
             self._flush()
             self._writer.close()

@@ -1,4 +1,4 @@
-"""Statistics of features: of an episode, and of a whole set, as LeRobot's normalisation reads them."""
+"""Statistics of features, for an episode and for a whole set, as LeRobot's normalisation reads them."""
 
 from __future__ import annotations
 
@@ -13,17 +13,18 @@ from manitwin.episodes.lerobot.frame_features import Feature
 from manitwin.episodes.lerobot.lerobot_format import QUANTILES
 
 Statistics = dict[str, list[Any]]
-"""``min, max, mean, std, q01, ...`` as lists of a number per dimension, ``count`` as a list of one number."""
+"""``min, max, mean, std, q01, ...`` as lists with a number per dimension, ``count`` as a list of one number."""
 
 BINS = 5000
-"""Quantiles of a whole set are read off a histogram of so many steps between min and max, as in lerobot's
-RunningQuantileStats: they are off by at most a step. Those of an episode are exact."""
+"""Quantiles of a whole set come from a histogram with this many bins between min and max, as in lerobot's
+RunningQuantileStats: their error is at most one bin. Those of an episode are exact.
+"""
 
 
 def episode_statistics(columns: dict[str, np.ndarray]) -> dict[str, Statistics]:
     """Return the statistics of arrays ``(T, width)`` or ``(T,)`` by feature."""
     matrices = [np.asarray(array, np.float64).reshape(len(array), -1) for array in columns.values()]
-    values = np.hstack(matrices)  # all at once: a call each costs more than the numbers
+    values = np.hstack(matrices)  # stacked, because a call per feature costs more than the arithmetic
     quantiles = np.quantile(values, list(QUANTILES.values()), axis=0)
     rows = {
         "min": values.min(0),
@@ -41,21 +42,21 @@ def episode_statistics(columns: dict[str, np.ndarray]) -> dict[str, Statistics]:
 
 
 class Pooled:
-    """Mean, spread and bounds of a feature over many episodes, one after the other.
+    """Mean, variance and bounds of a feature, accumulated over episodes.
 
-    Source: T. F. Chan, G. H. Golub, R. J. LeVeque, Updating formulae and a pairwise algorithm for computing sample
-    variances, 1979, equation 2.1.
+    Source: T. F. Chan, G. H. Golub, R. J. LeVeque, Updating formulae and a pairwise algorithm for computing sample variances,
+    1979, equation 2.1.
     """
 
     def __init__(self, first: Statistics):
-        """Begin with the statistics of one episode; arrays keep their shape, so that those of pictures do too."""
+        """Start with the statistics of one episode; arrays keep their shape, including those of pictures."""
         self.count: int = first["count"][0]
         self.mean = np.array(first["mean"], np.float64)
         self.squares = self.count * np.array(first["std"], np.float64) ** 2
         self.low, self.high = np.array(first["min"], np.float64), np.array(first["max"], np.float64)
 
     def add(self, other: Statistics) -> None:
-        """Take another episode's in."""
+        """Add another episode's statistics."""
         count: int = other["count"][0]
         both, delta = self.count + count, np.array(other["mean"], np.float64) - self.mean
         self.squares += count * np.array(other["std"], np.float64) ** 2 + delta**2 * self.count * count / both
@@ -64,7 +65,7 @@ class Pooled:
         self.low, self.high = np.minimum(self.low, other["min"]), np.maximum(self.high, other["max"])
 
     def statistics(self, quantiles: np.ndarray) -> Statistics:
-        """Return all that is known, with the quantiles ``(5, ...)`` given."""
+        """Return the pooled statistics with the given quantiles ``(5, ...)``."""
         return {
             "min": self.low.tolist(),
             "max": self.high.tolist(),
@@ -78,7 +79,7 @@ class Pooled:
 def quantiles_of_files(
     files: Iterable[Path], features: Sequence[Feature], pooled: dict[str, Pooled]
 ) -> dict[str, np.ndarray]:
-    """Return the quantiles ``(5, width)`` of each feature over data files, a file at a time in memory."""
+    """Return the quantiles ``(5, width)`` of each feature over data files, with one file in memory at a time."""
     counts = {f.name: np.zeros((f.width, BINS), np.int64) for f in features}
     for path in files:
         with pq.ParquetFile(path) as file:

@@ -1,4 +1,4 @@
-"""Features of a frame: one table of them for a robot, and an episode's frames as arrays."""
+"""Features of a frame: their table for a robot, and an episode's frames as arrays."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _TWIST = ("dx_m", "dy_m", "dz_m", "rx_rad", "ry_rad", "rz_rad")
 
 @dataclass(frozen=True)
 class Feature:
-    """A feature of LeRobot: ``names`` of its numbers, None for a single one."""
+    """A LeRobot feature; ``names`` of its components, None for a scalar."""
 
     name: str
     dtype: str
@@ -29,23 +29,23 @@ class Feature:
 
     @property
     def width(self) -> int:
-        """The number of values that a frame has."""
+        """Number of values per frame."""
         return 1 if self.names is None else len(self.names)
 
     @property
     def info(self) -> dict[str, Any]:
-        """The entry of info.json."""
+        """Entry of info.json."""
         return {"dtype": self.dtype, "shape": [self.width], "names": None if self.names is None else list(self.names)}
 
     @property
     def arrow(self) -> pa.DataType:
-        """The column's type."""
+        """Arrow type of the column."""
         value = pa.bool_() if self.dtype == "bool" else pa.type_for_alias(self.dtype)
         return value if self.names is None else pa.list_(value, self.width)
 
 
 def features_of(robot: RecordedRobot, *, granules: bool = False) -> tuple[Feature, ...]:
-    """Return the features of a robot's episodes in the order of the columns, with or without counts of ``granules``."""
+    """Return the features of a robot's episodes in column order, optionally with ``granules`` counts."""
     joints, told = robot.arm_joints, robot.hand_action
     prefixes = [f"{arm.name}_" for arm in robot.arms] or [""]
     tips, twists = ([f"{prefix}{name}" for prefix in prefixes for name in names] for names in (_POSE, _TWIST))
@@ -69,9 +69,9 @@ def features_of(robot: RecordedRobot, *, granules: bool = False) -> tuple[Featur
 def frames_of(
     episode: StoredEpisode, episode_index: int, first_index: int, task_index: int, rate_hz: int
 ) -> dict[str, np.ndarray]:
-    """Return the features of an episode with ``rate_hz`` states a second as arrays ``(T, width)``, single numbers ``(T,)``.
+    """Return the features of an episode with ``rate_hz`` states per second as arrays ``(T, width)``, scalars ``(T,)``.
 
-    Frame t is state t and the action given in it; the state after the last action is no frame.
+    Frame t is state t and the action given in it; the state after the last action has no frame.
     """
     recording = episode.recording
     steps, now = recording.steps, slice(0, recording.steps)
@@ -101,7 +101,10 @@ def frames_of(
 
 
 def _granule_counts(recording: Recording, handled: np.ndarray) -> np.ndarray:
-    """Return how many granules are in what is ``handled (T,)``, in other vessels and in none ``(T, 3)``; zeros without any."""
+    """Return the granules in the handled object, in other vessels and in none, ``(T, 3)``; zeros if there are no granules.
+
+    ``handled (T,)`` is the number of the handled object in each frame.
+    """
     positions, held = recording.granule_positions_m, recording.granules_in_objects
     if positions is None or held is None:
         return np.zeros((recording.steps, 3), np.int64)
@@ -111,13 +114,13 @@ def _granule_counts(recording: Recording, handled: np.ndarray) -> np.ndarray:
 
 
 def _active_literal(recording: Recording) -> np.ndarray:
-    """Return the number of the literal that is worked on ``(T,)``; zeros where the goal has one."""
+    """Return the index of the literal being worked on ``(T,)``; zeros for a goal with one literal."""
     told = recording.active_literal
     return np.zeros(recording.steps, np.int64) if told is None else told.astype(np.int64)
 
 
 def schema_of(features: tuple[Feature, ...]) -> pa.Schema:
-    """Return the columns of the data files, with the metadata that Hugging Face's ``datasets`` reads types from."""
+    """Return the schema of the data files, with the metadata from which Hugging Face's ``datasets`` reads types."""
     told = {
         f.name: {"dtype": f.dtype, "_type": "Value"}
         if f.names is None
@@ -129,7 +132,7 @@ def schema_of(features: tuple[Feature, ...]) -> pa.Schema:
 
 
 def table_of(frames: dict[str, np.ndarray], features: tuple[Feature, ...], schema: pa.Schema) -> pa.Table:
-    """Return an episode's frames as rows."""
+    """Return an episode's frames as an Arrow table."""
     columns = []
     for feature in features:
         array = frames[feature.name]

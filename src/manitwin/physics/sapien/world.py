@@ -219,7 +219,7 @@ class RobotWorld:
         return [ContactReader(self._system, self._roles(each), self._max_contact_force_n, arms) for each in self.robots]
 
     def _roles(self, used: SapienRobot) -> list[tuple[physx.PhysxBaseComponent, str, Role]]:
-        """Return every body with its name and role as seen by one arm; a base has no role because it does not move."""
+        """Return every body with its name and role as seen by one arm; all links outside its hand, the base included, are ARM."""
         roles: list[tuple[physx.PhysxBaseComponent, str, Role]] = list(self._fixed)
         for number, (body, placed) in enumerate(zip(self.bodies, self.placed, strict=True)):
             roles.append((body, placed.name, Role.TARGET if number == self.target else Role.OTHER))
