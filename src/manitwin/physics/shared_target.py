@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from manitwin.physics.trial import TrialSettings
 
-STILL_SHARE = (
-    0.01  # of the closing speed: slower fingers are stopped by the object, not merely lagging behind their target
-)
+# of the closing speed: slower fingers are stopped by the object, not merely lagging behind their target
+STILL_SHARE = 0.01
 MET_M = 1e-6  # pads closer than this are considered to have met
 
 

@@ -153,9 +153,8 @@ def _hull(tree: UrdfTree, path: Path, where: str) -> np.ndarray:
     if path.suffix.lower() not in MESH_SUFFIXES:
         raise tree.refuse(f"the mesh of {where}", f"is {path}", f"valid are {', '.join(MESH_SUFFIXES)}")
     if path.suffix.lower() == ".dae":
-        read_xml(
-            path, "COLLADA", name=str(path), refusal=tree.error
-        )  # refuses XML entities before the mesh library reads it
+        # refuses XML entities before the mesh library reads it
+        read_xml(path, "COLLADA", name=str(path), refusal=tree.error)
     try:
         return np.asarray(trimesh.convex.convex_hull(trimesh.load_mesh(path)).vertices)
     except Exception as error:  # mesh readers raise arbitrary exceptions

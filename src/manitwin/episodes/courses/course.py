@@ -26,10 +26,8 @@ from manitwin.physics.sapien.world import RobotWorld
 _Chosen = TypeVar("_Chosen")
 
 ANOTHER_GRASP = "another_grasp"
-TURNED_M, TURNED_RAD = (
-    0.01,
-    np.radians(10.0),
-)  # in the hand: beyond this, a plan made for another pose in the hand is hardly usable
+# in the hand: beyond this, a plan made for another pose in the hand is hardly usable
+TURNED_M, TURNED_RAD = 0.01, np.radians(10.0)
 FIRST_SHARE = 0.75  # share of the grasps whose order is kept: those that tend to be good
 LEAST_LIFT_SHARE = 0.5  # of the hand's rise: below this, the object was left behind
 

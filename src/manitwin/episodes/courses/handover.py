@@ -28,11 +28,8 @@ from manitwin.robots.two_arms import base_to_world
 GIVER, TAKER = 0, 1
 MEETINGS = 24
 OTHER_MEETINGS = 12  # number of meeting places tried if the target has turned in the first hand
-HEIGHTS_M, ASIDE_M, ALONG_M = (
-    (0.35, 0.55),
-    0.15,
-    0.08,
-)  # ranges of the meeting point relative to the midpoint between the bases
+# ranges of the meeting point relative to the midpoint between the bases
+HEIGHTS_M, ASIDE_M, ALONG_M = (0.35, 0.55), 0.15, 0.08
 TILTED_SHARE, TILT_RAD = 0.7, np.radians(100)
 RISEN_M = 0.03  # the meeting place is approached from this far below
 MEET_S, LONGEST_S = 0.8, 3.0

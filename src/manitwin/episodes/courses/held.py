@@ -33,9 +33,8 @@ from manitwin.physics.sapien.world import RobotWorld
 BACK_S = 1.2
 YIELDED_S, PRESSED_S = 0.1, 0.2  # hold time after contact, for a blow and for a press
 RISEN_M = (0.01, 0.03)  # heights of a straight rise before the way back
-PUT_BACK_RAD = np.radians(
-    [0.0, 45, -45, 90, -90, 135, -135, 180]
-)  # an object that turned in the hand is put back in the first feasible heading
+# an object that turned in the hand is put back in the first feasible heading
+PUT_BACK_RAD = np.radians([0.0, 45, -45, 90, -90, 135, -135, 180])
 PEAK_OF_QUINTIC = 1.875  # ratio of peak to mean speed
 MADE_UP_RAD, MADE_UP_TIMES, MADE_UP_S = np.radians(4.0), 3, 0.4
 """Correction of an object that turned in the hand at the path's end: tolerance, most repetitions, and duration of each."""

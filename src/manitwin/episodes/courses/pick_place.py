@@ -18,16 +18,11 @@ from manitwin.geometry.poses import inverse
 from manitwin.physics.sapien.contacts import NONE_MEANT, MeantContacts
 from manitwin.physics.sapien.world import RobotWorld
 
-SMALL_SLIP_M, SMALL_SLIP_RAD = (
-    0.004,
-    np.radians(2.0),
-)  # a fifth of the tolerance of a placement: a smaller slip is no reason to give up
+# a fifth of the tolerance of a placement: a smaller slip is no reason to give up
+SMALL_SLIP_M, SMALL_SLIP_RAD = 0.004, np.radians(2.0)
 
-LIES_ROWS, STILL_M, STILL_RAD = (
-    12,
-    0.001,
-    np.radians(1.0),
-)  # wait of at most 0.6 s until the object lies still, and the motion per row that counts as still
+# wait of at most 0.6 s until the object lies still, and the motion per row that counts as still
+LIES_ROWS, STILL_M, STILL_RAD = 12, 0.001, np.radians(1.0)
 ARRIVED_N = 3.0  # contact force at which an object to be dropped into a vessel counts as arrived, and is released
 
 

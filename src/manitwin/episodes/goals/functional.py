@@ -19,10 +19,8 @@ MOST_PRESSED = 3.0
 STRIKE_RAD = np.radians(15)
 CORNER_OF_SQUARE = np.sqrt(np.pi / 2)  # 1.25: half a square's diagonal over the radius of the circle of equal area
 HANG_SLACK_M = 0.006
-INSERTED_RAD, INSERTED_SLACK_M = (
-    np.radians(45),
-    0.002,
-)  # an object leans on the rim of a bore wider than itself, tip down
+# an object leans on the rim of a bore wider than itself, tip down
+INSERTED_RAD, INSERTED_SLACK_M = np.radians(45), 0.002
 BELLY = 1.5  # width of a belly below the neck, in rim radii
 FELL_M = 0.02  # an object released with some tilt settles by its own weight
 OBLONG, CLOSED_SHARE, LEAST_SLOPE = 4.5, 0.9, 0.3  # thresholds of hole detection (geometry.frames.hole)

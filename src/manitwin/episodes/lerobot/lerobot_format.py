@@ -1,4 +1,4 @@
-"""Names of files and features of a LeRobotDataset v3.0, and its columns as arrays.
+"""File and feature names of a LeRobotDataset v3.0, and its columns as arrays.
 
 Source: lerobot 0.4.4, datasets/utils.py, datasets/lerobot_dataset.py and datasets/compute_stats.py.
 """
@@ -15,14 +15,14 @@ import pyarrow as pa
 VERSION = "v3.0"
 INFO, STATS, TASKS = "meta/info.json", "meta/stats.json", "meta/tasks.parquet"
 CHUNKS_SIZE = 1000
-"""Files of a folder ``chunk-000``."""
+"""Files per folder ``chunk-000``."""
 
 DATA_FILES_SIZE_IN_MB, VIDEO_FILES_SIZE_IN_MB = 100, 200
 DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 EPISODES_PATH = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 VIDEO_PATH = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
 CODEC = "camera.codec"
-"""The key of a video feature's ``info`` for the codec of its files."""
+"""Key of the codec in a video feature's ``info``."""
 
 DEFAULT_FEATURES: dict[str, str] = {
     "timestamp": "float32",
@@ -31,33 +31,33 @@ DEFAULT_FEATURES: dict[str, str] = {
     "index": "int64",
     "task_index": "int64",
 }
-"""Features that every set has, with their types; each is one number a frame."""
+"""Features that every set has, with their types; each is a scalar per frame."""
 
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 STATISTICS = ("min", "max", "mean", "std", "count", *QUANTILES)
 
 TIMESTAMP_TOLERANCE_S = 1e-4
-"""How far LeRobot lets a timestamp be from the grid of frames (``tolerance_s`` of LeRobotDataset)."""
+"""Largest deviation of a timestamp from the frame grid that LeRobot accepts (``tolerance_s`` of LeRobotDataset)."""
 
 
 def place_of(number: int) -> tuple[int, int]:
-    """Return the chunk and the file in it of the n-th file."""
+    """Return the chunk of the n-th file, and its number in the chunk."""
     return divmod(number, CHUNKS_SIZE)
 
 
 def video_key(camera: str) -> str:
-    """Return the feature's name of a camera's pictures."""
+    """Return the feature name of a camera's pictures."""
     return f"observation.images.{camera}"
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write JSON as LeRobot has it: keys in their order, four blanks, no NaN."""
+    """Write JSON in LeRobot's format: keys in insertion order, four spaces of indentation, no NaN."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(value, indent=4, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def arrays_of(table: pa.Table, features: dict[str, dict[str, Any]]) -> dict[str, np.ndarray]:
-    """Return the columns of rows as arrays."""
+    """Return the columns of a table as arrays, without videos."""
     result = {}
     for name, feature in features.items():
         if feature["dtype"] == "video":

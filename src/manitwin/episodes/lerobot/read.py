@@ -1,7 +1,7 @@
-"""Read a LeRobotDataset v3.0 without LeRobot, and check all that its loader relies on and does not look at.
+"""Reader of LeRobotDataset v3.0 without LeRobot, which checks everything that LeRobot's loader relies on but does not verify.
 
-A gap in the numbers of episodes shifts every later video, frames outside their episode's rows become another's, and timestamps
-off the grid of frames fail in the middle of a training: each is an error here that names the file.
+A gap in the episode numbers shifts every later video, frames outside their episode's rows are attributed to another episode,
+and timestamps off the frame grid fail in the middle of a training run. Each of these is an error here that names the file.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ _NUMBERS = (
 
 @dataclass(frozen=True)
 class LeRobotSet:
-    """A data set whose layout is sound: ``tasks`` by ``task_index``; ``episodes`` are rows without their statistics."""
+    """A data set with a valid layout: ``tasks`` by ``task_index``; ``episodes`` are rows without their statistics."""
 
     root: Path
     info: dict[str, Any]
@@ -70,12 +70,12 @@ class LeRobotSet:
 
     @property
     def features(self) -> dict[str, dict[str, Any]]:
-        """The features by name, as info.json has them."""
+        """Features by name, as in info.json."""
         features: dict[str, dict[str, Any]] = self.info["features"]
         return features
 
     def frames(self, episode_index: int) -> dict[str, np.ndarray]:
-        """Return an episode's features as arrays ``(T, width)``, single numbers ``(T,)``; no pictures."""
+        """Return an episode's features as arrays ``(T, width)``, scalars ``(T,)``, without pictures."""
         row = self.episodes[episode_index]
         path = self.root / self.info["data_path"].format(
             chunk_index=row["data/chunk_index"], file_index=row["data/file_index"]
@@ -85,10 +85,10 @@ class LeRobotSet:
 
 
 def read_lerobot(root: Path, *, decode_videos: bool = False) -> LeRobotSet:
-    """Read and check a data set, one data file in memory at a time.
+    """Read and check a data set, with one data file in memory at a time.
 
-    Videos are checked by their headers, with ``decode_videos`` by decoding every frame. Raises EpisodesError with the file,
-    the cause and the remedy for the first thing that is not as the layout has it.
+    Videos are checked by their headers, or with ``decode_videos`` by decoding every frame. Raises EpisodesError with file,
+    cause and remedy for the first violation.
     """
     info = _info(root)
     tasks = _tasks(root / TASKS, info["total_tasks"])

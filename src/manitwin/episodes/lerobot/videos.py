@@ -1,4 +1,4 @@
-"""Pictures of a camera as LeRobot takes them: several episodes in one mp4, each at its own frames."""
+"""Videos of a LeRobotDataset: several episodes in one mp4, each with its own range of frames."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from manitwin.errors import EpisodesError
 
 _ENCODED_BY_LEROBOT = ("av1", "h264", "hevc")
 _SAMPLED_FRAMES = 50
-"""Of an episode's pictures so many at most are looked at for statistics (lerobot: 100)."""
+"""Largest number of pictures per episode sampled for statistics (lerobot: 100)."""
 
 _PIXEL_STEP = 4
 
 
 @dataclass(frozen=True)
 class Clip:
-    """The place of an episode's pictures: frame ``first_frame + t`` of an mp4 shows state t at the set's rate."""
+    """Location of an episode's pictures: frame ``first_frame + t`` of an mp4 shows state t at the set's rate."""
 
     file: Path
     first_frame: int = 0
@@ -32,7 +32,7 @@ class Clip:
 
 @dataclass(frozen=True)
 class CameraVideos:
-    """A camera's pictures of episodes, by ``episode_id``; all of one size and codec. ``pinhole``: see ``NamedCamera.to_json``."""
+    """A camera's clips by ``episode_id``, all of one size and codec; for ``pinhole`` see ``NamedCamera.to_json``."""
 
     camera: str
     clips: Mapping[str, Clip]
@@ -40,7 +40,7 @@ class CameraVideos:
 
 
 class VideoColumns:
-    """Copies a camera's files into a set, in the order in which episodes use them, and tells where each episode is."""
+    """Copies a camera's files into a set, in order of first use, and returns each episode's location."""
 
     def __init__(self, videos: CameraVideos, root: Path, rate_hz: int):
         self.videos, self.root, self.key, self._rate_hz = videos, root, video_key(videos.camera), rate_hz
@@ -50,9 +50,9 @@ class VideoColumns:
         self._reader = _ClipReader()
 
     def row(self, episode_id: str, steps: int) -> tuple[dict[str, Any], Statistics]:
-        """Return an episode's columns, and the statistics of its pictures.
+        """Return an episode's video columns, and the statistics of its pictures.
 
-        Raises EpisodesError where there are no pictures of it, or not of all its steps, or of another size or rate.
+        Raises EpisodesError if pictures are missing or incomplete, or have another size or rate.
         """
         clip = self.videos.clips.get(episode_id)
         if clip is None:
@@ -77,10 +77,10 @@ class VideoColumns:
 
     @property
     def info(self) -> dict[str, Any]:
-        """The entry of info.json.
+        """Entry of info.json.
 
-        ``video.codec`` is there only of codecs that LeRobot encodes with: its tools (0.6) take it for what they cut, and split
-        no set and delete no episode where it is another one. Without it they take their default, AV1.
+        ``video.codec`` is only set for codecs that LeRobot can encode: its tools (0.6) encode with this codec when they split
+        a set or delete an episode, and fail for another one. Without the entry they use their default, AV1.
         """
         assert self.facts is not None  # a set has at least one episode, and each has a clip
         facts = self.facts
@@ -123,7 +123,7 @@ class VideoColumns:
 
 
 class _ClipReader:
-    """Decodes clips; those of one file in their order need one pass."""
+    """Decodes clips; clips of one file in order need a single pass."""
 
     def __init__(self) -> None:
         self._file: Path | None = None

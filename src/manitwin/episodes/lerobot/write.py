@@ -1,4 +1,4 @@
-"""Write episodes as a LeRobotDataset v3.0. Source: see ``lerobot_format``; docs/episodes.md says every feature."""
+"""Writer of LeRobotDataset v3.0. Format: see ``lerobot_format``; docs/episodes.md describes every feature."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from manitwin.twin.store import folder_beside
 
 @dataclass(frozen=True)
 class LeRobotSummary:
-    """The numbers of episodes, frames and tasks of a LeRobot data set that was written."""
+    """Numbers of episodes, frames and tasks of a written data set."""
 
     episodes: int
     frames: int
@@ -56,13 +56,14 @@ def write_lerobot(
     granules: bool = False,
     rate_hz: int = RATE_HZ,
 ) -> LeRobotSummary:
-    """Write the episodes of one robot as a data set, numbered as they come; it appears whole or not at all.
+    """Write the episodes of one robot as a data set, numbered in order; the folder appears complete or not at all.
 
-    Every instruction is a task; ``seed`` and the episode's id choose the one that its frames have. With ``videos`` each
-    episode must have pictures of every camera; with ``granules`` frames tell where these are (zeros for an episode without).
-    Frames are ``rate_hz`` a second (``at_rate``), and so must pictures be.
-    One episode is in memory at a time. The same episodes give the same bytes. Raises EpisodesError for no episode, several
-    robots, an episode without instructions, and pictures that do not fit.
+    Every instruction is a task; ``seed`` and the episode's id select the one assigned to its frames. With ``videos`` each
+    episode must have pictures of every camera. With ``granules`` frames contain granule counts (zeros for an episode
+    without). Frames, and pictures, are at ``rate_hz`` per second (``at_rate``).
+
+    One episode is in memory at a time. The output is deterministic to the byte. Raises EpisodesError for no episode, several
+    robots, an episode without instructions, and pictures that do not match.
     """
     with folder_beside(place) as root:
         writer: _Set | None = None
@@ -82,7 +83,7 @@ def write_lerobot(
 
 
 class _Set:
-    """A data set while it is written."""
+    """A data set being written."""
 
     def __init__(
         self,
@@ -154,7 +155,7 @@ class _Set:
         self.frames += steps
 
     def describe(self) -> None:
-        """Write what tells of the whole set, info.json last."""
+        """Write the files that describe the whole set, info.json last."""
         quantiles = quantiles_of_files(self.data.files, self.features, self.pooled)
         quantiles |= {column.key: self.rows.mean_quantiles(column.key) for column in self.videos}
         write_json(self.root / STATS, {n: pooled.statistics(quantiles[n]) for n, pooled in self.pooled.items()})
@@ -186,7 +187,7 @@ def _chosen(tasks: Sequence[str], seed: int, episode_id: str) -> str:
 
 
 class _DataFiles:
-    """Data files: a row group an episode; a new file before one would get larger than it may."""
+    """Data files with a row group per episode; a new file is started before one would exceed the size limit."""
 
     def __init__(self, root: Path, schema: pa.Schema, size_mb: int):
         self.root, self.schema, self.most_bytes = root, schema, size_mb << 20
@@ -196,7 +197,7 @@ class _DataFiles:
         self._episodes = 0
 
     def write(self, table: pa.Table) -> tuple[int, int]:
-        """Write an episode and return the chunk and file that it is in."""
+        """Write an episode and return its chunk and file numbers."""
         if self._writer is not None:
             size = self._stream.tell()
             if size + size / self._episodes > self.most_bytes:
@@ -214,7 +215,7 @@ class _DataFiles:
         return place_of(len(self.files) - 1)
 
     def close(self) -> None:
-        """Finish the file that is open."""
+        """Finish the current file."""
         if self._writer is not None:
             self._writer.close()
             self._stream.close()
@@ -222,7 +223,7 @@ class _DataFiles:
 
 
 def _write_tasks(path: Path, tasks: list[str]) -> None:
-    """Write the tasks as pandas would: their words are the index, which LeRobot looks tasks up by."""
+    """Write the tasks in pandas format with the task text as index, by which LeRobot looks tasks up."""
     table = pa.table({"task_index": pa.array(range(len(tasks)), pa.int64()), "task": pa.array(tasks, pa.string())})
     told = {
         "index_columns": ["task"],

@@ -1,1 +1,1 @@
-"""Motion planning for one arm among convex obstacles: inverse kinematics, RRT-Connect, timing, and the pick-and-place task."""
+"""Motion planning of arms among convex obstacles: inverse kinematics, RRT-Connect, time parameterisation, pick-and-place."""

@@ -1,4 +1,4 @@
-"""Forward and inverse kinematics of an arm, of the twin's grasp frame in the world."""
+"""Forward and inverse kinematics of an arm, for the grasp frame in the world."""
 
 from __future__ import annotations
 
@@ -12,23 +12,24 @@ from manitwin.episodes.planning.obstacle_shapes import pose_of
 from manitwin.robots.robot import Robot
 
 LIMIT_MARGIN_RAD = 1e-3
-TOLERANCE = 5e-5  # of the twist's norm: metres and radians alike
-DAMPING = 1e-3  # of the error's square (Sugihara 2011): none is left near the solution
+TOLERANCE = 5e-5  # of the norm of the error twist, in metres and radians alike
+DAMPING = 1e-3  # factor of the squared error (Sugihara 2011), so that damping vanishes near the solution
 LEAST_DAMPING = 1e-8
 LARGEST_STEP_RAD = 0.5
 ITERATIONS = 30
 STALLED_AFTER = 6
-"""Iterations without the error's square halving: measured, from a known pose near by, 98 per cent converge."""
+"""Iterations without halving the squared error; measured: from a known pose nearby, 98 per cent converge."""
 
 
 class ArmKinematics:
-    """An arm of n joints that keep within ``lower`` and ``upper (n,)`` rad.
+    """Kinematics of an arm of n joints within ``lower`` and ``upper (n,)`` rad.
 
-    These are the limits of the URDF, ``limits_rad``, less a margin; what turns further than once turns once, about its home.
+    These are the URDF's limits ``limits_rad`` less a margin. A joint with a range of more than one revolution is limited to
+    one revolution about its home.
     """
 
     def __init__(self, robot: Robot, opening_m: float | None = None):
-        """Build the model of ``robot``'s arm with open fingers, or with the distance ``opening_m`` between the pads."""
+        """Build the model of ``robot``'s arm with the hand open, or with the distance ``opening_m`` between the pads."""
         self.body: KinematicBody = arm_of(robot, opening_m)
         self.home = np.asarray(robot.home_rad, float)
         model = self.body.model
@@ -55,16 +56,17 @@ class ArmKinematics:
         return self._data.oMi[self._joint] * self.body.gripper_to_joint
 
     def within_limits(self, configurations: np.ndarray) -> bool:
-        """Tell whether configurations ``(..., n)`` keep to the joints' limits."""
+        """Tell whether configurations ``(..., n)`` are within the joint limits."""
         slack = LIMIT_MARGIN_RAD / 2
         return bool(((configurations >= self.lower - slack) & (configurations <= self.upper + slack)).all())
 
     def inverse(
         self, gripper_to_world: np.ndarray, start: np.ndarray, iterations: int = ITERATIONS
     ) -> np.ndarray | None:
-        """Return the joint positions of a grasp frame's pose that damped least squares reaches from ``start``, or None.
+        """Return joint positions ``(n,)`` for a pose ``(4, 4)`` of the grasp frame by damped least squares from ``start``, or
+        None.
 
-        Levenberg-Marquardt with the damping of Sugihara (2011, IEEE T-RO 27:5), steps capped and clipped to the limits.
+        Levenberg-Marquardt with the damping of Sugihara (2011, IEEE T-RO 27:5); steps are capped and clipped to the limits.
         """
         model, data, joint = self._model, self._data, self._joint
         goal = pose_of(gripper_to_world) * self._joint_to_gripper

@@ -1,4 +1,4 @@
-"""An arm that stands still as an obstacle of another one: each link as convex hulls, where its joints have it."""
+"""A stationary arm as an obstacle for another one: each link as convex hulls at given joint positions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from manitwin.robots.robot import Robot
 
 
 class ArmObstacles:
-    """The links of one of two arms as bodies, made once; they are named as the robot's links are."""
+    """Links of one of two arms as bodies, built once and named like the robot's links."""
 
     def __init__(self, arm: Robot):
         """Take the shapes of the arm's links."""
@@ -23,7 +23,7 @@ class ArmObstacles:
         self._bodies = {link.name: _body_of(link) for link in self._links if link.shapes}
 
     def at(self, joints_rad: np.ndarray, openings_m: Sequence[float]) -> tuple[PlacedObject, ...]:
-        """Return the arm at joints ``(n,)``, its fingers as far apart as each of some openings says: on their way too."""
+        """Return the arm at joints ``(n,)``, with a copy of its fingers at each of the openings, which covers their motion."""
         placed = list[PlacedObject]()
         for number, opening_m in enumerate(openings_m):
             joints = dict(zip(self._arm.arm_joints, np.asarray(joints_rad, float).tolist(), strict=True))
@@ -38,13 +38,15 @@ class ArmObstacles:
 
 
 def _body_of(link: Link) -> RigidBody:
-    """Return a link's shapes as a body for planning, which asks for nothing but the hulls."""
+    """Return a link's shapes as a body for planning, which uses only the hulls."""
     hulls = tuple(_corners_of(shape) for shape in link.shapes)
     return RigidBody(hulls, max(link.mass_kg, 1.0), np.zeros(3), np.eye(3), 0.5, 0.5)
 
 
 def _corners_of(shape: LinkShape) -> np.ndarray:
-    """Return the corners ``(V, 3)`` of a shape's convex hull, of a sphere those of 80 triangles around it, in the link."""
+    """Return the vertices ``(V, 3)`` of a shape's convex hull in the link frame; a sphere becomes an icosphere of 80
+    triangles.
+    """
     if shape.half_extents_m is not None:
         return box_corners(shape.half_extents_m, shape.shape_to_link)
     if shape.radius_m is not None:

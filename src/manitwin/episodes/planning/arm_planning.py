@@ -1,4 +1,4 @@
-"""What planners of one arm share: its models, the planners of single motions, and the world of the last problem."""
+"""Components shared by the planners of one arm: its models, single-motion planners, and the world of the last problem."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from manitwin.robots.robot import Robot
 
 
 class ArmPlanning:
-    """The arm and its hand with the fingers as far apart as they open, or as said; shapes are kept between problems."""
+    """Planning models of an arm and its hand at a given opening; collision shapes are cached between problems."""
 
     def __init__(
         self,
@@ -32,9 +32,9 @@ class ArmPlanning:
         opening_m: float | None = None,
         standing: tuple[PlacedObject, ...] = (),
     ):
-        """Build the models of arm and hand; ``opening_m`` 0: the closed hand, which presses and pushes.
+        """Build the models of arm and hand; ``opening_m`` 0 is the closed hand, for pressing and pushing.
 
-        ``standing`` are obstacles of every problem: another arm that does not move.
+        ``standing`` are obstacles of every problem, such as another, stationary arm.
         """
         self.robot, self.timestep_s, self.settings = robot, timestep_s, settings or PlannerSettings()
         self.arm = ArmKinematics(robot, opening_m)
@@ -58,7 +58,7 @@ class ArmPlanning:
     def world_of(
         self, problem: PickPlaceProblem, goal_object_to_world: np.ndarray, *, as_hulls: bool = False
     ) -> ProblemWorld:
-        """Return the world of a problem; that of the last one is kept, for what is planned anew in it."""
+        """Return the world of a problem; the last one is cached for replanning."""
         problem, last = self._with_standing(problem), self._world
         if last is None or not last.is_of(problem, goal_object_to_world, as_hulls=as_hulls):
             self._world = last = ProblemWorld(
@@ -74,7 +74,7 @@ class ArmPlanning:
         return last
 
     def _with_standing(self, problem: PickPlaceProblem) -> PickPlaceProblem:
-        """Return a problem with what stands in every one; the same for the same problem."""
+        """Return the problem with the ``standing`` obstacles added; the same object for the same problem."""
         if not self._standing:
             return problem
         asked, found = self._asked

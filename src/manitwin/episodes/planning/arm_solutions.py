@@ -1,4 +1,4 @@
-"""Inverse kinematics of an arm: several configurations for one pose of its gripper, and how far it reaches."""
+"""Inverse kinematics with several solutions per gripper pose, and a reach test, from sampled configurations."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from manitwin.episodes.planning.problem import Phase, PlannerSettings
 SAMPLES = 4000
 NEAR_HOME_SHARE = 0.5
 NEAR_HOME_RAD = 0.8
-ROTATION_SCALE_M = 0.3  # a turn of one radian counts as this far
+ROTATION_SCALE_M = 0.3  # length equivalent of a rotation by one radian
 REACH_SLACK_M = 0.03
 SEED = 0
 
@@ -21,10 +21,10 @@ SAME_SOLUTION_RAD = 0.05
 
 
 class KnownPoses:
-    """Samples of an arm's configurations that are free of self-collision, half of them about home, with their poses."""
+    """Sampled configurations of an arm without self-collision, half of them near home, with their gripper poses."""
 
     def __init__(self, arm: ArmKinematics):
-        """Sample them; always the same ones for an arm."""
+        """Sample configurations; deterministic for an arm."""
         rng = np.random.default_rng(SEED)
         uniform = rng.uniform(arm.lower, arm.upper, (SAMPLES, arm.joints))
         near_home = np.clip(arm.home + rng.normal(0, NEAR_HOME_RAD, uniform.shape), arm.lower, arm.upper)
@@ -36,18 +36,18 @@ class KnownPoses:
         self._samples, self._features = samples[free], _features(poses[free])
 
     def out_of_reach(self, gripper_to_world: np.ndarray) -> bool:
-        """Tell whether no sample came as far from the shoulder as a pose is."""
+        """Tell whether a pose is farther from the shoulder than any sample."""
         return float(np.linalg.norm(gripper_to_world[:3, 3] - self._shoulder)) > self._reach_m
 
     def nearest(self, gripper_to_world: np.ndarray, count: int) -> np.ndarray:
-        """Return the ``count`` configurations whose poses are nearest to a pose, ``(count, n)``."""
+        """Return the ``count`` configurations with the nearest gripper poses, ``(count, n)``."""
         distances = ((self._features - _features(gripper_to_world[None])) ** 2).sum(1)
         nearest = np.argpartition(distances, count)[:count]
         return self._samples[nearest[np.argsort(distances[nearest], kind="stable")]]
 
 
 def _features(poses: np.ndarray) -> np.ndarray:
-    """Return positions and rotations ``(N, 12)`` such that their distance in metres compares poses."""
+    """Return pose features ``(N, 12)`` whose Euclidean distance (m) combines translation and rotation."""
     rotations = poses[:, :3, :3].reshape(-1, 9) * (ROTATION_SCALE_M / np.sqrt(2))
     return np.concatenate([poses[:, :3, 3], rotations], axis=1)
 
@@ -64,23 +64,25 @@ def _fixed_joint_position(arm: ArmKinematics, samples: np.ndarray) -> np.ndarray
 
 
 def _without_self_collision(body: KinematicBody, samples: np.ndarray) -> np.ndarray:
-    """Tell which samples ``(N, n)`` have no links that overlap."""
+    """Tell which samples ``(N, n)`` have no self-collision."""
     data, geometry = body.model.createData(), body.geometry.createData()
     manager = broad_phase(body.model, body.geometry, geometry)
     return np.array([not pin.computeCollisions(body.model, data, manager, sample, True) for sample in samples])
 
 
 class ArmSolutions:
-    """Inverse kinematics from where the arm is, then from known configurations whose poses are near."""
+    """Inverse kinematics started from a given configuration, then from known configurations with nearby poses."""
 
     def __init__(self, arm: ArmKinematics, known: KnownPoses, settings: PlannerSettings):
-        """Take the arm and what is known of it."""
+        """Take the arm, its known poses and the settings."""
         self._arm, self._known, self._settings = arm, known, settings
 
     def of(
         self, world: CollisionWorld, phase: Phase, gripper_to_world: np.ndarray, near: np.ndarray
     ) -> tuple[list[np.ndarray], bool]:
-        """Return free configurations of a pose, nearest to ``near`` first, and whether any at all was found."""
+        """Return collision-free configurations of a pose, nearest to ``near`` first, and whether any inverse kinematics
+        converged.
+        """
         found: list[np.ndarray] = []
         converged = False
         world.enter(phase)

@@ -1,4 +1,7 @@
-"""Collision worlds: which configurations of a body are free, phase by phase; the target is in a world twice, never rebuilt."""
+"""Collision worlds: collision tests of a body's configurations, with a collision filter for each phase.
+
+The target is in a world twice, at its standing pose and in the hand, so that the world need not be rebuilt.
+"""
 
 from __future__ import annotations
 
@@ -16,15 +19,15 @@ from manitwin.episodes.planning.obstacle_shapes import ObstacleShapes, obstacle_
 from manitwin.episodes.planning.problem import Grasp, Phase, PickPlaceProblem, PlannerSettings
 
 STANDING = "target"
-"""The name of the target's shapes where it stands."""
-TURNS_M = 0.01  # between what is lifted and the arm: as its weight comes on the jaws it turns in them
+"""Name of the target's shapes at its standing pose."""
+TURNS_M = 0.01  # clearance of a lifted object from the arm, because it turns in the jaws as they take its weight
 
 
 class FreeSpace(Protocol):
-    """The protocol of what is free for free motions, phase by phase: a collision world, or a narrower one."""
+    """Interface for collision tests of free motions, phase by phase: a collision world, or a restriction of one."""
 
     def enter(self, phase: Phase, margin_m: float | None = None) -> None:
-        """Test from now on what a phase forbids."""
+        """Select the phase, and optionally the margin, for the following tests."""
         ...
 
     def is_free(self, configuration: np.ndarray) -> bool:
@@ -33,17 +36,20 @@ class FreeSpace(Protocol):
 
 
 class CollisionWorld:
-    """A body among obstacles, and the target twice: where it stands, and in the hand.
+    """A body among obstacles, with the target twice: at its standing pose, and in the hand.
 
-    What may touch: in the phases that hold the target, the hand and the target, and the target and what bears it; in
-    RETREAT, the opening hand and the target. In all else every pair keeps its clearance; a robot's own links only must not
-    overlap. While jaws hold the target, nothing is between where they are open and where they meet: how far apart they are
-    is not known to a millimetre, and they let go there. What is lifted stays 1 cm away from the arm. Bounding boxes go first:
-    with five objects around, the plain loop over all pairs doubles a plan's time.
+    Allowed contacts: in phases that hold the target, between hand and target, and between target and its support; in RETREAT,
+    between the opening hand and the target. All other pairs keep their clearance, except pairs of the robot's own links,
+    which only must not overlap. While jaws hold the target, the whole sweep between their open and closed positions must be
+    free of obstacles: their opening is not known to the millimetre, and they open there on release. A lifted object keeps 1
+    cm from the arm.
+
+    A broad phase on bounding boxes comes first: with five objects around, the plain loop over all pairs doubles a plan's
+    time.
     """
 
     def __init__(self, body: KinematicBody, obstacles: ObstacleShapes, *, margin_m: float, clearance_m: float):
-        """Build all shapes and pairs; ``margin_m`` is kept in REACH and CARRY, ``clearance_m`` on the lines."""
+        """Build all shapes and pairs; ``margin_m`` is kept in REACH and CARRY, ``clearance_m`` on straight lines."""
         self._body, self._obstacles = body, obstacles
         self._margin_m, self._clearance_m = margin_m, clearance_m
         self._model, self._data = body.model, body.model.createData()
@@ -65,13 +71,13 @@ class CollisionWorld:
         return int(self._geometry.addGeometryObject(pin.GeometryObject(name, joint, pose, shape)))
 
     def hold(self, gripper_to_object: np.ndarray) -> None:
-        """Put the held copy of the target where a grasp ``(4, 4)`` has it."""
+        """Place the held copy of the target according to a grasp ``(4, 4)``."""
         placement = self._body.gripper_to_joint * pose_of(gripper_to_object).inverse()
         for index in self._held:
             self._geometry.geometryObjects[index].placement = placement
 
     def shape_hand(self, placements: Mapping[int, Any]) -> None:
-        """Put shapes of the hand, by their numbers, at other placements in the frame of the hand's joint."""
+        """Set the placements of hand shapes, by index, in the frame of the hand's joint."""
         for index, placement in placements.items():
             self._geometry.geometryObjects[index].placement = placement
 
@@ -82,11 +88,11 @@ class CollisionWorld:
         meant: frozenset[str] = frozenset(),
         spare_m: float = 0.0,
     ) -> None:
-        """Test from now on what a phase forbids, with its own margin or with another.
+        """Select the collision filter of a phase, with its default margin or ``margin_m``.
 
-        The body itself stays ``spare_m`` farther away from what stands around. Of the things named ``meant`` (the target where
-        it stands: ``STANDING``) nothing is tested against what is held, and against the fingers where nothing is: pair by pair,
-        all else keeps its clearance.
+        The body keeps an additional ``spare_m`` from static shapes. For bodies named in ``meant`` (``STANDING`` for the
+        target at its standing pose) pairs with the held object are not tested, or pairs with the fingers if nothing is held.
+        All other pairs keep their clearance.
         """
         if margin_m is None:
             margin_m = self._margin_m if phase in (Phase.REACH, Phase.CARRY) else self._clearance_m
@@ -105,11 +111,11 @@ class CollisionWorld:
         self._collision.setSecurityMargins(self._geometry, margins, True, True)
 
     def is_free(self, configuration: np.ndarray) -> bool:
-        """Tell whether nothing touches that must not, in the phase that was entered last."""
+        """Tell whether a configuration is free of collisions in the selected phase."""
         return not pin.computeCollisions(self._model, self._data, self._manager, configuration, True)
 
     def touching(self, configuration: np.ndarray) -> list[tuple[str, str]]:
-        """Return the names of the shapes that come too near to each other."""
+        """Return the names of the shape pairs in collision."""
         pin.computeCollisions(self._model, self._data, self._geometry, self._collision, configuration, False)
         return [
             (self._geometry.geometryObjects[pair.first].name, self._geometry.geometryObjects[pair.second].name)
@@ -119,7 +125,7 @@ class CollisionWorld:
 
 
 class _Pairs:
-    """The pairs of shapes that each phase tests, as upper triangles over all shapes."""
+    """Collision pairs of each phase, as upper triangular matrices over all shapes."""
 
     def __init__(
         self,
@@ -168,7 +174,7 @@ class _Pairs:
         return np.logical_or.reduce(list(self._of_phase.values()))
 
     def meant(self, names: frozenset[str], *, empty: bool) -> np.ndarray:
-        """Return the pairs of what is held with things by their names, of the fingers where the hand is ``empty``."""
+        """Return the pairs of the held object, or of the fingers if the hand is ``empty``, with the named bodies."""
         things = [index for index, name in zip(self._statics, self._names, strict=True) if name in names]
         pairs = np.zeros_like(self._own)
         pairs[np.ix_(things, self._held)] = True
@@ -177,7 +183,7 @@ class _Pairs:
         return pairs
 
     def of(self, phase: Phase, margin_m: float, obstacles: ObstacleShapes) -> tuple[np.ndarray, np.ndarray]:
-        """Return a phase's pairs and the clearance of each."""
+        """Return a phase's pairs and the clearance of each (m)."""
         key = (phase, margin_m)
         if key not in self._margins:
             margins = np.where(self._own, 0.0, margin_m)
@@ -194,13 +200,13 @@ class _Pairs:
 
 
 def is_path_free(world: CollisionWorld, path: JointPath, count: int) -> bool:
-    """Tell whether a path over [0, 1] is free at ``count + 1`` even places; the ends and the middle go first."""
+    """Tell whether a path over [0, 1] is free at ``count + 1`` uniform parameters; ends and middle are tested first."""
     places = np.array((0.0, *bisection_places(count)))
     return all(world.is_free(configuration) for configuration in path(places))
 
 
 class ProblemWorld:
-    """A problem's shapes around an arm and around its hand alone."""
+    """Collision worlds of a problem, for the whole arm and for the hand alone."""
 
     def __init__(
         self,
@@ -214,7 +220,7 @@ class ProblemWorld:
         shaping: tuple[HandShaping, HandShaping] | None = None,
         as_hulls: bool = False,
     ):
-        """Build both worlds; ``as_hulls``: the target is carried as its own hulls, so that its holes and cavities are free."""
+        """Build both worlds; ``as_hulls``: the held target consists of its own hulls, so that its holes and cavities are free."""
         self.problem, self.goal_object_to_world, self._as_hulls = problem, goal_object_to_world, as_hulls
         shapes = obstacle_shapes(problem, goal_object_to_world, store, settings.margin_m, as_hulls=as_hulls)
         self.arm = CollisionWorld(arm, shapes, margin_m=settings.margin_m, clearance_m=settings.clearance_m)
@@ -222,14 +228,14 @@ class ProblemWorld:
         self._shapings = shaping
 
     def is_of(self, problem: PickPlaceProblem, goal_object_to_world: np.ndarray, *, as_hulls: bool = False) -> bool:
-        """Tell whether this is the world of this very problem with such a goal, its target carried as asked for."""
+        """Tell whether this world was built for this problem object, goal and ``as_hulls``."""
         same = self.problem is problem and self._as_hulls == as_hulls
         return same and np.array_equal(self.goal_object_to_world, goal_object_to_world)
 
     def shape_hand(self, grasp: Grasp, closed: float = 0.0) -> None:
-        """Give the hand the joints that a grasp has before it closes, or ``closed`` of the way to those that it closes to.
+        """Set the fingers to the grasp's joints before closing, or to a fraction ``closed`` of the way to its closing goal.
 
-        A hand without joints of its own stays as it is.
+        Does nothing for a hand without finger joints.
         """
         if self._shapings is not None and grasp.joints_rad is not None:
             before, to = grasp.joints_rad
@@ -237,7 +243,7 @@ class ProblemWorld:
                 world.shape_hand(shaping.placements(before + closed * (to - before)))
 
     def hold(self, gripper_to_object: np.ndarray) -> None:
-        """Put the held target where a grasp has it."""
+        """Place the held target according to a grasp ``(4, 4)``."""
         self.arm.hold(gripper_to_object)
         self._hand.hold(gripper_to_object)
 
@@ -249,6 +255,6 @@ class ProblemWorld:
         meant: frozenset[str] = frozenset(),
         spare_m: float = 0.0,
     ) -> bool:
-        """Tell whether the hand, wherever its arm, is free at poses in a phase; all else as ``CollisionWorld.enter`` takes it."""
+        """Tell whether the hand alone is free at gripper poses in a phase; other arguments as for ``CollisionWorld.enter``."""
         self._hand.enter(phase, margin_m, meant, spare_m)
         return all(self._hand.is_free(pin.SE3ToXYZQUAT(pose_of(pose))) for pose in grippers_to_world)

@@ -1,4 +1,4 @@
-"""Objects as coal's convex shapes, kept from one problem to the next."""
+"""Convex shapes of objects for coal, cached between problems."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ from manitwin.geometry.boxes import box_corners
 from manitwin.geometry.rigid_body import RigidBody
 
 KEPT_BODIES = 256
-SOLID_SHARE = 0.7  # of the common hull's volume that the hulls must fill for it to stand for them near the hand
+# least share of the convex hull's volume that the hulls must fill for it to replace them near the hand
+SOLID_SHARE = 0.7
 
 
 def convex_hull(points: np.ndarray) -> Any:
-    """Return the convex hull of points ``(N, 3)`` m as coal's shape, its bounding box computed."""
+    """Return the convex hull of points ``(N, 3)`` m as a coal shape, with its bounding box computed."""
     vertices = coal.StdVec_Vec3s()
     for point in np.asarray(points, float):
         vertices.append(point)
@@ -29,7 +30,7 @@ def convex_hull(points: np.ndarray) -> Any:
 
 
 def corners_of(shape: Any) -> np.ndarray | None:
-    """Return the corners ``(N, 3)`` of one of pinocchio's shapes in the frame of its joint; None for what has none."""
+    """Return the vertices ``(N, 3)`` of a pinocchio shape in its joint's frame; None for a shape without vertices."""
     if isinstance(shape.geometry, coal.Box):
         local = box_corners(shape.geometry.halfSide, np.eye(4))
     elif isinstance(shape.geometry, coal.ConvexBase):
@@ -41,7 +42,7 @@ def corners_of(shape: Any) -> np.ndarray | None:
 
 @dataclass(frozen=True)
 class ConvexBody:
-    """A body's hulls and the one hull of all of them, in the object frame."""
+    """A body's hulls and the convex hull of all of them, in the object frame."""
 
     body: RigidBody
 
@@ -56,29 +57,29 @@ class ConvexBody:
 
     @cached_property
     def whole(self) -> Any:
-        """The hull of all points."""
+        """The convex hull of all vertices."""
         return convex_hull(self._whole.points[self._whole.vertices])
 
     @cached_property
     def is_solid(self) -> bool:
-        """True where the one hull stands well for the hulls: it adds little room that a hand could use."""
+        """Whether the convex hull is a good substitute for the hulls: it adds little volume that a hand could use."""
         return sum(ConvexHull(vertices).volume for vertices in self.body.hulls) >= SOLID_SHARE * self._whole.volume
 
     @cached_property
     def radius_m(self) -> float:
-        """The distance of the farthest point from the object frame's origin."""
+        """Distance of the farthest vertex from the object frame's origin."""
         return float(np.linalg.norm(self._whole.points, axis=1).max())
 
 
 class ShapeStore:
-    """Makes the shapes of bodies once, and keeps those last used; a body is known by its identity."""
+    """LRU cache of the shapes of bodies, by object identity."""
 
     def __init__(self) -> None:
         self._kept: OrderedDict[int, ConvexBody] = OrderedDict()
 
     def __call__(self, body: RigidBody) -> ConvexBody:
-        """Return the shapes of this very body."""
-        key = id(body)  # the kept shapes hold the body, so that its identity is not given to another
+        """Return the shapes of a body."""
+        key = id(body)  # the cached shapes keep the body alive, so that its id is not reused
         if key not in self._kept:
             self._kept[key] = ConvexBody(body)
             if len(self._kept) > KEPT_BODIES:

@@ -1,4 +1,4 @@
-"""The poses that a grasp can be tried in, and what forbids one whatever the arm does."""
+"""Candidate poses of grasps, and collision checks of the hand alone that are independent of the arm."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from manitwin.robots.grippers.gripper import Gripper
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.robots.grippers.suction import SuctionGripper
 
-CLOSED = (0.15, 0.3, 0.5)  # of the way to the joints that a hand closes to: what it holds stops it before their end
+CLOSED = (0.15, 0.3, 0.5)  # fractions of the closing motion: the object stops the fingers before its end
 QUARTER_TURN = np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 
 
 def turns_of(gripper: Gripper) -> np.ndarray:
-    """Return the turns about the approach axis ``(K, 4, 4)`` that leave a grasp what it is.
+    """Return the rotations about the approach axis ``(K, 4, 4)`` that leave a grasp equivalent.
 
-    Jaws may be exchanged, a cup is round (its body is square), and fingers are not alike.
+    Jaws are interchangeable, a cup is round (with a square body), and fingers of a multi-finger hand are all different.
     """
     if isinstance(gripper, SuctionGripper):
         return np.array([np.linalg.matrix_power(QUARTER_TURN, number) for number in range(4)])
@@ -35,20 +35,20 @@ def turns_of(gripper: Gripper) -> np.ndarray:
 
 
 class HandRoom:
-    """The corners of a hand's shapes in the grasp frame: a hand one of whose corners is inside a box has no room there.
+    """Vertices of a hand's shapes in the grasp frame, for a fast test against boxes.
 
-    It is the cheap half of a test: a hand that passes may still overlap a box by an edge.
+    The test is necessary but not sufficient: a hand that passes may still overlap a box with an edge.
     """
 
     def __init__(self, hand: KinematicBody, moving: frozenset[int] = frozenset()):
-        """Take the corners of the common hull of the shapes that have corners, but those that are ``moving`` with a grasp."""
+        """Take the vertices of the convex hull of all shapes with vertices, except those ``moving`` with a grasp's joints."""
         shapes = (shape for index, shape in enumerate(hand.geometry.geometryObjects) if index not in moving)
         pieces = [points for shape in shapes if (points := corners_of(shape)) is not None]
         points = np.concatenate(pieces)
         self._corners = np.concatenate([points[ConvexHull(points).vertices]])
 
     def is_inside(self, gripper_to_world: np.ndarray, boxes: tuple[StaticBox, ...], clearance_m: float) -> np.ndarray:
-        """Tell for each pose ``(N, 4, 4)`` whether a corner is nearer to a box than ``clearance_m``."""
+        """Tell for each pose ``(N, 4, 4)`` whether a vertex is closer to a box than ``clearance_m``."""
         inside = np.zeros(len(gripper_to_world), dtype=bool)
         for box in boxes:
             to_box = inverse(box.box_to_world) @ gripper_to_world
@@ -63,7 +63,7 @@ class HandRoom:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A pose ``gripper_to_object (4, 4)`` of the grasp number ``index``, or why the hand alone cannot be there."""
+    """A pose ``gripper_to_object (4, 4)`` of grasp ``index``, and why the hand cannot be there, if so."""
 
     index: int
     gripper_to_object: np.ndarray
@@ -71,16 +71,16 @@ class Candidate:
 
 
 class GraspCandidates:
-    """Looks at the hand alone; cheap beside anything that moves the arm."""
+    """Checks grasps with the hand alone, which is cheap compared with any motion of the arm."""
 
     def __init__(self, room: HandRoom, known: KnownPoses, settings: PlannerSettings, turns: np.ndarray):
-        """Take what is known of the hand and of the arm's reach, and the ``turns (K, 4, 4)`` that a grasp may be tried in."""
+        """Take hand and reach models, and the equivalent rotations ``turns (K, 4, 4)`` of a grasp."""
         self.turns = turns
         self._room, self._known, self._settings = room, known, settings
         self._ends = LineEnds(settings)
 
     def of(self, world: ProblemWorld) -> Iterator[Candidate]:
-        """Yield all turns of each grasp; the world's hand has the shape of it."""
+        """Yield all turns of each grasp; the world's hand has the grasp's shape at that time."""
         grasps = world.problem.grasps
         if not grasps:
             return
@@ -108,7 +108,11 @@ class GraspCandidates:
         return inside.reshape(gripper_to_world.shape[:2])
 
     def first_look(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> PlanFailure | None:
-        """Return what forbids a pose: the reach, or the hand at the ends of its lines. The world holds the target by it."""
+        """Return why a pose is infeasible: out of reach, or the hand collides at the ends of its straight lines; otherwise
+        None.
+
+        The world then holds the target in this pose.
+        """
         world.hold(gripper_to_object)
         failure = self.look_at_approach(world, gripper_to_object)
         if failure is not None:
@@ -126,7 +130,7 @@ class GraspCandidates:
         return None
 
     def _look_at_closing(self, world: ProblemWorld, grasp: Grasp, gripper_to_object: np.ndarray) -> PlanFailure | None:
-        """Return what forbids fingers with joints to close: on their way they curl towards what the target stands on."""
+        """Return why a multi-finger hand cannot close, since its fingers may curl into the support; otherwise None."""
         grasped = world.problem.target.object_to_world @ gripper_to_object
         for closed in CLOSED:
             world.shape_hand(grasp, closed)
@@ -137,7 +141,9 @@ class GraspCandidates:
         return None
 
     def look_at_approach(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> PlanFailure | None:
-        """Return what forbids to approach a pose: the reach, or the hand at either end of the line."""
+        """Return why a pose cannot be approached: out of reach, or the hand collides at either end of the line; otherwise
+        None.
+        """
         grasped = world.problem.target.object_to_world @ gripper_to_object
         if self._known.out_of_reach(grasped):
             return "outside_workspace"

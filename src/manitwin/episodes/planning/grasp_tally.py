@@ -1,4 +1,4 @@
-"""The grasps that a planner has tried, beyond a look or not, and what they failed of."""
+"""Statistics of the grasps that a planner has tried, and their failures."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from manitwin.episodes.planning.problem import PlanFailure, later
 
 @dataclass
 class GraspTally:
-    """Counts grasps by their numbers; a grasp fails by the cause of that try which came the farthest."""
+    """Counts grasps by index; a grasp's failure is that of the attempt that came farthest.
+
+    ``beyond_a_look`` are the grasps that passed the check of the hand alone.
+    """
 
     tried: set[int] = field(default_factory=set)
     beyond_a_look: set[int] = field(default_factory=set)
@@ -18,24 +21,24 @@ class GraspTally:
 
     @property
     def count_tried(self) -> int:
-        """How many grasps were tried."""
+        """Number of grasps tried."""
         return len(self.tried)
 
     @property
     def reasons(self) -> Counter[PlanFailure]:
-        """How many grasps failed by each cause."""
+        """Number of failed grasps by cause."""
         return Counter(self.failures.values())
 
     def is_new(self, index: int) -> bool:
-        """Tell whether a grasp has not been tried beyond a look."""
+        """Tell whether a grasp has not been tried beyond the check of the hand alone."""
         return index not in self.beyond_a_look
 
     def count(self, index: int, failure: PlanFailure) -> None:
-        """Count a try of a grasp, by its number, that failed."""
+        """Count a failed attempt of a grasp."""
         self.tried.add(index)
         self.failures[index] = later(failure, self.failures.get(index, failure))
 
     def succeed(self, index: int) -> None:
-        """Count the grasp that was planned."""
+        """Count the planned grasp."""
         self.failures.pop(index, None)
         self.tried.add(index)

@@ -1,4 +1,4 @@
-"""Where the shapes of a hand with joints are, as the planner takes it: the joints that a grasp has before it closes."""
+"""Placements of a multi-finger hand's shapes for planning, at the joints that a grasp has before it closes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 
 
 class HandShaping:
-    """The shapes of a body that belong to the fingers, each as it sits on its link."""
+    """Finger shapes of a body, each fixed to its link."""
 
     def __init__(self, body: KinematicBody, gripper: MultiFingerGripper, joints_rad: np.ndarray):
         """Take a body that was built with the hand at ``joints_rad (J,)``."""
@@ -30,11 +30,11 @@ class HandShaping:
 
     @property
     def moving(self) -> frozenset[int]:
-        """The numbers of these shapes."""
+        """Indices of the finger shapes."""
         return frozenset(index for index, _, _ in self._shapes)
 
     def placements(self, joints_rad: np.ndarray) -> dict[int, Any]:
-        """Return the placement of each of the shapes, by its number, with the hand at ``joints_rad (J,)``."""
+        """Return the placement of each finger shape, by index, for the hand at ``joints_rad (J,)``."""
         poses = self._gripper.link_poses(joints_rad)
         joint = self._body.gripper_to_joint
         return {index: joint * pose_of(poses[number]) * on_link for index, number, on_link in self._shapes}

@@ -1,4 +1,4 @@
-"""Held paths knot by knot: joints at which the arm has what it holds at the poses of a path, each sought where the last lead."""
+"""Joint positions along held paths, knot by knot: inverse kinematics extrapolated from the previous knots."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manitwin.episodes.planning.collision_world import STANDING, ProblemWorld
 from manitwin.episodes.planning.path_timing import joint_spline
 from manitwin.episodes.planning.problem import Phase, PlanFailure, later
 
-STARTS = 4  # known configurations from which the first pose is looked for
+STARTS = 4  # known configurations from which the first pose is solved
 LARGEST_KNOT_RAD = 0.6  # a larger change between knots is a jump to another branch
 ITERATIONS = 30
 SAME_RAD = 0.05
@@ -20,9 +20,9 @@ SAME_RAD = 0.05
 
 @dataclass(frozen=True)
 class HeldPath:
-    """Poses ``(K, 4, 4)`` in the world: of the object that is held, of the grasp frame where the hand is closed and empty.
+    """Poses ``(K, 4, 4)`` in the world, of the held object, or of the grasp frame for an empty closed hand.
 
-    From knot ``meant_from`` on the bodies named ``meant`` may be touched: by what is held, by the fingers of an empty hand.
+    From knot ``meant_from`` on, the held object (or the fingers of an empty hand) may touch the bodies named ``meant``.
     """
 
     poses: np.ndarray
@@ -30,15 +30,15 @@ class HeldPath:
     meant_from: int = 0
 
     def part(self, first: int, end: int) -> HeldPath:
-        """Return the path from a knot to before another one."""
+        """Return the knots from ``first`` up to, but not including, ``end``."""
         return replace(self, poses=self.poses[first:end], meant_from=max(0, self.meant_from - first))
 
 
 class HeldKnots:
-    """Finds the joints of held paths for one arm; the world holds the target, or nothing."""
+    """Solves joint positions of held paths for one arm; the world holds the target, or nothing."""
 
     def __init__(self, parts: ArmPlanning, phase: Phase):
-        """Take the models of an arm, and the phase that says what may touch: CARRY, or REACH of an empty hand."""
+        """Take the models of an arm, and the phase of the collision filter: CARRY, or REACH of an empty hand."""
         self._parts, self._phase = parts, phase
 
     def follow(
@@ -49,9 +49,10 @@ class HeldKnots:
         near_rad: np.ndarray,
         spare_m: float = 0.0,
     ) -> CubicSpline | PlanFailure:
-        """Return the joints' path, begun at the solution nearest to a configuration or at known ones; or why there is none.
+        """Return the joint spline of a path, starting at the solution nearest to ``near_rad`` or to known configurations; or
+        the failure.
 
-        The arm stays ``spare_m`` farther away from all around than it must.
+        The arm keeps ``spare_m`` of additional clearance.
         """
         if not self.is_hand_free(world, path, gripper_to_object, spare_m):
             return "path_blocked"
@@ -65,7 +66,7 @@ class HeldKnots:
         near_rad: np.ndarray,
         spare_m: float = 0.0,
     ) -> CubicSpline | PlanFailure:
-        """Return what ``follow`` does, of a path along which the hand is known to be free."""
+        """Do the same as ``follow`` for a path along which the hand is known to be free."""
         parts, hands = self._parts, path.poses @ gripper_to_object
         if any(parts.known.out_of_reach(hands[k]) for k in (0, len(hands) // 2, -1)):
             return "path_unreachable"
@@ -85,9 +86,10 @@ class HeldKnots:
     def is_hand_free(
         self, world: ProblemWorld, path: HeldPath, gripper_to_object: np.ndarray, spare_m: float = 0.0
     ) -> bool:
-        """Tell whether the hand with what it holds is free at each pose, wherever its arm: far cheaper than to seek the joints.
+        """Tell whether the hand with the held object is free at each pose, regardless of the arm; far cheaper than solving
+        the joints.
 
-        From the end: there most paths come near to something.
+        Tested from the end, where most paths come close to obstacles.
         """
         hands, margin_m = path.poses @ gripper_to_object, self._parts.settings.clearance_m
         return all(
@@ -107,7 +109,7 @@ class HeldKnots:
         largest_rad: float = LARGEST_KNOT_RAD,
         spare_m: float = 0.0,
     ) -> np.ndarray | PlanFailure:
-        """Return knots that go on from where the last of ``knots`` is; every new one is free, and the middle before it."""
+        """Return knots ``(K, n)`` continued from the last of ``knots``; every new knot and the midpoint before it are free."""
         arm, knots = self._parts.arm, list(knots)
         for number, hand in enumerate(hands):
             guess = knots[-1] if len(knots) == 1 else np.clip(2 * knots[-1] - knots[-2], arm.lower, arm.upper)
@@ -124,7 +126,7 @@ class HeldKnots:
     def _begin(
         self, world: ProblemWorld, path: HeldPath, hands: np.ndarray, first_rad: np.ndarray, spare_m: float
     ) -> np.ndarray | PlanFailure:
-        """Return free knots ``(K, n)``, the first of which is given."""
+        """Return free knots ``(K, n)`` that start at ``first_rad``."""
         self._enter(world, path, 0, spare_m)
         if not world.arm.is_free(first_rad):
             return "path_blocked"
@@ -135,6 +137,6 @@ class HeldKnots:
 
 
 def _meant(world: ProblemWorld, path: HeldPath, number: int) -> frozenset[str]:
-    """Return the names of what may be touched at a knot of a path."""
+    """Return the names of the bodies that may be touched at a knot of a path."""
     meant = path.meant if number >= path.meant_from else frozenset[str]()
     return meant | {STANDING} if world.problem.target.name in meant else meant

@@ -1,9 +1,9 @@
-"""Held paths: an object in the hand, or the closed hand itself, goes through poses one after another.
+"""Planning of held paths: a held object, or the closed hand itself, moves through a sequence of poses.
 
-A skill gives ``HeldPath``s, ``object_to_world`` poses from its frames (one for each choice of what is free), and ranks grasps.
-``plan`` finds the first grasp and path that can be reached, lifted and followed, with room to spare where there is; after the
-lift ``again`` plans carry and path from what was measured in the hand; ``onward`` the rest from wherever the arm is; ``timed``
-makes a motion. What cannot be planned anew is no reason to give up: the path from before serves.
+A skill provides ``HeldPath``s, ``object_to_world`` poses from its frames (one path for each choice of the free parameters),
+and ranks grasps. ``plan`` finds the first grasp and path that can be reached, lifted and followed, preferably with spare
+clearance. After the lift, ``again`` replans carry and path for the measured pose in the hand; ``onward`` replans the
+remainder from the current joints; ``timed`` computes a motion. If replanning fails, the previous path is still used.
 """
 
 from __future__ import annotations
@@ -23,21 +23,23 @@ from manitwin.episodes.planning.path_timing import joint_spline, time_quintic
 from manitwin.episodes.planning.problem import Grasp, Motion, Phase, PickPlaceProblem, PlanFailure, PlanReport, later
 from manitwin.geometry.poses import transform
 
-FROM_WHERE_IT_IS_RAD = 0.9  # to the first knot from where the arm has come to
+FROM_WHERE_IT_IS_RAD = 0.9  # to the first knot from the arm's current joints
 WITHDRAWN_M = 0.05
-MOST_PAIRS = 400  # of a grasp and a path, beyond a look at the hand: 1 to 5 ms each
-SPARE_M = 0.015  # things move by as much as the jaws close on them, and as their weight comes on the jaws
+MOST_PAIRS = 400  # pairs of a grasp and a path beyond the check of the hand: 1 to 5 ms each
+SPARE_M = 0.015  # objects move by this much as the jaws close and take their weight
 
 
 Accepts = Callable[[Grasp, HeldPath, np.ndarray], bool]
-"""Tells of a grasp as it is used, a path and the arm's joints ``(n,)`` at its end whether they serve."""
+"""Tells whether a grasp as used, a path and the arm's joints ``(n,)`` at its end are acceptable."""
 Serves = Callable[[Grasp], bool]
-"""Tells of a grasp as it is used whether it can serve, wherever a path ends."""
+"""Tells whether a grasp as used can be acceptable, wherever a path ends."""
 
 
 @dataclass(frozen=True)
 class HeldPlan:
-    """One grasp's motions: reach, approach, (close), lift, carry to the path's first pose; and the joints' path (timed later)."""
+    """Motions of one grasp: reach, approach, (close), lift, carry to the path's first pose; and the joint spline of the path,
+    not timed.
+    """
 
     grasp: Grasp
     gripper_to_object: np.ndarray
@@ -52,8 +54,8 @@ class HeldPlan:
 class HeldPathPlanner:
     """Plans held paths for one arm; deterministic for a problem's seed.
 
-    ``as_hulls``: what is held is carried as its own hulls, for functions of its holes and cavities. ``longest_s``: a path
-    that takes longer at the joints' limits is not taken (near singularities some take 20 s).
+    ``as_hulls`` (in the methods): the held object consists of its own hulls, for functions of its holes and cavities.
+    ``longest_s``: a path that takes longer at the joint limits is rejected (some near singularities take 20 s).
     """
 
     def __init__(
@@ -66,11 +68,12 @@ class HeldPathPlanner:
         accepts: Accepts | None = None,
         serves: Serves | None = None,
     ):
-        """Take the models and single motions of an arm; ``empty``: its hand holds nothing, and must not touch the target.
+        """Take the models of an arm; ``empty``: its hand holds nothing, and must not touch the target.
 
-        ``lets_go``: what is held is let go at the path's end, where the hand must have room to go back. ``level_rad``: it is
-        tilted by no more than that from how it stood on its way to the path. ``accepts`` is asked whether another arm can take
-        the object at the path's end, ``serves`` beforehand whether it could anywhere; without them nobody takes it.
+        ``lets_go``: the object is released at the path's end, where the hand must have room to retreat. ``level_rad``:
+        largest tilt on the way to the path, relative to how the object stood. ``accepts`` decides whether another arm can
+        take the object at the path's end, ``serves`` beforehand whether it could at any place; without them there is no
+        handover.
         """
         self._accepts, self._serves = accepts, serves
         self.parts, self._lets_go, self._level_rad = parts, lets_go, level_rad
@@ -79,10 +82,10 @@ class HeldPathPlanner:
     def plan(
         self, problem: PickPlaceProblem, paths: Sequence[HeldPath], *, as_hulls: bool, longest_s: float
     ) -> tuple[HeldPlan | None, PlanReport]:
-        """Plan with the first of ``problem.grasps``, itself or turned by 180 degrees, and the first path that it can follow.
+        """Plan with the first feasible pair of a grasp (or an equivalent turn of it) and a path.
 
-        Followed with ``SPARE_M`` around the arm, as the target is never quite where it was to be in the hand; else without.
-        The report has no plan of its own, only what was tried and what it failed of.
+        Pairs are tried with ``SPARE_M`` of clearance around the arm, because the target's pose in the hand is never exact,
+        then without. The report contains no plan, only the number of grasps tried and their failures.
         """
         world = self.parts.world_of(problem, problem.target.object_to_world, as_hulls=as_hulls)
         rng, tally, pairs = np.random.default_rng(problem.seed), GraspTally(), 0
@@ -132,10 +135,10 @@ class HeldPathPlanner:
         start_rad: np.ndarray | None = None,
         moved_to: np.ndarray | None = None,
     ) -> tuple[Motion, HeldPath, CubicSpline] | Sequence[PlanFailure]:
-        """Plan to reach the first path that the empty hand can follow: reach, path and its joints; or why not.
+        """Plan reach and path of the empty hand for the first feasible path, and return them with the joints; or the failures.
 
-        From home, or from where the arm is (``start_rad``). ``moved_to (4, 4)``: the path pushes the target there, and goes
-        where the target stood.
+        The motion starts at home, or at ``start_rad``. ``moved_to (4, 4)``: the path pushes the target there, through where
+        it stood.
         """
         pushed = problem
         if moved_to is not None:
@@ -169,9 +172,9 @@ class HeldPathPlanner:
         as_hulls: bool,
         longest_s: float,
     ) -> tuple[Motion, HeldPath, CubicSpline] | None:
-        """Plan carry and path anew from where the arm is and the pose in the hand that was measured; the first path that can.
+        """Replan carry and path for the measured pose in the hand from the current joints, with the first feasible path.
 
-        ``near_rad`` is where the path began before. None: there is no way.
+        ``near_rad`` is the previous start of the path. Returns None if no path is feasible.
         """
         world = self.parts.world_of(problem, problem.target.object_to_world, as_hulls=as_hulls)
         world.hold(gripper_to_object)
@@ -194,7 +197,7 @@ class HeldPathPlanner:
         *,
         as_hulls: bool,
     ) -> CubicSpline | None:
-        """Plan from where the arm is through all poses of a path, with the pose in the hand as measured; None: no way."""
+        """Plan from the current joints through all poses of a path for the measured pose in the hand; None if infeasible."""
         world = self.parts.world_of(problem, problem.target.object_to_world, as_hulls=as_hulls)
         world.hold(gripper_to_object)
         hands = path.poses @ gripper_to_object
@@ -203,7 +206,7 @@ class HeldPathPlanner:
         return joint_spline(knots) if isinstance(knots, np.ndarray) else None
 
     def timed(self, joints: CubicSpline, duration_s: float, phase: Phase, *, beyond: float = 1.0) -> Motion:
-        """Time a path over ``duration_s`` or as long as the joints' limits ask for, by ``path_timing.time_quintic``."""
+        """Time a path over ``duration_s``, or longer if the joint limits require it (``path_timing.time_quintic``)."""
         parts = self.parts
         positions, velocities = time_quintic(joints, parts.motions.limits, duration_s, parts.timestep_s, beyond)
         return Motion(phase, positions, velocities)
@@ -218,9 +221,9 @@ class HeldPathPlanner:
         rng: np.random.Generator,
         spare_m: float = 0.0,
     ) -> HeldPlan | PlanFailure | None:
-        """Plan one pose of a grasp with one path along which the hand is free, cheapest first; None: no spare room.
+        """Plan one pose of a grasp with one path along which the hand is free; None: there is no spare clearance.
 
-        Path, approach, lift, carry, reach.
+        Cheapest first: path, approach, lift, carry, reach.
         """
         parts = self.parts
         world.hold(gripper_to_object)
@@ -266,7 +269,7 @@ class HeldPathPlanner:
         return failure
 
     def _look_at_lift(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> PlanFailure | None:
-        """Return why the arm cannot grasp and lift by a pose of a grasp: cheap beside what an ``accepts`` asks."""
+        """Return why the arm cannot grasp and lift with a pose of a grasp, or None; cheap compared with ``accepts``."""
         parts, grasped = self.parts, world.problem.target.object_to_world @ gripper_to_object
         solutions, converged = parts.solutions.of(world.arm, Phase.APPROACH, grasped, parts.arm.home)
         failure: PlanFailure = "approach_blocked" if converged else "no_inverse_kinematics"
@@ -290,9 +293,10 @@ class HeldPathPlanner:
         *,
         level_only: bool = False,
     ) -> Motion | PlanFailure | None:
-        """Return the way to the path: within what the task allows, else little more tilted than the path begins, else any.
+        """Return the motion to the path: within the task's tilt limit, otherwise little more tilted than the path's start,
+        otherwise any.
 
-        None: it is to be ``level_only``, and there is only another way.
+        None: it must be ``level_only``, and only a tilted motion exists.
         """
         target, arm, free = world.problem.target, self.parts.arm, self.parts.motions.free
         upright = target.object_to_world[:3, :3]
@@ -307,7 +311,7 @@ class HeldPathPlanner:
         return free(world.arm, Phase.CARRY, start, end, rng)
 
     def _drawback(self, world: ProblemWorld, joints: CubicSpline, longest_s: float) -> PlanFailure | None:
-        """Return why a path is not taken that could be followed: too slow, or no room for the hand's way back from its end."""
+        """Return why a feasible path is rejected: too slow, or no room for the hand to retreat at its end; otherwise None."""
         if self._shortest_s(joints) > longest_s:
             return "path_slow"
         if not self._lets_go:

@@ -1,4 +1,4 @@
-"""Paths of joint positions: straight segments and their test, shortcuts and rounded corners."""
+"""Joint-space paths: straight segments and their collision test, shortcutting, corner rounding."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ SAME_RAD = 1e-4
 
 
 class JointPath(Protocol):
-    """Joint positions over [0, 1], or their first or second derivative, as scipy's splines give them."""
+    """Joint positions over [0, 1], or their first or second derivative, with the interface of scipy's splines."""
 
     def __call__(self, places: np.ndarray, nu: int = 0) -> np.ndarray:
-        """Return ``(..., n)`` for places ``(...)``."""
+        """Return ``(..., n)`` for parameters ``(...)``; ``nu`` is the order of the derivative."""
         ...
 
 
 class JointSegment:
-    """The straight line in joint space from one configuration to another."""
+    """Straight line in joint space between two configurations."""
 
     def __init__(self, start: np.ndarray, end: np.ndarray):
         """Take configurations ``(n,)``."""
         self.start, self.end = start, end
 
     def __call__(self, places: np.ndarray, nu: int = 0) -> np.ndarray:
-        """Return positions or derivatives at places."""
+        """Return positions or derivatives at parameters ``places``."""
         places, change = np.asarray(places, float)[..., None], self.end - self.start
         if nu == 0:
             return self.start + places * change
@@ -38,9 +38,9 @@ class JointSegment:
 
 
 def is_segment_free(start: np.ndarray, end: np.ndarray, is_free: Callable[[np.ndarray], bool], step_rad: float) -> bool:
-    """Tell whether even places no further apart than ``step_rad`` are free; ``start`` is taken to be.
+    """Tell whether uniform samples at most ``step_rad`` apart are free; ``start`` is assumed free.
 
-    The end goes first, then the middle, then the quarters: collisions are met early.
+    The end is tested first, then the middle, then the quarters, to detect collisions early.
     """
     way = end - start
     count = max(1, int(np.ceil(float(np.linalg.norm(way)) / step_rad)))
@@ -49,7 +49,7 @@ def is_segment_free(start: np.ndarray, end: np.ndarray, is_free: Callable[[np.nd
 
 @lru_cache(maxsize=4096)
 def bisection_places(count: int) -> tuple[float, ...]:
-    """Return 1 / count, ..., 1 in the order of coarse steps before fine ones."""
+    """Return 1 / count, ..., 1 in bisection order, coarse before fine."""
     return tuple(k / count for k in sorted(range(1, count + 1), key=lambda k: (k < count, -(k & -k), k)))
 
 
@@ -61,7 +61,7 @@ def shortcut(
     tries: int,
     check_step_rad: float,
 ) -> np.ndarray:
-    """Replace parts of a path ``(N, n)`` by straight lines between two random places of it, where these are free."""
+    """Shorten a path ``(N, n)`` by free straight segments between pairs of random points on it."""
     path = list(waypoints)
     for _ in range(tries):
         if len(path) < 3:
@@ -83,10 +83,10 @@ def shortcut(
 
 
 def round_corners(waypoints: np.ndarray, radius_rad: float) -> np.ndarray:
-    """Return the path resampled evenly, its corners rounded over about ``radius_rad`` to either side.
+    """Return the path resampled uniformly, with corners rounded over about ``radius_rad`` to either side.
 
-    Three passes of a moving average, mirrored through the ends so that these stay. A spline through corners that were cut at
-    uneven places nearly stalls when it is timed; through even ones it does not.
+    Three passes of a moving average, mirrored at the ends to keep them fixed. A spline through unevenly spaced points nearly
+    stalls when it is timed; through evenly spaced ones it does not.
     """
     lengths = path_lengths(waypoints)
     count = max(LEAST_PIECES, int(np.ceil(lengths[-1] / RESAMPLE_RAD)))
@@ -102,5 +102,5 @@ def round_corners(waypoints: np.ndarray, radius_rad: float) -> np.ndarray:
 
 
 def path_lengths(waypoints: np.ndarray) -> np.ndarray:
-    """Return the length of the path up to each waypoint."""
+    """Return the path length up to each waypoint, ``(N,)``."""
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(waypoints, axis=0), axis=1))])

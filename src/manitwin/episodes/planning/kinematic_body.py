@@ -1,4 +1,4 @@
-"""A robot's arm, or its hand alone, as pinocchio and coal take it."""
+"""Kinematic and collision models of a robot's arm, or of its hand alone, for pinocchio and coal."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ TURN_RAD = 2 * np.pi
 
 @dataclass(frozen=True)
 class KinematicBody:
-    """A model, its convex collision shapes with the pairs to be tested, and the joint that the gripper is fixed to.
+    """A pinocchio model, its convex collision shapes with the pairs to test, and the joint that carries the gripper.
 
-    ``gripper_to_joint`` is the pose of the twin's grasp frame in the frame of ``joint``. ``touching`` are the shapes that
-    may touch the target when they hold it, ``fingers`` those of them that are the fingers; ``pressed`` are a cup's lip, which is
-    pressed on the target at the end of the approach. ``links`` names the link of each shape. ``sweeps`` are shapes of their
-    own: all that each jaw goes through between closed and open, for while something is held, and for when it is let go.
+    ``gripper_to_joint`` is the pose of the grasp frame in the frame of ``joint``. Sets of shape indices: ``touching`` may
+    touch the target while holding it, ``fingers`` are those of them on the fingers, ``pressed`` is a cup's lip, which presses
+    on the target at the end of the approach, and ``sweeps`` are additional shapes for the volume that each jaw sweeps between
+    closed and open, tested while an object is held and when it is released. ``links`` names the link of each shape.
     """
 
     model: Any
@@ -40,7 +40,7 @@ class KinematicBody:
 
 
 def arm_of(robot: Robot, opening_m: float | None = None) -> KinematicBody:
-    """Build the arm with its fingers open, or as wide as said; joints are ``robot.arm_joints`` in their order."""
+    """Build the arm with its hand open, or at ``opening_m``; joints are ``robot.arm_joints`` in their order."""
     hand = robot.open_hand if opening_m is None else _jaws_at(robot, opening_m)
     model, shapes = _model_of(robot, hand)
     geometry = pin.GeometryModel()
@@ -77,7 +77,10 @@ def arm_of(robot: Robot, opening_m: float | None = None) -> KinematicBody:
 
 
 def floating_hand_of(arm: KinematicBody) -> KinematicBody:
-    """Return what moves with the gripper as a body of its own; its configuration is the grasp frame's pose, quaternion xyzw."""
+    """Return everything that moves with the gripper as a free-flying body.
+
+    Its configuration is the grasp frame's pose, position and quaternion xyzw.
+    """
     model = pin.Model()
     joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "gripper")
     geometry, kept = pin.GeometryModel(), list[int]()
@@ -97,7 +100,7 @@ def floating_hand_of(arm: KinematicBody) -> KinematicBody:
 
 
 def broad_phase(model: Any, geometry: Any, data: Any) -> Any:
-    """Return coal's sweep and prune over the shapes: with a few dozen of them, the fastest of its managers."""
+    """Return coal's sweep-and-prune manager, the fastest of its managers for a few dozen shapes."""
     return pin.BroadPhaseManager_SSaPCollisionManager(model, geometry, data)
 
 
@@ -106,7 +109,7 @@ def _jaws_at(robot: Robot, opening_m: float) -> np.ndarray:
 
 
 def _model_of(robot: Robot, hand: np.ndarray) -> tuple[Any, list[Any]]:
-    """Return the arm's model with its hand's joints held at ``hand``, and its convex shapes."""
+    """Return the arm's model with the hand's joints locked at ``hand``, and its convex shapes."""
     urdf = _without_continuous_joints(robot.urdf)
     model = pin.buildModelFromXML(urdf)
     geometry = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION, None, [])
@@ -119,7 +122,7 @@ def _model_of(robot: Robot, hand: np.ndarray) -> tuple[Any, list[Any]]:
 
 
 def _without_continuous_joints(urdf: str) -> str:
-    """Give joints without limits one turn to either side, so that each has one coordinate."""
+    """Give joints without limits one revolution to either side, so that each has one coordinate."""
     tree = UrdfTree.of_text(urdf)
     for joint in tree.joints.values():
         if joint.get("type") == "continuous":
@@ -133,7 +136,7 @@ def _without_continuous_joints(urdf: str) -> str:
 
 
 def _convex_shapes(geometry: Any, model: Any, finger_links: tuple[str, ...]) -> list[Any]:
-    """Return the shapes with their meshes' hulls, and each finger as the one hull of its pieces."""
+    """Return the shapes, with meshes replaced by their convex hulls and each finger by the convex hull of its parts."""
     shapes: list[Any] = []
     fingers: dict[str, list[Any]] = {link: [] for link in finger_links}
     for shape in geometry.geometryObjects:

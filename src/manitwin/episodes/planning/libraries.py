@@ -1,4 +1,4 @@
-"""The libraries that planning stands on, imported in one place: pinocchio's kinematics, coal's collisions, toppra's timing."""
+"""Third-party libraries for planning, imported in one place: pinocchio (kinematics), coal (collision), toppra (timing)."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ __all__ = ["coal", "eigenpy", "pin", "toppra_library"]
 
 @cache
 def toppra_library() -> Any:
-    """Import toppra when it is first needed (it takes a second); raises Unavailable where it is not installed."""
+    """Import toppra on first use (it takes a second); raises Unavailable if it is not installed."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # its docstrings have escapes that newer Pythons warn of
+            warnings.simplefilter("ignore")  # its docstrings contain invalid escape sequences
             import toppra
             import toppra.algorithm
             import toppra.constraint
     except ImportError as error:
         raise Unavailable(f"planning needs toppra ({error}): {import_remedy(error, REMEDY)}") from error
-    logging.getLogger("toppra").setLevel(logging.ERROR)  # tells of every path that cannot be timed
+    logging.getLogger("toppra").setLevel(logging.ERROR)  # it logs every path that cannot be timed
     return toppra

@@ -1,4 +1,4 @@
-"""Motions of one kind each: the gripper on a straight line, or the arm from one configuration to another around things."""
+"""Single motions: the gripper along a straight line, or the arm between two configurations around obstacles."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Motions:
     def line(
         self, world: CollisionWorld, phase: Phase, start: np.ndarray, end_to_world: np.ndarray
     ) -> CubicSpline | None:
-        """Return the path of a straight line of the gripper that is free in a phase, or None."""
+        """Return the joint path of a straight line of the gripper that is free in a phase, or None."""
         path = straight_line(self._arm, start, end_to_world)
         if path is None:
             return None
@@ -44,7 +44,7 @@ class Motions:
         return path if is_path_free(world, path, int(np.ceil(steps))) else None
 
     def timed(self, phase: Phase, path: JointPath, *, backwards: bool = False) -> Motion:
-        """Time a path from rest to rest, from its end to its start where it was found ``backwards``."""
+        """Time a path from rest to rest; reversed in time if it was planned ``backwards``."""
         positions, velocities = time_rest_to_rest(
             path, self._velocity_limits, self._acceleration_limits, self._timestep_s
         )
@@ -55,7 +55,7 @@ class Motions:
     def free(
         self, world: FreeSpace, phase: Phase, start: np.ndarray, goal: np.ndarray, rng: np.random.Generator
     ) -> Motion | PlanFailure:
-        """Return a motion around things with the largest margin that start and goal allow, or why there is none."""
+        """Return a collision-free motion with the largest margin that start and goal allow, or the failure."""
         margin_m = self._largest_margin_m(world, phase, start, goal)
         if margin_m is None:
             return "no_path"
@@ -93,7 +93,9 @@ class Motions:
         return None
 
     def _smooth(self, world: FreeSpace, phase: Phase, waypoints: np.ndarray) -> Motion | None:
-        """Return the motion with the widest corners that is free, stopping at the waypoints where none is."""
+        """Return the motion with the largest corner radius that is free, or one that stops at the waypoints; None if none is
+        free.
+        """
         step_rad = self._settings.check_step_rad
         for radius_rad in CORNER_RADII_RAD if len(waypoints) > 2 else ():
             timed = time_optimal(
@@ -112,7 +114,7 @@ class Motions:
 
 
 def _is_free(world: FreeSpace, positions: np.ndarray, step_rad: float) -> bool:
-    """Tell whether a sampled motion ``(T, n)`` is free, looked at every ``step_rad`` of its way."""
+    """Tell whether a sampled motion ``(T, n)`` is free, checked every ``step_rad`` of its length."""
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))])
     looked_at = np.unique(np.searchsorted(way, np.arange(0, way[-1] + step_rad, step_rad)).clip(max=len(way) - 1))
     return all(world.is_free(position) for position in positions[looked_at])

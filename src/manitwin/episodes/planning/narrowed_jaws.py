@@ -1,4 +1,4 @@
-"""Jaws that are opened no wider than a grasp needs, where fully open ones have no room beside what stands near."""
+"""Grasps with partially opened jaws, for places where fully open jaws have no room beside obstacles."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from manitwin.episodes.planning.problem import Grasp
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.robots.grippers.parallel import ParallelGripper
 
-SPARE_M = 0.016  # between the pads and what they hold, both sides together
-STEP_M = 0.02  # openings are multiples: each has a model of the arm of its own
+SPARE_M = 0.016  # additional opening over the object's width, both sides together
+STEP_M = 0.02  # openings are multiples of this, because each needs its own arm model
 
 
 def narrowed(grasps: Sequence[Grasp], gripper: Gripper) -> list[tuple[Grasp, ...]]:
-    """Return grasps by the opening that they need, the narrowest first, each in their order; of other grippers than jaws none.
+    """Group grasps by the opening that they need, narrowest first, in their order; empty unless the gripper has jaws.
 
-    Left out are those that need the jaws as wide as they open, less one step.
+    Grasps that need more than the full opening less one step are omitted.
     """
     if not isinstance(gripper, ParallelGripper):
         return []

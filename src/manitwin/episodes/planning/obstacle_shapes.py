@@ -1,4 +1,4 @@
-"""The obstacles of one problem as convex shapes: which of them are merged, and which bear the target."""
+"""Obstacles of a problem as convex shapes: which hulls are merged, and which shapes support the target."""
 
 from __future__ import annotations
 
@@ -12,17 +12,18 @@ from manitwin.episodes.planning.libraries import coal, pin
 from manitwin.episodes.planning.problem import PickPlaceProblem
 from manitwin.geometry.rigid_body import stands_for_a_plane
 
-BEARING_GAP_M = 0.003  # what is no further than this, and overlaps by no more, bears the target: they touch on purpose
-SINK_M = 0.002  # by how much deeper than it stands the target may go while it is lifted off or set down
-PLANE_M = 3.0  # half of the box that stands for the plane: beside a table an arm meets it as well
-HAND_REACH_M = 0.06  # what is nearer to the target than this comes between hand and target
+# shapes within this distance, or overlapping by at most this, support the target: their contact is intended
+BEARING_GAP_M = 0.003
+SINK_M = 0.002  # additional depth allowed while the target is lifted off or put down
+PLANE_M = 3.0  # half size of the box that represents the plane: beside a table, an arm meets the plane as well
+HAND_REACH_M = 0.06  # obstacles closer to the target than this can be between hand and target
 
 
 @dataclass(frozen=True)
 class StaticShape:
-    """A shape that does not move, with the clearance (m) that the held target keeps at its start and at its goal.
+    """Static shape, with the clearance (m) that the held target keeps from it at its start and at its goal.
 
-    ``start_allowance_m`` is negative where the shape bears the target: so deep may it go. None: what the phase asks for.
+    The allowances are negative if the shape supports the target: the permitted depth. None: the phase's default clearance.
     """
 
     name: str
@@ -34,7 +35,7 @@ class StaticShape:
 
 @dataclass(frozen=True)
 class ObstacleShapes:
-    """The shapes of a problem: static ones; the target's own hulls, its common hull, and the shapes that it is carried as."""
+    """Shapes of a problem: static ones; the target's hulls, its convex hull, and the shapes used while it is carried."""
 
     statics: tuple[StaticShape, ...]
     target_hulls: tuple[Any, ...]
@@ -52,10 +53,11 @@ def obstacle_shapes(
     *,
     as_hulls: bool = False,
 ) -> ObstacleShapes:
-    """Stand each object as one hull where nothing is lost by it, else as its own hulls; likewise what is carried.
+    """Represent each obstacle by its convex hull if that loses no free space, otherwise by its own hulls; likewise the
+    carried target.
 
-    Nothing is lost where the one hull stays ``margin_m`` away from the target at start and goal, and is as good as solid
-    or out of the hand's way. ``as_hulls``: the target is carried as its hulls whatever is around.
+    No free space is lost if the convex hull keeps ``margin_m`` from the target at start and goal, and is either nearly solid
+    or out of the hand's way. ``as_hulls``: the target is carried as its hulls in any case.
     """
     target = store(problem.target.body)
     start, goal = pose_of(problem.target.object_to_world), pose_of(goal_object_to_world)
@@ -87,12 +89,12 @@ def obstacle_shapes(
 
 
 def pose_of(matrix: np.ndarray) -> Any:
-    """Return a pose ``(4, 4)`` as pinocchio's."""
+    """Return a pose ``(4, 4)`` as pinocchio's SE3."""
     return pin.SE3(np.ascontiguousarray(matrix, float))
 
 
 def signed_distance_m(first: Any, first_pose: Any, second: Any, second_pose: Any) -> float:
-    """Return how far two convex shapes are apart; negative is how deep they overlap."""
+    """Return the distance of two convex shapes; negative for the penetration depth."""
     return float(
         coal.distance(
             first,
@@ -110,7 +112,7 @@ def _transform(pose: Any) -> Any:
 
 
 def _gap_m(obstacle: ConvexBody, pose: Any, target: ConvexBody, target_pose: Any) -> float:
-    """Return the distance of the common hulls, or a lower bound of it that is larger than any that matters."""
+    """Return the distance of the convex hulls, or a lower bound if that exceeds ``HAND_REACH_M``."""
     bound = float(np.linalg.norm(pose.translation - target_pose.translation)) - obstacle.radius_m - target.radius_m
     if bound > HAND_REACH_M:
         return bound

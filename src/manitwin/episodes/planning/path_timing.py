@@ -1,4 +1,4 @@
-"""Timing of paths that are followed for their own sake: a quintic from rest to rest, or one that is fastest at the end."""
+"""Time parameterisation of task paths: a quintic profile from rest to rest, or truncated near its peak speed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 
 from manitwin.episodes.planning.joint_paths import JointPath, path_lengths
 
-STRETCHED = 1.02  # longer by this than the limits ask for
+STRETCHED = 1.02  # safety factor when the limits require a longer duration
 
 
 def time_quintic(
@@ -17,10 +17,11 @@ def time_quintic(
     timestep_s: float,
     beyond: float = 1.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions and velocities ``(T, n)`` at every timestep: 10 u^3 - 15 u^4 + 6 u^5 over the path's parameter.
+    """Return positions and velocities ``(T, n)`` at every time step, with 10 u^3 - 15 u^4 + 6 u^5 over the path's parameter.
 
-    It lasts ``duration_s``, longer where ``limits`` (rad/s, rad/s2) ask for it. With ``beyond`` > 1 the profile is that of a
-    path so many times as long, straight on beyond its end, and is cut off where the path ends: it is then about fastest.
+    The duration is ``duration_s``, or longer if ``limits`` (rad/s, rad/s^2) require it. With ``beyond`` > 1 the profile
+    covers a path that is longer by this factor, extended straight beyond its end, and is truncated at the path's end, where
+    it is then about fastest.
     """
     velocity_limits, acceleration_limits = limits
     while True:
@@ -42,6 +43,6 @@ def time_quintic(
 
 
 def joint_spline(knots: np.ndarray) -> CubicSpline:
-    """Return the path through knots ``(K, n)`` over [0, 1] by chord length: by number it would stall and rush."""
+    """Return the spline through knots ``(K, n)`` over [0, 1], parameterised by chord length to avoid uneven speed."""
     lengths = path_lengths(knots) + 1e-6 * np.arange(len(knots))
     return CubicSpline(lengths / lengths[-1], knots)

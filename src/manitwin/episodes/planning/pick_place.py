@@ -1,4 +1,4 @@
-"""The pick-and-place planner: for each grasp in turn, backwards from the grasp, then on to the placement."""
+"""Pick-and-place planner: tries each grasp in turn, planning backwards from the grasp, then on to the placement."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ HAND_IN_THE_WAY = frozenset[PlanFailure](("approach_blocked", "lift_blocked", "l
 
 
 class PickPlacePlanner:
-    """Plans for one robot; deterministic for a problem's seed, with work counted and never timed."""
+    """Plans pick-and-place for one robot; deterministic for a problem's seed, with effort limited by counts instead of time."""
 
     def __init__(
         self,
@@ -41,9 +41,9 @@ class PickPlacePlanner:
         standing: tuple[PlacedObject, ...] = (),
         opening_m: float | None = None,
     ):
-        """Build the models of arm and hand; ``standing`` are obstacles of every problem: another arm that does not move.
+        """Build the models of arm and hand; ``standing`` are obstacles of every problem, such as another, stationary arm.
 
-        ``opening_m`` is how far jaws are apart when they hold nothing; None: as far as they open.
+        ``opening_m`` is the opening of empty jaws; None: fully open.
         """
         self.parts = parts = ArmPlanning(robot, timestep_s, settings, opening_m, standing)
         self._standing, self._opening_m = standing, opening_m
@@ -55,15 +55,15 @@ class PickPlacePlanner:
 
     @cached_property
     def closed(self) -> ArmPlanning:
-        """The same arm with a closed hand, which presses and pushes."""
+        """Planning models of the same arm with a closed hand, for pressing and pushing."""
         return ArmPlanning(self.robot, self.parts.timestep_s, self.settings, opening_m=0.0, standing=self._standing)
 
     def tip_pose(self, joint_positions_rad: np.ndarray) -> np.ndarray:
-        """Return the twin's grasp frame in the world ``(4, 4)`` (+Z approach, X closing)."""
+        """Return the grasp frame in the world ``(4, 4)`` (+Z approach, X closing)."""
         return self.arm.gripper_pose(np.asarray(joint_positions_rad, float))
 
     def of(self, grasp: Grasp | None) -> PickPlacePlanner:
-        """Return the planner of a hand whose jaws are as far apart as they are for a grasp."""
+        """Return the planner whose jaws have the opening of a grasp."""
         opening_m = None if grasp is None else grasp.opening_m
         if opening_m == self._opening_m or opening_m is None:
             return self
@@ -74,11 +74,11 @@ class PickPlacePlanner:
         return self._narrowed[opening_m]
 
     def plan(self, problem: PickPlaceProblem) -> PlanReport:
-        """Plan with the first grasp that can be, itself or turned about the approach axis (``grasp_candidates.turns_of``).
+        """Plan with the first feasible grasp, as given or rotated about the approach axis (``grasp_candidates.turns_of``).
 
-        At most ``settings.max_grasps`` are tried beyond a look at the hand alone. What a grasp fails of is the latest stage
-        that it came to. Where none can be planned that way and the hand was in the way of some, jaws are opened no wider than
-        each grasp needs (``narrowed_jaws``). What is to be carried level is planned so with any grasp first.
+        At most ``settings.max_grasps`` are tried beyond the check of the hand alone. The failure of a grasp is the latest
+        stage that it reached. If no grasp is feasible and the hand collided for some, jaws are opened only as far as each
+        grasp needs (``narrowed_jaws``). If the target should be carried level, level plans for all grasps are tried first.
         """
         report = self._plan_as_open(problem)
         if report.plan is None and report.failures.keys() & HAND_IN_THE_WAY:
@@ -121,12 +121,12 @@ class PickPlacePlanner:
         goal_object_to_world: np.ndarray,
         with_carry: bool,
     ) -> Placement | None:
-        """Plan the placement anew from where the arm is, and from the pose in the hand ``(4, 4)`` that was measured.
+        """Replan the placement from the current joints, for the measured pose in the hand ``(4, 4)``.
 
-        With ``with_carry`` the arm is somewhere above the start, and (carry, lower, retreat) are returned; without, it is
-        above the goal, and lowers from there on a straight line: (None, lower, retreat). Where the hand has no room to make
-        up for all that the object has turned since ``plan`` grasped it, it is let go a little higher or with some tilt.
-        None: there is no way.
+        With ``with_carry`` the arm is above the start, and (carry, lower, retreat) are returned. Otherwise it is above the
+        goal and lowers from there on a straight line: (None, lower, retreat). If the hand has no room to correct the object's
+        rotation since ``plan`` grasped it, the object is released slightly higher or tilted. Returns None if there is no
+        plan.
         """
         fitting = self.of(plan.grasp)
         if fitting is not self:
@@ -150,7 +150,7 @@ class PickPlacePlanner:
         return None
 
     def plan_way_home(self, problem: PickPlaceProblem, joints_rad: np.ndarray) -> Motion | None:
-        """Plan the way of the open hand, which has let go of everything, to where every plan begins; None: there is none."""
+        """Plan the motion of the empty open hand to the home configuration; None if there is none."""
         world, rng = self._world_of(problem, problem.goal_object_to_world), np.random.default_rng((problem.seed, 5))
         found = self._motions.free(world.arm, Phase.REACH, joints_rad, self.arm.home, rng)
         return replace(found, phase=Phase.RETURN) if isinstance(found, Motion) else None
@@ -160,7 +160,7 @@ class PickPlacePlanner:
         return sum(self.reached(problem)) / max(1, len(problem.grasps))
 
     def reached(self, problem: PickPlaceProblem) -> list[bool]:
-        """Tell of each grasp whether the arm can be there free of collisions, and come on a straight line, in any turn."""
+        """Tell for each grasp whether it has a collision-free inverse kinematics and a straight approach, in any turn."""
         world = self._world_of(problem, problem.goal_object_to_world)
         return [self._can_be_reached(world, grasp) for grasp in problem.grasps]
 
@@ -204,7 +204,7 @@ class PickPlacePlanner:
         rng: np.random.Generator,
         level_only: bool,
     ) -> PickPlacePlan | PlanFailure:
-        """Plan with the arm at one solution of the grasp."""
+        """Plan with the arm at one inverse kinematics solution of the grasp."""
         gripper_to_world = self.arm.gripper_pose(at_grasp)
         approach = self._motions.line(world.arm, Phase.APPROACH, at_grasp, self._ends.before(gripper_to_world))
         if approach is None:

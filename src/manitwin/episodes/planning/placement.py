@@ -1,4 +1,4 @@
-"""Putting down what is in the hand: where to let go of it, and how to carry, lower, let go and retreat."""
+"""Placement planning: where to release a held object, and the motions carry, lower and retreat."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from manitwin.geometry.poses import transform, transform_points
 from manitwin.geometry.rigid_body import RigidBody
 
 Placement = tuple[Motion | None, Motion, Motion]
-"""Carry (None where the arm is above the goal already), lower and retreat."""
+"""Carry (None if the arm is above the goal already), lower and retreat."""
 
-DROP_M = 0.003  # so much higher an object may be let go
+DROP_M = 0.003  # additional release height
 SWAYS_RAD = np.radians(5)
-"""Beyond a tilt at the start: an arm's joints do not turn what it holds back on the straightest way."""
-SHARES = (0.5, 0.0)  # of the turn that are made up for, where all of it cannot be
+"""Additional tilt beyond that at the start, because a straight joint-space motion does not reduce the tilt monotonically."""
+SHARES = (0.5, 0.0)  # shares of the rotation that are corrected if the full correction is infeasible
 
 
 class PlacementPlanner:
-    """Plans a placement backwards: first where the object is let go, then the way there."""
+    """Plans a placement backwards: the release first, then the motion there."""
 
     def __init__(self, arm: ArmKinematics, solutions: ArmSolutions, motions: Motions, ends: LineEnds):
-        """Take what plans single motions."""
+        """Take the planners of single motions."""
         self._arm, self._solutions, self._motions, self._ends = arm, solutions, motions, ends
 
     def plan(
@@ -42,9 +42,9 @@ class PlacementPlanner:
         *,
         level_only: bool = False,
     ) -> Placement | PlanFailure:
-        """Plan from a configuration to where the gripper lets go of what it holds; or tell the latest stage that failed.
+        """Plan from a configuration to the gripper pose at release; or return the latest stage that failed.
 
-        What is to be carried level is so where there is a way, and with ``level_only`` in any case.
+        A target to be kept level is carried level if possible, with ``level_only`` in any case.
         """
         solutions, converged = self._solutions.of(world.arm, Phase.LOWER, gripper_to_world, start)
         failure: PlanFailure = "lower_blocked" if converged else "place_unreachable"
@@ -59,9 +59,9 @@ class PlacementPlanner:
     def _spaces(
         self, world: ProblemWorld, start: np.ndarray, gripper_to_world: np.ndarray, *, level_only: bool
     ) -> Sequence[FreeSpace]:
-        """Return where to look for the way: first where what is to be carried level is level, in two searches.
+        """Return the free spaces to search in order: for a target to be kept level, the tilt-constrained space twice.
 
-        What is tilted at the start already, as after it was used, is tilted no farther.
+        A target that is already tilted at the start, as after use, may keep that tilt.
         """
         if not goes_level(world.problem, world.goal_object_to_world):
             return (world.arm,)
@@ -73,7 +73,7 @@ class PlacementPlanner:
     def plan_from_above(
         self, world: ProblemWorld, start: np.ndarray, gripper_to_world: np.ndarray
     ) -> Placement | PlanFailure:
-        """Lower on the straight line from where the arm is."""
+        """Plan lowering on a straight line from the current joints, and the retreat."""
         lower = self._motions.line(world.arm, Phase.LOWER, start, gripper_to_world)
         if lower is None:
             return "lower_blocked"
@@ -107,7 +107,7 @@ class PlacementPlanner:
 
 
 def goes_level(problem: PickPlaceProblem, goal_object_to_world: np.ndarray) -> bool:
-    """Tell whether a problem's target is to be carried level to a goal ``(4, 4)``: it is at it as upright as it stands."""
+    """Tell whether a problem's target should be carried level to a goal ``(4, 4)``, where it is as upright as at its start."""
     level, goal = problem.target.object_to_world[:3, :3], goal_object_to_world[None, :3, :3]
     return problem.target.name in problem.level and bool(tilts_rad(goal, level)[0] <= UPRIGHT_RAD)
 
@@ -115,10 +115,10 @@ def goes_level(problem: PickPlaceProblem, goal_object_to_world: np.ndarray) -> b
 def goals_after_slip(
     body: RigidBody, goal_object_to_world: np.ndarray, planned: np.ndarray, measured: np.ndarray
 ) -> list[np.ndarray]:
-    """Return goal poses of the object ``(4, 4)``, the best first: as asked, a little higher, half upright, as it hangs.
+    """Return goal poses of the object ``(4, 4)``, best first: exact, slightly higher, half corrected, and without correction.
 
-    ``planned`` and ``measured`` are gripper_to_object. An object that is let go with some tilt is as low as the goal, its
-    centre of mass above the same place: it tips the rest of the way by itself.
+    ``planned`` and ``measured`` are gripper_to_object. An object released with some tilt is as low as the goal, with its
+    centre of mass above the same point, and settles by itself.
     """
     higher = goal_object_to_world.copy()
     higher[2, 3] += DROP_M
@@ -132,7 +132,7 @@ def goals_after_slip(
 
 
 def _as_low(body: RigidBody, goal_object_to_world: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-    """Return a pose of a rotation whose lowest point and whose centre of mass's place are those of the goal."""
+    """Return the pose of a rotation with the goal's lowest height and the goal's horizontal position of the centre of mass."""
     points = np.concatenate(body.hulls)
     lowest_m = transform_points(goal_object_to_world, points)[:, 2].min()
     center = transform_points(goal_object_to_world, body.center_of_mass_m[None])[0]

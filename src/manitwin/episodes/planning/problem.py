@@ -1,4 +1,4 @@
-"""The planner's input and output: a problem, its settings, a plan with its motions, and why there is none."""
+"""Input and output of the planner: problem, settings, plan with its motions, and failure reasons."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ PlanFailure = Literal[
 
 
 class Phase(IntEnum):
-    """The phase of an episode; the numbers are part of the recorded format.
+    """Phase of an episode; the numbers are part of the recorded format.
 
-    ACT is what a skill does with what it holds (or with the closed hand), HOLD is to stay there, RETURN the way back.
+    ACT is the skill's own motion with the held object (or the closed hand), HOLD is waiting, RETURN is the way back.
     """
 
     REACH = 0
@@ -40,10 +40,10 @@ class Phase(IntEnum):
 
 @dataclass(frozen=True)
 class Grasp:
-    """A grasp as the planner takes it: ``gripper_to_object (4, 4)`` in the twin's grasp frame, and the width between the pads.
+    """A grasp for planning: ``gripper_to_object (4, 4)`` in the grasp frame, and the width between the pads.
 
-    ``joints_rad (2, J)`` are a hand's joints before closing and those to close to; None: it has none of its own.
-    ``opening_m`` is how far jaws are apart before they close and once they let go; None: as far as they open.
+    ``joints_rad (2, J)`` are a multi-finger hand's joints before closing and the closing goal; None for other hands.
+    ``opening_m`` is the opening of jaws before closing and after release; None: fully open.
     """
 
     grasp_id: str
@@ -55,11 +55,11 @@ class Grasp:
 
 @dataclass(frozen=True)
 class PickPlaceProblem:
-    """Move ``target`` to ``goal_object_to_world``, upright as it stands, with the first of ``grasps`` that can be planned.
+    """Move ``target`` to ``goal_object_to_world`` with the first feasible of ``grasps``.
 
-    ``static_boxes`` are the furniture, ``fixtures`` the boxes that a skill works with; nothing of either moves.
-    ``entered`` are the names of obstacles that what is held goes into, ``level`` those of objects that are carried
-    level where that can be planned (``kept_level``).
+    ``static_boxes`` are the furniture, ``fixtures`` the boxes that a skill interacts with; both are static. ``entered`` are
+    the names of obstacles that the held object enters, ``level`` those of objects to be carried level if possible
+    (``kept_level``).
     """
 
     target: PlacedObject
@@ -75,7 +75,7 @@ class PickPlaceProblem:
 
 @dataclass(frozen=True)
 class Motion:
-    """Joint positions and velocities ``(T, n)`` at the simulation's timestep, from rest to rest."""
+    """Joint positions and velocities ``(T, n)`` at the simulation's time step, from rest to rest."""
 
     phase: Phase
     positions_rad: np.ndarray
@@ -83,24 +83,24 @@ class Motion:
 
 
 class Grasped(Protocol):
-    """The protocol of a plan that says how it holds the target."""
+    """Interface of a plan that states how it holds the target."""
 
     @property
     def grasp(self) -> Grasp:
-        """The candidate that it is of."""
+        """The grasp that it uses."""
         ...
 
     @property
     def gripper_to_object(self) -> np.ndarray:
-        """The grasp's pose ``(4, 4)`` that is used."""
+        """The pose ``(4, 4)`` of the grasp as used."""
         ...
 
 
 @dataclass(frozen=True)
 class PickPlacePlan:
-    """One grasp's motions: reach, approach, (close), lift, carry, lower, (open), retreat.
+    """Motions of one grasp: reach, approach, (close), lift, carry, lower, (open), retreat.
 
-    ``gripper_to_object`` is the grasp that is used: a candidate, or the same turned by 180 degrees about the approach axis.
+    ``gripper_to_object`` is the pose as used: that of ``grasp``, or an equivalent rotation of it about the approach axis.
     """
 
     grasp: Grasp
@@ -115,7 +115,7 @@ class PickPlacePlan:
 
 @dataclass
 class PlanReport:
-    """A plan or none, with what the candidates that were tried failed of, and what it took."""
+    """A plan or None, the number of grasps tried, and the failures of those that were infeasible."""
 
     plan: PickPlacePlan | None
     tried: int
@@ -123,17 +123,17 @@ class PlanReport:
 
 
 def later(first: PlanFailure, second: PlanFailure) -> PlanFailure:
-    """Return the failure that came later on the way to a plan: the more telling one of two attempts."""
+    """Return the failure that occurs later in planning, which is the more informative of two."""
     return max(first, second, key=get_args(PlanFailure).index)
 
 
 @dataclass(frozen=True)
 class PlannerSettings:
-    """Lengths in metres, work in counts: no clock decides what is found.
+    """Planner settings: lengths in metres, effort in counts, so that results do not depend on time.
 
-    ``margin_m`` is kept in free motion, and lowered step by step to ``clearance_m`` where start or goal are nearer;
-    ``clearance_m`` is kept on straight lines. Defaults: 10 mm of margin, so that no thin part passes between two
-    checks of a path (every 0.02 rad); 10 cm approach, 12 cm lift.
+    ``margin_m`` is kept in free motion, and reduced in steps down to ``clearance_m`` if start or goal are closer;
+    ``clearance_m`` is kept on straight lines. Defaults: 10 mm of margin, so that no thin part passes between two checks of a
+    path (every 0.02 rad); 10 cm approach, 12 cm lift.
     """
 
     approach_m: float = 0.10

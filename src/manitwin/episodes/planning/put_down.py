@@ -1,4 +1,4 @@
-"""Putting down what a second arm was handed: places on the table before it, and the way to one of them."""
+"""Placement after a handover: places on the table in front of the second arm, and the motion to one of them."""
 
 from __future__ import annotations
 
@@ -18,28 +18,32 @@ from manitwin.geometry.rigid_body import PlacedObject, StaticBox
 from manitwin.robots.robot import Workspace
 
 PLACES, DRAWS = 32, 400
-MOST_PLANNED = 4  # places that are planned for with one grasp, beyond a look at the hand
-TABLE_M = 0.001  # from z = 0, where a robot's table has its top
+MOST_PLANNED = 4  # places planned with one grasp, beyond the check of the hand alone
+TABLE_M = 0.001  # tolerance of a table top at z = 0
 
 
 @dataclass(frozen=True)
 class Held:
-    """A grasp of the hand that puts down, as it is used: ``gripper_to_object (4, 4)``."""
+    """A grasp of the hand that puts the target down, with its pose as used, ``gripper_to_object (4, 4)``."""
 
     grasp: Grasp
     gripper_to_object: np.ndarray
 
 
 class PutDown:
-    """Goals of one problem for one arm, and which of them a grasp can be let go at; deterministic for the problem's seed."""
+    """Goals of one problem for one arm, and the choice among them for a grasp; deterministic for the problem's seed."""
 
     def __init__(self, arm: PickPlacePlanner, problem: PickPlaceProblem, goals: Sequence[np.ndarray]):
-        """Take poses ``(4, 4)`` of the target at rest, best first; the other arm is an obstacle of ``problem``, at home."""
+        """Take resting poses ``(4, 4)`` of the target, best first; ``problem`` contains the other arm, at home, as an
+        obstacle.
+        """
         self._arm, self._problem, self._goals = arm, problem, tuple(goals)
         self._found: dict[tuple[str, bytes], np.ndarray | None] = {}
 
     def goal_of(self, held: Held) -> np.ndarray | None:
-        """Return the first goal ``(4, 4)`` at which a grasp can put the target down, the arm coming from home; None: no goal."""
+        """Return the first goal ``(4, 4)`` at which a grasp can put the target down, starting from home; None if there is
+        none.
+        """
         key = held.grasp.grasp_id, held.gripper_to_object.tobytes()
         if key not in self._found:
             home = self._arm.arm.home
@@ -55,9 +59,9 @@ class PutDown:
         gripper_to_object: np.ndarray,
         most: int = MOST_PLANNED,
     ) -> tuple[np.ndarray, Placement] | None:
-        """Plan from where the arm is, with the pose in the hand ``(4, 4)`` that was measured: the goal and the way to it.
+        """Plan from the current joints for the measured pose in the hand ``(4, 4)``; return the goal and the motions.
 
-        None: there is none to the first ``most`` places where the hand alone has room.
+        Returns None if none of the first ``most`` goals with room for the hand alone is feasible.
         """
         for goal in islice(self._with_room(problem, held, gripper_to_object), most):
             found = self._arm.plan_place(problem, held, joints_rad, gripper_to_object, goal, True)
@@ -66,9 +70,9 @@ class PutDown:
         return None
 
     def _with_room(self, problem: PickPlaceProblem, held: Held, gripper_to_object: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield the goals at which the hand alone is free: where it lets go, above it, and after it has drawn back.
+        """Yield the goals at which the hand alone is free at release, above it, and after its retreat.
 
-        Of what has turned in the hand: where it lets go as it may then (``goals_after_slip``).
+        For a target that has turned in the hand, the release poses are those of ``goals_after_slip``.
         """
         parts, body = self._arm.parts, problem.target.body
         for goal in self._goals:
@@ -95,10 +99,11 @@ def put_down_poses(
     release_height_m: float,
     rng: np.random.Generator,
 ) -> tuple[np.ndarray, ...]:
-    """Draw poses of a target on the table, in the sector before an arm's base, in the ways that it lies or stands.
+    """Sample poses of a target on the table, in the workspace in front of an arm's base, in given resting orientations.
 
-    ``at_rest`` are poses ``(4, 4)`` in which it stays, wherever; turned about the vertical at random, those first come first.
-    Each is clear of what stands there, and ``release_height_m`` above the table. None where no table has its top at z = 0.
+    ``at_rest`` are stable poses ``(4, 4)`` anywhere; poses are rotated randomly about the vertical, and sorted by the order
+    of ``at_rest``. Each is clear of obstacles and ``release_height_m`` above the table. Empty if no table has its top at z =
+    0.
     """
     tables = [box for box in boxes if box.box_to_world[2, 2] > 1 - 1e-9 and abs(_top_m(box)) < TABLE_M]
     if not tables:

@@ -1,4 +1,4 @@
-"""RRT-Connect (Kuffner and LaValle, ICRA 2000) in joint space, with work counted in iterations."""
+"""RRT-Connect (Kuffner and LaValle, ICRA 2000) in joint space, with effort limited by iterations."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def rrt_connect(
     check_step_rad: float,
     iterations: int,
 ) -> np.ndarray | None:
-    """Return waypoints ``(N, n)`` from start to goal, or None after so many iterations; start and goal must be free."""
+    """Return waypoints ``(N, n)`` from start to goal, or None after ``iterations``; start and goal must be free."""
     from_start, from_goal = _Tree(start), _Tree(goal)
     growing, other = from_start, from_goal
 

@@ -1,4 +1,4 @@
-"""Straight lines of the gripper: where they end beside an object, and the arm's path along them."""
+"""Straight lines of the gripper: their end poses near an object, and the arm's joint path along them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from manitwin.episodes.planning.problem import PlannerSettings
 from manitwin.geometry.poses import transform
 
 KNOT_STEP_M = 0.02
-TURN_SCALE_M = 0.1  # a turn of one radian counts as this far
+TURN_SCALE_M = 0.1  # length equivalent of a rotation by one radian
 LEAST_KNOTS = 4
 LARGEST_KNOT_RAD = 0.7  # a larger change between knots is a jump to another branch
 OFF_LINE_M = 0.0005
@@ -19,14 +19,14 @@ OFF_LINE_RAD = 0.002
 ITERATIONS = 20
 
 HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
-"""About the approach axis: the same grasp with its fingers exchanged."""
+"""Rotation by 180 degrees about the approach axis: the same grasp with its fingers exchanged."""
 
 
 def straight_line(arm: ArmKinematics, start: np.ndarray, end_to_world: np.ndarray) -> CubicSpline | None:
-    """Return joint positions over [0, 1] that move the grasp frame straight to a pose ``(4, 4)``, or None.
+    """Return joint positions over [0, 1] that move the grasp frame on a straight line to a pose ``(4, 4)``, or None.
 
-    Position is linear and rotation turns about one axis. Knots every 2 cm come from inverse kinematics, each from where
-    the last two lead; between them a cubic spline stays within half a millimetre of the line, or there is none.
+    Position is linear, rotation is about a fixed axis. Knots every 2 cm come from inverse kinematics, each extrapolated from
+    the last two. A cubic spline between them must stay within half a millimetre of the line.
     """
     start_to_world = arm.gripper_pose(start)
     turn = Rotation.from_matrix(start_to_world[:3, :3].T @ end_to_world[:3, :3]).as_rotvec()
@@ -47,7 +47,7 @@ def straight_line(arm: ArmKinematics, start: np.ndarray, end_to_world: np.ndarra
 
 
 def _poses_between(start: np.ndarray, end: np.ndarray, turn: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return the poses at places ``(N,)`` of the line as ``(N, 4, 4)``."""
+    """Return the poses ``(N, 4, 4)`` at parameters ``places (N,)`` of the line."""
     poses = np.tile(np.eye(4), (len(places), 1, 1))
     poses[:, :3, 3] = start[:3, 3] + places[:, None] * (end[:3, 3] - start[:3, 3])
     poses[:, :3, :3] = start[:3, :3] @ Rotation.from_rotvec(places[:, None] * turn).as_matrix()
@@ -55,7 +55,7 @@ def _poses_between(start: np.ndarray, end: np.ndarray, turn: np.ndarray, places:
 
 
 def _stays_on_line(arm: ArmKinematics, configurations: np.ndarray, poses: np.ndarray) -> bool:
-    """Tell whether configurations have their poses, to half a millimetre and a tenth of a degree."""
+    """Tell whether configurations reach their poses, to half a millimetre and a tenth of a degree."""
     reached = np.array([arm.gripper_pose(configuration) for configuration in configurations])
     off_m = np.linalg.norm(reached[:, :3, 3] - poses[:, :3, 3], axis=1)
     off_rad = np.linalg.norm(reached[:, :3, :3] - poses[:, :3, :3], axis=(1, 2)) / np.sqrt(2)
@@ -63,7 +63,7 @@ def _stays_on_line(arm: ArmKinematics, configurations: np.ndarray, poses: np.nda
 
 
 class LineEnds:
-    """Poses beside a gripper's pose ``(..., 4, 4)``."""
+    """End poses of straight lines, relative to a gripper pose ``(..., 4, 4)``."""
 
     def __init__(self, settings: PlannerSettings):
         """Take the lengths of the lines."""
@@ -71,11 +71,11 @@ class LineEnds:
         self._lift_m = settings.lift_m
 
     def before(self, gripper_to_world: np.ndarray) -> np.ndarray:
-        """Return where the approach to a pose begins, and the retreat from it ends."""
+        """Return the start of the approach to a pose, which is also the end of the retreat from it."""
         return gripper_to_world @ self._back
 
     def above(self, gripper_to_world: np.ndarray) -> np.ndarray:
-        """Return where the lift from a pose ends, and the lowering to it begins."""
+        """Return the end of the lift from a pose, which is also the start of lowering to it."""
         result = gripper_to_world.copy()
         result[..., 2, 3] += self._lift_m
         return result

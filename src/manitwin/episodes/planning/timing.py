@@ -1,4 +1,4 @@
-"""Timing of joint paths within limits of velocity and acceleration: from rest to rest, and time-optimal."""
+"""Time parameterisation of joint paths within velocity and acceleration limits: trapezoidal rest-to-rest, and time-optimal."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ from manitwin.episodes.planning.libraries import toppra_library
 
 ACCELERATING_SHARES = (0.5, 0.4, 0.3, 0.22, 0.15, 0.1, 0.06, 0.03)
 LOOKED_AT = 41
-BETWEEN_LOOKS = 0.01  # longer by this, for what lies between the places that are looked at
+BETWEEN_LOOKS = 0.01  # safety factor for what lies between the sampled parameters
 
 LEAST_GRID = 41
 
 
 def trapezoid(share: float | np.ndarray, moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return place and speed on [0, 1] at moments of [0, 1], speeding up and slowing down for a ``share`` each."""
+    """Return position and speed on [0, 1] at moments in [0, 1], accelerating and decelerating for a ``share`` of the time
+    each.
+    """
     peak = 1 / (1 - share)
     first, last = moments**2 / (2 * share), (1 - moments) ** 2 / (2 * share)
     place = np.where(
@@ -28,11 +30,11 @@ def trapezoid(share: float | np.ndarray, moments: np.ndarray) -> tuple[np.ndarra
 def time_rest_to_rest(
     path: JointPath, velocity_limits: np.ndarray, acceleration_limits: np.ndarray, timestep_s: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions and velocities ``(T, n)`` at every timestep, at rest at both ends, within the limits (rad/s, rad/s2).
+    """Return positions and velocities ``(T, n)`` at every time step, from rest to rest, within the limits (rad/s, rad/s^2).
 
-    On a segment of joint space the trapezoid is the fastest there is: its duration is the larger of V / (1 - f) and
-    sqrt(A / (f (1 - f))) for the share f of speeding up, V and A the largest ratios of the joints' ways to their limits.
-    On other paths the fastest of a few shares is taken, whose duration follows from the path's derivatives.
+    On a joint-space segment the trapezoid is time-optimal: its duration is the larger of V / (1 - f) and sqrt(A / (f (1 -
+    f))) for the acceleration share f, with V and A the largest ratios of the joints' displacements to their limits. On other
+    paths the fastest of a few shares is used, whose duration follows from the path's derivatives.
     """
     if isinstance(path, JointSegment):
         way = np.abs(path.end - path.start)
@@ -49,7 +51,7 @@ def time_rest_to_rest(
 
 
 def _fastest(path: JointPath, velocity_limits: np.ndarray, acceleration_limits: np.ndarray) -> tuple[float, float]:
-    """Return the least duration at which speeds and accelerations keep to the limits, and its share of speeding up."""
+    """Return the smallest duration that satisfies the limits, and its acceleration share."""
     moments, shares = np.linspace(0, 1, LOOKED_AT), np.array(ACCELERATING_SHARES)[:, None]
     place, speed = trapezoid(shares, moments)
     slope, bend = path(place, 1), path(place, 2) * (speed**2)[..., None]
@@ -66,9 +68,10 @@ def _fastest(path: JointPath, velocity_limits: np.ndarray, acceleration_limits: 
 def time_optimal(
     waypoints: np.ndarray, velocity_limits: np.ndarray, acceleration_limits: np.ndarray, timestep_s: float
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return positions and velocities ``(T, n)`` at every timestep along the spline through even waypoints, or None.
+    """Return positions and velocities ``(T, n)`` at every time step along the spline through evenly spaced waypoints, or None.
 
-    Between its grid points the method goes beyond the accelerations (by 2 to 20 per cent); what does is slowed down.
+    Uses TOPP-RA (toppra). Between its grid points the result exceeds the acceleration limits by 2 to 20 per cent; it is
+    slowed down accordingly.
     """
     toppra = toppra_library()
     lengths = path_lengths(waypoints)

@@ -79,9 +79,8 @@ class HandScene:
             if self.object not in bodies:
                 continue
             deepest = max(deepest, -float(contact.dist))
-            towards_object = (
-                1 if bodies[1] == self.object else -1
-            )  # a contact normal points from the first geom to the second
+            # a contact normal points from the first geom to the second
+            towards_object = 1 if bodies[1] == self.object else -1
             for side, finger in enumerate(self.fingers):
                 if finger in bodies:
                     mujoco.mj_contactForce(self.model, self.data, index, wrench)
@@ -129,9 +128,8 @@ def even_impedance(mass_kg: float, force_n: float) -> list[float]:
     per_mass = 1 / mass_kg + 1 / FINGER_MASS_KG
     stiffness = 1 / (STIFF_SOLREF[0] * STIFF_SOLREF[1]) ** 2
     yielding = SINK_M * stiffness / (force_n * per_mass)
-    impedance = float(
-        np.clip(1 / (1 + yielding), LEAST_IMPEDANCE, MOST_IMPEDANCE)
-    )  # uses k at d = 1, since d is close to 1
+    # uses k at d = 1, since d is close to 1
+    impedance = float(np.clip(1 / (1 + yielding), LEAST_IMPEDANCE, MOST_IMPEDANCE))
     return [1 - 2 * (1 - impedance), impedance, IMPEDANCE_WIDTH_M, IMPEDANCE_MIDPOINT, IMPEDANCE_POWER]
 
 

@@ -27,10 +27,8 @@ FALL_S = 0.6
 _DENSITY_KG_M3, _FRICTION, _RESTITUTION = 1000.0, 0.4, 0.1
 _LINEAR_DAMPING, _ANGULAR_DAMPING = 0.05, 1.0  # per s; spheres would otherwise roll forever
 _OFFSET_SHARE = 0.2  # contact offset over the radius
-_ITERATIONS, _MAX_DEPENETRATION_M_S = (
-    4,
-    0.5,
-)  # faster depenetration shoots granules pressed against a wall out of the vessel
+# faster depenetration shoots granules pressed against a wall out of the vessel
+_ITERATIONS, _MAX_DEPENETRATION_M_S = 4, 0.5
 _SPACING = 2.15  # lattice spacing in radii
 _WIDTH_SHARE = 0.8  # lattice radius over the rim's radius
 

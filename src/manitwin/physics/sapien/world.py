@@ -153,9 +153,8 @@ class RobotWorld:
         held_count = self._iterations_held * (SLENDER_FACTOR if self._holds_slender else 1)
         iterations = held_count if held else self._iterations
         for robot in self.robots:
-            robot.articulation.set_solver_position_iterations(
-                iterations
-            )  # also applies to everything that touches the robot
+            # also applies to everything that touches the robot
+            robot.articulation.set_solver_position_iterations(iterations)
 
     def will_hold(self, names: Collection[str]) -> None:
         """Declare which objects the hand will hold in turn; by default the target alone."""

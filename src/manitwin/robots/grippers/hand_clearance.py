@@ -143,10 +143,8 @@ class HandReach:
         return np.asarray((np.linalg.norm(moved, axis=2) + turned[:, None] * self._radii_m).max(0))
 
 
-_MIRRORS = (
-    np.array([1.0, 1.0, 1.0]),
-    np.array([-1.0, 1.0, 1.0]),
-)  # seen from the +X finger, and mirrored for the -X finger
+# seen from the +X finger, and mirrored for the -X finger
+_MIRRORS = (np.array([1.0, 1.0, 1.0]), np.array([-1.0, 1.0, 1.0]))
 
 
 @lru_cache(maxsize=8)
