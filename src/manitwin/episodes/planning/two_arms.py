@@ -1,8 +1,8 @@
-"""Plans of two arms, of which one moves at a time while the other is an obstacle: an object goes from hand to hand.
+"""Two-arm planning for handovers, in which one arm moves at a time and the other is an obstacle.
 
-The first arm's half is a held path (``held_path``) to a meeting place; a grasp and a meeting are taken where the second arm
-finds another grasp that it can approach while the first holds on, and where the first can let go and withdraw. Deterministic
-for a problem's seed, with work counted and never timed.
+The first arm's part is a held path (``held_path``) to a meeting place. A grasp and a meeting place are accepted if the second
+arm has another grasp that it can approach while the first holds the object, and if the first arm can then release it and
+withdraw. Deterministic for a problem's seed, with effort limited by counts instead of time.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from manitwin.episodes.planning.withdrawal import plan_withdrawal
 from manitwin.robots.robot import Robot
 
 MOST_TAKEN, MOST_RETAKEN = 6, 24
-"""Grasps of the taker that are tried beyond a look at its hand: beforehand, and at the meeting."""
-SETTLED_M = 0.004  # by how much fingers may stand farther apart than planned
+"""Numbers of the taker's grasps tried beyond the check of its hand: in advance, and at the meeting."""
+SETTLED_M = 0.004  # allowance for fingers that stand farther apart than planned
 
 
 @dataclass(frozen=True)
 class Take:
-    """How the second arm takes: a grasp as it is used, and the motions from home to it."""
+    """The second arm's part: a grasp with its pose as used, and the motions from home to it."""
 
     grasp: Grasp
     gripper_to_object: np.ndarray
@@ -46,20 +46,20 @@ class Take:
 
     @property
     def joints_rad(self) -> np.ndarray:
-        """Where the arm is when its hand closes."""
+        """Arm joints when the hand closes, ``(n,)``."""
         return np.asarray(self.approach.positions_rad[-1])
 
 
 @dataclass(frozen=True)
 class HandoverPlan:
-    """What the first arm does until it waits with the object, and what the second does then."""
+    """The first arm's motions until it waits with the object, and the second arm's motions to take it."""
 
     give: HeldPlan
     take: Take
 
 
 class TwoArmPlanner(PickPlacePlanner):
-    """The planner of the first of two arms, the giver, with that of the second, the ``taker``."""
+    """Planner of the first of two arms, the giver, with that of the second, the ``taker``."""
 
     def __init__(self, robot: Robot, timestep_s: float = 1 / 120, settings: PlannerSettings | None = None):
         """Build the models of both arms and hands; ``robot`` has two ``arms``."""
@@ -71,18 +71,17 @@ class TwoArmPlanner(PickPlacePlanner):
 
     @cached_property
     def alone(self) -> PickPlacePlanner:
-        """The planner of the first arm for what it does alone, the second one at home, its hand open."""
+        """Planner for tasks of the first arm alone, with the second at home and its hand open."""
         resting = self._taker_shapes.at(self.taker.arm.home, (self._open_m,))
         return PickPlacePlanner(self.robot, self.parts.timestep_s, self.settings, resting)
 
     def plan_handover(
         self, problem: PickPlaceProblem, meetings: Sequence[HeldPath], put_down: PutDown, *, longest_s: float
     ) -> tuple[HandoverPlan | None, PlanReport]:
-        """Plan with the first of the grasps that leaves room for a second one, and the first meeting where both arms can be.
+        """Plan with the first grasp that leaves room for a second one, and the first meeting place that both arms reach.
 
-        The second grasp is one by which the object can be ``put_down``.
-
-        The report has no plan of its own, only what was tried and what it failed of.
+        The second grasp must allow ``put_down``. The report contains no plan, only the number of grasps tried and their
+        failures.
         """
         grasps = self._hands.givers(problem)
         asked = replace(self.with_taker_at(problem, self.taker.arm.home, None), grasps=grasps)
@@ -115,8 +114,9 @@ class TwoArmPlanner(PickPlacePlanner):
     ) -> Take | None:
         """Plan how the second arm, at home, takes the object that the first holds at ``object_to_world (4, 4)``.
 
-        ``opening_m`` is that of the first hand, which is at ``giver_to_object``. Grasps of ``first`` are tried before all
-        others. None: none can be approached, by none it can be put down, or the first hand could not withdraw from any.
+        ``opening_m`` is the first hand's opening, ``giver_to_object (4, 4)`` its pose. Grasps in ``first`` are tried before
+        all others. Returns None if no grasp can be approached, none allows putting the object down, or the first hand could
+        withdraw from none.
         """
         parts, ends = self.taker.parts, self.taker.parts.ends
         asked = self._at_meeting(problem, object_to_world, giver_rad, opening_m)
@@ -153,7 +153,9 @@ class TwoArmPlanner(PickPlacePlanner):
         taker_rad: np.ndarray,
         grasp: Grasp,
     ) -> Motion | None:
-        """Plan the first hand's way straight back from the object that the second arm holds by ``grasp``; None: it has none."""
+        """Plan the straight retreat of the first hand from the object that the second arm holds by ``grasp``; None if it is
+        blocked.
+        """
         asked = self.with_taker_at(problem, taker_rad, grasp)
         return plan_withdrawal(self.parts, asked, object_to_world, giver_rad, blind=False)
 
@@ -165,7 +167,7 @@ class TwoArmPlanner(PickPlacePlanner):
         taker_rad: np.ndarray,
         grasp: Grasp,
     ) -> Motion | None:
-        """Plan the first arm's way home around the second, which holds the object; None: there is none."""
+        """Plan the first arm's motion home around the second arm, which holds the object; None if there is none."""
         asked = self.with_taker_at(problem, taker_rad, grasp)
         asked = replace(asked, target=replace(problem.target, object_to_world=object_to_world))
         world, rng = self.parts.world_of(asked, object_to_world), np.random.default_rng((problem.seed, 7))
@@ -173,20 +175,20 @@ class TwoArmPlanner(PickPlacePlanner):
         return replace(found, phase=Phase.RETURN) if isinstance(found, Motion) else None
 
     def plan_taker_home(self, problem: PickPlaceProblem, taker_rad: np.ndarray, giver_rad: np.ndarray) -> Motion | None:
-        """Plan the second arm's way home with its hand empty and open; None: there is none."""
+        """Plan the second arm's motion home with its hand empty and open; None if there is none."""
         asked, parts = self.with_giver_at(problem, giver_rad), self.taker.parts
         world, rng = parts.world_of(asked, problem.target.object_to_world), np.random.default_rng((problem.seed, 10))
         found = parts.motions.free(world.arm, Phase.REACH, taker_rad, parts.arm.home, rng)
         return replace(found, phase=Phase.RETURN) if isinstance(found, Motion) else None
 
     def put_down(self, problem: PickPlaceProblem, goals: Sequence[np.ndarray]) -> PutDown:
-        """Return how the second arm puts the target down at one of ``goals (4, 4)``, the first one at home."""
+        """Return the placement choice of the second arm among ``goals (4, 4)``, with the first arm at home."""
         return PutDown(self.taker, self.with_giver_at(problem, self.arm.home), goals)
 
     def plan_bring_home(
         self, problem: PickPlaceProblem, gripper_to_object: np.ndarray, taker_rad: np.ndarray, giver_rad: np.ndarray
     ) -> Motion | None:
-        """Plan the second arm's way home with what it holds, else straight up with it; None: there is no way."""
+        """Plan the second arm's motion home with the held object, or else straight up; None if there is none."""
         parts = self.taker.parts
         asked = self.with_giver_at(problem, giver_rad)
         world, rng = parts.world_of(asked, problem.target.object_to_world), np.random.default_rng((problem.seed, 8))
@@ -200,18 +202,20 @@ class TwoArmPlanner(PickPlacePlanner):
         return None if line is None else parts.motions.timed(Phase.CARRY, line)
 
     def with_giver_at(self, problem: PickPlaceProblem, giver_rad: np.ndarray) -> PickPlaceProblem:
-        """Return the second arm's problem with the first as an obstacle, its hand open."""
+        """Return the second arm's problem with the first arm, hand open, as an obstacle."""
         return replace(problem, obstacles=(*problem.obstacles, *self._giver_shapes.at(giver_rad, (self._open_m,))))
 
     def with_taker_at(self, problem: PickPlaceProblem, taker_rad: np.ndarray, grasp: Grasp | None) -> PickPlaceProblem:
-        """Return the first arm's problem with the second as an obstacle, open, or closed on a grasp."""
+        """Return the first arm's problem with the second arm as an obstacle, its hand open or closed on a grasp."""
         opening_m = self._open_m if grasp is None else grasp.width_m + SETTLED_M
         return replace(problem, obstacles=(*problem.obstacles, *self._taker_shapes.at(taker_rad, (opening_m,))))
 
     def _at_meeting(
         self, problem: PickPlaceProblem, object_to_world: np.ndarray, giver_rad: np.ndarray, opening_m: float
     ) -> PickPlaceProblem:
-        """Return the second arm's problem: the object in the air, and the first arm as it holds it and as it lets go."""
+        """Return the second arm's problem: the object in the air, and the first arm with its hand both closed and open as
+        obstacles.
+        """
         giver = self._giver_shapes.at(giver_rad, (opening_m, self._open_m))
         return replace(
             problem,
@@ -226,10 +230,10 @@ class TwoArmPlanner(PickPlacePlanner):
 
 
 def planner_of(robot: Robot, timestep_s: float) -> PickPlacePlanner:
-    """Return the planner of a robot of one arm, or of two."""
+    """Return the planner of a one-arm or two-arm robot."""
     return (TwoArmPlanner if robot.arms else PickPlacePlanner)(robot, timestep_s=timestep_s)
 
 
 def alone(planner: PickPlacePlanner) -> PickPlacePlanner:
-    """Return the planner of what one arm does alone: of two arms that of the first."""
+    """Return the planner for tasks of a single arm: for two arms that of the first."""
     return planner.alone if isinstance(planner, TwoArmPlanner) else planner

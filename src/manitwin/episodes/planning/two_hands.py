@@ -1,4 +1,4 @@
-"""Which grasps of one object leave room for two hands, wherever the arms bring them."""
+"""Compatibility of two hands' grasps on one object, independent of the arms."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from manitwin.episodes.planning.put_down import Held
 from manitwin.episodes.steady_grasps import LEAST_APART_M, loads_any_way_up, pad_distances_m
 from manitwin.geometry.poses import inverse
 
-APART_M = 0.06  # of the pads of two hands: nearer, they have room where they come from two sides
+APART_M = 0.06  # distance between the pads of two hands; closer hands fit only if they come from two sides
 
 
 class TwoHands:
-    """The open hands of a giver and of a taker around one object; what was found of a problem is kept."""
+    """Open hands of a giver and a taker around one object; results for the last problem are cached."""
 
     def __init__(self, giver: ArmPlanning, taker: ArmPlanning, giver_shapes: ArmObstacles):
         """Take the models of both arms, and the giver's links as obstacles."""
@@ -31,10 +31,10 @@ class TwoHands:
         self._found: dict[bytes, tuple[Held, ...]] = {}
 
     def givers(self, problem: PickPlaceProblem) -> tuple[Grasp, ...]:
-        """Return the grasps that bear the target any way up and that another such one is apart from.
+        """Return the grasps that hold the target in any orientation and have another such grasp apart from them.
 
-        Those first that a quarter of them are well apart from; of these those whose load, and that of some other one apart from
-        them, is least (``steady_grasps``).
+        Grasps that are well apart from at least a quarter of the others come first. Within each group they are sorted by
+        load: the larger of their own and the smallest of a grasp apart from them (``steady_grasps``).
         """
         grasps, loads = self._bearing(problem)
         ranked = []
@@ -47,13 +47,13 @@ class TwoHands:
         return tuple(grasps[place] for *_, place in sorted(ranked))
 
     def turned(self, grasps: Sequence[Grasp], giver_to_object: np.ndarray) -> list[Held]:
-        """Return grasps that are apart from the first hand, each in all its turns."""
+        """Return the grasps that are apart from the first hand, each in all its equivalent turns."""
         apart_m = pad_distances_m(Grasp("", giver_to_object, 0.0), grasps, self._gripper)
         apart = [each for each, m in zip(grasps, apart_m, strict=True) if m >= LEAST_APART_M]
         return [Held(each, each.gripper_to_object @ turn) for each in apart for turn in self._taker.candidates.turns]
 
     def beside(self, problem: PickPlaceProblem, giver_to_object: np.ndarray) -> tuple[Held, ...]:
-        """Return the second hand's grasps that it can approach past the open first hand, the least loaded first."""
+        """Return the second hand's grasps that it can approach past the open first hand, smallest load first."""
         if self._problem is not problem:
             self._problem, self._found = problem, {}
         key = giver_to_object.tobytes()
@@ -75,7 +75,7 @@ class TwoHands:
         return self._found[key]
 
     def _bearing(self, problem: PickPlaceProblem) -> tuple[list[Grasp], list[int]]:
-        """Return the grasps that bear the target any way up, and their loads."""
+        """Return the grasps that hold the target in any orientation, and their loads."""
         loads = loads_any_way_up(problem.grasps, problem.target.body, self._gripper)
         both = [(grasp, load) for grasp, load in zip(problem.grasps, loads, strict=True) if load is not None]
         return [grasp for grasp, _ in both], [load for _, load in both]

@@ -1,4 +1,4 @@
-"""The open hand's way back from what it has let go of in the air: on a peg, in a holder."""
+"""Withdrawal of the open hand from an object released in the air, such as on a peg or in a holder."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ def plan_withdrawal(
     *,
     blind: bool = True,
 ) -> Motion | None:
-    """Plan straight back along the approach, from an object that is at ``object_to_world (4, 4)`` now.
+    """Plan a straight motion back along the approach, from an object at ``object_to_world (4, 4)``.
 
-    10 cm, less where that is blocked; 5 cm whatever is around where all is: a hand that stays holds on to what it has let
-    go of, and without ``blind`` not at all. None where the arm cannot.
+    The distance is 10 cm, or less if that is blocked. If every distance is blocked, ``blind`` plans 5 cm without collision
+    checks, because a hand that stays keeps holding the object. Returns None if no motion is found.
     """
     world = parts.world_of(problem, object_to_world, as_hulls=True)
     start = np.asarray(joints_rad, float)

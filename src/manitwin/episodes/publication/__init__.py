@@ -1,1 +1,1 @@
-"""A folder of episodes as a repository that others can download and train on."""
+"""Publication of an episodes folder as a data set repository."""

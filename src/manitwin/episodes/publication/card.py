@@ -1,4 +1,4 @@
-"""README.md of published episodes: the hub's dataset card, with what LeRobot and ``datasets`` read in its front matter."""
+"""README.md of published episodes: a dataset card with the front matter that LeRobot and ``datasets`` read."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ OF_EPISODES = (
 
 @dataclass(frozen=True)
 class EpisodesCard:
-    """The card's facts: ``twins`` are rows of the table of twins.
+    """Facts of the card: ``twins`` are rows of the table of twins.
 
     ``info`` is meta/info.json; ``made_of`` names the data set, scenes and versions, without folders.
     """
@@ -40,7 +40,7 @@ class EpisodesCard:
 
 
 def episodes_card(facts: EpisodesCard) -> str:
-    """Return README.md."""
+    """Return the text of README.md."""
     licences = [twin["license"] for twin in facts.twins]
     lines = [
         *front_matter(facts.name, licences, facts.info["total_frames"], TAGS, CONFIGS),

@@ -1,4 +1,4 @@
-"""Choose the episodes to publish: those whose objects all come from twins under an allowed licence."""
+"""Selection of the episodes to publish: those whose objects all come from twins under an allowed licence."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from manitwin.twin.store import RECORD, parse_record
 
 @dataclass(frozen=True)
 class TwinInEpisodes:
-    """A twin that published episodes show: whom to credit, and the numbers of these episodes.
+    """A twin shown in published episodes: its attribution, and the numbers of these episodes.
 
-    ``revisions`` are those that it had when the batches were made: what it is today may be another (``--retire`` amends it).
+    ``revisions`` are those at the time of the batches; its present revision may differ (``--retire`` amends it).
     """
 
     twin_id: str
@@ -37,13 +37,13 @@ class TwinInEpisodes:
 
     @property
     def terms(self) -> Terms:
-        """What decides whether it goes out."""
+        """Terms that decide whether it may be published."""
         return Terms(self.license, self.rehearsal)
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """The episodes that go out, the twins of all their objects, and the ids of the allowed ones that were to be moved."""
+    """The episodes to publish, the twins of all their objects, and the ids of the allowed target twins."""
 
     episodes: Selection
     twins: tuple[TwinInEpisodes, ...]
@@ -51,15 +51,15 @@ class Chosen:
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """The twins as rows."""
+        """The twins as table rows."""
         return [asdict(twin) for twin in self.twins]
 
     def tells_of(self, attempt: Attempt) -> bool:
-        """Tell whether success rates may count an attempt: its object's licence allows it."""
+        """Tell whether success rates may count an attempt: its target's licence allows it."""
         return not attempt.twin_id or attempt.twin_id in self.allowed_targets
 
     def publishes(self, attempt: Attempt) -> bool:
-        """Tell whether an attempt's row goes out."""
+        """Tell whether an attempt's row is published."""
         return self.tells_of(attempt) and attempt.episode_id not in self.episodes.kept_back
 
 
@@ -71,11 +71,11 @@ def choose_episodes(
     *,
     with_rehearsals: bool = False,
 ) -> Chosen:
-    """Choose among the kept episodes of batches; every object counts, the one that is moved and those that stand around.
+    """Select among the kept episodes of batches by the licences of all objects in them, not only the target.
 
-    An episode is left out under the licences that keep it here: ``CC-BY-NC-4.0``, or ``CC-BY-NC-4.0 + unknown``. One
-    with a twin that a rehearsal server had a part in is left out unless ``with_rehearsals``. Raises
-    UsageError where a twin is gone, and where no episode may go out; EpisodesError for a batch that cannot be read.
+    An excluded episode is counted under the licences that exclude it: ``CC-BY-NC-4.0``, or ``CC-BY-NC-4.0 + unknown``.
+    Episodes with a twin that a rehearsal server contributed to are excluded unless ``with_rehearsals``. Raises UsageError if
+    a twin no longer exists or no episode may be published, EpisodesError for a batch that cannot be read.
     """
     twin, allowed = cache(partial(_read, source)), Allowed(license_allow, with_rehearsals)
     objects = dict(objects_of_episodes(batches))
@@ -96,7 +96,7 @@ def choose_episodes(
 
 
 def revisions_of_twins(batches: Iterable[Path]) -> dict[str, tuple[str, ...]]:
-    """Return the revisions, sorted, that each twin had in batches: one that was amended between two of them had several."""
+    """Return the sorted revisions of each twin in the batches; a twin amended between two batches has several."""
     found = defaultdict[str, set[str]](set)
     for folder in batches:
         for twin_id, revision in read_batch(folder).twins.items():

@@ -1,4 +1,4 @@
-"""Publish episodes: choose by licence, write the LeRobot layout and films without the others, check it, put it in place."""
+"""Publication of episodes: select by licence, write the LeRobot layout and videos, validate, and put the result in place."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ _CAMERA = re.compile(r"[0-9A-Za-z_-]+")
 
 
 def drawn_from(episodes: Path) -> tuple[tuple[str, ...], int]:
-    """Return the cameras that a run was drawn from, and how often a second; no camera where it was not drawn."""
+    """Return the cameras of a run's rendered pictures, and their rate in Hz; no cameras if it was not rendered."""
     path = episodes / PICTURES / CONFIG
     if not os.path.lexists(path):
         return (), RATE_HZ
@@ -68,10 +68,10 @@ def drawn_from(episodes: Path) -> tuple[tuple[str, ...], int]:
 def films_of(
     episodes: Path, cameras: tuple[str, ...], batches: list[Path], allowed: Set[str], scratch: Path
 ) -> list[CameraVideos]:
-    """Return the films of ``cameras`` with the pictures of ``allowed`` episodes alone.
+    """Return the videos of ``cameras`` that contain only ``allowed`` episodes.
 
-    A film that shows others too is cut: what may go out of it is encoded again, with the same codec, below ``scratch``. Raises
-    EpisodesError for a batch that was not drawn.
+    A video that also shows other episodes is cut: the allowed parts are encoded again with the same codec, below ``scratch``.
+    Raises EpisodesError for a batch that was not rendered.
     """
     clips: dict[str, dict[str, Clip]] = {camera: {} for camera in cameras}
     pinholes: dict[str, dict[str, Any]] = {}
@@ -91,7 +91,7 @@ def films_of(
 
 
 def cut_film(film: Path, first_frames: dict[str, int], allowed: Set[str], place: Path) -> dict[str, Clip]:
-    """Write the ``allowed`` episodes of a film, which follow each other without gaps, to another; returns where they are."""
+    """Write the ``allowed`` episodes of a video, whose episodes are contiguous, to another one; return their clips."""
     with Film(film) as shown:
         return _cut(film, shown, first_frames, allowed, place)
 
@@ -119,9 +119,9 @@ def _cut(film: Path, shown: Film, first_frames: dict[str, int], allowed: Set[str
 
 @dataclass(frozen=True)
 class PublishedEpisodes:
-    """The counts of what was published and what was not; ``left_out`` counts kept episodes by the licences that keep them here.
+    """Counts of a publication; ``left_out`` counts kept episodes by the licences that exclude them.
 
-    ``rehearsals`` are those left out because a rehearsal server had a part in one of their twins.
+    ``rehearsals`` counts episodes excluded because a rehearsal server contributed to one of their twins.
     """
 
     episodes: int
@@ -143,13 +143,13 @@ def publish_episodes(
     twins: str | Path | None = None,
     name: str | None = None,
 ) -> PublishedEpisodes:
-    """Write a LeRobotDataset v3.0 with a card, licences, attempts and digests to ``out``, a folder or URL.
+    """Write a LeRobotDataset v3.0 with a card, licences, attempts and checksums to ``out``, a folder or URL.
 
-    An episode goes out where the licences of all its objects may: those of ``license_allow``, or all that are known; one
-    of a twin that a rehearsal server (``manitwin fake``) had a part in only ``with_rehearsals``. Of the others no row, no
-    picture and no statistic is written. ``twins`` names where the twins are now, None: where they were as the episodes
-    were made. The same episodes give the same bytes. Raises UsageError for wrong arguments and twins that are gone,
-    EpisodesError for episodes that cannot be read or name a folder of this machine.
+    An episode is published if the licences of all its objects allow it: those in ``license_allow``, or all known ones.
+    Episodes with a twin that a rehearsal server (``manitwin fake``) contributed to need ``with_rehearsals``. No row, picture
+    or statistic of other episodes is written. ``twins`` is the current location of the twins; None: that recorded with the
+    episodes. The output is deterministic to the byte. Raises UsageError for invalid arguments and missing twins,
+    EpisodesError for episodes that cannot be read or that contain a local path.
     """
     episodes = Path(episodes)
     said = _configuration(episodes)
@@ -203,7 +203,7 @@ def _configuration(episodes: Path) -> dict[str, Any]:
 
 
 def _write_tables(episodes: Path, chosen: Chosen, made: Path) -> int:
-    """Write the attempts that go out, numbered as the episodes are, and the twins; return how many attempts."""
+    """Write the published attempts, numbered like the episodes, and the twins; return the number of attempts."""
     unnumbered = made / f".{ATTEMPTS}"
     write_attempts(unnumbered, (each for each in read_attempts(episodes / ATTEMPTS) if chosen.publishes(each)))
     rows, _ = merge_attempts([unnumbered], made / ATTEMPTS)

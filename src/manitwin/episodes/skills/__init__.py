@@ -1,1 +1,1 @@
-"""What episodes do with objects: each skill is a module that says which goals it sets, and where the object is to go."""
+"""Manipulation skills: each module defines who can take part, the goal, and the target's goal poses or its path."""

@@ -1,4 +1,4 @@
-"""``aim``: point a nozzle, a lens or a scanner's window at another thing, held by the grip, and put it back."""
+"""Skill ``aim``: point the target's nozzle, lens or scanner window at another object, and put the target back."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from manitwin.scenes.layouts.pool import Pool, PoolTwin
 from manitwin.scenes.layouts.twin_frames import TwinFrame
 
 KINDS = ("tip", "opening", "hole", "face", "surface", "button")
-DISTANCES_M = (0.10, 0.22)  # of the nozzle from the middle of what it points at
-FARTHER_M, KNOTS = 0.05, 3  # from which it comes nearer
+DISTANCES_M = (0.10, 0.22)  # of the nozzle from the centre of the object it points at
+FARTHER_M, KNOTS = 0.05, 3  # distance over which the nozzle approaches
 DOWNWARD_RAD = np.radians([0.0, 60.0])
 DRAWN, WAYS = 600, 48
-UPRIGHT_SHARE = 0.5  # of the ways, and tried first with all grasps: the thing is not turned about the nozzle's axis
-LEAST_HEIGHT_M = 0.02  # of its lowest corner above where it stood
-FREE_M = 0.02  # of a finger's pads from the nozzle's axis, ahead of its end
-NEAR_STEP_M = 0.02  # grasps that are no less apart from the grip count as equal
+UPRIGHT_SHARE = 0.5  # share of the paths without rotation about the nozzle's axis, tried first with all grasps
+LEAST_HEIGHT_M = 0.02  # of the lowest vertex above its initial support
+FREE_M = 0.02  # clearance of the finger pads from the nozzle's axis, ahead of its end
+NEAR_STEP_M = 0.02  # grasps whose distances to the grip differ by less count as equal
 HELD_S = 2 * AIMED_S
 
 
@@ -36,11 +36,11 @@ class Aim(HeldSkill):
     name, predicate, has_partner = "aim", "aimed", True
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept a thing with a nozzle, a lens or another place that points, and anything to point it at."""
+        """Accept a target with a nozzle, a lens or another pointing frame, and any partner."""
         return partner is not None and nozzle_of(target.frames) is not None
 
     def task(self, scene: HeldScene) -> HeldTask:
-        """Return ways to point at the partner: from all around, from above by some angles, turned about the nozzle's axis."""
+        """Return paths that point at the partner, from random azimuths, downward angles and rolls about the nozzle's axis."""
         target, aimed_at, rng = scene.target, scene.partner, scene.rng
         nozzle = nozzle_of(scene.frames[target.name])
         assert aimed_at is not None
@@ -102,11 +102,11 @@ class Aim(HeldSkill):
 
 
 def nozzle_of(frames: tuple[TwinFrame, ...]) -> TwinFrame | None:
-    """Return the first frame whose label says that something comes out of it, or looks out."""
+    """Return the first frame whose label means an outlet or a lens."""
     return next((frame for frame in frames if frame.kind in KINDS and aims(frame.label)), None)
 
 
 def grip_of(frames: tuple[TwinFrame, ...]) -> TwinFrame | None:
-    """Return the frame of the place that it is held by: a trigger's, else a grip's, else a handle's or the body's."""
+    """Return the frame at which the object is held: a trigger's, else a grip's, else a handle's or the body's."""
     ranked = [(rank, frame) for frame in frames if (rank := grip_rank(frame.label)) is not None]
     return min(ranked, key=lambda each: each[0])[1] if ranked else None

@@ -1,4 +1,4 @@
-"""``away_from``: set an object down well clear of another one that it is near to."""
+"""Skill ``away_from``: set an object down at a distance from another one that it is near to."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from manitwin.geometry.boxes import separation_m
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
 
 DRAWN = 200
-SPARE_M = 0.02  # beyond what the goal asks for: what is set down is off by a few millimetres
+SPARE_M = 0.02  # beyond the goal's distance, because placements are off by a few millimetres
 
 
 class AwayFrom(Skill):
-    """Set the target down on its surface so that it is apart from its partner; it begins nearer to it."""
+    """Set the target down on its surface apart from its partner, near which it starts."""
 
     name, predicate, has_partner = "away_from", "away_from", True
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept any two."""
+        """Accept any pair."""
         return partner is not None
 
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> Iterator[np.ndarray]:
-        """Yield free poses in reach, turned at random, whose footprints are far enough from the partner's."""
+        """Yield free poses in reach, with random heading, whose footprints are far enough from the partner's."""
         assert partner is not None
         moved = around.objects[target]
         least_m = SIGNATURES[self.predicate].default

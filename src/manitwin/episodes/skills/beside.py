@@ -1,4 +1,4 @@
-"""``left_of``, ``right_of``, ``behind``, ``in_front_of``, ``near``: set an object down beside another one."""
+"""Skills ``left_of``, ``right_of``, ``behind``, ``in_front_of``, ``near``: set an object down beside another one."""
 
 from __future__ import annotations
 
@@ -14,30 +14,31 @@ from manitwin.geometry.boxes import separations_m
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
 
-YAWS, PLACES = 48, 128  # that are tried in each area: places of each yaw
+YAWS, PLACES = 48, 128  # headings tried in each area, and places for each heading
 INSIDE_SHARES = (0.8, 0.93)
-"""Of the sector and of the gap, the farther inside first: what is set down is off by a few millimetres."""
+"""Shares of the sector and of the gap, the smaller first, because placements are off by a few millimetres."""
 NEAR_M = 0.10
 
 
 @dataclass(frozen=True)
 class Beside(Skill):
-    """Set the target down on one side of its partner, or on any (``near``), on the same surface, turned at random."""
+    """Set the target down on one side of its partner, or on any (``near``), on the same surface, with random heading."""
 
     name: str
     predicate: str
     has_partner: bool = True
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept any two."""
+        """Accept any pair."""
         return partner is not None
 
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> Iterator[np.ndarray]:
-        """Yield free poses in the sector, by their centres of mass: in the workspace, then beyond, as far as an arm may come.
+        """Yield free poses with the centre of mass in the sector: in the workspace first, then beyond it, as far as an arm
+        may reach.
 
-        Then closer to the sector's border.
+        The same is then repeated closer to the sector's border.
         """
         assert partner is not None
         moved, other = around.objects[target], around.objects[partner]
@@ -56,7 +57,7 @@ class Beside(Skill):
                     near = separations_m(turned, beside, places) <= share * self._most_gap_m
                     free = np.all([separations_m(turned, each, places) >= MIN_GAP_M for each in taken], axis=0)
                     at = next((at for at in places[near & free] if area.reaches(at, turned + at)), None)
-                    if at is not None:  # one of each turn: what cannot be planned there is tried turned otherwise
+                    if at is not None:  # one pose per heading: if it cannot be planned, another heading is tried
                         yield transform(turn, np.array([*at, 0.0])) @ object_to_plane
 
     @property
@@ -64,7 +65,7 @@ class Beside(Skill):
         return NEAR_M if self.name == "near" else SIDE_GAP_M[1]
 
     def _offsets_m(self, rng: np.random.Generator, share: float, reach_m: float) -> np.ndarray:
-        """Draw ways ``(N, 2)`` from the partner's centre of mass to the target's, in a share of the sector."""
+        """Draw offsets ``(N, 2)`` m from the partner's centre of mass to the target's, in a share of the sector."""
         if self.name == "near":
             angles = rng.uniform(-np.pi, np.pi, PLACES)
         else:

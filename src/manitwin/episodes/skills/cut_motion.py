@@ -1,4 +1,4 @@
-"""``cut_motion``: draw a knife's edge along the middle of a board. A motion only: nothing is divided."""
+"""Skill ``cut_motion``: draw a knife's edge along the middle of a board. Motion only: nothing is divided."""
 
 from __future__ import annotations
 
@@ -22,15 +22,17 @@ from manitwin.scenes.layouts.pool import Pool, PoolTwin
 from manitwin.scenes.layouts.twin_frames import TwinFrame
 
 BOARD, LINE = "cutting_board", "line"
-BOARD_HALF_M = np.array([0.035, 0.06, 0.05])  # a block: short along the line and high, so that the hand is beside it
+# a block, short along the line and high, so that there is room for the hand beside it
+BOARD_HALF_M = np.array([0.035, 0.06, 0.05])
 LINE_M = 0.06
 LEAST_EDGE_M = 0.05
 ABOVE_M, FREE_KNOTS, KNOTS = 0.05, 4, 7
-NEAR_M = 0.002  # of the edge above the board
-SHARES = (0.0, 0.2, -0.2)  # of the edge's length from its middle: which part of it goes along the line
-FINGER_M = 0.015  # fingers are so far from the edge's ends
+NEAR_M = 0.002  # clearance of the edge above the board
+# offset of the part of the edge that moves along the line, relative to the edge's length, from its middle
+SHARES = (0.0, 0.2, -0.2)
+FINGER_M = 0.015  # clearance of the fingers from the edge's ends
 LEAN_STEP = 0.25
-"""In the cosine of a hand's lean: grasps that differ by less are about as high above the knife, and count as equal."""
+"""In the cosine of the hand's lean: grasps that differ by less are about equally high above the knife, and count as equal."""
 
 
 class CutMotion(HeldSkill):
@@ -39,12 +41,12 @@ class CutMotion(HeldSkill):
     name, predicate = "cut_motion", "cut_motion"
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept a thing that cuts, with an edge 5 cm long or more."""
+        """Accept a cutting object with an edge of at least 5 cm."""
         edge = edge_of(target.frames)
         return edge is not None and cuts(target.category, edge.label)
 
     def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
-        """Return: the edge went along the line."""
+        """Return the goal that the edge moved along the line."""
         return Goal((Literal(self.predicate, target.name, LINE),))
 
     def fixture(self, around: Surroundings, target: int, rng: np.random.Generator) -> Fixture | None:
@@ -52,7 +54,9 @@ class CutMotion(HeldSkill):
         return board_in_reach(around, BOARD_HALF_M, BOARD, rng)
 
     def task(self, scene: HeldScene) -> HeldTask:
-        """Return the ways along the line: either way, either side of the knife to the left, with one part of the edge."""
+        """Return the paths along the line, in both directions, with either side of the knife to the left, for several parts
+        of the edge.
+        """
         target, (under,) = scene.target, scene.fixtures
         edge = edge_of(scene.frames[target.name])
         assert edge is not None, "only what cuts is drawn along a line"

@@ -1,4 +1,4 @@
-"""Dropping tests: whether a goal is true of where an object comes to rest that is let go on or in another one, in physics."""
+"""Drop tests in physics: whether an object released on or in another one comes to rest in a state that satisfies a goal."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from manitwin.physics.sapien.settle import settle_scene
 
 PERTURBED, OFF_M, OFF_RAD = 3, 0.005, np.radians(3)
 SETTLES_S = 2.0
-GIVE_UP_M = 0.3  # what has moved so far from where it was let go has fallen beside
+GIVE_UP_M = 0.3  # an object that has moved this far from its release has fallen beside the partner
 FLOOR = StaticBox("floor", np.array([1.0, 1.0, 0.25]), transform(translation=np.array([0.0, 0, -0.25])))
 
 
 def rest_after_drop(
     around: Surroundings, target: int, partner: int, goal: Goal, let_go_at: np.ndarray
 ) -> np.ndarray | None:
-    """Return where the target comes to rest ``(4, 4)`` that is let go at a pose; None where the goal is not true there.
+    """Return the target's resting pose ``(4, 4)`` after release at a pose; None if it does not satisfy the goal.
 
-    The two are alone on a level floor under the partner.
+    The scene contains only the two objects and a level floor under the partner.
     """
     moved, base = around.objects[target], around.objects[partner]
     height_m = float(around.parts(partner).bounds[0][2])
@@ -49,12 +49,12 @@ def rest_after_drop(
 
 
 def all_rest(around: Surroundings, target: int, partner: int, goal: Goal, let_go_at: Iterable[np.ndarray]) -> bool:
-    """Tell whether the goal is true of where the target comes to rest from each of some poses ``(4, 4)``."""
+    """Tell whether the target satisfies the goal at rest after release at each of the poses ``(4, 4)``."""
     return all(rest_after_drop(around, target, partner, goal, pose) is not None for pose in let_go_at)
 
 
 def nearby(pose: np.ndarray, rng: np.random.Generator, scale: int = 1) -> Iterator[np.ndarray]:
-    """Yield poses that differ from one as a placement does from its plan, or ``scale`` times as far and as many."""
+    """Yield random perturbations of a pose with the errors of a placement; ``scale`` multiplies their size and number."""
     for _ in range(scale * PERTURBED):
         turn = Rotation.from_rotvec(rng.normal(0, scale * OFF_RAD, 3)).as_matrix() @ pose[:3, :3]
         yield transform(turn, pose[:3, 3] + np.array([*rng.normal(0, scale * OFF_M, 2), 0.0]))

@@ -1,4 +1,6 @@
-"""``handover``: one arm picks the target, a second one takes it by another grasp, and puts it down on its side of the table."""
+"""Skill ``handover``: one arm picks the target, a second one takes it by another grasp and puts it down on its side of the
+table.
+"""
 
 from __future__ import annotations
 
@@ -10,25 +12,27 @@ from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings
 from manitwin.geometry.poses import transform
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
 
-LEAST_LENGTH_M = 0.10  # shorter things have no room for two hands
-LEAST_LIKELY = 0.05  # a placement's probability
-SAME = 0.02  # largest difference in a coordinate of the upward direction of two placements that are the same
+LEAST_LENGTH_M = 0.10  # shorter objects have no room for two hands
+LEAST_LIKELY = 0.05  # smallest probability of a placement
+SAME = 0.02  # largest coordinate difference between the up directions of placements that count as the same
 
 
 class Handover(Skill):
-    """Hand the target over from the first arm to the second; ``courses.handover`` chooses where, once all has come to rest."""
+    """Hand the target from the first arm to the second; ``courses.handover`` chooses the place once all objects are at rest."""
 
     name, predicate, has_partner, arms = "handover", "handed_over", False, 2
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept what is 10 cm long or more."""
+        """Accept an object at least 10 cm long."""
         points = pool.body(target.twin_id).parts.whole
         return bool(np.ptp(points @ np.linalg.eigh(np.cov(points.T))[1], axis=0).max() >= LEAST_LENGTH_M)
 
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> Iterator[np.ndarray]:
-        """Yield the target's pose, then its other stable placements at the same place: the ways in which it may be put down."""
+        """Yield the target's pose, then its other stable placements at the same place: the orientations in which it may be
+        put down.
+        """
         here = around.objects[target].object_to_world
         yield here
         for placement in around.twin(target).poses:

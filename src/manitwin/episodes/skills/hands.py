@@ -1,4 +1,4 @@
-"""Which hands a skill can be done with: what uses a held thing, or the closed fingertips, is planned for two jaws."""
+"""Compatibility of robots and skills: skills that use a held object or closed fingertips are planned for parallel jaws."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from manitwin.robots.robot import Robot
 
 
 def wants_jaws(skill: Skill | None) -> bool:
-    """Tell whether a skill (None: pick-and-place) is planned for two jaws alone."""
+    """Tell whether a skill (None: pick-and-place) is planned for parallel jaws only."""
     return isinstance(skill, HeldSkill | Push | Handover)
 
 
 def skills_of(robot: Robot) -> tuple[Skill, ...]:
-    """Return the skills that a robot's arms and hand can do; what one arm does alone, the first of two does."""
+    """Return the skills that a robot's arms and hand support; the first of two arms does single-arm skills."""
     return tuple(skill for skill in SKILLS.values() if _has_arms(robot, skill) and _has_hand(robot, skill))
 
 
 def check_hand(robot: Robot, skill: Skill | None) -> None:
-    """Raise UsageError where a robot's arms or hand are none for a skill, naming what would do."""
+    """Raise UsageError, naming alternatives, if a robot's arms or hand do not support a skill."""
     if skill is not None and not _has_arms(robot, skill):
         raise UsageError(
             f"skill {skill.name} needs two arms, but {robot.name} has one; give one of"
@@ -43,9 +43,9 @@ def check_hand(robot: Robot, skill: Skill | None) -> None:
 
 
 def check_grasps(robot: Robot, skill: Skill | None, twin_ids: Sequence[str], has_grasps: Callable[[str], bool]) -> None:
-    """Raise UsageError where none of the twins has a grasp for a robot's hand: every attempt would be in vain.
+    """Raise UsageError if none of the twins has a grasp for the robot's hand, because every attempt would fail.
 
-    ``has_grasps`` tells of a twin's id whether it has one. What the closed hand does asks for none.
+    ``has_grasps`` tells whether a twin, by its id, has one. Skills of the closed hand need none.
     """
     if isinstance(skill, Press | Push) or not twin_ids or any(has_grasps(twin_id) for twin_id in twin_ids):
         return
@@ -58,7 +58,7 @@ def check_grasps(robot: Robot, skill: Skill | None, twin_ids: Sequence[str], has
 
 
 def check_jaws(robot: Robot, what: str) -> None:
-    """Raise UsageError where a robot is none of one arm with two jaws, which ``what`` is made for."""
+    """Raise UsageError unless a robot has one arm with parallel jaws, which ``what`` requires."""
     if robot.arms:
         raise UsageError(f"{what} need one arm, but {robot.name} has two; give one of {_with_jaws()}")
     if not robot.has_jaws:

@@ -1,4 +1,4 @@
-"""``hang``: put a thing on a peg by its hole: a mug by its handle, scissors by a ring, a wrench by its eye."""
+"""Skill ``hang``: hang an object on a peg by its hole, such as a mug by its handle, scissors by a ring, a wrench by its eye."""
 
 from __future__ import annotations
 
@@ -20,26 +20,29 @@ from manitwin.geometry.poses import inverse, transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
 
-LEAST_RADIUS_M = 1.8 * PEG_RADIUS_M  # the peg is square: its corners, and a millimetre or two of room
+LEAST_RADIUS_M = 1.8 * PEG_RADIUS_M  # the peg is square: room for its corners, and a millimetre or two
 PEG_REACH_M = np.sqrt(2) * PEG_RADIUS_M + 0.0005
 HALF_DEPTH_M = 0.012
-"""How far along its axis a hole is looked at, to each side: what is farther is beside it, as a mug is beside its handle."""
+"""Half depth, along a hole's axis, that is checked; geometry farther away is beside the hole, as a mug's body is beside its
+handle.
+"""
 PEG = "peg"
 FINGERS_CLEAR_M = 0.03
 RADII_M, TURN_RAD, FACING_RAD = (0.45, 0.60), (0.6, 0.9), 0.6
-BEFORE_TIP_M, HUNG_SHARE = 0.06, 0.45  # where the hole is before it goes on, and how far along the peg it is let down
+# position of the hole before sliding on, and share of the peg's length at which it is let down
+BEFORE_TIP_M, HUNG_SHARE = 0.06, 0.45
 SLIDING_KNOTS, LEANS_RAD = 8, np.radians([0.0, 12, -12])
 ROUNDS = 4
-LET_DOWN = 1.2  # peg radii that the hole's upper edge stays above the peg's middle
+LET_DOWN = 1.2  # distance of the hole's upper edge above the peg's axis, in peg radii
 
 
 class Hang(HeldSkill):
-    """Slide the widest hole over a peg, let it down, and let go."""
+    """Slide the widest hole over a peg, let the object down, and release it."""
 
     name, predicate = "hang", "hung"
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept a thing whose widest hole is wider than the peg, also between its hulls: some fill holes."""
+        """Accept an object whose widest hole passes the peg, also between its hulls, since some hulls fill holes."""
         frame = hole_frame_of(target.frames)
         if frame is None or frame.size_m < LEAST_RADIUS_M:
             return False
@@ -47,11 +50,11 @@ class Hang(HeldSkill):
         return rod_passes(pool.body(target.twin_id).body.hulls, center, axis, PEG_REACH_M, HALF_DEPTH_M)
 
     def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
-        """Return: hung on the peg."""
+        """Return the goal that the target hangs on the peg."""
         return Goal((Literal("hung", target.name, PEG),))
 
     def fixture(self, around: Surroundings, target: int, rng: np.random.Generator) -> Fixture | None:
-        """Draw a peg stand to one side of the target, its peg pointing at the robot, more or less."""
+        """Draw a peg stand to one side of the target, with its peg pointing roughly at the robot."""
         x_m, y_m = around.objects[target].object_to_world[:2, 3]
         side = rng.choice([-1.0, 1.0]) * rng.uniform(*TURN_RAD)
         angle = float(np.clip(np.arctan2(y_m, x_m) + side, -1.0, 1.0))
@@ -61,7 +64,7 @@ class Hang(HeldSkill):
         return peg_stand(foot, angle + np.pi + rng.uniform(-FACING_RAD, FACING_RAD), height_m=PEG_HEIGHT_M, name=PEG)
 
     def task(self, scene: HeldScene) -> HeldTask:
-        """Return the ways on to the peg, from either side of the hole, leaning to either side of the upright."""
+        """Return the paths onto the peg, from either side of the hole, leaning to either side of the vertical."""
         frame = hole_frame_of(scene.frames[scene.target.name])
         assert frame is not None, "only things with holes are hung"
         hole = frame.frame_to_object[:3, 3]
@@ -69,7 +72,7 @@ class Hang(HeldSkill):
         up, room_m = _hanging(body.hulls, hole, axis, body.center_of_mass_m)
         (stand,) = scene.fixtures
         paths = []
-        for lean in LEANS_RAD:  # the upright first: what is let go as it hangs does not swing
+        for lean in LEANS_RAD:  # upright first: an object released as it hangs does not swing
             for sign in scene.rng.permutation([1.0, -1.0]):
                 hole_to_object = transform(rotation_of(sign * axis, up), hole)
                 turned = stand.frame_to_world @ transform(Rotation.from_euler("z", lean).as_matrix())
@@ -87,9 +90,10 @@ class Hang(HeldSkill):
 def _hanging(
     hulls: Sequence[np.ndarray], hole_m: np.ndarray, axis: np.ndarray, center_of_mass_m: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """Return what is up ``(3,)`` when a thing hangs at rest, and how far from the hole's middle its edge is there (m).
+    """Return the up direction ``(3,)`` of an object hanging at rest, and the distance from the hole's centre to its edge
+    there (m).
 
-    The edge that rests on the peg is straight above the centre of mass: found by going from one to the other.
+    The edge that rests on the peg is vertically above the centre of mass; found by fixed-point iteration.
     """
     up, room_m = hole_m - center_of_mass_m, 0.0
     for _ in range(ROUNDS):

@@ -1,4 +1,6 @@
-"""Skills that use what is in the hand: they say where fixtures stand, and make the held path once all has come to rest."""
+"""Base of skills that use a held object: placement of fixtures, and the held path, which is built once all objects are at
+rest.
+"""
 
 from __future__ import annotations
 
@@ -22,28 +24,30 @@ FIXTURES_TRIED = 60
 
 
 class HeldSkill(Skill):
-    """A skill of a held path. A new one says ``suits`` (by ``frames_of``), ``task``, its ``goal``, and its ``fixture`` if any."""
+    """A skill with a held path. A subclass defines ``suits`` (with ``frames_of``), ``task``, ``goal``, and optionally
+    ``fixture``.
+    """
 
     has_partner = False
 
     @abstractmethod
     def task(self, scene: HeldScene) -> HeldTask:
-        """Return what is to be done, from where everything has come to rest."""
+        """Return the task, given where everything has come to rest."""
 
     def fixture(self, around: Surroundings, target: int, rng: np.random.Generator) -> Fixture | None:
-        """Draw a fixture somewhere in reach; it is taken where it stands clear of all objects. None: the skill has none."""
+        """Draw a fixture in reach; it is accepted if it is clear of all objects. None: the skill has no fixture."""
         return None
 
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> Iterator[np.ndarray]:
-        """Yield where the target is: what counts is the way."""
+        """Yield the target's current pose, because the goal depends on the path."""
         yield around.objects[target].object_to_world
 
     def set_goal(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> SkillGoal | None:
-        """Return the goal with its fixtures; None where there is no room for them."""
+        """Return the goal with its fixtures; None if there is no room for them."""
         fixtures = self._fixtures(around, target, rng)
         if fixtures is None:
             return None
@@ -75,7 +79,7 @@ class HeldSkill(Skill):
 
 
 def board_in_reach(around: Surroundings, half_m: np.ndarray, name: str, rng: np.random.Generator) -> Fixture | None:
-    """Draw a board with half extents ``(3,)`` in reach on the furniture; None where none fits."""
+    """Draw a board with half extents ``(3,)`` m in reach on the furniture; None if none fits."""
     place = around.area.draw(board(np.zeros(3), 0.0, half_m).footprint_m, [], rng)
     if place is None:
         return None
@@ -84,7 +88,7 @@ def board_in_reach(around: Surroundings, half_m: np.ndarray, name: str, rng: np.
 
 
 def frames_of(twin: PoolTwin, *kinds: str) -> tuple[TwinFrame, ...]:
-    """Return a twin's frames of some kinds, in their order."""
+    """Return a twin's frames of the given kinds, in their order."""
     return tuple(frame for frame in twin.frames if frame.kind in kinds)
 
 
@@ -94,7 +98,7 @@ def hole_frame_of(frames: tuple[TwinFrame, ...]) -> TwinFrame | None:
 
 
 def hole_of(frames: tuple[TwinFrame, ...]) -> Hole | None:
-    """Return the widest hole of a thing, in its frame."""
+    """Return the widest hole of an object, in the object frame."""
     frame = hole_frame_of(frames)
     if frame is None:
         return None
@@ -102,7 +106,7 @@ def hole_of(frames: tuple[TwinFrame, ...]) -> Hole | None:
 
 
 def tip_of(frames: tuple[TwinFrame, ...], hulls: Sequence[np.ndarray]) -> Tip | None:
-    """Return the first tip of a slender thing, its direction that of the length, out of the tip; None: it has none."""
+    """Return the first tip of a slender object, with the direction of its length, out of the tip; None if it has no tip."""
     frame = next((frame for frame in frames if frame.kind == "tip"), None)
     if frame is None:
         return None
@@ -114,9 +118,11 @@ def tip_of(frames: tuple[TwinFrame, ...], hulls: Sequence[np.ndarray]) -> Tip | 
 
 
 def stick_frame(points_m: np.ndarray, frames: tuple[TwinFrame, ...], up: np.ndarray) -> np.ndarray:
-    """Return the frame ``(4, 4)`` of the working end: Z along the length, out at the outermost place; X near ``up (3,)``.
+    """Return the frame ``(4, 4)`` of the working end: Z along the length, pointing out of the outermost vertex; X near ``up
+    (3,)``.
 
-    The end is that away from the handle where a frame tells it (an axis named so), else the broader one.
+    The working end is the one away from the handle if a frame marks it (an axis whose label contains "handle"), otherwise the
+    broader one.
     """
     middle = points_m.mean(0)
     axis = np.linalg.eigh(np.cov(points_m.T))[1][:, 2]

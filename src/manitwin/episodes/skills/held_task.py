@@ -1,4 +1,4 @@
-"""What a skill asks to be done with a thing in the hand (or with the closed hand): paths, grasps, guards, endings."""
+"""Task of a held-object skill: paths of the object or the closed hand, ranking of grasps, guarded moves, and endings."""
 
 from __future__ import annotations
 
@@ -22,10 +22,11 @@ MEASURED_TIMES = 4
 
 @dataclass(frozen=True)
 class HeldScene:
-    """What a skill sees once all has come to rest: where things are, their frames, the fixtures, and the hand.
+    """Scene for a skill once all objects are at rest: poses, frames, fixtures, and the hand.
 
-    ``openings`` and ``places_m`` are those of the goal. ``fingers`` are the names of the finger links; ``fingertips_m (N, 3)``
-    the corners of the closed fingers in the grasp frame, ``tip_depth_m`` how far along its Z the middle of the pads is.
+    ``openings`` and ``places_m`` are those of the goal. ``fingers`` are the names of the finger links; ``fingertips_m (N,
+    3)`` the vertices of the closed fingertips in the grasp frame, ``tip_depth_m`` the coordinate of the pads' centre along
+    its Z.
     """
 
     target: PlacedObject
@@ -43,11 +44,11 @@ class HeldScene:
 
 @dataclass(frozen=True)
 class Guard:
-    """A guarded move: from knot ``first`` on, until what is watched presses with ``stop_n``.
+    """Guarded move: from knot ``first`` on, until the watched force reaches ``stop_n``.
 
-    A touch is expected at knot ``touches``. It goes at ``speed_m_s`` at most and, where a touch is expected, creeps there; or as
-    a blow: as fast as ``duration_s`` says, fastest at the end of the path (``beyond`` > 1, see ``path_timing``), and yielding
-    once it touches.
+    Contact is expected at knot ``touches``. The speed is at most ``speed_m_s``, and the move creeps at the expected contact.
+    A blow instead has the duration ``duration_s``, is fastest at the end of the path (``beyond`` > 1, see ``path_timing``),
+    and yields on contact.
     """
 
     first: int
@@ -59,16 +60,16 @@ class Guard:
 
     @property
     def is_blow(self) -> bool:
-        """Whether it goes as fast as it can where it touches."""
+        """Whether the move is as fast as possible at contact."""
         return self.beyond > 1
 
 
 @dataclass(frozen=True)
 class Regulated:
-    """A move under force: from knot ``first`` on, as far as a guard came, while what is watched presses with ``force_n``.
+    """Force-controlled move: from knot ``first`` on, from where the guard stopped, with the watched force kept at ``force_n``.
 
-    The way is that of the poses' places alone, from where the guard has stopped; ``normal (3,)``, out of the surface, world
-    frame, is the direction in which the hand yields or follows; ``speed_m_s`` is the mean along it.
+    The path uses only the positions of the poses, relative to where the guard stopped. ``normal (3,)``, out of the surface in
+    the world frame, is the direction of compliance; ``speed_m_s`` is the mean speed along the path.
     """
 
     first: int
@@ -79,15 +80,17 @@ class Regulated:
 
 @dataclass(frozen=True)
 class HeldTask:
-    """One skill's work: ``paths`` are alternatives, of which the first that can be planned is taken, ``otherwise`` more of them.
+    """Task of one skill. ``paths`` are alternatives, of which the first feasible one is used, ``otherwise`` are further ones.
 
-    ``rank`` orders grasps, the least first; None: its fingers block the function. ``empty``: the closed hand itself moves, and
-    nothing is grasped. ``as_hulls``: the target is carried as its hulls, and may go into the objects that it ``enters``. The
-    path takes ``duration_s``, is not taken where the joints need more than ``longest_s``, and is measured and planned anew
-    ``measured`` times. After ``hold_s`` there the target is let go, or kept in the hand, which goes back along the path, or put
-    back where it was. One that ``rises`` goes straight up first, and from there to the path's beginning; one that ``comes_out``
-    ends where it began, and does not go back. ``level_rad``: the target is tilted by no more on its way to the path. ``steady``:
-    what turns in the hand on the path spoils it. ``watch`` makes what latches events, and what a guard asks for the force.
+    ``rank`` orders grasps, smallest first; None: the fingers block the function. ``empty``: the closed hand moves, and
+    nothing is grasped. ``as_hulls``: the target is carried as its hulls, and may enter the objects that it ``enters``.
+
+    The path takes ``duration_s``, is rejected if the joint limits require more than ``longest_s``, and is replanned from
+    measurements ``measured`` times. After ``hold_s`` at its end the target is released ("let_go"), kept in the hand, which
+    goes back along the path ("keep"), or also returned to its place ("put_back"). ``rises``: it first goes straight up and
+    from there to the path's start. ``comes_out``: the path ends where it started, so that there is no way back.
+    ``level_rad``: largest tilt of the target on the way to the path. ``steady``: rotation of the target in the hand during
+    the path would spoil the result. ``watch`` creates the watch that records events and measures the force for a guard.
     """
 
     paths: tuple[HeldPath, ...]

@@ -1,4 +1,4 @@
-"""``insert``: put a slender thing into an upright holder, its tip first: a marker, a screwdriver, a spoon, a knife."""
+"""Skill ``insert``: put a slender object tip first into an upright holder, such as a marker, a screwdriver, a spoon, a knife."""
 
 from __future__ import annotations
 
@@ -21,23 +21,24 @@ from manitwin.scenes.layouts.pool import Pool, PoolTwin
 
 HOLDER = "holder"
 LEAST_LENGTH_M, MOST_RADIUS_M = 0.10, 0.03
-DEPTH_SHARE, DEPTHS_M = 0.4, (0.05, 0.08)  # of the length: as deep as utensils stand in a cup
-ROOM_M = 0.003  # between the thing and each wall, as in ManiSkill's PegInsertionSide
-ABOVE_M, LET_GO_M = 0.04, 0.008  # the tip above the rim before, and above the floor when it is let go
+# share of the object's length, and limits: as deep as utensils stand in a cup
+DEPTH_SHARE, DEPTHS_M = 0.4, (0.05, 0.08)
+ROOM_M = 0.003  # clearance to each wall, as in ManiSkill's PegInsertionSide
+ABOVE_M, LET_GO_M = 0.04, 0.008  # tip above the rim at the start, and above the floor at release
 FREE_KNOTS, KNOTS = 4, 9
 TURNS = 12
-FLAT = 2.0  # broad by narrow side of what goes in
-FINGER_M = 0.012  # half of what a finger is wide: it stays out of the holder
-FAR_STEP_M = 0.02  # grasps that are less apart along the thing count as equal
+FLAT = 2.0  # ratio of the broad to the narrow side of the inserted part
+FINGER_M = 0.012  # half width of a finger, which stays out of the holder
+FAR_STEP_M = 0.02  # grasps whose positions along the object differ by less count as equal
 
 
 class Insert(HeldSkill):
-    """Turn the thing upright above the holder, its tip down, lower it, and let go just above the floor."""
+    """Turn the object upright above the holder, tip down, lower it, and release it just above the floor."""
 
     name, predicate = "insert", "inserted"
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept a thing 10 cm long or more with a tip, no thicker than 6 cm where it goes in."""
+        """Accept an object at least 10 cm long with a tip, whose inserted part is at most 6 cm thick."""
         points = pool.body(target.twin_id).parts.whole
         stick = _stick(points, target)
         if stick is None:
@@ -45,11 +46,11 @@ class Insert(HeldSkill):
         return _length_m(points, stick) >= LEAST_LENGTH_M and _radius_m(points, stick) <= MOST_RADIUS_M
 
     def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
-        """Return: inserted into the holder."""
+        """Return the goal that the target is inserted into the holder."""
         return Goal((Literal(self.predicate, target.name, HOLDER),))
 
     def fixture(self, around: Surroundings, target: int, rng: np.random.Generator) -> Fixture | None:
-        """Draw a holder in reach whose bore the thing passes with 3 mm of room."""
+        """Draw a holder in reach whose bore leaves 3 mm of clearance."""
         points = around.body(target).parts.whole
         stick = _stick(points, around.twin(target))
         assert stick is not None, "only things with a tip are inserted"
@@ -62,7 +63,9 @@ class Insert(HeldSkill):
         return holder(position_m, float(np.arctan2(place[1, 0], place[0, 0])), bore_m, depth_m, name=HOLDER)
 
     def task(self, scene: HeldScene) -> HeldTask:
-        """Return the ways down into the holder, the thing turned about its own length by twelfths."""
+        """Return the paths down into the holder, with the object rotated about its length in steps of 30 degrees (a flat one:
+        180).
+        """
         target, (into,) = scene.target, scene.fixtures
         bore = into.holder
         assert bore is not None, "things are inserted into holders"
@@ -97,7 +100,7 @@ class Insert(HeldSkill):
 
 
 def _stick(points: np.ndarray, twin: PoolTwin) -> np.ndarray | None:
-    """Return the tip's frame ``(4, 4)``, Z out of the tip along the length; None for a thing without a tip."""
+    """Return the tip's frame ``(4, 4)``, Z out of the tip along the length; None for an object without a tip."""
     tip = tip_of(twin.frames, (points,))
     return None if tip is None else transform(rotation_of(tip.direction), tip.position_m)
 
@@ -107,20 +110,21 @@ def _length_m(points: np.ndarray, stick: np.ndarray) -> float:
 
 
 def _depth_m(points: np.ndarray, stick: np.ndarray) -> float:
-    """Return how deep a holder is for a thing: a long one falls out of a shallow bore."""
+    """Return the depth of a holder for an object: a long one falls out of a shallow bore."""
     return float(np.clip(DEPTH_SHARE * _length_m(points, stick), *DEPTHS_M))
 
 
 def _radius_m(points: np.ndarray, stick: np.ndarray) -> float:
-    """Return the radius of the part that goes in, about the middle of its box."""
+    """Return the radius of the inserted part, about the centre of its bounding box."""
     return _section(points, stick, _depth_m(points, stick)).radius_m
 
 
 @dataclass(frozen=True)
 class _Section:
-    """What goes in as seen along the stick: ``to_stick (4, 4)`` is its box's middle at the outermost point, X its broad side.
+    """Cross-section of the inserted part, seen along the stick.
 
-    ``half_m (2,)`` of that box, and the radius about its middle.
+    ``to_stick (4, 4)``: origin at the centre of its bounding rectangle, at the outermost point, X along the broad side.
+    ``half_m (2,)`` are the half sides of the rectangle, ``radius_m`` the radius about its centre.
     """
 
     to_stick: np.ndarray
@@ -129,22 +133,24 @@ class _Section:
 
     @property
     def is_flat(self) -> bool:
-        """Whether it is so flat that it would balance in a square bore on its edge, or fall over in it: a blade, a ruler."""
+        """Whether it is so flat that it would balance on its edge in a square bore or fall over, such as a blade or a ruler."""
         return bool(self.half_m[0] > FLAT * self.half_m[1])
 
     @property
     def bore_half_m(self) -> np.ndarray:
-        """The half widths ``(2,)`` of a bore for it: a slot for what is flat, else a square one that it passes in any turn."""
+        """Half widths ``(2,)`` of a bore: a slot for a flat part, otherwise a square that it passes at any rotation."""
         return np.asarray((self.half_m if self.is_flat else np.full(2, self.radius_m)) + ROOM_M)
 
 
 def _section(points: np.ndarray, stick: np.ndarray, depth_m: float) -> _Section:
-    """Return the section of what goes in by a depth: the smallest box about it, by turns of a degree."""
+    """Return the cross-section of the part inserted to a depth, with its smallest bounding rectangle over rotations by one
+    degree.
+    """
     local = transform_points(inverse(stick), points)
     entering = local[local[:, 2] > local[:, 2].max() - depth_m, :2]
     turns = [Rotation.from_euler("z", each, degrees=True).as_matrix() for each in range(180)]
     spans = np.array([np.ptp(entering @ turn[:2, :2], axis=0) for turn in turns])
-    spans[spans[:, 0] < spans[:, 1] - 1e-9] = np.inf  # X is along the broad side
+    spans[spans[:, 0] < spans[:, 1] - 1e-9] = np.inf  # keeps X along the broad side
     best = int(spans.prod(1).argmin())
     turned = entering @ turns[best][:2, :2]
     middle = turns[best][:2, :2] @ ((turned.max(0) + turned.min(0)) / 2)

@@ -1,4 +1,4 @@
-"""``lift``: take a thing and hold it up."""
+"""Skill ``lift``: grasp an object and hold it up."""
 
 from __future__ import annotations
 
@@ -12,27 +12,28 @@ from manitwin.geometry.poses import transform
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
 
-LEAST_M = 0.1  # what the goal asks for
-HEIGHTS_M = (0.13, 0.16, 0.19)  # the arm sags, and things turn in the hand: more than what is asked for
-ASIDE_M = ((0.0, 0.0), (-0.08, 0.0), (0.0, 0.08), (0.0, -0.08), (0.08, 0.0))  # where there is no room straight above
+LEAST_M = 0.1  # height that the goal requires
+HEIGHTS_M = (0.13, 0.16, 0.19)  # above the required height, because the arm sags and objects rotate in the hand
+# lateral alternatives if there is no room straight above
+ASIDE_M = ((0.0, 0.0), (-0.08, 0.0), (0.0, 0.08), (0.0, -0.08), (0.08, 0.0))
 HELD_S, UP_S = 0.5, 1.0
 
 
 class Lift(HeldSkill):
-    """Hold the target up by 10 cm or more, turned as it lay."""
+    """Hold the target at least 10 cm above its start, in its initial orientation."""
 
     name, predicate = "lift", "lifted"
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept anything: grasps decide."""
+        """Accept anything: the grasps decide."""
         return True
 
     def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
-        """Return: in the hand, higher by 10 cm than at the beginning."""
+        """Return the goal that the target is in the hand, at least 10 cm above its start."""
         return Goal((Literal("lifted", target.name, None, LEAST_M),))
 
     def task(self, scene: HeldScene) -> HeldTask:
-        """Return ways up: straight above where it lay, or a little aside."""
+        """Return paths up: straight above the start, or slightly to the side."""
         start = scene.target.object_to_world
         ways = [
             HeldPath(np.array([transform(None, np.array([*aside, height])) @ start for height in HEIGHTS_M]))

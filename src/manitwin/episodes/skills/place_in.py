@@ -1,4 +1,4 @@
-"""``place_in``: let an object go in a vessel where it comes to rest, lying or leaning, or on end below the rim."""
+"""Skill ``place_in``: release an object in a vessel, lying or leaning, or on end with its lower end below the rim."""
 
 from __future__ import annotations
 
@@ -15,23 +15,25 @@ from manitwin.geometry.poses import transform, transform_points
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
 from manitwin.scenes.layouts.stacking import Mouth, mouth_of, open_poses, put_into
 
-LEAST_DEPTH_M = 0.025  # of a vessel: what is put on a plate lies on it, and rolls off
-LEANING_FALL_M = 0.004  # above where a drop ended
+LEAST_DEPTH_M = 0.025  # of a vessel: an object on a plate lies on it, and rolls off
+LEANING_FALL_M = 0.004  # release height above where a drop ended
 AS_IT_IS_TRIED, LYING_TRIED, ON_END_TRIED, LEANING_TRIED = 3, 4, 12, 12
-ROUNDS = 5  # of tries; the next is only made where no pose of those before can be planned for
-RESTS_FIRST = 8  # of where drops ended, before the poses that they began in
+ROUNDS = 5  # rounds of sampling; the next round is only used if no pose of the previous ones can be planned
+RESTS_FIRST = 8  # number of resting poses tried before release poses
 FAR_FALL_M = 0.03
-"""What moves farther as it falls meets the opening hand on its way: twice as many drops of it are tried, twice as far beside."""
+"""An object that moves farther while falling meets the opening hand: twice as many drops with twice the perturbation are
+tested.
+"""
 
 
 class PlaceIn(Skill):
-    """Put the target into its partner, a vessel that opens upward."""
+    """Put the target into its partner, a vessel that opens upwards."""
 
     name, predicate, has_partner, most_poses = "place_in", "in", True, 32
     lets_fall = True
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept a vessel that is deeper than a plate, with a rim wider than the target's two smaller sides."""
+        """Accept a vessel deeper than a plate, with a rim wider than the target's two smaller sides."""
         if partner is None or not partner.vessel or not open_poses(partner, pool.body(partner.twin_id)):
             return False
         opening = pool.body(partner.twin_id).opening
@@ -44,12 +46,14 @@ class PlaceIn(Skill):
     ) -> Iterator[np.ndarray]:
         """Yield poses just above where the target would lie or lean, and poses on end with the lower end below the rim.
 
-        Those from which it comes to rest in the vessel when it is let go there in physics, also when that is a little beside:
-        a banana that balances on the rim of a bowl is no goal. Where a drop ended is one, and comes before where it began: a fork
-        on end in a bowl falls to any side, over the rim or against the hand. Of those that lie, some as the target lies now, and
-        those on end, by turns, the ones come first that move the least: the hand may meet the rim for all of one kind. Where
-        a hand has no room in the vessel, things are let go leaning, tilted from how they lie now, so that a hand that took them
-        from above stays above the rim; or at the rim of a deep vessel: the poses before the drop.
+        Only poses from which the target comes to rest in the vessel in a simulated drop are used, also with perturbations: a
+        banana that balances on the rim of a bowl does not qualify. The resting pose of a drop is also a goal pose and comes
+        before the release pose: a fork on end in a bowl falls to any side, over the rim or against the hand.
+
+        Lying poses, some in the target's present orientation, alternate with poses on end, those with the least motion first,
+        because the hand may collide with the rim for all poses of one kind. For vessels without room for the hand, objects
+        are released leaning, tilted from their present orientation, so that a hand that grasped from above stays above the
+        rim; or at the rim of a deep vessel, at the poses before the drop.
         """
         assert partner is not None
         mouth = mouth_of(around.body(partner), around.objects[partner].object_to_world)
@@ -59,7 +63,9 @@ class PlaceIn(Skill):
         goal = self.goal(around.objects[target], around.objects[partner])
 
         def steadiest(poses: Iterator[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
-            """Return where drops that reach the goal end, a little above, and where they begin."""
+            """Return the resting poses of drops that reach the goal, slightly raised, with their release poses; smallest
+            motion first.
+            """
             rests = [(begun, rest_after_drop(around, target, partner, goal, begun)) for begun in poses]
             found = [(begun, rest) for begun, rest in rests if rest is not None]
             found.sort(key=lambda each: _farthest_m(around.body(target).parts.whole, *each))
@@ -90,7 +96,7 @@ class PlaceIn(Skill):
         rng: np.random.Generator,
         scale: int = 1,
     ) -> Iterator[np.ndarray]:
-        """Yield those of some poses from which the goal is reached also a little beside."""
+        """Yield the poses from which the goal is also reached with perturbations."""
         goal = self.goal(around.objects[target], around.objects[partner])
         for pose in poses:
             if all_rest(around, target, partner, goal, nearby(pose, rng, scale)):
@@ -114,5 +120,5 @@ def _raised(rest: np.ndarray) -> np.ndarray:
 
 
 def _farthest_m(points: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
-    """Return how far the point moves that moves the farthest between two poses ``(4, 4)``."""
+    """Return the largest displacement of any point between two poses ``(4, 4)``."""
     return float(np.linalg.norm(transform_points(after, points) - transform_points(before, points), axis=1).max())

@@ -1,4 +1,4 @@
-"""``place_on`` and ``stack``: set an object down on another one, where a drop in physics shows that it stays."""
+"""Skills ``place_on`` and ``stack``: set an object down on another one, where a simulated drop shows that it stays."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from manitwin.scenes.layouts.stacking import Level, level_end, lower
 AS_IT_IS_TRIED, DRAWN_TRIED = 2, 8
 ABOVE_M, RAISED_M = 0.001, 0.02
 MOST_MOVED_M, MOST_TURNED_RAD = 0.008, np.radians(6)
-LEVEL_M = 0.006  # corners within this of the highest are the top: no scan of a box is level to a millimetre
-BROAD_M = 0.012  # how far the middle of a top is from its edges
-SPREAD_SHARE = 0.4  # of that: how far from the middle something is put
+LEVEL_M = 0.006  # vertices within this of the highest form the top: scans of boxes are not level to the millimetre
+BROAD_M = 0.012  # distance of a top's centre from its edges
+SPREAD_SHARE = 0.4  # share of that distance by which placements vary around the centre
 
 
 @dataclass(frozen=True)
 class PlaceOn(Skill):
-    """Set the target down on its partner; ``same_category``: only on its like (``stack``)."""
+    """Set the target down on its partner; ``same_category``: only on an object of the same category (``stack``)."""
 
     name: str
     same_category: bool = False
@@ -35,7 +35,7 @@ class PlaceOn(Skill):
     most_poses: int = 4 + AS_IT_IS_TRIED
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept a partner with a level top, which a vessel does not have; whether the target stays there a drop shows."""
+        """Accept a partner with a level top that is not a vessel; a drop test later decides whether the target stays."""
         if partner is None or partner.vessel or (self.same_category and partner.category != target.category):
             return False
         best = max(partner.poses, key=lambda pose: (pose.upright, pose.probability))
@@ -44,9 +44,9 @@ class PlaceOn(Skill):
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> Iterator[np.ndarray]:
-        """Yield poses in which the target came to rest on its partner after a fall of a millimetre, also from a little beside.
+        """Yield poses in which the target comes to rest on its partner after a drop of a millimetre, also with perturbations.
 
-        Those in which it is as it stands or lies now come first: who has a cup put on a box does not ask for it on its side.
+        Poses in the target's present orientation come first: a cup put on a box is not expected to lie on its side.
         """
         assert partner is not None
         body, goal = around.body(target), self.goal(around.objects[target], around.objects[partner])
@@ -72,7 +72,7 @@ class PlaceOn(Skill):
                 yield rested
 
     def _let_go(self, around: Surroundings, target: int, partner: int, raised: np.ndarray) -> np.ndarray | None:
-        """Return the pose a millimetre above the partner that is straight below another one; None where that is beside it."""
+        """Return the pose a millimetre above the partner, straight below ``raised``; None if that misses the partner."""
         low_m = float(around.parts(partner).bounds[0][2])
         lowered = lower(around.body(target), raised, [around.parts(partner)], low_m)
         if lowered is None or lowered.bounds[0][2] < low_m + ABOVE_M:
@@ -88,20 +88,20 @@ def _raised(pose: np.ndarray) -> np.ndarray:
 
 
 def _as_it_is(body: PoolBody, object_to_world: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Return a pose that differs from one by its heading and place alone, with the lowest point at z = 0."""
+    """Return a pose with the same tilt and random heading, with the lowest point at z = 0."""
     turned = transform(Rotation.from_rotvec([0, 0, rng.uniform(-np.pi, np.pi)]).as_matrix() @ object_to_world[:3, :3])
     turned[2, 3] = -body.parts.at(turned).bounds[0][2]
     return turned
 
 
 def _top(base: PlacedParts) -> Level | None:
-    """Return the top of a base that something may stand on: level as far as scans are, and no rim."""
+    """Return the level top of an object that can support another one, excluding rims; None if there is none."""
     top = level_end(base, top=True, within_m=LEVEL_M)
     return top if top is not None and top.depth_inside(top.middle_m) >= BROAD_M else None
 
 
 def _stayed(body: PoolBody, start: np.ndarray, end: np.ndarray) -> bool:
-    """Tell whether an object rests as it was let go: what slid or toppled first is hard to set down there."""
+    """Tell whether an object rests as it was released: where it slid or toppled first, a placement is difficult."""
     center = body.body.center_of_mass_m[None]
     moved_m = float(np.linalg.norm(transform_points(end, center) - transform_points(start, center)))
     return moved_m <= MOST_MOVED_M and rotation_angle_rad(end[:3, :3] @ start[:3, :3].T) <= MOST_TURNED_RAD

@@ -1,4 +1,4 @@
-"""``pour``: empty a vessel of its granules into another one, over the lip and back upright, and put it back."""
+"""Skill ``pour``: empty a vessel of its granules into another one over its lip, turn it upright again, and put it back."""
 
 from __future__ import annotations
 
@@ -21,32 +21,38 @@ from manitwin.scenes.layouts.pool import Pool, PoolTwin
 from manitwin.scenes.layouts.stacking import open_poses
 from manitwin.scenes.layouts.twin_frames import TwinFrame
 
-SHORT_OF_MIDDLE = 0.45  # rim radii of the vessel that is poured into, from the lip to its middle
-CLEAR_M = 0.015  # of the lowest corner above that vessel's rim
-HIGH_M = 0.10  # the same where a hand that holds the rim comes below it: what is too heavy for its handle is held there
-ABOVE_M, LOW_FROM_RAD = 0.05, np.radians(50)  # it begins higher: what has turned in the hand is measured on the way
+SHORT_OF_MIDDLE = 0.45  # distance of the lip from the centre of the receiving vessel, in rim radii
+CLEAR_M = 0.015  # clearance of the lowest vertex above that vessel's rim
+# the same for a hand that holds the rim and comes below it: vessels too heavy for their handle are held there
+HIGH_M = 0.10
+# the path starts higher, because the rotation in the hand is measured on the way
+ABOVE_M, LOW_FROM_RAD = 0.05, np.radians(50)
 TILT_RAD, TILTS = np.radians(115), 13
-LEVEL_RAD = np.radians(40)  # a vessel that is a sixth full begins to spill at about 60 degrees, sooner as it is swung
+# a vessel that is a sixth full starts to spill at about 60 degrees, or less when it is swung
+LEVEL_RAD = np.radians(40)
 DEEP, DEEP_TILT_RAD, DEEP_LASTS_S = 3.0, np.radians(135), 2.0
-"""Rim radii from which on a vessel is deep; a belly below a neck runs out later, and longer."""
+"""Ratio of depth to rim radius from which a vessel is deep; a belly below a neck empties later and takes longer."""
 AZIMUTHS = 8
 POURS_S, LASTS_S, LONGEST_S = 2.5, 0.5, 4.0
-MOST_SHARE = 0.8  # of the vessel that is poured into
-LEAST_DEPTH_M = 0.025  # of that vessel: grains roll off a plate
-LEAST_RIM_M, RIM_SHARE = 0.03, 2 / 3  # of that vessel; the other's rim by its: a stream spreads as it falls
+MOST_SHARE = 0.8  # of the receiving vessel's volume
+LEAST_DEPTH_M = 0.025  # of the receiving vessel: granules roll off a plate
+# of the receiving vessel, and ratio of the source's rim radius to its: a stream spreads as it falls
+LEAST_RIM_M, RIM_SHARE = 0.03, 2 / 3
 LIP_BAND_M, LIP_RAD = 0.008, np.radians(20)
-FINGER_M = 0.006  # half of what a finger is thick
+FINGER_M = 0.006  # half thickness of a finger
 INSIDE_M = 0.002  # a fingertip deeper than this below the rim is inside
 BESIDE_LIP_RAD, AWAY_STEP_RAD = np.radians(60), np.radians(30)
 
 
 class Pour(HeldSkill):
-    """Pour from the target, a vessel with a lip, into its partner, a vessel that holds it all."""
+    """Pour from the target, a vessel with a lip, into its partner, a vessel that holds the whole content."""
 
     name, predicate, has_partner = "pour", "poured", True
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept vessels that open upward, the partner deeper than a plate, its rim 3 cm and wider than the target's."""
+        """Accept vessels that open upwards; the partner deeper than a plate, with a rim of at least 3 cm that is wider than
+        the target's.
+        """
         if partner is None or not (target.vessel and partner.vessel) or lip_frame(target) is None:
             return False
         first, second = (pool.body(twin.twin_id) for twin in (target, partner))
@@ -58,7 +64,7 @@ class Pour(HeldSkill):
         return holds and deep and vessel.rim_radius_m >= max(LEAST_RIM_M, source.rim_radius_m / RIM_SHARE)
 
     def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
-        """Return: poured, the target upright again and the partner where it was."""
+        """Return the goal: poured, with the target upright again and the partner undisturbed."""
         assert partner is not None
         stays = (Literal("upright", target.name), Literal("undisturbed", partner.name))
         return Goal((Literal(self.predicate, target.name, partner.name),), stays)
@@ -66,14 +72,14 @@ class Pour(HeldSkill):
     def set_goal(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> SkillGoal | None:
-        """Return the goal with granules in the target; None where it has no room for them."""
+        """Return the goal with granules in the target; None if it has no room for them."""
         name, body = around.objects[target].name, around.body(target)
         found = super().set_goal(around, target, partner, rng)
         granules = None if body.opening is None else fill(name, body.opening, body.body.hulls, rng)
         return None if found is None or granules is None else replace(found, granules=granules)
 
     def task(self, scene: HeldScene) -> HeldTask:
-        """Return the tilt over the partner's rim, from eight sides."""
+        """Return the tilts over the partner's rim, from eight sides."""
         assert scene.partner is not None
         lip, vessel = lip_of(scene), scene.openings[scene.partner.name]
         center = transform_points(scene.partner.object_to_world, vessel.center_m[None])[0]
@@ -100,12 +106,12 @@ class Pour(HeldSkill):
 
 
 def lip_frame(twin: PoolTwin) -> TwinFrame | None:
-    """Return the frame of an opening that has a side to pour over: a handle's opposite, or a spout."""
+    """Return the frame of an opening with a pouring side: opposite a handle, or at a spout."""
     return next((frame for frame in frames_of(twin, "opening") if not frame.roll_free), None)
 
 
 def lip_of(scene: HeldScene) -> np.ndarray:
-    """Return the lip's frame ``(4, 4)`` in the target's: at the rim in the pour direction, X that way, Z out of the opening."""
+    """Return the lip's frame ``(4, 4)`` in the target's: at the rim, X in the pouring direction, Z out of the opening."""
     frame = next(f for f in scene.frames[scene.target.name] if f.kind == "opening" and not f.roll_free)
     points = transform_points(inverse(frame.frame_to_object), np.concatenate(scene.target.body.hulls))
     out_m, azimuth = np.linalg.norm(points[:, :2], axis=1), np.arctan2(points[:, 1], points[:, 0])
@@ -123,9 +129,10 @@ def pouring_paths(
     first_rad: float,
     clear_m: float,
 ) -> tuple[HeldPath, ...]:
-    """Return tilts about the lip's Y from eight sides: the lip short of the middle, the lowest corner ``clear_m`` above the rim.
+    """Return tilts about the lip's Y axis from eight sides, with the lip short of the centre.
 
-    Each begins a little higher and comes down while it tilts to ``tilt_rad``.
+    The lowest vertex stays ``clear_m`` above the rim. Each path starts slightly higher and comes down while it tilts to
+    ``tilt_rad``.
     """
     corners = transform_points(inverse(lip), np.concatenate(body.hulls))
     paths = []
@@ -143,9 +150,11 @@ def pouring_paths(
 
 
 def grasp_rank(grasp: Grasp, opening: Opening, lip: np.ndarray, tip_depth_m: float) -> float | None:
-    """Order grasps: none with a finger inside beside the lip, those with one elsewhere inside last, far from the lip first.
+    """Rank grasps: reject fingers inside the vessel near the lip, put other fingers inside last, and prefer a small distance
+    step.
 
-    By steps: of a handle that is far from the lip any place serves that holds.
+    The rank grows in steps with the angle towards the lip, because all places on a handle far from the lip serve equally
+    well.
     """
     side = grasp.width_m / 2 + FINGER_M
     tips = transform_points(grasp.gripper_to_object, np.array([[s, 0.0, tip_depth_m] for s in (-side, 0.0, side)]))

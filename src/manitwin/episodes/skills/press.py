@@ -1,4 +1,6 @@
-"""``press``: push a button, a lid or another upward place of a thing with the closed fingertips, until it pushes back."""
+"""Skill ``press``: push a button, a lid or another upward frame of an object with the closed fingertips, until a force is
+reached.
+"""
 
 from __future__ import annotations
 
@@ -18,27 +20,29 @@ from manitwin.physics.sapien.world import RobotWorld
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
 from manitwin.scenes.layouts.twin_frames import TwinFrame
 
-KINDS = ("button", "face", "surface")  # what is pressed, where a thing has several
+KINDS = ("button", "face", "surface")  # in order of preference
 UPWARD = np.cos(np.radians(30))
 ABOVE_M, NEAR_M, BELOW_M, FREE_KNOTS = 0.06, 0.012, 0.006, 6
-LEAST_HEIGHT_M = 0.012  # above the table: the tilted hand goes a little deeper than the place
-SOLID_M = 0.006  # below the place there is something to press on: the middle of a brick's top may be a hole
+LEAST_HEIGHT_M = 0.012  # above the table, because the tilted hand goes slightly deeper than the pressed point
+SOLID_M = 0.006  # depth below the point at which there must be material: the middle of a brick's top may be a hole
 TILT_RAD = np.radians([10.0, 25.0])
-LEAST_LEAD_M = 0.0015  # of the corner that presses: where two touch at once, the force is between them, 2 cm off
+LEAST_LEAD_M = 0.0015  # lead of the pressing vertex: if two touch at once, the force acts between them, 2 cm away
 TRIED = 24
-TOUCHES = FREE_KNOTS + 2  # the knot at the place's height
+TOUCHES = FREE_KNOTS + 2  # the knot at the height of the point
 SPEED_M_S = 0.004
-"""At most; near the place a sixth of it, 0.03 mm between two actions, in which a stiff thing presses 1 N more."""
-MORE_N = 3.0  # than is asked for, so that what sags away still leaves enough
+"""Upper limit; near the point a sixth of it, 0.03 mm between two actions, in which the force on a stiff object grows by 1 N."""
+MORE_N = 3.0  # above the requested force, to compensate relaxation
 
 
 class Press(HeldSkill):
-    """Close the hand and bring the lowest corner of the fingertips down on the place, slowly, until the force is there."""
+    """Close the hand and lower its leading fingertip vertex onto the point, slowly, until the force is reached."""
 
     name, predicate = "press", "pressed"
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept a thing with a button, face or surface that looks upward as it stands, is solid, and not as low as the table."""
+        """Accept an object with a button, face or surface that faces upwards in its placement, is solid, and is well above
+        the table.
+        """
         standing = self.begins_in(target)[0].object_to_plane
         frame = pressed_frame(target.frames, standing)
         if frame is None or float((standing @ frame.frame_to_object)[2, 3]) < LEAST_HEIGHT_M:
@@ -47,13 +51,13 @@ class Press(HeldSkill):
         return bool(inside_any_hull(under_m, pool.body(target.twin_id).body.hulls)[0])
 
     def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
-        """Return: the target was pressed, and stays where it is."""
+        """Return the goal: the target was pressed and is undisturbed."""
         return Goal((Literal(self.predicate, target.name),), (Literal("undisturbed", target.name),))
 
     def task(self, scene: HeldScene) -> HeldTask:
-        """Return ways down to the place, the hand turned and tilted at random so that one corner of it comes first.
+        """Return paths down to the point, with the hand rotated and tilted randomly so that a single vertex leads.
 
-        None of a thing that lies so that no such place looks upward: a scene's may, and what another step has laid down.
+        There are no paths if no such frame faces upwards, as in given scenes, or after another step has laid the object down.
         """
         target, rng, frames = scene.target, scene.rng, scene.frames[scene.target.name]
         frame = pressed_frame(frames, target.object_to_world)
@@ -83,16 +87,19 @@ class Press(HeldSkill):
 
 
 def pressed_place(frames: tuple[TwinFrame, ...], object_to_world: np.ndarray) -> np.ndarray:
-    """Return the frame ``(4, 4)`` in the world that is pressed of what is at a pose now; its own where none looks upward.
+    """Return the pressed frame ``(4, 4)`` in the world for the object's current pose; the object's own frame if none faces
+    upwards.
 
-    Another step may have laid it down another way than it began.
+    Another step may have changed the object's orientation.
     """
     frame = pressed_frame(frames, object_to_world)
     return object_to_world if frame is None else object_to_world @ frame.frame_to_object
 
 
 def pressed_frame(frames: tuple[TwinFrame, ...], object_to_world: np.ndarray) -> TwinFrame | None:
-    """Return the frame that is pressed: the first that looks upward at a pose ``(4, 4)``, buttons before faces and surfaces."""
+    """Return the first frame that faces upwards at a pose ``(4, 4)``, buttons before faces and surfaces; None if there is
+    none.
+    """
     upward = [
         frame
         for frame in frames

@@ -1,4 +1,4 @@
-"""``push``: slide an object over the table to a marked place with the closed hand, stroke by stroke, never lifting it."""
+"""Skill ``push``: slide an object over the table to a marked place with the closed hand, in strokes, without lifting it."""
 
 from __future__ import annotations
 
@@ -18,44 +18,47 @@ from manitwin.scenes.layouts.pool import Pool, PoolTwin
 MARK = "mark"
 WAY_M = (0.08, 0.20)
 PLACES_TRIED = 60
-MOST_INWARD = -0.5  # cosine to the direction away from the robot: the hand does not reach behind a thing to pull it in
+MOST_INWARD = -0.5  # cosine to the outward direction: the hand does not reach behind an object to pull it in
 LEAST_HEIGHT_M, LEAST_WIDTH_M = 0.02, 0.03
-BASE_M, LEAST_BASE_M = 0.002, 0.025  # corners so near to the table are its base; with a narrower base it rolls
-TIPPING = 0.8  # height over width up to which a thing that is pushed slides and does not fall over
+# vertices within BASE_M of the table form the base; an object with a narrower base rolls
+BASE_M, LEAST_BASE_M = 0.002, 0.025
+TIPPING = 0.8  # largest ratio of height to width for which a pushed object slides instead of falling over
 
 
 def base_width_m(points: np.ndarray) -> float:
-    """Return the least width (m) of the base of an object with corners ``(N, 3)``; of a lying round thing it is a strip."""
+    """Return the smallest width (m) of an object's base, given vertices ``(N, 3)``; a lying round object has a narrow strip
+    as base.
+    """
     base = points[points[:, 2] < points[:, 2].min() + BASE_M, :2]
     angles = np.linspace(0, np.pi, 36, endpoint=False)
     return float(np.ptp(base @ np.array([np.cos(angles), np.sin(angles)]), axis=0).min())
 
 
 def can_be_pushed(points: np.ndarray) -> bool:
-    """Tell whether an object with corners ``(N, 3)`` m is high enough for a fingertip, and neither falls over nor rolls."""
+    """Tell whether an object with vertices ``(N, 3)`` m is high enough for a fingertip, and neither falls over nor rolls."""
     *across_m, height_m = np.ptp(points, axis=0).tolist()
     broad = min(across_m) >= max(LEAST_WIDTH_M, HEIGHT_SHARE * TIPPING * height_m)
     return height_m >= LEAST_HEIGHT_M and broad and base_width_m(points) >= LEAST_BASE_M
 
 
 class Push(Skill):
-    """Push the target to a place in reach, along a way that is free."""
+    """Push the target to a place in reach along a free path."""
 
     name, predicate, has_partner = "push", "pushed_to", False
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept what is high enough for a fingertip, and stands broadly enough neither to fall over nor to roll."""
+        """Accept an object that is high enough for a fingertip and broad enough neither to fall over nor to roll."""
         pose = self.begins_in(target)[0].object_to_plane
         return can_be_pushed(transform_points(pose, np.concatenate(pool.body(target.twin_id).body.hulls)))
 
     def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
-        """Return: pushed to the mark."""
+        """Return the goal that the target was pushed to the mark."""
         return Goal((Literal(self.predicate, target.name, MARK),))
 
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> Iterator[np.ndarray]:
-        """Yield poses in reach that the target may be slid to: free ones, with a free way there for target and fingertip."""
+        """Yield free poses in reach, with a free straight path there for target and fingertips."""
         moved = around.objects[target]
         corners = footprint_at(moved.body, moved.object_to_world)
         taken = [footprint_at(o.body, o.object_to_world) for i, o in enumerate(around.objects) if i != target]
@@ -76,7 +79,9 @@ class Push(Skill):
     def set_goal(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> SkillGoal | None:
-        """Return the goal with its mark; None where nothing is free, or the target lies so that it would roll or fall over."""
+        """Return the goal with its mark; None if no place is free, or if the target would roll or fall over in its present
+        orientation.
+        """
         moved = around.objects[target]
         points = transform_points(moved.object_to_world, np.concatenate(moved.body.hulls))
         pose = next(self.poses(around, target, partner, rng), None) if can_be_pushed(points) else None

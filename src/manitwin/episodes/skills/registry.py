@@ -1,4 +1,4 @@
-"""The skills by name."""
+"""Registry of the skills by name."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from manitwin.episodes.skills.wipe import Wipe
 from manitwin.errors import UsageError, choose_from
 
 PICK_PLACE = "pick_place"
-"""Moves an object to a pose drawn at random: its goal is that pose, not one in words."""
+"""Moves an object to a random pose: its goal is that pose, not a literal."""
 
 _SKILLS: tuple[Skill, ...] = (
     PLACE_ON,
@@ -57,7 +57,7 @@ def skill_names() -> tuple[str, ...]:
 
 
 def load_skill(name: str) -> Skill | None:
-    """Return a skill, None for pick-and-place; raises UsageError that lists the valid names for an unknown one."""
+    """Return a skill, None for pick-and-place; raises UsageError listing the valid names for an unknown one."""
     if name == PICK_PLACE:
         return None
     if name not in SKILLS:

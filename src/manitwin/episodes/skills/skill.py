@@ -1,4 +1,4 @@
-"""What a skill is: it tells who can take part, and sets a goal in words with the poses that may reach it."""
+"""Skill interface: selection of participants, and the goal with the target's poses that may reach it."""
 
 from __future__ import annotations
 
@@ -42,24 +42,24 @@ class Surroundings:
         return self.pool.twin(self.objects[number].twin_id)
 
     def parts(self, number: int) -> PlacedParts:
-        """Return an object's convex parts where it stands."""
+        """Return an object's convex parts at its pose."""
         return self.body(number).parts.at(self.objects[number].object_to_world)
 
     def obstacles(self, *, without: Sequence[int]) -> list[PlacedParts]:
-        """Return the convex parts of furniture and of all objects but some."""
+        """Return the convex parts of furniture and of all objects except ``without``."""
         boxes = [ConvexParts.of_box(box).at(np.eye(4)) for box in self.boxes]
         return boxes + [self.parts(number) for number in range(len(self.objects)) if number not in without]
 
 
 class FoundPoses(Sequence[np.ndarray]):
-    """Poses ``(4, 4)`` that are looked for when they are asked for: most goals are planned for with the first one or two."""
+    """Lazy sequence of poses ``(4, 4)``: most goals are planned with the first one or two."""
 
     def __init__(self, poses: Iterator[np.ndarray]):
-        """Take what finds them; the length is known once all have been found."""
+        """Take the iterator of poses; the length requires all of them."""
         self._left, self._found = poses, list[np.ndarray]()
 
     def __len__(self) -> int:
-        """Return how many there are."""
+        """Return the number of poses."""
         self._found += self._left
         return len(self._found)
 
@@ -68,7 +68,7 @@ class FoundPoses(Sequence[np.ndarray]):
     @overload
     def __getitem__(self, number: slice) -> Sequence[np.ndarray]: ...
     def __getitem__(self, number: int | slice) -> np.ndarray | Sequence[np.ndarray]:
-        """Return one, or some; raises IndexError where there is none."""
+        """Return one pose or several; raises IndexError out of range."""
         wanted = len(self) if isinstance(number, slice) or number < 0 else number + 1
         self._found += islice(self._left, max(0, wanted - len(self._found)))
         return self._found[number]
@@ -76,14 +76,14 @@ class FoundPoses(Sequence[np.ndarray]):
 
 @dataclass(frozen=True)
 class SkillGoal:
-    """A goal, the poses ``object_to_world (4, 4)`` of the target that should reach it, best first, and who takes part.
+    """A goal, the target's poses ``object_to_world (4, 4)`` that should reach it, best first, and the participants.
 
-    ``partner`` is the object that the goal is about beside the target. ``openings``, ``holes`` and ``frames`` are those of the
-    objects, by name. Of a skill that moves the target along a held path there is the ``path`` that is made once all has come to
-    rest, and its ``fixtures``; the one pose is then that of the beginning. ``granules`` lie in one of the objects;
-    ``places_m`` are marked places ``(3,)`` in the world. ``pushes``: the closed hand pushes the target to one of them.
-    ``hands_over``: one arm hands the target over to another one. ``lets_fall``: the target is let go in the air. ``ways`` are
-    poses at rest in which it may be put down to be taken anew, where no grasp serves both start and goal; None: it is not.
+    ``partner`` is the goal's second object. ``openings``, ``holes`` and ``frames`` are those of the objects, by name. A skill
+    with a held path has a ``path``, which is built once all objects are at rest, and ``fixtures``; its single pose is the
+    initial one. ``granules`` fill one of the objects. ``places_m`` are marked places ``(3,)`` in the world. ``pushes``: the
+    closed hand pushes the target to one of them. ``hands_over``: one arm hands the target to another one. ``lets_fall``: the
+    target is released in the air. ``ways`` are intermediate resting poses for a regrasp, used if no grasp serves both start
+    and goal; None: no regrasp.
     """
 
     goal: Goal
@@ -103,15 +103,15 @@ class SkillGoal:
 
     @property
     def is_of_a_path(self) -> bool:
-        """True where the goal is reached on the way and not by where the target is let go."""
+        """Whether the goal is reached along a path instead of by the release pose."""
         return self.path is not None or self.pushes or self.hands_over
 
 
 class Skill(ABC):
-    """A skill: ``name`` is that on the command line, ``has_partner`` tells whether a second object takes part.
+    """A skill: ``name`` on the command line; ``has_partner``: whether a second object takes part.
 
-    ``predicate`` is that of its goal. ``most_poses``: so many goal poses are planned for, one after the other, before a goal
-    counts as impossible to plan. ``arms``: how many it takes.
+    ``predicate`` is that of its goal. ``most_poses`` is the number of goal poses tried before the goal counts as infeasible.
+    ``arms`` is the number of arms required.
     """
 
     name: str
@@ -123,39 +123,39 @@ class Skill(ABC):
 
     @abstractmethod
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Tell whether these two can take part, by what is known of them: sizes, openings, placements."""
+        """Tell whether the two twins can take part, by sizes, openings and placements."""
 
     @abstractmethod
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> Iterator[np.ndarray]:
-        """Yield poses ``(4, 4)`` of the target that reach the goal when it is let go there; none: there is no room."""
+        """Yield release poses ``(4, 4)`` of the target that reach the goal; none if there is no room."""
 
     def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
-        """Return the goal: the predicate of the target, and of the partner where there is one."""
+        """Return the goal: the predicate of the target, and of the partner if there is one."""
         return Goal((Literal(self.predicate, target.name, None if partner is None else partner.name),))
 
     def begins_in(self, target: PoolTwin) -> Sequence[StandingPose]:
-        """Return the placements that the target may begin in: its likeliest one, upright where it has such."""
+        """Return the placements in which the target may start: the likeliest, preferably upright."""
         return [max(target.poses, key=lambda pose: (pose.upright, pose.probability))]
 
     def ends_in(self, target: PoolTwin) -> Sequence[StandingPose]:
-        """Return the placements that the target is to be brought to; none: its goal asks for no placement."""
+        """Return the placements in which the target should end; empty if the goal requires none."""
         return ()
 
     def set_goal(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> SkillGoal | None:
-        """Return the goal in some surroundings with the first poses that are found; None where there is none."""
+        """Return the goal in the given surroundings with its poses; None if there is none."""
         return set_goal(self, around, target, partner, rng)
 
 
 def set_goal(
     skill: Skill, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
 ) -> SkillGoal | None:
-    """Return a skill's goal in some surroundings with the first poses that it finds.
+    """Return a skill's goal in the given surroundings with its poses.
 
-    None where it finds none, and where the goal is true of the beginning.
+    None if no pose is found, or if the goal is already true.
     """
     second = None if partner is None else around.objects[partner]
     goal = skill.goal(around.objects[target], second)
@@ -163,7 +163,7 @@ def set_goal(
         return None
     own = np.random.default_rng(
         rng.integers(2**63)
-    )  # how many poses are asked for changes nothing of what is drawn elsewhere
+    )  # own generator: the number of poses consumed does not affect other random draws
     poses = FoundPoses(islice(skill.poses(around, target, partner, own), skill.most_poses))
     if next(iter(poses), None) is None:
         return None
@@ -173,13 +173,13 @@ def set_goal(
 
 
 def openings_of(around: Surroundings, numbers: Sequence[int]) -> dict[str, Opening]:
-    """Return the openings of those objects that have one, by name."""
+    """Return the openings, by name, of those objects that have one."""
     found = {around.objects[number].name: around.body(number).opening for number in numbers}
     return {name: opening for name, opening in found.items() if opening is not None}
 
 
 def state_at_rest(around: Surroundings) -> WorldState:
-    """Return the state in which nothing happens, as far as poses tell: nothing touches, nothing opens."""
+    """Return the world state of the objects at rest, without contacts and openings."""
     return WorldState(
         {
             each.name: ObjectState(each.body, each.object_to_world, each.object_to_world, True)
@@ -190,7 +190,7 @@ def state_at_rest(around: Surroundings) -> WorldState:
 
 
 def tries(draw: Callable[[], np.ndarray | None], count: int) -> Iterator[np.ndarray]:
-    """Yield what ``count`` draws give, without those that give nothing."""
+    """Yield the results of ``count`` draws, without failed ones."""
     for _ in range(count):
         drawn = draw()
         if drawn is not None:

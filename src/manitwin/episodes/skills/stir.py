@@ -1,4 +1,4 @@
-"""``stir``: a spoon's end goes round in a vessel with granules, and the spoon is laid back."""
+"""Skill ``stir``: move a spoon's end in circles in a vessel with granules, and put the spoon back."""
 
 from __future__ import annotations
 
@@ -20,29 +20,31 @@ from manitwin.physics.sapien.world import RobotWorld
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
 from manitwin.scenes.layouts.stacking import open_poses
 
-SLENDER = 4.0  # length by width of what stirs
+SLENDER = 4.0  # least ratio of length to width of the stirring object
 LEAST_LENGTH_M, LEAST_DEPTH_M, LEAST_RIM_M = 0.12, 0.03, 0.03
-CIRCLE_SHARE, ASIDE_SHARE = 0.4, 0.15  # of the rim's radius; to where the end points: the rim is in the way
-FLOORS = 4  # circles at which the floor is looked for: it rises to the wall of a bowl
-FLOOR_M, HEAD_M = 0.006, 0.012  # the lowest corner above the floor, half of what a head is wide
-TURN_RAD, KNOTS = np.radians(1120), 44  # three times around and a little more, nearer and nearer to the middle
-INNER = 0.4  # of the first circle, at the end
-RIM_M = 0.004  # between the rim and what leans over it
-ABOVE_M = 0.03  # the end above the rim, before and after
-LEANS_RAD = np.radians([45.0, 55, 35, 25, 15])  # those for which the rim leaves room
+# of the rim radius: radius of the circles, and their offset towards the side to which the end points, away from the rim
+CIRCLE_SHARE, ASIDE_SHARE = 0.4, 0.15
+FLOORS = 4  # radii at which the floor's height is measured: a bowl's floor rises towards the wall
+FLOOR_M, HEAD_M = 0.006, 0.012  # lowest vertex above the floor; half width of a spoon's head
+TURN_RAD, KNOTS = np.radians(1120), 44  # slightly more than three turns, spiralling inwards
+INNER = 0.4  # final over initial radius
+RIM_M = 0.004  # clearance between the rim and a leaning stick
+ABOVE_M = 0.03  # height of the end above the rim, before and after
+LEANS_RAD = np.radians([45.0, 55, 35, 25, 15])  # leans that are tried if the rim leaves room
 AZIMUTHS = 8
-FREE_END = 0.45  # of the length from the end: no fingers there
-FAR_END, HAND_M = 0.9, 0.035  # of the length, where it is held at most; from there to the rim: a hand stays above it
+FREE_END = 0.45  # share of the length from the end that must be free of fingers
+# farthest grasp as a share of the length; distance from there to the rim, because the hand stays above it
+FAR_END, HAND_M = 0.9, 0.035
 STIRS_S, LONGEST_S = 6.0, 12.0
 
 
 class Stir(HeldSkill):
-    """Stir with the target, a slender thing, in its partner, a vessel."""
+    """Stir with the target, a slender object, in its partner, a vessel."""
 
     name, predicate, has_partner = "stir", "stirred", True
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept what is slender and 12 cm long, and a vessel that opens upward, deep and wide enough to go round in."""
+        """Accept a slender object at least 12 cm long, and a vessel that opens upwards and is deep and wide enough to stir in."""
         if partner is None or not partner.vessel or not open_poses(partner, pool.body(partner.twin_id)):
             return False
         opening = pool.body(partner.twin_id).opening
@@ -59,7 +61,7 @@ class Stir(HeldSkill):
     def set_goal(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> SkillGoal | None:
-        """Return the goal with granules in the vessel; None where it has no room for them."""
+        """Return the goal with granules in the vessel; None if it has no room for them."""
         assert partner is not None
         found, body = super().set_goal(around, target, partner, rng), around.body(partner)
         granules = None
@@ -68,7 +70,7 @@ class Stir(HeldSkill):
         return None if found is None or granules is None else replace(found, granules=granules)
 
     def task(self, scene: HeldScene) -> HeldTask:
-        """Return rounds with the working end down, leaning away from the robot and to the sides."""
+        """Return circular paths with the working end down, leaning to several sides."""
         vessel = scene.partner
         assert vessel is not None
         target, opening = scene.target, scene.openings[vessel.name]
@@ -85,7 +87,7 @@ class Stir(HeldSkill):
             for azimuth in scene.rng.uniform(-np.pi, np.pi) + np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS:
                 side = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
                 down = np.sin(lean) * side - np.array([0.0, 0.0, np.cos(lean)])
-                turn = rotation_of(down, UP)  # the side that was up, where the hand is, stays up
+                turn = rotation_of(down, UP)  # keeps the upper side, where the hand is, up
                 above_m = FLOOR_M - float((points @ turn.T)[:, 2].min())
                 round_m = _round(center, opening.rim_radius_m, side)
                 out_m = np.linalg.norm(round_m[:, :2] - center[:2], axis=1)
@@ -123,13 +125,13 @@ class Stir(HeldSkill):
 
 
 def leans_rad(rim_radius_m: float, depth_m: float, thick_m: float) -> list[float]:
-    """Return the leans at which what goes around at a depth, leaning to one side, stays clear of the rim."""
+    """Return the leans at which a stick that circles at a depth stays clear of the rim."""
     room_m = (1 - CIRCLE_SHARE + ASIDE_SHARE) * rim_radius_m - thick_m / 2 - RIM_M
     return [float(lean) for lean in LEANS_RAD if depth_m * np.tan(lean) <= room_m]
 
 
 def _round(center_m: np.ndarray, rim_radius_m: float, side: np.ndarray) -> np.ndarray:
-    """Return places ``(K, 3)`` of the end, around and nearer and nearer to the middle, at the rim's height."""
+    """Return positions ``(K, 3)`` of the end on an inward spiral, at the rim's height."""
     start, places = float(np.arctan2(side[1], side[0])), []
     for share in np.linspace(0, 1, KNOTS):
         angle, out_m = start + share * TURN_RAD, CIRCLE_SHARE * rim_radius_m * min(1.0, 12 * share, 8 * (1 - share))
@@ -141,7 +143,7 @@ def _round(center_m: np.ndarray, rim_radius_m: float, side: np.ndarray) -> np.nd
 
 
 def _in_and_out(turn: np.ndarray, center_m: np.ndarray, round_m: np.ndarray) -> np.ndarray:
-    """Return poses ``(K, 4, 4)`` of the end: into the vessel from above, around through places ``(K, 3)``, and out again."""
+    """Return poses ``(K, 4, 4)`` of the end: into the vessel from above, through positions ``(K, 3)``, and out again."""
     above = np.array([*round_m[0, :2], center_m[2] + ABOVE_M])
     halfway = (above + round_m[0]) / 2
     return np.array([transform(turn, at) for at in (above, halfway, *round_m, halfway, above)])

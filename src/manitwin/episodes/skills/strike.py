@@ -1,4 +1,4 @@
-"""``strike``: hit a block with a tool's striking face, the face level, fastest as it touches."""
+"""Skill ``strike``: hit a block with a tool's striking face, level and fastest at contact."""
 
 from __future__ import annotations
 
@@ -22,26 +22,28 @@ from manitwin.scenes.layouts.pool import Pool, PoolTwin
 from manitwin.scenes.layouts.twin_frames import TwinFrame
 
 BLOCK = "block"
-ABOVE_M, BELOW_M, FREE_KNOTS = 0.12, 0.03, 6  # the blow begins so far above, and would end so far below the top
+ABOVE_M, BELOW_M, FREE_KNOTS = 0.12, 0.03, 6  # the blow starts ABOVE_M above the top and would end BELOW_M below it
 ROLLS = 8
 FINGERS_BEHIND_M = 0.005
-"""How far fingers stay behind the tool's face: farther out they would touch before it, or as the tool turns in the hand."""
-LEVER_STEP_M = 0.03  # grasps whose levers differ by less count as equal: heavy heads turn in a hand far from them
+"""Distance of the fingers behind the tool's face: otherwise they touch first, directly or as the tool turns in the hand."""
+# grasps whose levers differ by less count as equal: a heavy head turns in a hand that is far from it
+LEVER_STEP_M = 0.03
 BLOW = Guard(first=0, stop_n=1e-3, duration_s=0.5, beyond=1.7, touches=FREE_KNOTS)
-SLOWEST_S = 1.2  # of the whole way at the joints' limits, which leaves 0.23 m/s at the touch: 1.875 x 0.15 m / 1.2 s
+# duration of the whole path at the joint limits, which leaves 0.23 m/s at contact: 1.875 x 0.15 m / 1.2 s
+SLOWEST_S = 1.2
 
 
 class Strike(HeldSkill):
-    """Bring the face down on the top of a block, about whose upright it may be turned as it likes."""
+    """Bring the face down on the top of a block, with any heading."""
 
     name, predicate = "strike", "struck"
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept a tool with a face that is called a striking one."""
+        """Accept a tool with a face labelled as a striking one."""
         return striking_face(target.frames) is not None
 
     def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
-        """Return: the block was struck."""
+        """Return the goal that the block was struck."""
         return Goal((Literal("struck", target.name, BLOCK),))
 
     def fixture(self, around: Surroundings, target: int, rng: np.random.Generator) -> Fixture | None:
@@ -53,7 +55,7 @@ class Strike(HeldSkill):
         return block(position_m, float(np.arctan2(place[1, 0], place[0, 0])), name=BLOCK)
 
     def task(self, scene: HeldScene) -> HeldTask:
-        """Return the blows, turned about the upright by eighths."""
+        """Return the blows, rotated about the vertical in steps of 45 degrees."""
         target, (anvil,) = scene.target, scene.fixtures
         face = striking_face(scene.frames[target.name])
         assert face is not None, "only tools with a striking face strike"
@@ -85,6 +87,6 @@ class Strike(HeldSkill):
 
 
 def striking_face(frames: tuple[TwinFrame, ...]) -> TwinFrame | None:
-    """Return the first face whose label says that it strikes."""
+    """Return the first face labelled as a striking one."""
     faces = (frame for frame in frames if frame.kind == "face" and is_end(frame.label))
     return next(faces, None)

@@ -1,4 +1,4 @@
-"""Strokes of the closed hand behind an object, over the table: where its fingertips meet it, and how they go."""
+"""Push strokes of the closed hand over the table: contact of fingertips and object, and the path of the hand."""
 
 from __future__ import annotations
 
@@ -13,21 +13,25 @@ from manitwin.geometry.poses import inverse, transform, transform_points
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.rigid_body import PlacedObject
 
-HEIGHT_SHARE, HEIGHTS_M = 0.35, (0.012, 0.04)  # of the object's height: where it is pushed
-LEANS_RAD = np.radians([30.0, 15, 45, 0])  # the palm is behind the fingertips, not over the object
+HEIGHT_SHARE, HEIGHTS_M = 0.35, (0.012, 0.04)  # share of the object's height, and limits, at which it is pushed
+LEANS_RAD = np.radians([30.0, 15, 45, 0])  # the palm is behind the fingertips, not above the object
 ROLLS_RAD = np.radians([0.0, 180, 90, -90, 45, -45, 135, -135])  # the broad side of the fingertips first
 BEHIND_M, BEYOND_M, KNOT_M = 0.025, 0.015, 0.025
-DOWN = np.array([1.0, 0.7, 0.4, 0.2])  # of an arc that ends level: a corner would make the joints' spline dip
+# of an arc that ends level: a corner would make the joint spline overshoot downwards
+DOWN = np.array([1.0, 0.7, 0.4, 0.2])
 DOWN_M, DOWN_BACK_M = 0.10, 0.06
-MET_M, LATE_M, FAR_M = 0.002, 0.02, 0.5  # over the fingertips' lower edge; after where an object begins; of rays
-BAND_M = 0.012  # to either side of the line: half of what the closed fingertips are wide
+# height above the fingertips' lower edge; tolerance behind the object's start; start of the rays
+MET_M, LATE_M, FAR_M = 0.002, 0.02, 0.5
+BAND_M = 0.012  # to either side of the line: half the width of the closed fingertips
 
 
 def strokes(moved: PlacedObject, place_m: np.ndarray, fingertips_m: np.ndarray, level_m: float) -> tuple[HeldPath, ...]:
-    """Return ways of the closed hand from behind an object through its centre of mass towards a place, by how it leans.
+    """Return paths of the closed hand that push an object through its centre of mass towards a place, for several leans and
+    rolls.
 
-    Down behind the object, then along the line a little beyond what brings the centre of mass ``(3,)`` to the place: whoever
-    follows it stops there. ``fingertips_m (N, 3)`` are the corners of the closed fingers in the grasp frame.
+    Each goes down behind the object, then along the line slightly beyond what brings the centre of mass to ``place_m (3,)``;
+    the course stops there. ``fingertips_m (N, 3)`` are the vertices of the closed fingertips in the grasp frame, ``level_m``
+    the height of the supporting surface.
     """
     center = transform_points(moved.object_to_world, moved.body.center_of_mass_m[None])[0]
     way = place_m[:2] - center[:2]
@@ -55,14 +59,14 @@ def strokes(moved: PlacedObject, place_m: np.ndarray, fingertips_m: np.ndarray, 
 
 
 def arc_to(low: np.ndarray, along: np.ndarray) -> list[np.ndarray]:
-    """Return poses that come down to a low one of the hand from behind, level at the end."""
+    """Return hand poses that descend from behind to the pose ``low``, level at the end."""
     return [transform(None, np.array([*(-along * DOWN_BACK_M * each), DOWN_M * each**2])) @ low for each in DOWN]
 
 
 def is_met(moved: PlacedObject, along: np.ndarray) -> bool:
-    """Tell whether fingertips that come along ``(2,)`` to an object's centre of mass meet it where it begins.
+    """Tell whether fingertips that move along ``(2,)`` towards an object's centre of mass touch it at its near edge.
 
-    All over the middle of the band: they would pass over the handle of a spoon.
+    Checked over the middle of the band: the fingertips would pass over the handle of a spoon.
     """
     points = transform_points(moved.object_to_world, np.concatenate(moved.body.hulls))
     level_m, height_m = float(points[:, 2].min()), _pushed_at_m(points)
@@ -79,12 +83,12 @@ def is_met(moved: PlacedObject, along: np.ndarray) -> bool:
 
 
 def _pushed_at_m(points_m: np.ndarray) -> float:
-    """Return how high over what bears an object of corners ``(N, 3)`` the fingertips push it."""
+    """Return the height above the support at which the fingertips push an object with vertices ``(N, 3)``."""
     return float(np.clip(HEIGHT_SHARE * np.ptp(points_m[:, 2]), *HEIGHTS_M))
 
 
 def _behind(points_m: np.ndarray, center_m: np.ndarray, along: np.ndarray, below_m: float) -> float:
-    """Return how far an object reaches behind its centre of mass at the fingertips, in the band that these are wide."""
+    """Return how far an object extends behind its centre of mass, at the fingertips' height and within their width."""
     flat = footprint(points_m[points_m[:, 2] <= below_m] if (points_m[:, 2] <= below_m).sum() > 3 else points_m)
     corners = (flat - center_m[:2]) @ np.column_stack([along, [-along[1], along[0]]])
     sides = np.concatenate([np.linspace(a, b, 20) for a, b in pairwise([*corners, corners[0]])])
@@ -93,7 +97,7 @@ def _behind(points_m: np.ndarray, center_m: np.ndarray, along: np.ndarray, below
 
 
 def _hand(along: np.ndarray, lean_rad: float, roll_rad: float) -> np.ndarray:
-    """Return the hand's rotation ``(3, 3)``: pointing down and forward, closing across the way and turned from there."""
+    """Return the hand's rotation ``(3, 3)``: pointing down and forward, closing across the direction of motion, then rolled."""
     forward, down = np.array([*along, 0.0]), np.array([0.0, 0.0, -1.0])
     z = np.cos(lean_rad) * down + np.sin(lean_rad) * forward
     across = np.array([-along[1], along[0], 0.0])

@@ -1,4 +1,4 @@
-"""``upright``: stand a lying object up, at once or by way of another placement."""
+"""Skill ``upright``: stand a lying object up, directly or via another placement."""
 
 from __future__ import annotations
 
@@ -15,19 +15,20 @@ from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose
 
 POSES, WAYS = 12, 12
 LEAST_HEIGHT = 0.35
-"""A thing that is no vessel stands where it is so high, in its longest extent: of what lies as it is made, +Z up, a hammer and a
-book have 0.1 and a flashlight 0.3; of what stands, a shoe has 0.4."""
+"""Least height, relative to the longest extent, of a standing object that is not a vessel. With +Z up, lying objects such as
+a hammer and a book have 0.1 and a flashlight 0.3; a shoe, which stands, has 0.4.
+"""
 
 
 class Upright(Skill):
-    """Set the target down in an upright placement; it begins in one that is not."""
+    """Set the target down in an upright placement, starting from another one."""
 
     name, predicate, has_partner = "upright", "upright", False
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept a twin that stands, and that also stays in some other placement.
+        """Accept a twin that can stand and also has a stable placement on its side.
 
-        A book that is laid flat again has not been stood up: what is low with +Z up takes no part.
+        Flat objects are excluded: laying a book flat is not standing it up.
         """
         return bool(standing_poses(target)) and bool(lying_poses(target)) and is_high(pool, target)
 
@@ -50,7 +51,7 @@ class Upright(Skill):
     def set_goal(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> SkillGoal | None:
-        """Return the goal with free poses on the way: in each of the placements in which the target does not stand, in turn."""
+        """Return the goal with free intermediate poses, cycling through the placements in which the target does not stand."""
         found, own = super().set_goal(around, target, partner, rng), np.random.default_rng(rng.integers(2**63))
         if found is None:
             return None
@@ -62,23 +63,23 @@ class Upright(Skill):
 def _free(
     around: Surroundings, target: int, placements: Iterable[StandingPose], rng: np.random.Generator
 ) -> Iterator[np.ndarray]:
-    """Yield a free pose in reach for each of some placements, as far as there is one."""
+    """Yield a free pose in reach for each placement for which there is one."""
     taken = footprints_of_others(around.objects, target)
     for placement in placements:
         yield from free_poses(around.objects[target].body, placement.object_to_plane, taken, around.area, rng, count=1)
 
 
 def standing_poses(twin: PoolTwin) -> list[StandingPose]:
-    """Return the placements in which a twin's up (+Z of its frame) is the world's."""
+    """Return the placements in which a twin's up axis (+Z of its frame) is vertical."""
     return [pose for pose in twin.poses if pose.object_to_plane[2, 2] >= np.cos(UPRIGHT_RAD)]
 
 
 def is_high(pool: Pool, twin: PoolTwin) -> bool:
-    """Tell whether a person would say of a twin whose +Z is up that it stands: a vessel, and what is high enough."""
+    """Tell whether a twin with +Z up is regarded as standing: a vessel, or high enough."""
     low, high = pool.body(twin.twin_id).parts.at(np.eye(4)).bounds
     return twin.vessel or bool((high - low)[2] >= LEAST_HEIGHT * (high - low).max())
 
 
 def lying_poses(twin: PoolTwin) -> list[StandingPose]:
-    """Return the placements in which a twin is on its side."""
+    """Return the placements in which a twin lies on its side."""
     return [pose for pose in twin.poses if abs(pose.object_to_plane[2, 2]) < np.sin(np.radians(30))]

@@ -1,4 +1,4 @@
-"""``wipe``: slide a sponge, a brush or an eraser over a board, to and fro, its face pressing with a force that is kept."""
+"""Skill ``wipe``: move a sponge, a brush or an eraser over a board in rows, with its face pressing at a controlled force."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from manitwin.scenes.layouts.twin_frames import TwinFrame
 
 BOARD, PATCH = "wiping_board", "patch"
 BOARD_HALF_M, PATCH_HALF_M = np.array([0.10, 0.08, 0.02]), np.array([0.06, 0.04])
-LEAST_RADIUS_M, LEAST_THICK_M = 0.01, 0.015  # a centimetre of the pads, and their room over the board
+LEAST_RADIUS_M, LEAST_THICK_M = 0.01, 0.015  # a centimetre of contact for the pads, and their clearance above the board
 WIPED_N = float(np.mean(WIPING_N))
 ABOVE_M, BELOW_M, FREE_KNOTS, DESCENT_KNOTS = 0.05, 0.003, 4, 4
 DESCENT_M_S, STROKE_M_S = 0.004, 0.06
-OVERLAP = 0.8  # of the face's width: from row to row
+OVERLAP = 0.8  # row spacing over the face's width
 STEP_M = 0.01
-FINGERS_BEHIND_M = 0.003  # how far fingers stay behind the face that wipes
+FINGERS_BEHIND_M = 0.003  # distance of the fingers behind the wiping face
 
 
 class Wipe(HeldSkill):
-    """Let the face down until it presses, slide it over the patch in rows under force, and put the thing back."""
+    """Lower the face until it presses, move it over the patch in rows under force control, and put the object back."""
 
     name, predicate = "wipe", "wiped"
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept what is 15 mm thick behind a face that wipes: any of a sponge or soap, the bristles of a brush."""
+        """Accept an object at least 15 mm thick behind a wiping face: any face of a sponge or soap, the bristles of a brush."""
         points = pool.body(target.twin_id).parts.whole
         return any(
             wipes(target.category, face.label) and np.ptp(points @ face.frame_to_object[:3, 2]) >= LEAST_THICK_M
@@ -47,11 +47,11 @@ class Wipe(HeldSkill):
         )
 
     def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
-        """Return: the patch was wiped."""
+        """Return the goal that the patch was wiped."""
         return Goal((Literal(self.predicate, target.name, PATCH),))
 
     def begins_in(self, target: PoolTwin) -> list[StandingPose]:
-        """Return the likeliest placement with a face that wipes downward, else the likeliest."""
+        """Return the likeliest placement with a wiping face downwards, otherwise the likeliest."""
         faces = wiping_faces(target.frames)
 
         def down(pose: StandingPose) -> bool:
@@ -64,7 +64,7 @@ class Wipe(HeldSkill):
         return board_in_reach(around, BOARD_HALF_M, BOARD, rng)
 
     def task(self, scene: HeldScene) -> HeldTask:
-        """Return the rows over the patch with each face, the one that is below first, turned by quarters, from either end."""
+        """Return the rows over the patch with each face, the lowest face first, at four headings, from either end."""
         target, (under,) = scene.target, scene.fixtures
         points, faces = np.concatenate(target.body.hulls), wiping_faces(scene.frames[target.name])
         faces = tuple(sorted(faces, key=lambda face: (target.object_to_world @ face.frame_to_object)[2, 2]))
@@ -113,7 +113,7 @@ def wiping_faces(frames: tuple[TwinFrame, ...]) -> tuple[TwinFrame, ...]:
 
 
 def _rows(half_m: np.ndarray) -> np.ndarray:
-    """Return the places ``(N, 2)`` of a face's middle, by 1 cm, on its way over the patch to and fro, row by row."""
+    """Return positions ``(N, 2)`` of a face's centre, 1 cm apart, on a boustrophedon path over the patch."""
     reach_m = np.maximum(PATCH_HALF_M - half_m, 0.0)
     reach_m = np.where(reach_m > 0, reach_m + np.minimum(STEP_M, half_m / 2), 0.0)
     reach_m[0] = max(reach_m[0], 0.03)

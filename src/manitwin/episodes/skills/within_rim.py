@@ -1,4 +1,4 @@
-"""Poses of an object within a vessel's rim: on end, as it lies now, or between the two; lowered until something is near below."""
+"""Poses of an object within a vessel's rim: on end, in its present orientation, or in between; optionally lowered to contact."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from manitwin.geometry.poses import rotation_between, transform, transform_point
 from manitwin.scenes.layouts.pool import PoolBody
 from manitwin.scenes.layouts.stacking import RIM_SLACK, Mouth, lower
 
-LET_GO_M = 0.04  # the lower end is so deep below the rim: a hand that goes deeper meets the rim
-LEAST_ROOM_M = 0.004  # all around a thing on end
-FREE_FALL_M = 0.002  # above where a thing would come to rest by its shape
-ABOVE_RIM_M = 0.02  # where lowering begins
-END_M = 0.01  # of what leans, all that is no higher above its lowest point is its lower end
+LET_GO_M = 0.04  # depth of the lower end below the rim: a hand that goes deeper collides with the rim
+LEAST_ROOM_M = 0.004  # clearance around an object on end
+FREE_FALL_M = 0.002  # height above the geometric resting pose
+ABOVE_RIM_M = 0.02  # start height of lowering
+END_M = 0.01  # of a leaning object, everything within this height of its lowest point is its lower end
 
 
 def on_end(
     body: PoolBody, vessel: PlacedParts, mouth: Mouth, rng: np.random.Generator, *, deep: bool
 ) -> np.ndarray | None:
-    """Draw a pose ``(4, 4)`` on end, its lower end below the rim, or ``deep``, just above what is below it: it falls less far.
+    """Draw a pose ``(4, 4)`` on end, its lower end below the rim, or ``deep``, just above contact, which shortens the fall.
 
-    None where the rim is too narrow.
+    None if the rim is too narrow.
     """
     longest = _axes(body.parts.whole)[:, 2] * rng.choice([-1.0, 1.0])
     rotation = _yaw(rng) @ rotation_between(longest, np.array([0.0, 0, 1]))
@@ -35,9 +35,10 @@ def on_end(
 def as_it_is(
     body: PoolBody, rotation: np.ndarray, vessel: PlacedParts, mouth: Mouth, rng: np.random.Generator
 ) -> np.ndarray | None:
-    """Draw a pose ``(4, 4)`` with a ``rotation (3, 3)`` turned about the vertical alone: a grasp of what stands so serves there.
+    """Draw a pose ``(4, 4)`` with ``rotation (3, 3)`` and a random heading, so that a grasp of the standing object remains
+    usable.
 
-    None where the rim is too narrow, or the thing would lie on it.
+    None if the rim is too narrow, or if the object would lie on it.
     """
     pose = _within(body, _yaw(rng) @ rotation, mouth, -ABOVE_RIM_M, rng)
     return None if pose is None else _lowered_below_rim(body, pose, vessel, mouth)
@@ -46,10 +47,10 @@ def as_it_is(
 def leaning(
     body: PoolBody, rotation: np.ndarray, vessel: PlacedParts, mouth: Mouth, rng: np.random.Generator
 ) -> np.ndarray | None:
-    """Draw a pose ``(4, 4)`` with a ``rotation (3, 3)`` tilted by up to a quarter turn, an end of its longer side below the rim.
+    """Draw a pose ``(4, 4)`` with ``rotation (3, 3)`` tilted by up to 90 degrees, one end of its longer side below the rim.
 
-    What is its upper side now faces up: a hand that takes it from above is then above the rim, beside the higher end. None
-    where the thing would lie on the rim, or its centre of mass be beside the vessel.
+    Its present upper side still faces upwards, so that a hand that grasps from above is above the rim, beside the higher end.
+    None if the object would lie on the rim, or if its centre of mass were outside the vessel.
     """
     side = rng.choice([-1.0, 1.0]) * _longer_side(body.parts.whole @ rotation.T)
     tilt = Rotation.from_rotvec(rng.uniform(0, np.pi / 2) * np.cross([0.0, 0, 1], side)).as_matrix()
@@ -68,7 +69,7 @@ def leaning(
 def _within(
     body: PoolBody, rotation: np.ndarray, mouth: Mouth, depth_m: float, rng: np.random.Generator
 ) -> np.ndarray | None:
-    """Draw a pose within the rim, the lower end so deep below it; None where it is wider."""
+    """Draw a pose within the rim with the lower end ``depth_m`` below it; None if the object is too wide."""
     turned = body.parts.whole @ rotation.T
     middle, radius_m = smallest_enclosing_circle(turned[:, :2])
     spare_m = RIM_SLACK * mouth.radius_m - radius_m - LEAST_ROOM_M
@@ -92,7 +93,7 @@ def _lowered_below_rim(body: PoolBody, pose: np.ndarray, vessel: PlacedParts, mo
 
 
 def _longer_side(points: np.ndarray) -> np.ndarray:
-    """Return the level direction ``(3,)`` in which points ``(N, 3)`` extend the farthest."""
+    """Return the horizontal direction ``(3,)`` in which points ``(N, 3)`` extend farthest."""
     return np.array([*np.linalg.eigh(np.cov(points[:, :2].T))[1][:, 1], 0.0])
 
 
@@ -106,6 +107,6 @@ def _axes(points: np.ndarray) -> np.ndarray:
 
 
 def radius_on_end(points: np.ndarray) -> float:
-    """Return the radius of the circle that a thing of points ``(N, 3)`` passes through on end, with some room."""
+    """Return the radius, with clearance, of the circle that an object with vertices ``(N, 3)`` passes on end."""
     flat = points @ _axes(points)[:, :2]
     return float(smallest_enclosing_circle(flat)[1]) + LEAST_ROOM_M

@@ -1,1 +1,1 @@
-"""The statistics of a folder of episodes: what was attempted, planned, executed, succeeded and kept, and of what it failed."""
+"""Statistics of an episodes folder: attempts planned, executed, succeeded and kept, and their failures."""

@@ -1,4 +1,4 @@
-"""The report's figures: lengths, placement errors, outcomes, and success by category."""
+"""Figures of the statistics report: lengths, placement errors, outcomes, and success by category."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _MOST_CATEGORIES = 40
 
 
 def lengths(histogram: Result, summary: Result) -> tuple[Figure, bytes] | None:
-    """Draw the lengths of kept episodes, and the paper's mean; as a figure of the page and as PNG."""
+    """Plot the lengths of kept episodes with the paper's mean; return a figure of the page and a PNG."""
     if not histogram.rows:
         return None
     figure, axis = _histogram(histogram, LENGTH_STEP_S)
@@ -53,7 +53,7 @@ def lengths(histogram: Result, summary: Result) -> tuple[Figure, bytes] | None:
 
 
 def placement(histogram: Result, summary: Result) -> Figure | None:
-    """Draw the position errors of what succeeded."""
+    """Plot the position errors of succeeded attempts."""
     if not histogram.rows:
         return None
     figure, axis = _histogram(histogram, 1.0)
@@ -72,7 +72,7 @@ def placement(histogram: Result, summary: Result) -> Figure | None:
 
 
 def outcomes(result: Result) -> Figure | None:
-    """Draw what became of the attempts."""
+    """Plot the attempts by outcome."""
     rows = [row for row in result.rows if row["attempts"]]
     if not rows:
         return None
@@ -88,7 +88,7 @@ def outcomes(result: Result) -> Figure | None:
 
 
 def categories(result: Result) -> Figure | None:
-    """Draw attempted and kept episodes of the categories that were attempted most."""
+    """Plot attempted and kept episodes for the most attempted categories."""
     rows = result.rows[:_MOST_CATEGORIES]
     if not rows:
         return None

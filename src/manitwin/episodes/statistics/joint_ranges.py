@@ -1,4 +1,4 @@
-"""The ranges of joints in recorded episodes, as a table of the report."""
+"""Joint ranges in recorded episodes, as a table of the report."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ SCHEMA = pa.schema(
         *((name, pa.float64()) for name in ("fastest_rad_s", "limit_rad_s")),
     ]
 )
-"""``used`` is the recorded range as a share of the limits' range; ``limit_rad_s`` is the speed the planner keeps to."""
+"""``used`` is the recorded range over the range of the limits; ``limit_rad_s`` is the planner's speed limit."""
 
 
 def joint_ranges(files: Iterable[Path]) -> pa.Table:
-    """Return a row for every arm joint of every robot in files of episodes; the files are read one array at a time."""
+    """Return a row for each arm joint of each robot in files of episodes; one array is in memory at a time."""
     found: dict[str, tuple[RecordedRobot, np.ndarray]] = {}
     for path in files:
         with EpisodeFile(path) as file:

@@ -1,4 +1,4 @@
-"""The tables of the report: SQL (DuckDB) over the views ``attempts`` and ``joints``, with the words that go with them."""
+"""Tables of the report: SQL (DuckDB) over the views ``attempts`` and ``joints``, with captions and notes."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ _RATE_COLUMNS = (
 
 
 _CATEGORY = "coalesce(nullif(category, ''), 'not told')"
-"""What could not be set up has no category."""
+"""Attempts that could not be set up have no category."""
 
 
 def _by(
