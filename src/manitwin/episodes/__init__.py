@@ -1,1 +1,1 @@
-"""Episodes: planned, executed, judged, recorded."""
+"""Episodes: planning, execution in simulation, judging and recording of manipulation skills."""

@@ -1,4 +1,4 @@
-"""Attempted episodes: the rows of the table of attempts, which batches write in parts and a run merges; and their counts."""
+"""Table of attempted episodes: rows that batches write and a run merges, and their counts."""
 
 from __future__ import annotations
 
@@ -20,11 +20,12 @@ OUTCOMES = (
     "kept", "unplanned_contact", "disturbed", "misplaced", "toppled", "goal_missed", "dropped", "not_lifted", "replan_failed",
     "unsettled", "reached_already", "no_grasp", "no_plan", "no_room",
 )  # fmt: skip
-"""``kept`` succeeded and touched nothing by accident; ``unplanned_contact`` and ``disturbed`` (another object moved by more than
-1 cm or 5 degrees) succeeded otherwise; from ``misplaced`` to ``replan_failed`` the execution failed; ``unsettled`` is a start
-that did not stand, ``reached_already`` one of which the goal was true, ``no_room`` one that could not be set up; ``no_grasp``
-(the twin has none for the robot's hand) and ``no_plan`` were never executed. ``goal_missed``: the skill's goal is not true at
-the end; ``failure`` says what of it."""
+"""``kept``: succeeded without unplanned contact. ``unplanned_contact`` and ``disturbed`` (another object moved by more than 1
+cm or 5 degrees) otherwise succeeded. From ``misplaced`` to ``replan_failed`` the execution failed. Never executed:
+``unsettled`` (the start was not stable), ``reached_already`` (the goal was true at the start), ``no_grasp`` (the twin has
+none for the robot's hand), ``no_plan``, and ``no_room`` (the scene could not be set up). ``goal_missed``: the skill's goal is
+not true at the end; ``failure`` names the literal.
+"""
 
 NEVER_EXECUTED = ("unsettled", "reached_already", "no_grasp", "no_plan", "no_room")
 EXECUTION_FAILURES = ("misplaced", "toppled", "goal_missed", "dropped", "not_lifted", "replan_failed")
@@ -61,21 +62,21 @@ SCHEMA = pa.schema(
         ("task_id", _TEXT),
     ]
 )
-"""The columns of a batch: the fields of Attempt."""
+"""Columns of a batch's table: the fields of Attempt."""
 
 MERGED_SCHEMA = SCHEMA.append(pa.field("episode_index", pa.int64()))
-"""``episode_index`` is the number of a kept attempt's trajectory in the merged file, null for those that were not kept."""
+"""``episode_index`` is the number of a kept attempt's trajectory in the merged file, null for other attempts."""
 
 _ROW_GROUP = 1 << 16
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """One row; errors are of the released object at rest against the goal that was asked for. None: never got there.
+    """One row. Errors compare the released object at rest with the requested goal; None if the episode did not get there.
 
-    ``plan_failures`` is JSON: how many candidate grasps failed of what. ``goal`` is the skill's goal in words (pick_place: None),
-    ``failure`` the first literal of it that is not true, ``measured`` JSON: every literal with what was measured.
-    ``task_id`` is that of a task, None for episodes that were drawn.
+    ``plan_failures`` is JSON: numbers of failed candidate grasps by reason. ``goal`` is the skill's goal as text (None for
+    pick_place), ``failure`` its first literal that is not true, ``measured`` JSON: every literal with its measurements.
+    ``task_id`` is None for episodes without a task.
     """
 
     episode_id: str
@@ -105,17 +106,17 @@ class Attempt:
 
     @property
     def planned(self) -> bool:
-        """True where a plan was found, so that it was executed."""
+        """True if a plan was found and executed."""
         return self.outcome not in NEVER_EXECUTED
 
     @property
     def succeeded(self) -> bool:
-        """True where the object stands where it should, whatever was touched on the way."""
+        """True if the goal was reached, regardless of unplanned contacts."""
         return self.outcome in ("kept", "unplanned_contact", "disturbed")
 
 
 def attempt_from(said: dict[str, Any]) -> Attempt:
-    """Return the attempt of a dict with its fields; raises EpisodesError where one is missing or unknown."""
+    """Return the attempt given by a dict of its fields; raises EpisodesError if one is missing or unknown."""
     try:
         return Attempt(**{**said, "instructions": tuple(said["instructions"])})
     except (TypeError, KeyError) as error:
@@ -133,30 +134,31 @@ def attempts_table(attempts: Iterable[Attempt]) -> pa.Table:
 
 
 def write_attempts(path: Path, attempts: Iterable[Attempt]) -> None:
-    """Write attempts as a Parquet file, which appears whole or not at all; equal attempts give equal bytes."""
+    """Write attempts as a Parquet file, atomically and deterministically."""
     with file_beside(path) as beside:
         pq.write_table(attempts_table(attempts), beside, compression="zstd", version="2.6")
 
 
 def read_attempts(path: Path) -> Iterator[Attempt]:
-    """Yield the attempts of a file in order; raises EpisodesError for a file that is no table of attempts."""
+    """Yield the attempts of a file in order; raises EpisodesError for a file that is not a table of attempts."""
     for rows in read_tables(path):
         for row in rows.select(SCHEMA.names).to_pylist():
             yield attempt_from(row)
 
 
 def read_tables(path: Path) -> Iterator[pa.Table]:
-    """Yield the rows of a file, a row group at a time, with the columns of ``SCHEMA`` first."""
+    """Yield the rows of a file, one row group at a time, with the columns of ``SCHEMA``."""
     with open_parquet(path, EpisodesError, schema=SCHEMA, remedy=REMEDY, inside=path.parent) as file:
         for group in range(file.row_groups):
             yield file.read(SCHEMA.names, row_group=group)
 
 
 def merge_attempts(files: Iterable[Path], place: Path) -> tuple[int, int]:
-    """Write all rows of all files in order as one file, with ``episode_index``; return how many rows, and how many kept.
+    """Write the rows of all files in order into one file, with ``episode_index``; return the numbers of rows and of kept
+    attempts.
 
-    Kept attempts are numbered as they come, which is how ``hdf5_merge.merge_episodes`` numbers the trajectories of the
-    same batches. A row group's worth of rows is in memory at a time.
+    Kept attempts are numbered in order, as ``hdf5_merge.merge_episodes`` numbers the trajectories of the same batches. About
+    one row group is in memory at a time.
     """
     rows = kept = waiting = 0
     buffer: list[pa.Table] = []
@@ -188,7 +190,7 @@ def _numbered(table: pa.Table, kept: int) -> tuple[pa.Table, int]:
 
 @dataclass
 class Tally:
-    """Counts of attempts by how far they came."""
+    """Counts of attempts by the stage they reached."""
 
     attempted: int = 0
     executed: int = 0
@@ -196,7 +198,7 @@ class Tally:
     kept: int = 0
 
     def add(self, attempt: Attempt) -> None:
-        """Count an attempt by how far it came."""
+        """Count an attempt."""
         self.attempted += 1
         self.executed += attempt.planned
         self.succeeded += attempt.succeeded
@@ -205,10 +207,10 @@ class Tally:
 
 @dataclass(frozen=True)
 class Success:
-    """Attempts in all, by category and by outcome, and the objects (id, category) that never succeeded.
+    """Counts of attempts in total, by category and by outcome, and the objects (id, category) that never succeeded.
 
-    ``plan_failures``: of attempts without a plan, what grasps failed of, frequent reasons first. ``without_grasp``: the objects
-    that have no grasp for the hand. ``transferred``: attempts with a grasp that was verified for other jaws.
+    ``plan_failures``: for attempts without a plan, failure reasons of grasps, frequent ones first. ``without_grasp``: objects
+    without a grasp for the hand. ``transferred``: number of attempts with a grasp verified for other jaws.
     """
 
     total: Tally = field(default_factory=Tally)
@@ -225,7 +227,7 @@ def _frequent_first(counted: Counter[str]) -> dict[str, int]:
 
 
 def success_of(attempts: Iterable[Attempt]) -> Success:
-    """Return the counts of attempts, in all and by category and outcome."""
+    """Return the counts of attempts, in total and by category and outcome."""
     total, by_category, outcomes = Tally(), dict[str, Tally](), Counter[str]()
     categories, successful = dict[str, str](), set[str]()
     failures, without_grasp, transferred = Counter[str](), set[tuple[str, str]](), 0

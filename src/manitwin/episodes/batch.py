@@ -1,4 +1,4 @@
-"""Batches of episodes: some of one object, or in one scene, made by one worker at a time; and their records."""
+"""Batches of episodes, each of one twin, scene or task and made by one worker, and their records."""
 
 from __future__ import annotations
 
@@ -27,7 +27,9 @@ REMEDY_OF_REPEATS = "an older version made these in steps; make the episodes aga
 
 @dataclass(frozen=True)
 class Batch(Payload):
-    """Some episodes of a twin, a scene or a task, by their numbers in the whole: ``count`` from ``first`` in steps."""
+    """Some episodes of a twin, a scene or a task, by their numbers in the run: ``count`` from ``first`` in increments of
+    ``step``.
+    """
 
     robot: str
     first: int
@@ -44,26 +46,28 @@ class Batch(Payload):
 
     @property
     def of(self) -> str:
-        """The id of its twin, of its scene, or of its task."""
+        """The id of its twin, scene or task."""
         return self.twin_id or self.scene_id or self.task_id or ""
 
     @property
     def batch_id(self) -> str:
-        """An id that follows from the fields."""
+        """An id derived from the fields."""
         return sha256_of_json(self.to_json())[:16]
 
     @property
     def title(self) -> str:
-        """The numbers of its episodes, and the id of its twin or scene."""
+        """Display title."""
         return f"episodes {self.numbers[0]} to {self.numbers[-1]} of {self.of}"
 
     @classmethod
     def from_json(cls, fields: Mapping[str, Any]) -> Batch:
-        """Return the batch that a ledger keeps; those of earlier versions kept its JSON as a text."""
+        """Return the batch stored in a ledger; earlier versions stored its JSON as text."""
         return cls(**(json.loads(fields["text"]) if "text" in fields else fields))
 
     def to_json(self) -> dict[str, Any]:
-        """Return its fields; ``step`` only where it is not 1, ``task_id`` where there is one: ids of older versions stay."""
+        """Return its fields, without a ``step`` of 1 and without an unset ``task_id``, so that ids of older versions stay
+        valid.
+        """
         left_out = {
             name for name, told in (("step", self.step != 1), ("task_id", self.task_id is not None)) if not told
         }
@@ -80,11 +84,11 @@ def batches(
     task_ids: Sequence[str] = (),
     there: Iterable[Batch] = (),
 ) -> list[Batch]:
-    """Return the batches that are missing for ``episodes``: each number goes to what has the fewest episodes until then.
+    """Return the batches missing for ``episodes``: each number goes to the id with the fewest episodes so far.
 
-    So a number has the same twin, scene or task, and the same seed, whether episodes are made in one go or in steps. ``there``
-    are the batches that there are; none of their numbers comes again. Raises UsageError where two have a number in common.
-    Batches go round, so that a run that is stopped has some of every twin.
+    A number therefore has the same twin, scene or task, and the same seed, whether episodes are made in one run or in
+    several. ``there`` are existing batches, whose numbers are not repeated. Raises UsageError if two existing batches share a
+    number. Batches of different ids are interleaved, so that an interrupted run has episodes of every twin.
     """
     kind, ids = next(
         (each for each in (("twin_id", twin_ids), ("task_id", task_ids)) if each[1]), ("scene_id", scene_ids)
@@ -113,7 +117,7 @@ def batches(
 
 
 def _runs(numbers: Sequence[int], size: int) -> Iterator[range]:
-    """Cut rising numbers into runs of equal steps, each of ``size`` at most; the step of a single number is 1."""
+    """Split increasing numbers into arithmetic progressions of at most ``size`` numbers; the step of a single number is 1."""
     start = 0
     while start < len(numbers):
         step = numbers[start + 1] - numbers[start] if start + 1 < len(numbers) and size > 1 else 1
@@ -127,14 +131,14 @@ def _runs(numbers: Sequence[int], size: int) -> Iterator[range]:
 
 
 def batch_name(batch_id: str) -> str:
-    """Return a batch's folder below the root of the episodes, and that of its pictures below theirs."""
+    """Return the relative folder of a batch below the episodes' root, and of its pictures below theirs."""
     return f"{BATCHES}/{batch_id[:2]}/{batch_id}"
 
 
 class BatchRecord(FolderRecord):
-    """``batch.json``: what the batch was, what became of its attempts, and the digests of its files.
+    """``batch.json``: identity of a batch, counts of its attempts, and the digests of its files.
 
-    ``twins`` has the ids of all twins that were set up in it, with the revisions that they had then.
+    ``twins`` maps the ids of all twins in it to their revisions at that time.
     """
 
     schema_version: int
@@ -151,7 +155,7 @@ _REMEDY = "run manitwin trajectories again"
 
 
 def read_batch(folder: Path) -> BatchRecord:
-    """Read the record of a finished batch; raises EpisodesError where it cannot be read."""
+    """Read the record of a finished batch; raises EpisodesError if it cannot be read."""
     path = folder / BATCH_RECORD
     said = read_json_object(path, EpisodesError, inside=folder, name=str(path), remedy=_REMEDY)
     if is_newer(said.get("schema_version"), BATCH_SCHEMA_VERSION):

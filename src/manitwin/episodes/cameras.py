@@ -16,16 +16,16 @@ from manitwin.robots.robot import Robot
 from manitwin.robots.two_arms import base_to_world
 
 FOV_Y_RAD = 0.75
-WRIST_FOV_Y_RAD = 1.2  # about that of the small cameras that are mounted on hands (69 degrees)
-BESIDE_M = 0.1  # so far beside the bases of two arms a camera sees
-WRIST_CLEARANCE_M = 0.045  # of the camera from the palm
+WRIST_FOV_Y_RAD = 1.2  # about that of small cameras mounted on hands (69 degrees)
+BESIDE_M = 0.1  # margin beside the bases of two arms in the picture
+WRIST_CLEARANCE_M = 0.045  # distance of the camera from the palm
 
 
 @dataclass(frozen=True)
 class NamedCamera:
-    """A pinhole camera that stands in the world, or rides on the hand (``on_hand``).
+    """A pinhole camera, fixed in the world or mounted on the hand (``on_hand``).
 
-    ``camera_to_mount (4, 4)``, OpenGL axes, is its pose in the world, or in the grasp frame (+Z approach, X closing).
+    ``camera_to_mount (4, 4)``, with OpenGL axes, is its pose in the world, or in the grasp frame (+Z approach, X closing).
     """
 
     name: str
@@ -39,9 +39,9 @@ class NamedCamera:
         return Camera(pose, self.fov_y_rad, width_px, height_px)
 
     def to_json(self, width_px: int, height_px: int) -> dict[str, Any]:
-        """Return what relates its pictures to the world, as LeRobot sets have it: intrinsics and pose along OpenCV's axes.
+        """Return intrinsics and pose with OpenCV axes, as stored in LeRobot sets.
 
-        The pose is in ``world``, or for a camera on the hand in the frame of ``tip``, the first arm's. The centre of the upper
+        The pose is in the frame ``world``, or ``tip`` (the first arm's) for a camera on the hand. The centre of the upper
         left pixel is (0.5, 0.5).
         """
         focal_px = self.placed(np.eye(4), width_px, height_px).focal_px
@@ -53,11 +53,11 @@ class NamedCamera:
 
 
 def named_cameras(names: Iterable[str], robot: Robot) -> list[NamedCamera]:
-    """Return cameras by name: ``front`` looks at the robot from beyond its workspace, ``side`` from its right, ``top`` straight
-    down (the robot at the left), ``wrist`` along the hand's approach, past the fingers. At two arms ``front`` looks across the
-    line between them, from the first one's left.
+    """Return cameras by name: ``front``, ``side``, ``top`` or ``wrist``, positioned by the robot's workspace and hand.
 
-    They are placed by the robot's workspace and hand. Raises UsageError for a name that is none of these.
+    ``front`` looks at the robot from beyond its workspace, ``side`` from its right, ``top`` straight down (the robot at the
+    left), ``wrist`` along the approach, past the fingers. For two arms, ``front`` looks across the line between them, from
+    the first arm's left. Raises UsageError for another name.
     """
     makers = {"front": _front, "side": _side, "top": _top, "wrist": _wrist}
     cameras = []
@@ -76,7 +76,9 @@ def _front(robot: Robot) -> NamedCamera:
 
 
 def _front_of_two(robot: Robot) -> NamedCamera:
-    """Across the line between both bases, on the first arm's left: beyond its workspace the second arm stands in the way."""
+    """Return a camera that looks across the line between the bases, because the second arm blocks the view from beyond the
+    workspace.
+    """
     first, second = (base_to_world(arm)[:3, 3] for arm in robot.arms)
     middle, along = (first + second) / 2, (second - first)[:2]
     apart_m = float(np.hypot(*along))
@@ -101,7 +103,7 @@ def _standing(name: str, eye: np.ndarray, target: np.ndarray) -> NamedCamera:
 
 
 def _wrist(robot: Robot) -> NamedCamera:
-    """Beside the palm, on the side where the fingers do not move, turned towards what they hold."""
+    """Return a camera beside the palm, off the closing plane, directed at the fingertips."""
     gripper = robot.gripper
     palm = gripper.boxes(gripper.opening_m)
     if isinstance(gripper, ParallelGripper):

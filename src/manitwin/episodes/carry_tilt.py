@@ -1,4 +1,4 @@
-"""How far things that are carried level were tilted on their way, as recorded."""
+"""Tilt of level-carried objects during transport, from a recording."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from manitwin.episodes.recording import Recording
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.geometry.rigid_body import PlacedObject
 
-CARRIED_M = 0.02  # what was lifted by less has not been carried
+CARRIED_M = 0.02  # an object lifted by less has not been carried
 ON_THE_WAY = (Phase.LIFT, Phase.CARRY, Phase.LOWER)
 
 
 def carry_tilts_rad(recording: Recording, objects: Sequence[PlacedObject], level: Collection[str]) -> dict[str, float]:
-    """Return for each object of the names ``level`` that was carried the most that it was tilted, rad, from how it stood.
+    """Return the largest tilt (rad) from its initial orientation of each carried object named in ``level``.
 
-    ``objects`` are where they stood, in any order; of a recording they are in that of their names.
+    ``objects`` are the initial poses in any order; recordings order objects by name.
     """
     rows, found = np.isin(recording.phase, ON_THE_WAY), dict[str, float]()
     for number, placed in enumerate(sorted(objects, key=lambda each: each.name)):

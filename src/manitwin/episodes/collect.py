@@ -1,4 +1,4 @@
-"""Collect a run's batches into what people load: one table of attempts, a LeRobot data set, and a ManiSkill file."""
+"""Collection of a run's batches: the table of attempts, a LeRobot data set, and a ManiSkill file."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MOST_NAMED = 10
 
 @dataclass(frozen=True)
 class AttemptTotals:
-    """All attempts of a run; ``without_success`` are the twins that no episode succeeded with."""
+    """Counts of all attempts of a run; ``without_success`` are the twins without a successful episode."""
 
     attempted: int
     planned: int
@@ -34,14 +34,14 @@ class AttemptTotals:
 
 @dataclass(frozen=True)
 class Collected:
-    """The lines that a person reads at a run's end, and the numbers in them."""
+    """Summary lines for the end of a run, and the numbers in them."""
 
     lines: list[str]
     totals: AttemptTotals
 
 
 def chosen_formats(given: Iterable[str]) -> list[str]:
-    """Return the formats of these names; raises UsageError naming those that there are."""
+    """Return the formats of these names; raises UsageError naming the valid ones."""
     names = [name.strip() for name in given if name.strip()]
     for name in names:
         if name not in FORMATS:
@@ -50,10 +50,10 @@ def chosen_formats(given: Iterable[str]) -> list[str]:
 
 
 def batch_folders(out: Path) -> list[Path]:
-    """Return the finished batches of a run, by the numbers of their episodes.
+    """Return the finished batches of a run, ordered by episode numbers.
 
-    Raises UsageError where there are none, EpisodesError for one that cannot be read or is of a newer version, and where two have
-    an episode of the same number: both drew with one seed.
+    Raises UsageError if there are none, EpisodesError for a batch that cannot be read or has a newer version, and if two
+    batches contain the same episode number, and thus the same seed.
     """
     folders = [path.parent for path in sorted((out / BATCHES).glob(f"*/*/{BATCH_RECORD}"))]
     if not folders:
@@ -78,7 +78,7 @@ def stored_episodes(folders: Iterable[Path]) -> Iterator[StoredEpisode]:
 
 
 def any_granules(folders: Iterable[Path]) -> bool:
-    """Tell whether a kept episode of batches has granules."""
+    """Tell whether any kept episode of the batches has granules."""
     for folder in folders:
         with EpisodeFile(folder / EPISODES) as file:
             if any(has_granules(file.content, f"traj_{number}") for number in range(len(file))):
@@ -87,7 +87,7 @@ def any_granules(folders: Iterable[Path]) -> bool:
 
 
 def collect(out: Path, formats: list[str]) -> Collected:
-    """Write the table of attempts and the data sets of the kept episodes; each appears whole or not at all."""
+    """Write the table of attempts and the data sets of the kept episodes, each atomically."""
     folders = batch_folders(out)
     _, kept = merge_attempts([folder / ATTEMPTS for folder in folders], out / ATTEMPTS)
     if MANISKILL in formats:
@@ -98,7 +98,7 @@ def collect(out: Path, formats: list[str]) -> Collected:
 
 
 def _whose_grasps(success: Success) -> list[str]:
-    """Write how many episodes took grasps that are not the gripper's own, with the remedy."""
+    """Return lines on the number of episodes with grasps verified for another gripper, with the remedy."""
     if not success.transferred:
         return []
     return [
@@ -109,7 +109,7 @@ def _whose_grasps(success: Success) -> list[str]:
 
 
 def _why_never_executed(success: Success) -> list[str]:
-    """Write what grasps could not be planned for, and whose twins have none for the hand, with the remedy."""
+    """Return lines on planning failures and on twins without grasps for the hand, with the remedy."""
     lines = []
     if failures := success.plan_failures:
         total = sum(failures.values())

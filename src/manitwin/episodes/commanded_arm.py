@@ -1,4 +1,4 @@
-"""One arm of an episode and its hand: what they are told row by row, which is what is recorded as actions."""
+"""One arm of an episode with its hand, and their commands per row, which are recorded as actions."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from manitwin.physics.sapien.controls.control import HandControl
 
 @dataclass(eq=False)
 class CommandedArm:
-    """An arm of the world: where it is told to be at the row's end, its hand, and whether that keeps pressing.
+    """An arm of the world: its commanded joints at the end of the row, its hand, and whether the hand keeps pressing.
 
-    What the hand is told is chosen once a row, as a policy would. ``next_told`` and ``rest_told`` are what it does by itself.
+    The hand command is chosen once per row, as by a policy. ``next_told`` and ``rest_told`` are queued hand commands.
     """
 
     tip_pose: Callable[[np.ndarray], np.ndarray]
@@ -31,11 +31,11 @@ class CommandedArm:
 
     @property
     def may_hold(self) -> bool:
-        """Whether the hand is told, now or before, anything else than what it began with."""
+        """Whether the current or previous hand command differs from the initial one."""
         return may_hold(self.told, self.before, self.open)
 
     def choose(self) -> None:
-        """Choose what the hand is told by the end of the row that begins."""
+        """Choose the hand command for the end of the row that begins."""
         self.before, told = self.told, self.told
         if self.presses:
             told = self.hand.squeeze()
@@ -44,5 +44,5 @@ class CommandedArm:
         self.told = np.asarray(told, np.float32).astype(float)
 
     def tell(self, share: float) -> None:
-        """Tell the hand what it is to do when it has gone a ``share`` of its way in a row."""
+        """Set the hand's target at a ``share`` of its motion in the row."""
         self.hand.tell(self.before + share * (self.told - self.before))

@@ -1,4 +1,4 @@
-"""What a folder of episodes was made with: its config.json, as far as other commands rely on it."""
+"""Configuration (config.json) of an episodes folder, as far as other commands use it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class _Configuration(BaseModel):
 
 
 def read_configuration(episodes: Path) -> dict[str, Any]:
-    """Return the configuration of a folder of episodes; raises EpisodesError where it has none, or another kind's."""
+    """Return the configuration of an episodes folder; raises EpisodesError if it is missing or of another kind."""
     path = episodes / CONFIG
     said = read_json_object(path, EpisodesError, inside=episodes, name=str(path), remedy=_REMEDY)
     if (episodes / TWINS).is_dir():

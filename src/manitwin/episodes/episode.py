@@ -1,4 +1,4 @@
-"""One episode: settle, plan, execute in physics by the course of its skill, judge (docs/trajectories.md)."""
+"""Run of one episode: settle, plan, execute in physics by the skill's course, judge (docs/trajectories.md)."""
 
 from __future__ import annotations
 
@@ -34,12 +34,13 @@ def run_episode(
     skill_goal: SkillGoal | None = None,
     sequence: GoalSequence | None = None,
 ) -> tuple[EpisodeFacts, Recording | None]:
-    """Run one episode and return what became of it, and its recording where it was executed.
+    """Run one episode; return its facts, and its recording if it was executed.
 
-    The objects settle first, and the plan is made from where they came to rest. Without a ``skill_goal`` the target's pose is
-    judged against that of the problem; with one its goal is judged: of a placing skill the first of the poses that can be
-    planned is taken, of a held path the first grasp and path. A ``sequence`` has goals of several literals: ``skill_goal`` is
-    then all of it, the problem that of the first step, and the grasp is not told. The same arguments give the same bytes.
+    The objects settle first, and planning starts from their resting poses. Without ``skill_goal`` the target's pose is
+    compared with the problem's goal pose. With one, its goal is judged; a placing skill uses the first pose that can be
+    planned, a held path the first grasp and path. A ``sequence`` has a goal of several literals: ``skill_goal`` is then the
+    combined goal, the problem that of the first step, and the grasp is not reported. Deterministic to the byte for equal
+    arguments.
     """
     facts, recording, closing = EpisodeFacts(), None, closing_of(robot, settings)
     with world_of(problem, robot, settings, closing.force_n) as world:
@@ -73,13 +74,13 @@ def run_episode(
 
 
 def tip_poses_of(planner: Planner) -> tuple[Callable[[np.ndarray], np.ndarray], ...]:
-    """Return the forward kinematics of each arm that a planner plans for."""
+    """Return the forward kinematics of each arm of a planner."""
     taker = (planner.taker.tip_pose,) if isinstance(planner, TwoArmPlanner) else ()
     return (planner.tip_pose, *taker)
 
 
 def world_of(problem: PickPlaceProblem, robot: Robot, settings: EpisodeSettings, closing_force_n: float) -> RobotWorld:
-    """Put a problem into physics."""
+    """Create the physics world of a problem."""
     return RobotWorld(
         robot,
         problem.target,
@@ -110,7 +111,7 @@ def settled(
     skill_goal: SkillGoal | None,
     world: RobotWorld,
 ) -> Start | None:
-    """Let the objects come to rest and make the problem that of where they are; None where one does not stand."""
+    """Let the objects settle and return the start at their resting poses; None if an object does not stay in place."""
     if skill_goal is not None and skill_goal.granules is not None:
         world.add_granules(skill_goal.granules)
     world.settle(settings.max_settle_s)
@@ -135,6 +136,7 @@ def settled(
 
 
 def closing_of(robot: Robot, settings: EpisodeSettings) -> TrialSettings:
+    """Return the settings of closing hands: the closing force and friction with the episode's time step."""
     gripper = robot.gripper
     force_n = gripper.force_n if settings.closing_force_n is None else settings.closing_force_n
     return TrialSettings(

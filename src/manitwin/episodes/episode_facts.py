@@ -1,4 +1,4 @@
-"""The result of an episode: the part of an ``Attempt`` that the execution knows."""
+"""Result of an episode: the part of an ``Attempt`` that the execution determines."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from manitwin.episodes.planning.problem import Grasp, PlanFailure
 
 @dataclass
 class EpisodeFacts:
-    """What became of an episode; ``replans`` counts what was planned anew and where that failed.
+    """Facts of an episode; ``replans`` counts replanning results by name.
 
-    ``taker_grasp`` is that of the second arm, to which the target is handed over.
+    ``taker_grasp`` is the second arm's grasp in a handover.
     """
 
     outcome: str = "no_plan"

@@ -1,4 +1,4 @@
-"""Pictures of recorded episodes: films of the kept episodes of each batch, which show their states again."""
+"""Rendering of recorded episodes: videos of the kept episodes of each batch."""
 
 from __future__ import annotations
 
@@ -55,23 +55,23 @@ PICTURES = "pictures"
 
 @dataclass(frozen=True)
 class BatchDrawing(Payload):
-    """A batch whose kept episodes are to be drawn."""
+    """A batch whose kept episodes are to be rendered."""
 
     batch_id: str
 
     @property
     def title(self) -> str:
-        """The batch's id."""
+        """Display title."""
         return f"pictures of {self.batch_id}"
 
     @classmethod
     def from_json(cls, fields: Mapping[str, Any]) -> BatchDrawing:
-        """Return the batch that a ledger keeps; those of earlier versions kept its id as a text."""
+        """Return the batch stored in a ledger; earlier versions stored its id as text."""
         return cls(fields["text"] if "text" in fields else fields["batch_id"])
 
 
 class PicturesRecord(FolderRecord):
-    """``pictures.json``: at which frame of its camera's film each episode begins, and each camera's intrinsics and pose."""
+    """``pictures.json``: the first frame of each episode in its cameras' videos, and the cameras' intrinsics and poses."""
 
     batch_id: str
     first_frames: dict[str, int]
@@ -80,7 +80,9 @@ class PicturesRecord(FolderRecord):
 
 
 class EpisodeFilmsStage:
-    """Draw the kept episodes of a batch: one film a camera, all episodes in it, frame t of an episode showing state t."""
+    """Stage that renders the kept episodes of a batch: one video per camera with all episodes, frame t of an episode showing
+    state t.
+    """
 
     name = "films"
     version = "8"
@@ -91,7 +93,7 @@ class EpisodeFilmsStage:
     model: str | None = None
 
     def __init__(self, settings: PicturesConfig, episodes: str, dataset: str, robot: str):
-        """Take the settings, and where the episodes and their twins are."""
+        """Take the settings, and the locations of the episodes and their twins."""
         self.settings, self._episodes, self._robot_name = settings, Path(episodes), robot
         self._source = TwinSource(dataset)
         self._drawn = self._to_draw = 0
@@ -101,7 +103,7 @@ class EpisodeFilmsStage:
         return load_robot(self._robot_name)
 
     def run(self, draft: Draft[BatchDrawing], folder: Path) -> dict[str, Any]:
-        """Write ``films/<camera>.mp4``, return the fields ``first_frames`` and ``cameras``."""
+        """Write ``films/<camera>.mp4``; return the fields ``first_frames`` and ``cameras``."""
         cameras = named_cameras(self.settings.cameras, self._robot)
         first_frames: dict[str, int] = {}
         (folder / FILMS).mkdir()
@@ -124,7 +126,7 @@ class EpisodeFilmsStage:
         return episode.recording.steps // rows_per_frame(self.settings.rate_hz)
 
     def pictures_of(self, episode: StoredEpisode, cameras: list[NamedCamera]) -> list[list[np.ndarray]]:
-        """Return the pictures ``(H, W, 3) uint8`` of each camera, one a state of the recording at the settings' rate."""
+        """Return the pictures ``(H, W, 3) uint8`` of each camera, one per state at the settings' rate."""
         room, size = episode_room(episode), self.settings.size_px
         pictures: list[list[np.ndarray]] = [[] for _ in cameras]
         with EpisodeReplay(
@@ -149,7 +151,7 @@ class EpisodeFilmsStage:
 
 @dataclass(frozen=True)
 class PicturesRecipe(FolderRecipe[PicturesRecord]):
-    """Films of the batches of ``episodes``, of twins in ``dataset``, with a robot by name or file."""
+    """Videos of the batches of ``episodes``, with twins in ``dataset`` and a robot by name or file."""
 
     payload = BatchDrawing
     record = PICTURES_RECORD
@@ -164,12 +166,12 @@ class PicturesRecipe(FolderRecipe[PicturesRecord]):
 
     @cached_property
     def sha256(self) -> str:
-        """The digest of what decides a picture."""
+        """Digest of everything that determines a picture."""
         return sha256_of_json([self.config.model_dump(mode="json", exclude={"run"}), EpisodeFilmsStage.version])
 
     @property
     def seed(self) -> int:
-        """Nothing is random but the furniture's looks, which are the episode's own."""
+        """Constant: only the appearance of furniture is random, and it is seeded by the episode."""
         return 0
 
     def folder_of(self, item_id: str) -> str:
@@ -177,11 +179,11 @@ class PicturesRecipe(FolderRecipe[PicturesRecord]):
         return batch_name(item_id)
 
     def identify(self, payload: BatchDrawing) -> Identity:
-        """Return the batch's id."""
+        """Return the batch's identity."""
         return Identity(payload.batch_id, "films")
 
     def stages(self, kind: str) -> list[Stage]:
-        """Return the one stage."""
+        """Return the single stage."""
         return [EpisodeFilmsStage(self.config, self.episodes, self.dataset, self.robot)]
 
     def write(
@@ -194,7 +196,7 @@ class PicturesRecipe(FolderRecipe[PicturesRecord]):
         return self.seal(fresh, said)
 
     def ending(self, record: PicturesRecord) -> Ending:
-        """Return how a record of pictures says that its batch ended."""
+        """Return the ending stated by a record of pictures."""
         return Ending("accepted", record.revision, None, f"{len(record.first_frames)} episodes drawn")
 
 
@@ -202,7 +204,7 @@ _DRAW = "run manitwin render again"
 
 
 def read_pictures(folder: Path) -> PicturesRecord:
-    """Read the record of a batch's pictures; raises EpisodesError where there is none."""
+    """Read the record of a batch's pictures; raises EpisodesError if there is none."""
     path = folder / PICTURES_RECORD
     try:
         return PicturesRecord(**read_json_object(path, EpisodesError, inside=folder, name=str(path), remedy=_DRAW))
@@ -218,10 +220,10 @@ def draw_episodes(
     twins: str | Path | None = None,
     **run: Unpack[RunOptions],
 ) -> RunReport:
-    """Draw the kept episodes of a finished run below ``out/pictures``; what is there already stays.
+    """Render the kept episodes of a finished run below ``out/pictures``; existing results are kept.
 
-    ``twins`` names where their twins are now, None: where they were as the episodes were made.
-    Raises EpisodesError where there are none, UsageError for an unknown camera.
+    ``twins`` is the current location of the twins; None: that recorded with the episodes. Raises EpisodesError if there are
+    no episodes, UsageError for an unknown camera.
     """
     said = _said(out)
     named_cameras(config.cameras, load_robot(said["robot"]))
@@ -236,7 +238,7 @@ def draw_episodes(
 
 
 def write_with_pictures(out: Path, cameras: tuple[str, ...], rate_hz: int) -> LeRobotSummary:
-    """Write the LeRobot data set of a run again, at the rate of its films of these cameras and with them."""
+    """Write the LeRobot data set of a run again with the videos of these cameras, at their rate."""
     folders = batch_folders(out)
     clips: dict[str, dict[str, Clip]] = {camera: {} for camera in cameras}
     pinholes: dict[str, dict[str, Any]] = {}

@@ -1,4 +1,4 @@
-"""Where an episode took place, as its facts say: furniture, light, fixtures, and how large its granules are."""
+"""Environment of an episode from its facts: furniture, lighting, fixtures, and granule size."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from manitwin.twin.record_values import Quaternion
 
 
 class FixtureBox(BaseModel):
-    """One box of a fixture, world frame."""
+    """One box of a fixture, in the world frame."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -32,7 +32,7 @@ class _Fixture(BaseModel):
 
 
 class EpisodeRoom(BaseModel):
-    """What the facts of an episode say of its furniture, its light, and its fixtures, if any."""
+    """Furniture, lighting and fixtures stated by an episode's facts."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -56,7 +56,7 @@ class EpisodeRoom(BaseModel):
 
 
 def episode_room(episode: StoredEpisode) -> EpisodeRoom:
-    """Return where an episode took place; raises EpisodesError for facts that do not say so."""
+    """Return the environment of an episode; raises EpisodesError for invalid facts."""
     try:
         return EpisodeRoom(**episode.facts)
     except (ValidationError, TypeError) as error:
@@ -67,7 +67,7 @@ def episode_room(episode: StoredEpisode) -> EpisodeRoom:
 
 
 def granules_of(episode: StoredEpisode) -> tuple[int, float] | None:
-    """Return the number and radius (m) of an episode's granules, if it has any; raises EpisodesError where it has no radius."""
+    """Return number and radius (m) of an episode's granules, None without any; raises EpisodesError for an invalid radius."""
     positions, radius_m = episode.recording.granule_positions_m, episode.facts.get("granule_radius_m")
     if positions is None:
         return None

@@ -1,4 +1,4 @@
-"""Make many episodes: the recipe of their batches, the engine's run over these, and what is made of them at its end."""
+"""Generation of many episodes: the recipe of batches, the engine's run, and the retirement of failing grasps."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.store import RUN, canonical_json, digests_below, sha256_of_json, write_bytes_atomically
 
 KIND = "trajectories"
-MOST_PAIRED = 200  # twins of a pool, of whose pairs it is asked whether they suit a skill
+MOST_PAIRED = 200  # largest pool for which pairs of twins are tested for a skill
 DECIDE_NO_EPISODE = frozenset(("dataset", "scenes", "tasks", "run", "batch", "retire_failed_share"))
 
 
 @dataclass(frozen=True)
 class EpisodesRecipe(FolderRecipe[BatchRecord]):
-    """Batches of episodes; ``dataset``, ``scenes`` and ``tasks`` are where these are read from (no scenes, no tasks: None)."""
+    """Batches of episodes; ``dataset``, ``scenes`` and ``tasks`` are their sources (None if unused)."""
 
     payload = Batch
     record = BATCH_RECORD
@@ -64,14 +64,14 @@ class EpisodesRecipe(FolderRecipe[BatchRecord]):
 
     @cached_property
     def sha256(self) -> str:
-        """The digest of what decides an episode, but for the twins: their revisions stand in the batch's record."""
+        """Digest of everything that determines an episode except the twins, whose revisions are in the batch's record."""
         decides = self.config.model_dump(mode="json", exclude={"run", "batch", "retire_failed_share"})
         decides["robot"] = load_robot(self.config.robot).sha256
         return sha256_of_json([decides, EpisodesStage.version])
 
     @property
     def seed(self) -> int:
-        """The seed of everything random."""
+        """The seed of all random draws."""
         return self.config.seed
 
     def folder_of(self, item_id: str) -> str:
@@ -79,11 +79,11 @@ class EpisodesRecipe(FolderRecipe[BatchRecord]):
         return batch_name(item_id)
 
     def identify(self, payload: Batch) -> Identity:
-        """Return the batch's id."""
+        """Return the batch's identity."""
         return Identity(payload.batch_id, "batch")
 
     def stages(self, kind: str) -> list[Stage]:
-        """Return the one stage."""
+        """Return the single stage."""
         return [EpisodesStage(self.config, self.dataset, self.scenes, self.tasks)]
 
     def write(
@@ -104,13 +104,13 @@ class EpisodesRecipe(FolderRecipe[BatchRecord]):
         return self.seal(fresh, said)
 
     def ending(self, record: BatchRecord) -> Ending:
-        """Return how a batch's record says that it ended."""
+        """Return the ending stated by a batch's record."""
         detail = f"{record.kept} of {record.attempted} episodes kept, {record.planned} executed, {record.succeeded} succeeded"
         return Ending("accepted", record.revision, None, detail)
 
 
 def _check_asked(config: TrajectoriesConfig, source: EpisodesSource) -> None:
-    """Raise UsageError for settings that the source has its own answer to: they would be left out without a word."""
+    """Raise UsageError for settings that the source determines itself and that would be ignored silently."""
     if source.tasks is not None and config.skill != TrajectoriesConfig.model_fields["skill"].default:
         raise UsageError(
             f"skill is {config.skill}: tasks define their own skill; leave skill out, or give the scenes,"
@@ -124,7 +124,7 @@ def _check_asked(config: TrajectoriesConfig, source: EpisodesSource) -> None:
 
 
 def _with_robot_of(tasks: Sequence[TaskRecord], config: TrajectoriesConfig) -> TrajectoriesConfig:
-    """Return settings with the robot that tasks were made for, where none is named and all are of the same."""
+    """Return settings with the robot of the tasks, if no robot is set and all tasks are for the same one."""
     robots = {task.robot for task in tasks}
     if len(robots) != 1 or "robot" in config.model_fields_set:
         return config
@@ -132,7 +132,7 @@ def _with_robot_of(tasks: Sequence[TaskRecord], config: TrajectoriesConfig) -> T
 
 
 def _check_out(out: DatasetRoot, source: EpisodesSource) -> None:
-    """Raise UsageError where a folder has episodes of scenes and is to get some of twins alone, or the other way."""
+    """Raise UsageError if existing episodes in the folder have another kind of source (twins, scenes or tasks)."""
     if not out.exists(CONFIG):
         return
     said = out.read_json(CONFIG, UsageError, remedy="give another folder")
@@ -154,14 +154,14 @@ def make_episodes(
     twins: str | Path | None = None,
     **run: Unpack[RunOptions],
 ) -> RunReport:
-    """Attempt ``count`` episodes with the twins, or in the scenes, of a place; those that are there stay.
+    """Attempt episodes with the twins, scenes or tasks at ``place`` until ``out`` has ``count``; existing ones are kept.
 
-    ``twins`` names where the twins of scenes are now, None: where they were as the layouts were made.
-    ``count`` is how many there are at the end; where there are as many already, none is made.
-    Raises UsageError for a place without twins or scenes, scenes whose twins stand otherwise now, twins of which none has a grasp
-    for the robot's hand or one has those of another hand of its name, settings that tasks or scenes answer themselves, an unknown
-    robot or skill, an ``out`` that has episodes of scenes where twins are given or the other way, or made with other settings, or
-    where another run is at work there; EpisodesError for an ``out`` whose episodes an earlier version made that recorded less.
+    ``twins`` is the current location of the scenes' twins; None: that recorded with the layouts.
+
+    Raises UsageError for a location without twins or scenes, scenes whose twins have changed, twins without any grasp for the
+    robot's hand or with grasps of a different gripper of its name, settings that tasks or scenes determine themselves, an
+    unknown robot or skill, and an ``out`` with episodes of another source or other settings or with another run in progress.
+    Raises EpisodesError if the episodes in ``out`` were made by an earlier version that recorded less.
     """
     if not 1 <= count <= LARGEST_COUNT:
         raise UsageError(f"{count:.6g} episodes; ask for 1 or more, at most {LARGEST_COUNT}")
@@ -213,10 +213,10 @@ def make_episodes(
 
 
 def twins_for(skill: Skill | None, pool: Pool, begins: Begins) -> list[str]:
-    """Return the ids of the twins that episodes are of: all, but of a skill those that it suits, with some partner if it has one.
+    """Return the ids of the twins for episodes: all, or for a skill those that it suits, with some partner if it needs one.
 
-    And those that can be brought where it ends, from some placement. Partners and grasps are asked about in small pools alone:
-    they are pairs, each of which asks for the shapes of two twins, and tables.
+    They must also have a placement from which the skill's end placement can be reached. Partners and grasps are only tested
+    for small pools, because every pair loads the shapes of two twins, and grasps load tables.
     """
     if skill is None or (skill.has_partner and len(pool.twins) > MOST_PAIRED):
         return [twin.twin_id for twin in pool.twins]
@@ -235,7 +235,7 @@ def twins_for(skill: Skill | None, pool: Pool, begins: Begins) -> list[str]:
 
 
 def _batches_there(root: DatasetRoot) -> list[Batch]:
-    """Return the batches that earlier runs at a root were to make."""
+    """Return the batches scheduled by earlier runs at a root."""
     path = local_ledger(root)
     if not path.is_file():
         return []
@@ -245,9 +245,9 @@ def _batches_there(root: DatasetRoot) -> list[Batch]:
 
 
 def _check_collectable(out: Path, there: Sequence[Batch]) -> None:
-    """Raise EpisodesError where the first batch that was made is of a version whose attempts this one cannot collect.
+    """Raise EpisodesError if the first existing batch has a version whose attempts cannot be collected.
 
-    Batches that were made before would else be found to be so after those that are missing were made.
+    Otherwise this would only be detected after the missing batches have been made.
     """
     tables = (out / batch_name(batch.batch_id) / ATTEMPTS for batch in there)
     first = next((path for path in tables if path.is_file()), None)
@@ -263,7 +263,7 @@ def _batch(text: str, ledger: Path) -> Batch:
 
 
 def retire_failing(out: Path) -> tuple[list[Retirement], int]:
-    """Retire the grasps that a finished run says fail; returns them, and how many were not retired before."""
+    """Retire the grasps that fail according to a finished run; return them, and the number that was newly retired."""
     said = read_configuration(out)
     found = find_retirements(read_attempts(out / ATTEMPTS), failed_share=said["retire_failed_share"])
     return found, retire(TwinSource(said["dataset"]), found)

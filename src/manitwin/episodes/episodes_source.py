@@ -1,4 +1,4 @@
-"""What episodes and tasks are made of: a data set of twins, or scenes of them, or tasks in these scenes."""
+"""Sources of episodes and tasks: a data set of twins, scenes, or tasks in scenes."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from manitwin.twin.record_digests import TwinState
 
 @dataclass(frozen=True)
 class EpisodesSource:
-    """The source of episodes: a data set of twins, and scenes of them or none; tasks in these scenes or none.
+    """A data set of twins, optionally scenes with these twins, and optionally tasks in these scenes.
 
-    ``states`` are those of the twins in the scenes, ``remarks`` are on these twins.
+    ``states`` are the current states of the twins in the scenes, ``remarks`` concern these twins.
     """
 
     dataset: str
@@ -33,9 +33,10 @@ class EpisodesSource:
 
     @classmethod
     def of(cls, place: str | Path, twins: str | Path | None = None) -> EpisodesSource:
-        """Tell scenes from twins; raises UsageError for what is neither, and for scenes whose twins are gone or stand otherwise.
+        """Detect the kind of source; raises UsageError for an invalid one, and for scenes whose twins are missing or have
+        changed.
 
-        ``twins`` names where those of the scenes are now, None: where they were as the layouts were made.
+        ``twins`` is the current location of the scenes' twins; None: that recorded with the layouts.
         """
         root = DatasetRoot(place)
         path = root.absolute()
@@ -63,15 +64,15 @@ class EpisodesSource:
         return cls(dataset, scenes, path, *_check_twins(dataset, Path(scenes)))
 
     def check_grippers(self, robot: Robot) -> None:
-        """Raise UsageError where twins of the scenes have grasps of another gripper of the name of the robot's."""
+        """Raise UsageError if twins of the scenes have grasps of a different gripper with the robot's gripper name."""
         require_same(robot.gripper, ((each, state.grippers) for each, state in self.states.items()), robot.name)
 
 
 def _check_twins(dataset: str, scenes: Path) -> tuple[dict[str, TwinState], tuple[str, ...]]:
     """Return the states of the twins of scenes, and remarks.
 
-    Raises UsageError where one is not there: every batch with it would fail; and where one is another than came to rest there:
-    what is done with it would be done in a scene that no physics has settled.
+    Raises UsageError if a twin is missing, because every batch with it would fail, or has changed since the scene was
+    settled, because episodes would then start in a scene that no simulation has settled.
     """
     source, ids = TwinSource(dataset), scene_ids(scenes)
     source.check({each.twin_id for scene_id in ids for each in read_scene(scenes / scene_name(scene_id)).objects})

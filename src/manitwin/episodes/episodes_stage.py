@@ -1,4 +1,4 @@
-"""The stage that makes a batch: set up, plan and execute one episode after the other, and write what came of them."""
+"""Stage that makes a batch: sets up, plans and executes its episodes, and writes the results."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ KEPT_TWINS = 256
 
 
 class EpisodesStage:
-    """Make the episodes of a batch. Each draws from a generator of its own, by the run's seed and its number in the whole."""
+    """Makes the episodes of a batch; each has its own generator, seeded by the run's seed and the episode's number."""
 
     name = "episodes"
     version = "16"
@@ -62,7 +62,7 @@ class EpisodesStage:
     backend = "sapien"
 
     def __init__(self, settings: TrajectoriesConfig, dataset: str, scenes: str | None, tasks: str | None = None):
-        """Take the configuration, and where twins, scenes and tasks are read from."""
+        """Take the configuration, and the locations of twins, scenes and tasks."""
         self.settings, self.dataset, self.scenes, self.tasks = settings, dataset, scenes, tasks
         self._placeable = lru_cache(KEPT_TWINS)(self._read_placeable)
         self._twin = lru_cache(KEPT_TWINS)(self._read_twin)
@@ -70,7 +70,7 @@ class EpisodesStage:
 
     @property
     def model(self) -> str:
-        """The robot and the digest of its definition."""
+        """Name and shortened digest of the robot."""
         return f"{self._robot.name}:{self._robot.sha256[:12]}"
 
     @cached_property
@@ -121,7 +121,7 @@ class EpisodesStage:
     def _episodes(
         self, draft: Draft[Batch], batch: Batch, attempts: list[Attempt], twins: dict[str, str]
     ) -> Iterator[StoredEpisode]:
-        """Yield those that are kept, one at a time; all attempts are added to ``attempts``."""
+        """Yield the kept episodes, one at a time; append all attempts to ``attempts``."""
         for number in batch.numbers:
             words = np.random.SeedSequence([draft.seed, number]).generate_state(2)
             seed, task = int(words[0]), self._task_setting(batch, int(words[0]))
@@ -142,7 +142,7 @@ class EpisodesStage:
         return {} if self.tasks is None else {task.task_id: task for task in read_tasks(self.tasks)}
 
     def _task_setting(self, batch: Batch, seed: int) -> TaskSetting | None:
-        """Set a batch's task up, if it is of one; None where the robot has no way to begin."""
+        """Set up a batch's task; None if it has none or the robot cannot start it."""
         if batch.task_id is None:
             return None
         if batch.task_id not in self._tasks:
@@ -170,7 +170,7 @@ class EpisodesStage:
         return self._placeable(twin.twin_id)
 
     def begins(self, skill: Skill, target: PoolTwin) -> Sequence[StandingPose]:
-        """Return the placements that a target may begin in: where one is to be reached, those that a grasp leads there from."""
+        """Return the placements in which a target may start: if the goal is a placement, those from which a grasp leads there."""
         return begins_that_lead_there(
             skill,
             target,
@@ -180,7 +180,7 @@ class EpisodesStage:
         )
 
     def has_grasps(self, twin_id: str) -> bool:
-        """Tell whether a twin has a verified grasp that the robot's hand may use."""
+        """Tell whether a twin has a verified grasp usable by the robot's hand."""
         return bool(self._grasps(twin_id))
 
     def _is_graspable(self, twin_id: str) -> bool:
@@ -256,7 +256,7 @@ class EpisodesStage:
         return StoredEpisode(attempt, recording, recorded_robot(self._robot), objects, said)
 
     def _skill_of(self, batch: Batch) -> str:
-        """Return the skill's name, of a task those of its steps: ``place_in+near``."""
+        """Return the skill's name, for a task those of its steps: ``place_in+near``."""
         if batch.task_id is None:
             return self.settings.skill
         return "+".join(step.skill for step in self._tasks[batch.task_id].steps)

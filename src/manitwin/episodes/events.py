@@ -1,6 +1,6 @@
-"""Events of an episode, latched from the contacts of physics as they happen: an object was pressed, another one struck.
+"""Event watches of an episode: presses, strikes and contact forces, recorded from physics contacts as they happen.
 
-A watch looks at the contacts of every step that it is shown. What it measures is judged later (``goals.functional``).
+A watch processes the contacts of every step that it is shown. Its measurements are judged later (``goals.functional``).
 """
 
 from __future__ import annotations
@@ -17,30 +17,30 @@ from manitwin.geometry.poses import inverse, transform_points
 from manitwin.physics.sapien.contacts import ContactReader, Push
 
 Pose = Callable[[], np.ndarray]
-"""Tells a frame's pose in the world ``(4, 4)`` as it is now."""
+"""Returns a frame's current pose in the world ``(4, 4)``."""
 
 
 class EventWatch(Protocol):
-    """The protocol of what latches events."""
+    """Interface of event watches."""
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """What has happened so far, in its order."""
+        """The events so far, in order."""
         ...
 
     @property
     def force_n(self) -> float:
-        """The force (N) of what is watched, at the last look."""
+        """The watched force (N) at the last look."""
         ...
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
-        """Look at the contacts of the last step."""
+        """Process the contacts of the last step."""
         ...
 
 
 @dataclass
 class ContactWatch:
-    """Latches nothing: it tells how hard ``subject`` is pressed on by bodies, by their names, while it is ``asked``."""
+    """Measures the contact force of named bodies on ``subject`` while ``asked``; records no events."""
 
     subject: str
     by: frozenset[str]
@@ -49,21 +49,21 @@ class ContactWatch:
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """None: a touch on the way says nothing of a goal."""
+        """Always empty: incidental contact is irrelevant for goals."""
         return ()
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
-        """Look at the contacts of the last step."""
+        """Process the contacts of the last step."""
         push = reader.push(contacts, self.subject, self.by) if self.asked else None
         self.force_n = 0.0 if push is None else float(np.linalg.norm(push.force_n))
 
 
 @dataclass
 class PressWatch:
-    """Latches how a body was pressed at a place: each touch from its beginning to its end, by its largest force.
+    """Records presses of a body at a place: each contact from start to end, by its largest force.
 
-    ``subject`` and ``by`` are names of bodies; ``place`` gives the frame that is to be pressed, Z out of the surface. Values:
-    ``force_n``, ``off_m`` from the place across Z, ``angle_rad`` between the force and -Z, ``time_s``.
+    ``subject`` and ``by`` are names of bodies; ``place`` returns the frame to press, Z out of the surface. Values:
+    ``force_n``, ``off_m`` from the frame's Z axis, ``angle_rad`` between the force and -Z, ``time_s``.
     """
 
     subject: str
@@ -75,11 +75,11 @@ class PressWatch:
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """All touches, the one that lasts included."""
+        """All contacts, including the current one."""
         return (*self._ended, *([] if self._now is None else [self._now]))
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
-        """Look at the contacts of the last step."""
+        """Process the contacts of the last step."""
         push = reader.push(contacts, self.subject, self.by)
         self.force_n = 0.0 if push is None else float(np.linalg.norm(push.force_n))
         if push is None:
@@ -93,11 +93,11 @@ class PressWatch:
 
 @dataclass
 class StrikeWatch:
-    """Latches how a tool's face struck another body: each touch by its first moment, with the largest force of it.
+    """Records strikes of a tool's face on another body: each contact by its first moment, with its largest force.
 
-    ``face`` gives the tool's face in the world, Z out of it; ``timestep_s`` is that between two looks. Values: ``off_m`` from
-    the face's middle across Z, ``face_radius_m``, ``angle_rad`` between the force on what is struck and Z, ``speed_m_s`` of
-    the face along Z in the step before it touched, ``force_n``, ``time_s``.
+    ``face`` returns the face's frame in the world, Z outwards; ``timestep_s`` is the time between two looks. Values:
+    ``off_m`` from the face's Z axis, ``face_radius_m``, ``angle_rad`` between the force on the struck body and Z,
+    ``speed_m_s`` of the face along Z in the step before contact, ``force_n``, ``time_s``.
     """
 
     tool: str
@@ -112,11 +112,11 @@ class StrikeWatch:
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """All touches in their order."""
+        """All contacts in order."""
         return tuple(self._events)
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
-        """Look at the contacts of the last step."""
+        """Process the contacts of the last step."""
         push, face = reader.push(contacts, self.struck, frozenset({self.tool})), self.face()
         touched_before = self.force_n > 0
         self.force_n = 0.0 if push is None else float(np.linalg.norm(push.force_n))
@@ -134,7 +134,7 @@ class StrikeWatch:
 
 
 def _at(push: Push, frame_to_world: np.ndarray, along: np.ndarray) -> dict[str, float]:
-    """Return how far from a frame's Z axis a push is, and its angle to a direction ``(3,)``."""
+    """Return the distance of a push from a frame's Z axis, and its angle to the direction ``along (3,)``."""
     at_m = transform_points(inverse(frame_to_world), push.at_m[None])[0]
     cosine = float(push.force_n @ along) / max(float(np.linalg.norm(push.force_n)), 1e-12)
     return {"off_m": float(np.linalg.norm(at_m[:2])), "angle_rad": float(np.arccos(np.clip(cosine, -1, 1)))}

@@ -1,4 +1,4 @@
-"""Carrying out a plan in physics, step by step, with the recorder looking on 20 times a second."""
+"""Execution of plans in physics, step by step, with recording at 20 Hz."""
 
 from __future__ import annotations
 
@@ -28,28 +28,28 @@ IN_HAND = frozenset(
     {Phase.CLOSE, Phase.LIFT, Phase.CARRY, Phase.LOWER, Phase.OPEN, Phase.ACT, Phase.HOLD, Phase.RETURN}
 )
 STILL_ROWS, REST_ROWS = 5, 10  # 0.25 s and 0.5 s
-FRAME_S = 1 / 60  # between two looks at how hard the hand presses
-STEADY_ROWS = 2  # the hand presses for so long before it moves on
-OPENING_S = 0.1  # after the hand has let go, before the hand withdraws
-# Nine touches of fingers and table lasted 12 to 25 ms: looking at the recorded rows alone, every 50 ms, missed 4 of them.
+FRAME_S = 1 / 60  # interval between updates of the hand's target
+STEADY_ROWS = 2  # the hand must press for this long before the arm moves on
+OPENING_S = 0.1  # wait after opening, before the hand withdraws
+# Nine contacts of fingers and table lasted 12 to 25 ms; checking only the recorded rows, every 50 ms, missed 4 of them.
 WATCH_S = 0.0125
-TRACKING_S = 0.05  # after a motion, for the arm to come to rest
+TRACKING_S = 0.05  # wait after a motion for the arm to come to rest
 
 
 class Execution:
-    """Moves the robot of a world and records what happens.
+    """Moves the robot of a world and records the states.
 
-    It acts as a policy does: what it tells arms and hands it chooses at the beginning of a row, and within a row they are told
-    what the environment of a task tells them. So the recorded actions lead to the recorded states again, bit for bit.
-    Of two arms one moves at a time, the one that is used; the other stays where it is told to be, and goes on pressing.
+    It acts like a policy: commands of arms and hands are chosen at the beginning of a row, and applied within the row as a
+    task's environment applies them. Replaying the recorded actions therefore reproduces the recorded states bit for bit. Of
+    two arms one moves at a time; the other holds its commanded joints, and continues to press.
     """
 
     def __init__(
         self, world: RobotWorld, robot: Robot, closing: TrialSettings, *tip_poses: Callable[[np.ndarray], np.ndarray]
     ):
-        """Record the first state; ``tip_poses`` is the forward kinematics of each arm's commanded joints.
+        """Record the first state; ``tip_poses`` are the forward kinematics of each arm for commanded joints.
 
-        Raises ValueError where the timestep does not fit the rate of recording.
+        Raises ValueError if the time step does not divide the recording interval.
         """
         self._world, self._closing = world, closing
         self._steps_per_row = round(1 / RATE_HZ / closing.timestep_s)
@@ -80,28 +80,28 @@ class Execution:
         self._recorder = Recorder(world, touches, self._hands_state)
 
     def use(self, arm: int) -> None:
-        """Move another arm from now on, by its number; ``touches`` are those of its fingers."""
+        """Switch to another arm, by number; ``touches`` are then those of its fingers."""
         self._world.use(arm)
         self._arm = self._arms[arm]
         self._take_touches(self._world.contacts.read())
 
     @property
     def used(self) -> int:
-        """The number of the arm that is used."""
+        """Number of the current arm."""
         return self._arms.index(self._arm)
 
     @property
     def commanded_rad(self) -> np.ndarray:
-        """The joints ``(n,)`` that the arm is told."""
+        """Commanded joints ``(n,)`` of the current arm."""
         return self._arm.commanded_rad
 
     @property
     def length_s(self) -> float:
-        """The time since the first state."""
+        """Time since the first state."""
         return self.steps * self._closing.timestep_s
 
     def recording(self) -> Recording:
-        """Return what was recorded so far."""
+        """Return the recording so far."""
         ends = np.cumsum([len(arm.commanded_rad) for arm in self._arms])[:-1]
         return self._recorder.recording(
             lambda told: np.array(
@@ -111,7 +111,7 @@ class Execution:
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """What the ``watches`` have latched."""
+        """Events recorded by the ``watches``."""
         return tuple(event for watch in self.watches for event in watch.events)
 
     def follow(
@@ -124,13 +124,13 @@ class Execution:
         pace: Callable[[int], float] | None = None,
         yields: bool = False,
     ) -> bool:
-        """Move the arm along a motion and wait until it has come to rest.
+        """Move the arm along a motion and wait until it has come to rest; return whether it was completed.
 
-        A guarded move ends with the row in which ``until`` has become true, which is asked after every step, and the arm stays
-        where it then is told to be, or, where it ``yields``, where it is; or at the end of a row, where ``until_row`` is true.
-        ``adjusted`` gives what is added to a sample's positions ``(n,)``; it is asked for all samples of a row as that begins.
-        ``pace`` gives the share of a row by which the arm goes on from a sample, by its number; one sample at least.
-        Returns whether it went all the way.
+        A guarded move ends with the row in which ``until`` becomes true, which is checked after every step; the arm then
+        holds its commanded joints, or its actual ones if it ``yields``. ``until_row`` is checked at the end of each row.
+        ``adjusted`` returns the offset of a sample's positions ``(n,)``; it is called for all samples of a row at its
+        beginning. ``pace`` returns the share of a row by which the arm advances from a sample, given its number; at least one
+        sample.
         """
         samples = motion.positions_rad
         first = 0
@@ -152,7 +152,7 @@ class Execution:
         return True
 
     def delayed(self, motion: Motion, sample: int) -> Motion:
-        """Return a motion that waits at its beginning for less than a row, such that the sample of this number ends a row."""
+        """Return the motion with a wait of less than a row at its beginning, such that the given sample ends a row."""
         waits = -(sample + 1) % self._steps_per_row
         positions_rad, velocities_rad_s = motion.positions_rad, motion.velocities_rad_s
         return replace(
@@ -162,25 +162,25 @@ class Execution:
         )
 
     def yield_here(self) -> None:
-        """Take the joints as they are for those that they are told to be: what presses against the arm presses no more."""
+        """Make the actual joints the commanded ones, which releases forces on the arm."""
         self._arm.commanded_rad = self._world.robot.joint_positions()
 
     def wait_s(self, phase: Phase, time_s: float) -> None:
-        """Stay for a while, whole rows."""
+        """Wait for a time, rounded up to whole rows."""
         self.wait(phase, int(np.ceil(time_s * RATE_HZ - 1e-9)))
 
     def wait(self, phase: Phase, rows: int) -> None:
-        """Stay where the robot is told to be."""
+        """Wait for a number of rows at the commanded joints."""
         for _ in range(rows):
             self._carry_out_row(phase)
 
     def shape(self, grasp: Grasp | None) -> None:
-        """Shape the hand for a grasp; cups stay as they are."""
+        """Prepare the hand for a grasp; cups do nothing."""
         joints_rad, opening_m = (None, None) if grasp is None else (grasp.joints_rad, grasp.opening_m)
         self._play(Phase.REACH, self._arm.hand.shaping(joints_rad, opening_m))
 
     def close(self) -> None:
-        """Close the hand until it presses; from then on it keeps pressing with the closing force, whatever gives way."""
+        """Close the hand until it presses; it then keeps pressing with the closing force."""
         self._arm.presses, steady = True, 0
         for _ in range(round(self._closing.close_time_s * RATE_HZ)):
             self._carry_out_row(Phase.CLOSE)
@@ -189,12 +189,12 @@ class Execution:
                 break
 
     def close_empty(self) -> None:
-        """Close the hand on nothing, at the closing speed; it does not press."""
+        """Close the empty hand at the closing speed, without pressing."""
         self._play(Phase.CLOSE, self._arm.hand.closing_empty())
         self.wait_s(Phase.CLOSE, OPENING_S)
 
     def open(self) -> None:
-        """Let go, at the closing speed."""
+        """Open the hand at the closing speed."""
         self._arm.presses = False
         self._play(Phase.OPEN, self._arm.hand.opening())
         self.wait_s(Phase.OPEN, OPENING_S)
@@ -212,11 +212,13 @@ class Execution:
         return self._world.object_to_world(self._world.target)
 
     def gripper_to_object(self) -> np.ndarray:
-        """Return the hand where the joints are told to be, in the object's frame: what the arm sags by counts as in the hand."""
+        """Return the commanded hand pose in the object frame; the arm's tracking error thus counts as a pose change in the
+        hand.
+        """
         return inverse(self.target_to_world()) @ self._arm.tip_pose(self.commanded_rad)
 
     def rest(self, max_steps: int, still_rows: int = STILL_ROWS) -> list[list[np.ndarray]]:
-        """Stay until nothing has moved for some rows; returns the poses ``(4, 4)`` of all objects at the last rows."""
+        """Wait until nothing has moved for some rows; return the poses ``(4, 4)`` of all objects in the last rows."""
         watch = self._world.rest_watch(still_rows)
         for _ in range(max_steps // self._steps_per_row):
             self.wait(Phase.REST, 1)
@@ -227,14 +229,14 @@ class Execution:
 
     @property
     def pressing(self) -> frozenset[frozenset[str]]:
-        """The pairs of names of what pressed on each other at any of the last rows."""
+        """Pairs of names that pressed on each other in any of the last rows."""
         return frozenset().union(*self._last_pressing)
 
     def _poses(self) -> list[np.ndarray]:
         return [self._world.object_to_world(number) for number in range(len(self._world.placed))]
 
     def _play(self, phase: Phase, told: Iterator[np.ndarray]) -> None:
-        """Tell the hand one thing after the other, until there is no more and the row ends."""
+        """Apply queued hand commands until none is left and the row ends."""
         arm = self._arm
         arm.next_told = next(told, None)
         arm.rest_told = told
@@ -242,20 +244,17 @@ class Execution:
             self._carry_out_row(phase)
 
     def _carry_out_row(self, phase: Phase, until: Callable[[], bool] | None = None) -> bool:
-        """Go on until the next row is recorded, as an environment does that is told what that row says: an action.
-
-        Returns False where ``until`` became true on the way.
-        """
+        """Advance to the next recorded row, as an environment does for one action; return False if ``until`` became true."""
         count, dt, goes_on = self._steps_per_row, self._closing.timestep_s, True
         ways = []
         for arm in self._arms:
-            arm.commanded_rad = np.asarray(arm.commanded_rad, np.float32).astype(float)  # as it is recorded
+            arm.commanded_rad = np.asarray(arm.commanded_rad, np.float32).astype(float)  # as recorded
             arm.choose()
             ways.append(arm.targets.towards(arm.commanded_rad, count))
         self._world.expect_load(any(arm.may_hold for arm in self._arms))
         for step in range(count):
             for arm, robot, (positions, steps) in zip(self._arms, self._world.robots, ways, strict=True):
-                # the drives pull to where the arm is to be in the middle of the step, or it would run ahead of its targets
+                # targets at the middle of the step; otherwise the arm would run ahead of them
                 velocities = steps[step] / (count * dt)
                 robot.set_targets(positions[step] - velocities * (dt / 2), velocities)
                 arm.tell(hand_share(step + 1, self._closing.steps_per_frame, count))
@@ -287,7 +286,7 @@ class Execution:
         self._unplanned_since_row = self._unplanned_since_row or bool(unplanned)
 
     def _record(self, phase: Phase, contacts: Sequence[physx.PhysxContact]) -> None:
-        """Add a row; speeds are those of the last step."""
+        """Append a row; speeds are those of the last step."""
         self._recorder.add(
             np.concatenate([arm.commanded_rad for arm in self._arms]),
             np.concatenate([arm.told for arm in self._arms]),
@@ -311,7 +310,7 @@ class Execution:
         return np.concatenate([arm.hand.state for arm in self._arms])
 
     def _take_touches(self, contacts: Sequence[physx.PhysxContact]) -> Touches:
-        """Take down what the fingers of the arm that is used touch; return what those of all do."""
+        """Store the current arm's contact forces, and return those of all arms."""
         of_arms = [
             arm.hand.touches(reader.touches(contacts))
             for arm, reader in zip(self._arms, self._world.readers, strict=True)

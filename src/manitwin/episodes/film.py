@@ -1,4 +1,4 @@
-"""Films read again, picture by picture: by OpenCV, and those of AV1, which its wheels cannot decode, by Pillow's libavif."""
+"""Video decoding frame by frame: by OpenCV, and for AV1, which its wheels cannot decode, by Pillow's libavif."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _refused = with_remedy(EpisodesError, _REMEDY)
 
 @dataclass(frozen=True)
 class VideoFacts:
-    """The size, rate, codec and number of frames that an mp4 states."""
+    """Size, rate, codec and number of frames according to an mp4's header."""
 
     frames: int
     rate_hz: float
@@ -41,10 +41,10 @@ class VideoFacts:
 
 
 class Film:
-    """The pictures of an mp4, ``(H, W, 3) uint8`` RGB, from the first to the last or at a place. To be used in a ``with``.
+    """Pictures of an mp4, ``(H, W, 3) uint8`` RGB, in sequence or by number. Use it in a ``with`` statement.
 
-    Raises EpisodesError for a file that is no video. FFmpeg goes by a file's content: what is a list of other files' names to
-    it is not given to it.
+    Raises EpisodesError for a file that is not a video. Only mp4 content is passed to FFmpeg, which would otherwise follow
+    playlists to other files.
     """
 
     def __init__(self, path: Path):
@@ -73,20 +73,20 @@ class Film:
         self.close()
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._capture.release()
         if self._sequence is not None:
             self._sequence.close()
 
     def __iter__(self) -> Iterator[np.ndarray]:
-        """Yield the pictures as far as they can be decoded."""
+        """Yield the pictures until one cannot be decoded."""
         frame = 0
         while (picture := self._decoded(frame)) is not None:
             yield picture
             frame += 1
 
     def picture(self, frame: int) -> np.ndarray:
-        """Return a picture, soonest one behind the last that was asked for; raises EpisodesError where there is none."""
+        """Return a picture by number, fastest in increasing order; raises EpisodesError if it cannot be decoded."""
         picture = self._decoded(frame)
         if picture is None:
             raise EpisodesError(f"{self._path}: frame {frame} cannot be decoded; {_REMEDY}")
@@ -109,7 +109,7 @@ class Film:
 
 
 def video_facts(path: Path) -> VideoFacts:
-    """Read the header of a video; raises EpisodesError for a file that is no video."""
+    """Read the header of a video; raises EpisodesError for a file that is not a video."""
     with Film(path) as film:
         return film.facts
 
@@ -133,7 +133,7 @@ def _sequence(path: Path, facts: VideoFacts) -> Image.Image:
     content = read_bytes(path, _MAX_BYTES, _refused, inside=path.parent, name=str(path))
     try:
         sequence = Image.open(io.BytesIO(as_avif_sequence(content)), formats=["AVIF"])
-    except Exception as error:  # a decoder may raise anything on damaged bytes
+    except Exception as error:  # decoders raise arbitrary exceptions on damaged data
         raise EpisodesError(f"{path}: not a readable AV1 video; {_REMEDY}") from error
     if sequence.size != (facts.width_px, facts.height_px):
         raise EpisodesError(
@@ -146,7 +146,5 @@ def _sought(sequence: Image.Image, frame: int) -> np.ndarray | None:
     try:
         sequence.seek(frame)
         return np.asarray(sequence.convert("RGB"))
-    except (
-        Exception
-    ):  # behind the end; a decoder may raise anything on damaged bytes, and who asks says which picture it was
+    except Exception:  # beyond the end, or damaged data; the caller reports the frame number
         return None

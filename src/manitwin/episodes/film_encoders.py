@@ -1,7 +1,7 @@
-"""Encoders of films into mp4: AV1 of Pillow's libavif and libaom (BSD), VP9 and MPEG-4 Part 2 of OpenCV's FFmpeg (LGPL).
+"""Video encoders for mp4: AV1 of Pillow's libavif and libaom (BSD), VP9 and MPEG-4 Part 2 of OpenCV's FFmpeg (LGPL).
 
-OpenCV cannot choose an encoder's settings (opencv/opencv#24570), and libvpx's own ones are slow. PyAV's wheels bring libx264
-and libx265, which are GPL.
+OpenCV cannot set encoder options (opencv/opencv#24570), and libvpx's defaults are slow. PyAV's wheels contain libx264 and
+libx265, which are GPL.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ _NO_ENCODER = {
 }
 
 _GROUP_PICTURES = 12
-"""Pictures from one that is decoded by itself to the next: what a picture drawn at random costs, against bytes."""
+"""Pictures per group, from one independently decodable picture to the next: a trade-off of random access time and size."""
 
 _QUALITY = 80
-_SPEED = 9  # libavif's, 0 to 10: libaom's way for films that are coded as they come
+_SPEED = 9  # libavif's speed, 0 to 10; here libaom's real-time mode
 _CPU_USED = "11"
-"""libaom's fastest way: two thirds of the time of that at which libavif's speeds end, a twentieth more bytes, 0.2 dB less."""
+"""libaom's fastest mode: two thirds of the time of libavif's fastest speed, 5 % more bytes, 0.2 dB less."""
 
 
 class Encoder(Protocol):
-    """Takes the pictures of a film, ``(H, W, 3) uint8`` RGB, all of one size; ``close`` writes what is left of them."""
+    """Encodes pictures ``(H, W, 3) uint8`` RGB of one size; ``close`` writes the remaining ones."""
 
     def write(self, picture: np.ndarray) -> None: ...
 
@@ -45,7 +45,7 @@ class Encoder(Protocol):
 
 
 def missing_encoder(codec: Codec) -> UsageError:
-    """Return the error for an installation without a codec's encoder, which names the builds that have it."""
+    """Return the error for an installation without a codec's encoder, naming builds that have it."""
     others = " or ".join(f"--codec {name}" for name in CODECS if name != codec)
     return UsageError(
         f"this {_NO_ENCODER[codec]} from PyPI, whose wheels bring it; builds of distributions may not. Or take {others}"
@@ -53,7 +53,7 @@ def missing_encoder(codec: Codec) -> UsageError:
 
 
 def opened_encoder(codec: Codec, path: Path, width_px: int, height_px: int, rate_hz: int) -> Encoder | None:
-    """Begin a film; None where the file cannot be written, or where this installation has no encoder for the codec."""
+    """Start a video; None if the file cannot be written, or if this installation has no encoder for the codec."""
     if codec == "av1":
         try:
             return _Av1(path, width_px, height_px, rate_hz) if features.check("avif") else None
@@ -77,7 +77,7 @@ class _OpenCV:
 
 
 class _Av1:
-    """Codes groups of pictures as AVIF sequences, and puts what is coded into one track."""
+    """Encodes groups of pictures as AVIF sequences, and concatenates them into one track."""
 
     def __init__(self, path: Path, width_px: int, height_px: int, rate_hz: int):
         self._stream = path.open("wb")
@@ -99,7 +99,8 @@ class _Av1:
         first, *rest = self._group
         alone = (
             not rest
-        )  # one picture is coded as a still, which is another kind of track: twice, and one of them is taken
+            # a single picture would be coded as a still image, which is another kind of track: it is coded twice, and one is used
+        )
         coded = io.BytesIO()
         first.save(
             coded,
@@ -111,7 +112,7 @@ class _Av1:
             codec="aom",
             advanced={"cpu-used": _CPU_USED},
             subsampling="4:2:0",
-            range="limited",  # what players take where a decoder does not say
+            range="limited",  # the default of players if the range is not stated
             max_threads=1,
         )
         pictures = coded_pictures(coded.getvalue())

@@ -1,4 +1,4 @@
-"""Fixtures: what a skill needs beside twins: a peg on a stand, a block to strike, a board, a holder. Boxes that stay."""
+"""Fixtures of skills: static boxes such as a peg on a stand, a block to strike, a board, a holder."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from manitwin.geometry.boxes import footprint
 from manitwin.geometry.poses import quaternion_wxyz, transform, transform_points
 from manitwin.geometry.rigid_body import StaticBox
 
-PEG_RISES_RAD = np.radians(10)  # towards its tip, as coat hooks do: what hangs slides to the post
+PEG_RISES_RAD = np.radians(10)  # towards its tip, as for coat hooks: hung objects slide to the post
 PEG_RADIUS_M, PEG_LENGTH_M, PEG_HEIGHT_M = 0.004, 0.09, 0.28
 POST_HALF_M, FOOT_HALF_M, FOOT_HALF_HEIGHT_M = 0.012, 0.05, 0.006
 BLOCK_HALF_M, BLOCK_HALF_HEIGHT_M = 0.025, 0.06
-"""Slim and tall: the hand beside a short head has room, the arm above the table."""
+"""Slender and tall: room for the hand beside a short head, and for the arm above the table."""
 PANEL_HALF_M, PANEL_HALF_HEIGHT_M = (0.07, 0.05), 0.02
 BUTTON_HALF_M, BUTTON_HALF_HEIGHT_M = 0.010, 0.003
 HOLDER_FLOOR_M, HOLDER_WALL_M = 0.010, 0.006
@@ -27,10 +27,11 @@ _CORNERS = np.array([[x, y, z] for x in (-1.0, 1) for y in (-1.0, 1) for z in (-
 
 @dataclass(frozen=True)
 class Fixture:
-    """Boxes that stand where they are, each a body of the episode's world under its own name.
+    """Static boxes, each a body of the episode's world with its own name.
 
-    ``frame_to_world (4, 4)`` is where it works, at the box ``name``: a peg's foot with Z to its tip and X upward, the middle
-    of a face, a button or a bore's rim with Z out of it. ``size_m`` is a peg's length, the half width of the others.
+    ``frame_to_world (4, 4)`` is the functional frame, at the box ``name``: a peg's foot with Z towards its tip and X upwards,
+    or the centre of a face, a button or a bore's rim with Z outwards. ``size_m`` is a peg's length, or the half width of
+    other fixtures.
     """
 
     kind: Literal["peg", "block", "panel", "holder", "board"]
@@ -41,26 +42,26 @@ class Fixture:
 
     @property
     def footprint_m(self) -> np.ndarray:
-        """The corners ``(K, 2)`` of what it covers, seen from above."""
+        """Vertices ``(K, 2)`` of its footprint, seen from above."""
         return footprint(np.concatenate([_corners(box) for box in self.boxes]))
 
     @property
     def bearing(self) -> frozenset[str]:
-        """The names of its boxes that count as furniture where something lies on them: all but the box ``name`` and a post."""
+        """Names of its boxes that count as furniture for objects resting on them: all except the box ``name`` and a post."""
         if self.kind == "holder":
             return frozenset()
         return frozenset(box.name for box in self.boxes) - {self.name, f"{self.name}_post"}
 
     @property
     def peg(self) -> Peg | None:
-        """The peg that things hang on; None for another kind."""
+        """The peg for hanging objects; None for other kinds."""
         if self.kind != "peg":
             return None
         return Peg(self.frame_to_world[:3, 3], self.frame_to_world[:3, 2], self.size_m, PEG_RADIUS_M)
 
     @property
     def holder(self) -> Holder | None:
-        """The holder that things are inserted into; None for another kind."""
+        """The holder for inserting objects; None for other kinds."""
         if self.kind != "holder":
             return None
         depth_m = 2 * float(self.boxes[1].half_extents_m[2]) - HOLDER_FLOOR_M
@@ -89,7 +90,7 @@ def peg_stand(position_m: np.ndarray, yaw_rad: float, *, height_m: float = PEG_H
 
 
 def block(position_m: np.ndarray, yaw_rad: float, *, name: str = "block") -> Fixture:
-    """Return a block 5 x 5 x 12 cm that stands on the table at ``position_m (3,)``; it works at its top."""
+    """Return a block of 5 x 5 x 12 cm that stands on the table at ``position_m (3,)``; its frame is at its top."""
     upright = transform(Rotation.from_euler("z", yaw_rad).as_matrix(), np.asarray(position_m, float))
     half_m = np.array([BLOCK_HALF_M, BLOCK_HALF_M, BLOCK_HALF_HEIGHT_M])
     middle = upright @ transform(translation=np.array([0.0, 0.0, BLOCK_HALF_HEIGHT_M]))
@@ -98,7 +99,9 @@ def block(position_m: np.ndarray, yaw_rad: float, *, name: str = "block") -> Fix
 
 
 def board(position_m: np.ndarray, yaw_rad: float, half_m: np.ndarray, *, name: str = "board") -> Fixture:
-    """Return a level board on the table at ``position_m (3,)`` with half extents ``(3,)``; it works at its top's middle."""
+    """Return a level board on the table at ``position_m (3,)`` with half extents ``(3,)`` m; its frame is at the centre of
+    its top.
+    """
     upright = transform(Rotation.from_euler("z", yaw_rad).as_matrix(), np.asarray(position_m, float))
     high_m = float(half_m[2])
     box = StaticBox(name, np.asarray(half_m, float), upright @ transform(translation=np.array([0.0, 0, high_m])))
@@ -108,7 +111,7 @@ def board(position_m: np.ndarray, yaw_rad: float, half_m: np.ndarray, *, name: s
 
 
 def panel(position_m: np.ndarray, yaw_rad: float, *, name: str = "button") -> Fixture:
-    """Return a flat box on the table at ``position_m (3,)`` with a button 2 cm wide that stands out of it by 6 mm."""
+    """Return a flat box on the table at ``position_m (3,)`` with a button 2 cm wide that protrudes by 6 mm."""
     upright = transform(Rotation.from_euler("z", yaw_rad).as_matrix(), np.asarray(position_m, float))
     housing_m = np.array([*PANEL_HALF_M, PANEL_HALF_HEIGHT_M])
     button_m = np.array([BUTTON_HALF_M, BUTTON_HALF_M, BUTTON_HALF_HEIGHT_M])
@@ -125,9 +128,9 @@ def panel(position_m: np.ndarray, yaw_rad: float, *, name: str = "button") -> Fi
 def holder(
     position_m: np.ndarray, yaw_rad: float, bore_half_m: np.ndarray, depth_m: float, *, name: str = "holder"
 ) -> Fixture:
-    """Return a holder on the table at ``position_m (3,)`` with a bore of half widths ``(2,)`` m that opens upward.
+    """Return a holder on the table at ``position_m (3,)`` with a bore of half widths ``(2,)`` m that opens upwards.
 
-    Its frame is in the middle of the bore's rim, Z upward; ``size_m`` is the larger half width.
+    Its frame is at the centre of the bore's rim, Z upwards; ``size_m`` is the larger half width.
     """
     upright = transform(Rotation.from_euler("z", yaw_rad).as_matrix(), np.asarray(position_m, float))
     outer_m, half_height_m = bore_half_m + HOLDER_WALL_M, (HOLDER_FLOOR_M + depth_m) / 2
@@ -142,7 +145,7 @@ def holder(
 
 
 def to_json(fixture: Fixture) -> dict[str, Any]:
-    """Return a fixture as JSON values, as records of episodes keep it."""
+    """Return a fixture as JSON values, as stored in episode records."""
     boxes = [
         {
             "name": box.name,

@@ -1,4 +1,4 @@
-"""How many granules each object of an episode holds: at its beginning, and at every row of its recording."""
+"""Numbers of granules in each object of an episode, at the start and in every row of its recording."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def held_by(
     openings: Mapping[str, Opening],
     granules: Granules,
 ) -> dict[str, int]:
-    """Return how many granules lie in each object at its pose ``(4, 4)``, by name."""
+    """Return the number of granules in each object at its pose ``(4, 4)``, by name."""
     counts = {}
     for placed, pose in zip(objects, object_to_world, strict=True):
         vessel = ObjectState(placed.body, pose, pose, True, openings.get(placed.name))
@@ -32,7 +32,7 @@ def held_by(
 def with_granule_counts(
     recording: Recording, objects: Sequence[PlacedObject], openings: Mapping[str, Opening], radius_m: float
 ) -> Recording:
-    """Return the recording with how many granules each of its objects holds at every row."""
+    """Return the recording with the number of granules in each object in every row."""
     assert recording.granule_positions_m is not None
     middles = recording.granule_positions_m.astype(float)
     held = np.zeros((len(middles), len(objects)), np.int16)

@@ -1,4 +1,4 @@
-"""What is handled at each state of an episode: of a goal of several literals one object after the other."""
+"""Handled object in each state of an episode, which changes for goals of several literals."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from manitwin.errors import UsageError
 
 
 def handled_objects(episode: StoredEpisode) -> np.ndarray:
-    """Return the number of the object that is handled ``(T + 1,) int``: the subject of the literal that is worked on.
+    """Return the number of the handled object ``(T + 1,) int``: the subject of the literal being worked on.
 
-    Contacts are recorded of that one. Where there is one literal, or none names an object, it is the recording's target.
+    Contacts are recorded for this object. For a single literal, or if none names an object, it is the recording's target.
     """
     recording = episode.recording
     target, worked_on = recording.target, recording.active_literal
@@ -25,7 +25,7 @@ def handled_objects(episode: StoredEpisode) -> np.ndarray:
 
 
 def of_states(of_actions: np.ndarray) -> np.ndarray:
-    """Return for ``(T + 1,)`` states what is told of ``(T,)`` actions: that of the action that follows, or the last one."""
+    """Return per-action values ``(T,)`` as per-state values ``(T + 1,)``: that of the following action, or the last one."""
     return np.append(of_actions, of_actions[-1:])
 
 

@@ -1,4 +1,4 @@
-"""The watch of a handover: that the second arm took an object from the first and held it alone, and how it was let go."""
+"""Event watch of a handover: the second arm took an object from the first and held it alone, and how it was released."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ HELD_ALONE_S = 0.2
 
 @dataclass
 class HandoverWatch:
-    """Latches that ``taker`` held ``subject`` for 0.2 s with nothing else touching it, after ``giver`` had held it.
+    """Records that ``taker`` held ``subject`` for 0.2 s without any other contact, after ``giver`` had held it.
 
-    Arms go by their names. ``center`` tells the object's centre of mass ``(3,)`` in the world. Values: ``rise_m``, how much
-    higher than at the first look it was then, at the most; ``fell_m``, how far it has sunk since the last touch of the
-    second arm; ``time_s`` of the beginning. A touch of the first arm afterwards takes it back: there is no event then.
+    Arms are given by name. ``center`` returns the object's centre of mass ``(3,)`` in the world. Values: ``rise_m``, the
+    largest height while held alone, above that at the first look; ``fell_m``, its descent since the last contact of the
+    second arm; ``time_s`` of the beginning. A later contact of the first arm cancels the event.
     """
 
     subject: str
@@ -36,14 +36,14 @@ class HandoverWatch:
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """One event where the second arm has it, or had it last."""
+        """One event if the second arm holds the object or was the last to hold it."""
         if not self._values:
             return ()
         fell_m = max(0.0, self._let_go_m - float(self.center()[2]))
         return (Event("handed_over", self.subject, None, {**self._values, "fell_m": fell_m}),)
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
-        """Look at the contacts of the last step."""
+        """Process the contacts of the last step."""
         height_m = float(self.center()[2])
         self._start_m = height_m if self._start_m is None else self._start_m
         pairs = (pair for pair in reader.pressing(contacts) if self.subject in pair)

@@ -1,8 +1,10 @@
-"""Recorded episodes as HDF5 in the layout of ManiSkill's demonstrations, and back.
+"""HDF5 storage of recorded episodes in the layout of ManiSkill's demonstrations.
 
 Source: ManiSkill's docs/source/user_guide/datasets/demos.md, mani_skill/utils/wrappers/record.py (groups and types) and
 mani_skill/utils/structs/articulation.py (a state is pose, velocities of the root, joint positions, joint velocities).
-docs/episodes.md says every data set. Read by h5py alone; HDF5 1.10 or later. The same episodes give the same bytes.
+
+docs/episodes.md describes every data set. Reading needs only h5py, and HDF5 1.10 or later. The output is deterministic to the
+byte.
 """
 
 from __future__ import annotations
@@ -37,20 +39,20 @@ from manitwin.robots.robot import OPENING
 from manitwin.twin.store import file_beside
 
 LIBVER = ("v110", "v110")
-"""Small groups and single chunks take no index: a fifth less than the oldest format (measured, 29 arrays an episode)."""
+"""Small groups and single chunks need no index: a fifth smaller than the oldest format (measured with 29 arrays per episode)."""
 
 EPISODE = "episode"
-"""The attribute of a trajectory's group that holds what is no array, as JSON."""
+"""Attribute of a trajectory's group with all non-array data as JSON."""
 
 _REMEDY = "write the episodes again"
 EXTRA = "manitwin"
-"""The group of what ManiSkill has no place for."""
+"""Group of data without a place in ManiSkill's layout."""
 
 _NAME = r"^[0-9A-Za-z_-][0-9A-Za-z_. -]*$"
-"""What can be the name of a group in the file, and of a twin's folder."""
+"""Valid names of groups in the file and of twin folders."""
 
 _COMPRESSED_BYTES = 512
-"""Smaller arrays are stored as they are: they would not get smaller."""
+"""Smaller arrays are stored uncompressed, because compression would not shrink them."""
 
 
 class _Said(BaseModel):
@@ -84,7 +86,7 @@ class _SaidObject(_Said):
 
 
 class StoredSaid(_Said):
-    """What is no array of an episode, as JSON has it: the fields of an attempt are looked at by ``attempt_from``."""
+    """Schema of an episode's non-array data; ``attempt_from`` validates the fields of the attempt."""
 
     attempt: dict[str, Any]
     robot: _SaidRobot
@@ -97,9 +99,9 @@ _ATTEMPT = TypeAdapter(Attempt)
 
 
 def write_episodes(path: Path, episodes: Iterable[StoredEpisode]) -> int:
-    """Write episodes as ``traj_0``, ``traj_1``, ... and return how many; the file appears whole or not at all.
+    """Write episodes as ``traj_0``, ``traj_1``, ... atomically, and return their number.
 
-    Raises EpisodesError for a recording whose arrays do not fit together or are not finite.
+    Raises EpisodesError for a recording with inconsistent or non-finite arrays.
     """
     count = 0
     with file_beside(path) as beside, h5py.File(beside, "w", libver=LIBVER) as file:
@@ -109,9 +111,9 @@ def write_episodes(path: Path, episodes: Iterable[StoredEpisode]) -> int:
 
 
 class EpisodeFile:
-    """The episodes of a file, read one at a time.
+    """Episodes of a file, read one at a time.
 
-    Raises EpisodesError where there is no such file, or its groups are not ``traj_0`` to ``traj_<n - 1>``.
+    Raises EpisodesError if the file is missing, or its groups are not ``traj_0`` to ``traj_<n - 1>``.
     """
 
     def __init__(self, path: Path):
@@ -147,12 +149,12 @@ class EpisodeFile:
         return _read(self.content, f"traj_{number}", self.said(number), f"{self.path}: traj_{number}")
 
     def said(self, number: int) -> dict[str, Any]:
-        """Return what is no array of an episode: ``attempt, robot, objects, target, facts``."""
+        """Return an episode's non-array data: ``attempt, robot, objects, target, facts``."""
         return _said(self.content.text(f"traj_{number}", EPISODE), f"{self.path}: traj_{number}")
 
 
 def _said(content: bytes | None, where: str) -> dict[str, Any]:
-    """Return the JSON of a trajectory's group, with its fields of the right types; raises EpisodesError."""
+    """Return the validated JSON of a trajectory's group; raises EpisodesError."""
     if content is None:
         raise EpisodesError(
             f"{where}: no attribute {EPISODE!r}, so it was not written by this package; give a file written by manitwin"
@@ -210,12 +212,12 @@ def _write(group: h5py.Group, episode: StoredEpisode) -> None:
 
 
 def _hand_joints(hand: np.ndarray, robot: RecordedRobot) -> np.ndarray:
-    """Return the positions of the hand's joints ``(T + 1, J)``: of jaws, half of the opening each."""
+    """Return the positions of the hand's joints ``(T + 1, J)``; for jaws, half of the opening each."""
     return np.repeat(hand / 2, 2, axis=1) if robot.has_jaws else hand
 
 
 def _articulations(robot: RecordedRobot, positions: np.ndarray, velocities: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the states of the robot, or of each of its arms: the base, at rest, and the arm's joints before the hand's."""
+    """Return the states of the robot, or of each arm: the stationary base, and the arm's joints before the hand's."""
     arms = robot.arms or (RecordedArm(robot.name, len(robot.arm_joints), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)),)
     hand = (positions.shape[1] - len(robot.arm_joints)) // len(arms)
     found, first = {}, 0
@@ -239,7 +241,7 @@ def _read(content: Hdf5, group: str, said: dict[str, Any], where: str) -> Stored
             raise EpisodesError(f"{where}: {name} has the shape {found.shape}; {_REMEDY}")
         return found
 
-    # (T + 1, objects, 13): with no objects there would be no target, so there is always one
+    # (T + 1, objects, 13); there is at least one object, because there is a target
     each = [array(f"env_states/actors/{thing.name}", 13) for thing in objects]
     if len({len(states) for states in each}) != 1:
         raise EpisodesError(f"{where}: its objects have different numbers of states; {_REMEDY}")
@@ -283,5 +285,5 @@ def _read(content: Hdf5, group: str, said: dict[str, Any], where: str) -> Stored
 
 
 def has_granules(content: Hdf5, group: str) -> bool:
-    """Tell whether a trajectory of a file has granules."""
+    """Tell whether a trajectory has granules."""
     return content.has(f"{group}/{EXTRA}/{GRANULES[1]}")

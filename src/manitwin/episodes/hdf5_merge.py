@@ -1,4 +1,4 @@
-"""Many files of episodes as one, with the JSON that ManiSkill keeps beside it."""
+"""Merging of episode files into one, with the JSON file of ManiSkill's format."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from manitwin.twin.store import file_beside
 TRAJECTORIES, METADATA = "trajectory.h5", "trajectory.json"
 
 ENVIRONMENT = "manitwin/PickPlace"
-"""The ``env_id``: no environment of ManiSkill has this name. The states can be set and read; the task cannot be made there."""
+"""The ``env_id``, which is not a ManiSkill environment: states can be set and read there, but the task cannot be created."""
 
 CONTROL_MODE = "pd_joint_pos"
-"""Targets of joint positions, as ManiSkill calls it; in radians and metres, not scaled to [-1, 1]."""
+"""ManiSkill's name for joint position targets; here in radians and metres, not scaled to [-1, 1]."""
 
 
 def merge_episodes(files: Iterable[Path], folder: Path) -> int:
-    """Write ``trajectory.h5`` and ``trajectory.json`` of all episodes of all files in order; return how many.
+    """Write ``trajectory.h5`` and ``trajectory.json`` of all episodes of all files in order; return their number.
 
-    Groups are copied as they are and numbered without gaps; one episode's metadata is in memory at a time. Each of the two
-    files appears whole or not at all, the JSON last. Raises EpisodesError for a file that cannot be read.
+    Groups are copied unchanged and numbered consecutively; one episode's metadata is in memory at a time. Each file is
+    written atomically, the JSON last. Raises EpisodesError for a file that cannot be read.
     """
     count, longest, robots = 0, 0, dict[str, Any]()
     with file_beside(folder / METADATA) as metadata, metadata.open("w", encoding="ascii", newline="\n") as text:
@@ -71,7 +71,7 @@ def _row(number: int, steps: int, said: dict[str, Any]) -> dict[str, Any]:
 
 
 def _note(robots: dict[str, Any], robot: dict[str, Any], path: Path) -> None:
-    """Keep each robot once; raises EpisodesError for two different ones of one name."""
+    """Keep each robot once; raises EpisodesError for two different robots with the same name."""
     if robots.setdefault(robot["name"], robot) != robot:
         raise EpisodesError(
             f"{path}: its robot {robot['name']!r} differs from the robot of this name in other files (its digest or"
@@ -90,7 +90,7 @@ def _line(value: Any) -> str:
 
 @contextmanager
 def _listed(text: TextIO, name: str) -> Iterator[Any]:
-    """Open a JSON object with a list in it, one entry a line; the object stays open for what follows."""
+    """Open a JSON object that contains a list, one entry per line; the object stays open for further members."""
     text.write(f'{{\n"{name}": [')
     entries = 0
 

@@ -1,4 +1,4 @@
-"""Instructions as a person would give them: one episode in several phrasings, from its twin's words and the way it goes."""
+"""Natural-language instructions of pick-and-place episodes, from the twin's language record and the direction of motion."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ TEMPLATES = (
     "{there} in front of you; move {it} {where}",
     "please put {the} {where}",
 )
-"""Every template is used once before any is used again."""
+"""Every template is used once before any is repeated."""
 
 WITH_DISTANCE = "move {the} about {distance} cm {side}"
-"""Joins the templates where the way is along one axis and 5 cm or more."""
+"""Additional template for displacements of 5 cm or more along one axis."""
 
 _DISTANCE_STEP_M, _NOWHERE_M = 0.05, 0.01
 _OCTANT = np.pi / 8
@@ -45,12 +45,11 @@ def episode_instructions(
     count: int = 6,
     others: Sequence[Language] = (),
 ) -> tuple[str, ...]:
-    """Return ``count`` different instructions in English to move an object from start to goal ``(3,)``, world frame.
+    """Return ``count`` different English instructions to move an object from start to goal ``(3,)``, world frame.
 
-    Left and right are as the robot sees them, which looks along +X. What the twin does not know is not said. A name that
-    fits one of the ``others`` in the scene too is left out where another tells them apart; where none does, the most
-    particular one is used. The same arguments give the same words. Raises UsageError for a count below 1 or above what
-    the templates give.
+    Left and right are as seen by the robot, which looks along +X. Unknown attributes are not mentioned. A name that also fits
+    one of the ``others`` in the scene is avoided if another name is unambiguous; otherwise the most specific one is used.
+    Deterministic for equal arguments. Raises UsageError for a count below 1 or above the number of combinations.
     """
     names = names_of(language, others)
     way = np.asarray(goal_position_m, float)[:2] - np.asarray(start_position_m, float)[:2]
@@ -85,7 +84,7 @@ def _filled(template: str, name: Name, where: str, along: str | None, distance_c
 
 
 def _direction(way: np.ndarray) -> tuple[str, str | None]:
-    """Return where a way ``(2,)`` leads, and the same to go with a distance; the latter is None for a way across."""
+    """Return the direction of a displacement ``(2,)`` in words, and its form with a distance; None for a diagonal one."""
     if np.linalg.norm(way) < _NOWHERE_M:
         return "in the same place", None
     angle = float(np.arctan2(way[1], way[0]))
@@ -93,6 +92,6 @@ def _direction(way: np.ndarray) -> tuple[str, str | None]:
     sideways = None if min(abs(angle), np.pi - abs(angle)) < _OCTANT else _LEFT if angle > 0 else _RIGHT
     if forward is None or sideways is None:
         only = forward or sideways
-        assert only is not None  # an angle is within an octant of at most one of the two axes
+        assert only is not None  # an angle is within an octant of at most one axis
         return only
     return f"{sideways[0]} and {forward[0]}", None

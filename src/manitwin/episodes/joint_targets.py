@@ -1,30 +1,31 @@
-"""Targets of an arm at the timesteps between two actions, the same for recorded episodes and for policies in an environment."""
+"""Interpolation of arm targets between two actions, the same for recorded episodes and for policies in an environment."""
 
 from __future__ import annotations
 
 import numpy as np
 
-ORDER = 3  # of the polynomial between actions
-HELD = 1e-3  # m, rad or a share: a hand whose target is farther from its first one holds something, or is about to
+ORDER = 3  # order of the polynomial between actions
+HELD = 1e-3  # m, rad or a share: a hand whose target differs more from its initial one holds something, or is about to
 
 
 class JointTargets:
-    """The targets of an arm within a step, on the cubic through the targets ``(n,)`` rad at the ends of the last four steps.
+    """Arm targets within a step, on the cubic polynomial through the targets ``(n,)`` rad at the ends of the last four steps.
 
-    Motions are planned at every timestep and actions are samples of them. Between four samples of a smooth motion the cubic errs
-    by a term of fourth order (Newton's backward differences), and as little in its speed, which the drives' dampers follow.
-    It passes through the targets, and overshoots a jump by about a quarter of it at most.
+    Motions are planned at every time step, and actions are samples of them. Between four samples of a smooth motion, the
+    cubic has a fourth-order error (Newton's backward differences), also in its speed, which the drives' dampers follow. It
+    passes through the targets, and overshoots a jump by at most about a quarter of it.
     """
 
     def __init__(self, start_rad: np.ndarray, lowest_rad: np.ndarray, highest_rad: np.ndarray):
-        """Begin at rest at ``start_rad (n,)``; targets are clipped to the limits ``lowest_rad`` and ``highest_rad (n,)``."""
+        """Start at rest at ``start_rad (n,)``; targets are clipped to ``lowest_rad`` and ``highest_rad (n,)``."""
         self._last = np.repeat(np.asarray(start_rad, float)[None], ORDER, axis=0)
         self._lowest, self._highest = lowest_rad, highest_rad
 
     def towards(self, target_rad: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return targets ``(count, n)`` rad at even times up to the step's end, where it is ``target_rad (n,)``, and speeds.
+        """Return targets ``(count, n)`` rad at uniform times up to the step's end, where they are ``target_rad (n,)``, and
+        speeds.
 
-        Speeds ``(count, n)`` are in rad a step, 0 for joints at their limits.
+        Speeds ``(count, n)`` are in rad per step, 0 for joints at their limits.
         """
         clipped_rad = np.clip(np.asarray(target_rad, float), self._lowest, self._highest)
         samples = np.concatenate([self._last, clipped_rad[None]])
@@ -37,7 +38,7 @@ class JointTargets:
 
 
 def _polynomial(samples: np.ndarray, left: np.ndarray) -> np.ndarray:
-    """Return the polynomial through ``samples (K, n)``, a step apart, at times ``(T,)`` in steps from the last: ``(T, n)``."""
+    """Return the polynomial through ``samples (K, n)``, one step apart, at times ``(T,)`` in steps from the last: ``(T, n)``."""
     factor, rows = np.ones((len(left), 1)), np.repeat(samples[-1:], len(left), axis=0)
     for order in range(1, len(samples)):
         factor = factor * (left[:, None] + order - 1) / order
@@ -46,13 +47,13 @@ def _polynomial(samples: np.ndarray, left: np.ndarray) -> np.ndarray:
 
 
 def hand_share(number: int, per_frame: int, count: int) -> float:
-    """Return the share of its way that a hand's target has gone at timestep ``number`` (from 1) of ``count``.
+    """Return the share of its motion that a hand's target has completed at time step ``number`` (from 1) of ``count``.
 
-    The target moves once in ``per_frame`` timesteps.
+    The target is updated every ``per_frame`` time steps.
     """
     return float(min(1.0, np.ceil(number / per_frame) * per_frame / count))
 
 
 def may_hold(told: np.ndarray, before: np.ndarray, began: np.ndarray) -> bool:
-    """Tell whether a hand's target now or before, ``(h,)`` each, is any other than the one that it began with."""
+    """Tell whether a hand's current or previous target, ``(h,)`` each, differs from its initial one."""
     return bool((np.abs(np.array([told, before]) - began) > HELD).any())

@@ -1,4 +1,4 @@
-"""Judging an episode: the state of the world that goals are judged on, and what the outcome is."""
+"""Judging of an episode: the world state for its goal, and the outcome."""
 
 from __future__ import annotations
 
@@ -17,11 +17,13 @@ from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.world import RobotWorld
 
 SWINGS_S = 16.0
-"""How long things that hang or lie in a bowl are waited for: they swing and roll long, and stand still at each turning point."""
+"""Longest wait for hanging objects and objects in bowls, which swing for a long time and are momentarily still at turning
+points.
+"""
 
 
 def is_reached_already(start: Start, world: RobotWorld) -> bool:
-    """Tell whether a goal, or one of its literals, is true of the start."""
+    """Tell whether any literal of the goal is true at the start."""
     if start.skill_goal is None:
         return False
     touching = frozenset(world.contacts.pressing(world.contacts.read()))
@@ -37,7 +39,7 @@ def state_of(
     at_rest: Sequence[bool] | None = None,
     events: tuple[Event, ...] = (),
 ) -> WorldState:
-    """Return what a goal is judged on, from the objects' poses ``(4, 4)`` in the order of the world."""
+    """Return the world state for judging a goal, given the objects' poses ``(4, 4)`` in the world's order."""
     goal = start.skill_goal
     assert goal is not None
     rests = at_rest if at_rest is not None else [True] * len(start.objects)
@@ -68,7 +70,7 @@ def state_of(
 def judge(
     start: Start, goal_object_to_world: np.ndarray, facts: EpisodeFacts, world: RobotWorld, execution: Execution
 ) -> None:
-    """Wait until all is at rest, and take down the outcome."""
+    """Wait until everything is at rest, and set the outcome."""
     settings, target = start.settings, start.objects[world.target]
     if start.skill_goal is not None and max(execution.touches.finger_forces_n) == 0:
         last = execution.rest(round(max(settings.max_rest_s, SWINGS_S) / settings.timestep_s), REST_ROWS)
@@ -100,7 +102,7 @@ def judge(
 
 
 def _is_disturbed(start: Start, placed: PlacedObject, after: np.ndarray) -> bool:
-    """Tell whether an object that was to stay moved; a partner that something is put on or into may move a little more."""
+    """Tell whether an uninvolved object moved; a partner, which the target is placed on or into, has a larger tolerance."""
     settings, center = start.settings, placed.body.center_of_mass_m
     goal = start.skill_goal
     if goal is not None and (placed.name == goal.partner or placed.name in start.partners):

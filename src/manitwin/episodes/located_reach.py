@@ -1,4 +1,4 @@
-"""Which of a located thing's grasps a robot's arm reaches, where its base stands."""
+"""Reachability of a located object's grasps by a robot's arm at its base."""
 
 from __future__ import annotations
 
@@ -26,10 +26,11 @@ def with_reach(
     world: WorldFrame,
     planner: PickPlacePlanner,
 ) -> CarriedGrasps:
-    """Return the free grasps of ``objects[number]`` with whether an arm reaches them, those that it does first.
+    """Return the free grasps of ``objects[number]`` with their reachability, reachable ones first.
 
-    Reached is what the arm can grasp free of collisions with table, boxes, other located things and the thing itself, at the end
-    of a straight approach of 10 cm, itself or with the fingers exchanged. A grasp too wide for the robot's jaws is not reached.
+    A grasp is reachable if the arm can take it without collision with table, boxes, other located objects and the object
+    itself, at the end of a straight approach of 10 cm, as given or with the fingers exchanged. A grasp too wide for the
+    robot's jaws is not reachable.
     """
     robot, target = planner.robot, objects[number]
     verified = target.twin.grasps()

@@ -1,4 +1,4 @@
-"""What can be done with what was found in a view: its grasps, which of them a robot reaches, and the view as a layout."""
+"""Located objects in a depth view: their grasps, which of these a robot reaches, and the view as a layout."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from manitwin.scenes.locate.world_frame import WorldFrame, world_of_base, world_
 from manitwin.scenes.scene import Furniture
 from manitwin.twin.loaded_twin import Twin
 
-if TYPE_CHECKING:  # what plans wants manitwin[robots]; to locate does not
+if TYPE_CHECKING:  # planning needs manitwin[robots]; locating does not
     from manitwin.episodes.planning.pick_place import PickPlacePlanner
 
 
 class LocatedView:
-    """A view with the things that were looked for in it; what all of them share is found once.
+    """A view with the objects located in it; results that all of them share are computed once.
 
-    ``camera_to_base (4, 4)`` is where the camera is in the frame of a robot's base, if that is known; ``robot`` the arm that
-    stands there; ``grippers`` are those of one's own that twins were built with. Raises UsageError for a robot that these
-    grasps are not for, Unavailable where planning is not installed.
+    ``camera_to_base (4, 4)`` is the camera's pose in the robot's base frame, if known; ``robot`` is the arm at that base;
+    ``grippers`` are custom grippers of the twins. Raises UsageError for a robot that cannot use these grasps, Unavailable if
+    planning is not installed.
     """
 
     def __init__(
@@ -53,14 +53,16 @@ class LocatedView:
 
     @cached_property
     def plane(self) -> Plane:
-        """The table, of which the things are no part: a large box's side is none. Raises UsageError where none is seen."""
+        """The table plane, found without the objects' masks, because a large box's side is not a table; raises UsageError if
+        none is seen.
+        """
         things = np.any([thing.mask for thing, _ in self.things], axis=0)
         beside = replace(self.view, depth_m=np.where(things, 0.0, self.view.depth_m))
         return table_plane(beside, np.random.default_rng(self.seed))
 
     @cached_property
     def world(self) -> WorldFrame:
-        """The robot's world, or one over the table; raises UsageError where the table leans in the base's frame."""
+        """The robot's world frame, or one above the table; raises UsageError if the table is tilted in the base frame."""
         middles = [
             transform_points(thing.location.poses[0].object_to_camera, thing.model.center[None])[0]
             for thing, _ in self.things
@@ -72,9 +74,9 @@ class LocatedView:
         return world_of_base(self._camera_to_base, self.plane, about)
 
     def grasps(self, number: int) -> CarriedGrasps | None:
-        """Return the grasps of a thing that are free where it was found, with a robot also whether it reaches them.
+        """Return the collision-free grasps of an object where it was located, with a robot also their reachability.
 
-        None where it was not found, or its twin has none of jaws. Raises UsageError where no table is seen.
+        None if it was not located, or if its twin has no grasps for jaws. Raises UsageError if no table is seen.
         """
         thing, twin = self.things[number]
         try:
@@ -91,14 +93,14 @@ class LocatedView:
         return with_reach(carried, place, self._objects, self._furniture, self.world, self._planner)
 
     def placements(self, number: int) -> tuple[CarriedPlacement, ...]:
-        """Return the resting poses of a thing on the table that is seen, where it was found."""
+        """Return the resting poses of an object on the table, where it was located."""
         thing, twin = self.things[number]
         noise_m = measured_noise_m(self.view, np.ones(self.view.depth_m.shape, bool))
         return carry_placements(thing, twin, self.view, self.plane, noise_m)
 
     @cached_property
     def scene(self) -> LocatedScene | NoLayout:
-        """The view as a layout; at least one thing was found."""
+        """The view as a layout; at least one object was located."""
         try:
             self.plane  # noqa: B018  (that there is a table is asked first)
         except UsageError as error:
@@ -116,7 +118,7 @@ class LocatedView:
 
 
 def _planner_of(robot: str) -> PickPlacePlanner:
-    """Return the planner of a robot; raises UsageError for one that grasps of jaws are not for, Unavailable without planning."""
+    """Return the planner of a robot; raises UsageError for one without jaws, Unavailable if planning is not installed."""
     from manitwin.episodes.planning.pick_place import PickPlacePlanner
     from manitwin.episodes.skills.hands import check_jaws
     from manitwin.robots.load import load_robot

@@ -1,4 +1,4 @@
-"""Recordings at a lower rate than they were made at: for policies that act less often, and for pictures that cost less."""
+"""Downsampling of recordings, for policies that act less often, and for cheaper pictures."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from manitwin.errors import EpisodesError, UsageError, choose_from
 
 RATES_HZ = (RATE_HZ, 10, 5)
 _OF_FRAMES = ("phase", "active_literal")
-"""What is told of an action, and is that of the time at which it begins."""
+"""Per-action values that belong to the start of the action."""
 
 
 def rows_per_frame(rate_hz: int) -> int:
-    """Return how many rows of a recording go into a frame at ``rate_hz``; raises UsageError for another than ``RATES_HZ``."""
+    """Return the number of recorded rows per frame at ``rate_hz``; raises UsageError for a rate not in ``RATES_HZ``."""
     if isinstance(rate_hz, bool) or rate_hz not in RATES_HZ:
         raise UsageError(choose_from("rate", str(rate_hz), [str(each) for each in RATES_HZ]))
     return RATE_HZ // int(rate_hz)
 
 
 def at_rate(recording: Recording, rate_hz: int) -> Recording:
-    """Return a recording as it would have been made at ``rate_hz``: every k-th state, and the actions that lead to them.
+    """Return a recording as if made at ``rate_hz``: every k-th state, and the actions that lead to them.
 
-    Action i is what is told to be reached by state i + 1, which is the last one told before it. Rows at the end that make no
-    whole frame, k - 1 at most, are left out: kept episodes end with half a second of rest. Raises UsageError as
-    ``rows_per_frame``, EpisodesError for a recording that is shorter than a frame.
+    Action i is the command for state i + 1, which is the last one given before it. Incomplete frames at the end, at most k -
+    1 rows, are dropped; kept episodes end with half a second of rest. Raises UsageError as ``rows_per_frame``, EpisodesError
+    for a recording shorter than a frame.
     """
     every = rows_per_frame(rate_hz)
     if every == 1:

@@ -1,4 +1,4 @@
-"""Names of an object in an instruction: "mug", "red mug", "mug for holding hot drinks"."""
+"""Names of objects in instructions: "mug", "red mug", "mug for holding hot drinks"."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from manitwin.models.annotators.words import joined
 from manitwin.twin.record import Language
 
 NAMELESS = "object"
-"""What a thing is called that nobody has named."""
+"""Name of an object without a known category."""
 
 _UNSAID = re.compile(r"\b(?:unknown|unclear|unspecified|unidentified|various|none|not|n/?a)\b", re.IGNORECASE)
-_MOST_LETTERS = 1000  # of a description: patterns that look for brackets and spaces slow down with the square of it
+_MOST_LETTERS = 1000  # of a description: regular expressions for brackets and spaces take quadratic time
 _PLAIN = re.compile(r"[a-z]+(?:[ -][a-z]+)*")
 _SIZES = frozenset(
     ("tiny", "small", "little", "large", "big", "long", "short", "medium-sized", "palm-sized", "hand-sized")
@@ -36,7 +36,7 @@ _COLORS = 2
 
 @dataclass(frozen=True)
 class Name:
-    """The words behind "the"; ``in_pairs``: one of them is a pair. ``uses`` are the attributes that it tells."""
+    """A noun phrase after "the"; ``in_pairs``: a single item is a pair. ``uses`` are the attributes that it mentions."""
 
     words: str
     plural: bool
@@ -46,7 +46,7 @@ class Name:
 
 @dataclass(frozen=True)
 class _Told:
-    """The parts of a twin's words that can be said; None where there is nothing to say."""
+    """Usable parts of a twin's language record; None if a part is not usable."""
 
     noun: str
     plural: bool
@@ -60,7 +60,7 @@ class _Told:
 
 
 def names_of(language: Language, others: Sequence[Language] = ()) -> list[Name]:
-    """Return the names of an object, the plainest first; those that fit one of the others too only where all do."""
+    """Return the names of an object, simplest first; names that also fit one of the others only if all do."""
     told = _told(language)
     names = _names(told)
     beside = [_told(other) for other in others]
@@ -97,13 +97,13 @@ def _names(told: _Told) -> list[Name]:
 
 
 def _before(told: _Told, *attributes: str) -> str | None:
-    """Return the noun behind attributes; None where one of them cannot be said."""
+    """Return the noun preceded by attributes; None if an attribute is not usable."""
     said = [getattr(told, attribute) for attribute in attributes]
     return None if None in said else " ".join([*said, told.noun])
 
 
 def _fits(name: Name, told: _Told, other: _Told) -> bool:
-    """Tell whether a name could mean another object too."""
+    """Tell whether a name could also refer to another object."""
     if other.noun != told.noun and told.noun != NAMELESS:
         return False
     return all(getattr(other, attribute) == getattr(told, attribute) for attribute in name.uses)
@@ -139,14 +139,14 @@ def _is_plural(noun: str) -> bool:
 
 
 def _color(text: str) -> str | None:
-    """Return "dark grey and gold" of "dark grey (69 %), gold (25 %)"."""
+    """Return "dark grey and gold" for "dark grey (69 %), gold (25 %)"."""
     pieces = [piece.strip() for piece in re.sub(r"\([^)]*\)", "", text[:_MOST_LETTERS].lower()).split(",")]
     plain = [p for p in pieces if _PLAIN.fullmatch(p) and not _UNSAID.search(p) and len(p.split()) <= 3]
     return joined(plain[:_COLORS]) if plain and not _UNSAID.search(text) else None
 
 
 def _material(text: str, noun: str) -> str | None:
-    """Return the adjective of a single material; None for a mixture, a doubt, or what the noun says itself."""
+    """Return the adjective of a single material; None for a mixture, an uncertain one, or one that the noun already states."""
     words = text.lower().split()
     if not words or len(words) > 2 or words[-1] not in _OF_ONE_MATERIAL or not _PLAIN.fullmatch(" ".join(words)):
         return None
@@ -169,7 +169,7 @@ def _use(text: str) -> str | None:
 
 
 def _part(text: str) -> str | None:
-    """Return "a side handle" of "cylindrical with a side handle, flat"."""
+    """Return "a side handle" for "cylindrical with a side handle, flat"."""
     found = re.search(
         r"\bwith ((?:an?|one|two|three|four|[a-z]+) [a-z ]+?)\s*(?:,|;|\.|$)", text[:_MOST_LETTERS].lower()
     )
@@ -179,7 +179,7 @@ def _part(text: str) -> str | None:
 
 
 def _caption(captions: Sequence[str], noun: str) -> str | None:
-    """Return the first caption that is a short name with the noun in it and no sentence."""
+    """Return the first caption that is a short noun phrase ending with the noun."""
     for text in captions:
         line = re.sub(r"^(?:an?|the)\s+", "", text.strip().rstrip(".").lower())
         plain = re.fullmatch(r"[a-z]+(?:,? [a-z]+|-[a-z]+)*", line) and len(line.split()) <= _CAPTION_WORDS

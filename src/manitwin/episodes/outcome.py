@@ -1,4 +1,4 @@
-"""Outcomes of episodes: where the object stands against its goal, and whether the others stayed."""
+"""Placement outcomes of episodes: errors of the target against its goal, and disturbance of other objects."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from manitwin.geometry.poses import rotation_angle_rad, transform_points
 
 @dataclass(frozen=True)
 class PlacementErrors:
-    """Distances of an object from its goal: its centre of mass, the angle between the upward directions of both, its heading."""
+    """Errors of an object's pose against its goal: centre of mass, tilt, and heading."""
 
     position_error_m: float
     tilt_rad: float
@@ -23,7 +23,7 @@ class PlacementErrors:
 def placement_errors(
     object_to_world: np.ndarray, goal_object_to_world: np.ndarray, center_of_mass_m: np.ndarray
 ) -> PlacementErrors:
-    """Compare poses ``(4, 4)``; the yaw error (0 to pi) is that of the turn about the vertical nearest to the whole rotation."""
+    """Compare poses ``(4, 4)``; the yaw error (0 to pi) is that of the vertical rotation closest to the whole rotation."""
     turn = object_to_world[:3, :3] @ goal_object_to_world[:3, :3].T
     yaw = np.arctan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1])
     return PlacementErrors(
@@ -34,20 +34,20 @@ def placement_errors(
 
 
 def moved_m(before: np.ndarray, after: np.ndarray, center_of_mass_m: np.ndarray) -> float:
-    """Return how far the centre of mass moved between two poses ``(4, 4)``."""
+    """Return the displacement of the centre of mass between two poses ``(4, 4)``."""
     center = center_of_mass_m[None]
     return float(np.linalg.norm(transform_points(after, center) - transform_points(before, center)))
 
 
 def turned_rad(before: np.ndarray, after: np.ndarray) -> float:
-    """Return by what angle an object turned between two poses ``(4, 4)``."""
+    """Return the rotation angle between two poses ``(4, 4)``."""
     return rotation_angle_rad(after[:3, :3] @ before[:3, :3].T)
 
 
 def is_at_rest(poses: Sequence[np.ndarray], center_of_mass_m: np.ndarray, settings: EpisodeSettings) -> bool:
-    """Tell whether a released object stays where it is, by its poses ``(4, 4)`` in the last half of a second.
+    """Tell whether a released object is at rest, by its poses ``(4, 4)`` in the last half second.
 
-    Speeds do not tell: a tall box rocks on by a tenth of a degree, as nothing in a simulation of rigid bodies damps it.
+    Speeds are unsuitable: a tall box keeps rocking by a tenth of a degree, because rigid-body simulation does not damp it.
     """
     return all(
         moved_m(pose, poses[-1], center_of_mass_m) < settings.max_rest_m
@@ -59,7 +59,7 @@ def is_at_rest(poses: Sequence[np.ndarray], center_of_mass_m: np.ndarray, settin
 def placement_outcome(
     errors: PlacementErrors, *, at_rest: bool, released: bool, settings: EpisodeSettings
 ) -> str | None:
-    """Return ``toppled`` or ``misplaced``, or None where the object stands where it should, still and let go."""
+    """Return ``toppled`` or ``misplaced``, or None if the object is at its goal, at rest and released."""
     if not errors.tilt_rad < np.radians(settings.max_tilt_deg):
         return "toppled"
     if not (errors.position_error_m < settings.max_placed_m and at_rest and released):
@@ -70,7 +70,7 @@ def placement_outcome(
 def is_disturbed(
     before: np.ndarray, after: np.ndarray, center_of_mass_m: np.ndarray, settings: EpisodeSettings
 ) -> bool:
-    """Tell whether an object that was to stay has moved or turned by more than the settings allow."""
+    """Tell whether an object has moved or turned by more than the settings allow."""
     return (
         moved_m(before, after, center_of_mass_m) > settings.max_disturbed_m
         or turned_rad(before, after) > np.radians(settings.max_disturbed_deg)

@@ -150,11 +150,9 @@ def pouring_paths(
 
 
 def grasp_rank(grasp: Grasp, opening: Opening, lip: np.ndarray, tip_depth_m: float) -> float | None:
-    """Rank grasps: reject fingers inside the vessel near the lip, put other fingers inside last, and prefer a small distance
-    step.
+    """Rank grasps, smallest first: by the angle from the lip in steps, and those with a finger inside the vessel last.
 
-    The rank grows in steps with the angle towards the lip, because all places on a handle far from the lip serve equally
-    well.
+    None for a finger inside near the lip. The steps make all places on a handle far from the lip equal.
     """
     side = grasp.width_m / 2 + FINGER_M
     tips = transform_points(grasp.gripper_to_object, np.array([[s, 0.0, tip_depth_m] for s in (-side, 0.0, side)]))

@@ -1,4 +1,4 @@
-"""The statistics of a folder of episodes: asked once, printed as text or written as a page."""
+"""Statistics report of an episodes folder, as terminal text or as an HTML page."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ _PRINTED = (
 
 
 def table_text(result: Result) -> str:
-    """Return a table as plain text: its caption, its head, its rows, its note; empty where there are no rows."""
+    """Return a table as plain text with caption, header, rows and note of omitted rows; empty if there are no rows."""
     columns, rows = result.query.columns, result.rows[:_MOST_ROWS]
     if not columns or not rows:
         return ""
@@ -72,7 +72,7 @@ def table_text(result: Result) -> str:
 
 
 def histogram_text(caption: str, rows: Sequence[tuple[str, int]]) -> str:
-    """Return a histogram as plain text: a bar of # for every label."""
+    """Return a histogram as plain text with a bar of # for each label."""
     if not rows:
         return ""
     most, width = max(count for _, count in rows), max(len(label) for label, _ in rows)
@@ -88,7 +88,7 @@ def _cell(column: Column, row: Row) -> str:
 
 @dataclass(frozen=True)
 class EpisodeReport:
-    """The result of every query by its name."""
+    """Results of all queries by name."""
 
     title: str
     results: dict[str, Result]
@@ -109,7 +109,7 @@ class EpisodeReport:
         )
 
     def text(self) -> str:
-        """Return all that fits a terminal: tables, and the histogram of lengths."""
+        """Return the tables and the length histogram for a terminal."""
         counted = {row["step"]: row["episodes"] for row in self.results[q.LENGTH_HISTOGRAM.name].rows}
         every = range(min(counted, default=0), max(counted, default=-1) + 1)
         steps = [(f"{step * q.LENGTH_STEP_S:.1f} s", counted.get(step, 0)) for step in every]
@@ -118,7 +118,7 @@ class EpisodeReport:
         return "\n".join([self.summary + "\n", *filter(None, tables)])
 
     def write(self, out: Path) -> Path:
-        """Write ``report.html``, ``statistics.json`` and ``figures/`` into a folder; return the page."""
+        """Write ``report.html``, ``statistics.json`` and ``figures/`` into a folder; return the path of the page."""
         with drawing():
             figures, lengths_png = self._draw()
         lead, sections = [self.summary], self._sections(figures)
@@ -169,7 +169,7 @@ _REMEDY = f"run manitwin trajectories again, or {REMEDY}"
 
 
 def episode_statistics(folder: Path) -> EpisodeReport:
-    """Ask everything of a folder of episodes; raises EpisodesError where it has no table of attempts."""
+    """Run all queries on an episodes folder; raises EpisodesError if it has no table of attempts."""
     attempts = folder / ATTEMPTS
     if not attempts.is_file():
         raise EpisodesError(

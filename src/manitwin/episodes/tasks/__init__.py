@@ -1,1 +1,1 @@
-"""Tasks that write themselves: enumerated in scenes, checked by planning, said in words, exported."""
+"""Task generation: enumerate tasks in scenes, check them by planning, write instructions, and export them."""

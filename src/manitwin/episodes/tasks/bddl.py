@@ -1,4 +1,4 @@
-"""Tasks as BDDL, in the dialect of LIBERO: what it can say is written, what it cannot is listed and never written wrongly.
+"""BDDL export of tasks in LIBERO's dialect; whatever the dialect cannot express is listed instead of approximated.
 
 Source: LIBERO 8f1084e, libero/libero/bddl_files/ and libero/libero/envs/predicates/ (``On``, ``In``). BDDL has no numbers, no
 events, no sides and no orientations.
@@ -23,14 +23,14 @@ LEFT_OUT = "left_out.json"
 
 @dataclass(frozen=True)
 class Bddl:
-    """A task's text, None where a literal of its goal has no word in BDDL; and all that the text does not say."""
+    """A task's text, None if a literal of its goal cannot be expressed in BDDL; and everything that the text omits."""
 
     text: str | None
     left_out: tuple[str, ...]
 
 
 def bddl_of(task: TaskRecord, scene: SceneRecord) -> Bddl:
-    """Return a task in a scene as BDDL: the goal's literals; what is to stay true is left out."""
+    """Return a task in a scene as BDDL: the goal's literals; ``stays`` literals are omitted."""
     goal = task.parsed_goal
     unsaid = tuple(str(each) for each in goal.literals if not _can_be_said(each))
     if unsaid:
@@ -54,7 +54,7 @@ def bddl_of(task: TaskRecord, scene: SceneRecord) -> Bddl:
 
 
 def write_bddl(tasks: Sequence[TaskRecord], scenes: dict[str, SceneRecord], folder: Path) -> tuple[int, int]:
-    """Write ``TASK_ID.bddl`` of every task that BDDL can say, and ``left_out.json``; return how many, and of how many others."""
+    """Write ``TASK_ID.bddl`` for every expressible task, and ``left_out.json``; return the numbers of written and other tasks."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     left_out, written = {}, 0

@@ -1,4 +1,6 @@
-"""Candidates: what skills could do in a scene, by annotations, sizes, openings and reach; and why the rest could not."""
+"""Task candidates: the skills applicable in a scene by annotations, sizes, openings and reach, and rejection counts for the
+rest.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,7 @@ from manitwin.episodes.tasks.task_scene import TaskScene
 
 @dataclass(frozen=True)
 class Action:
-    """A skill of a target and its partner, by their numbers in the scene, and the goal that it reaches."""
+    """A skill applied to a target and a partner, by their numbers in the scene, with its goal."""
 
     skill: str
     target: int
@@ -30,24 +32,26 @@ class Action:
 
     @property
     def literal(self) -> Literal:
-        """What comes true."""
+        """The literal to achieve."""
         return self.goal.literals[0]
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One action, or several in their order."""
+    """One action, or several in order."""
 
     actions: tuple[Action, ...]
 
     @property
     def kind(self) -> str:
-        """The predicates of all."""
+        """The predicates of all actions, sorted and joined by ``+``."""
         return "+".join(sorted(action.kind for action in self.actions))
 
 
 def single_actions(scene: TaskScene, dropped: Counter[str]) -> list[Action]:
-    """Return every action that sizes, openings, reach and words allow, each literal once; counts what was ``dropped`` of what."""
+    """Return every action allowed by sizes, openings, reach and names, each literal once; count rejections by reason in
+    ``dropped``.
+    """
     found: dict[str, Action] = {}
     able = []
     for number in range(len(scene.objects)):
@@ -80,7 +84,7 @@ def single_actions(scene: TaskScene, dropped: Counter[str]) -> list[Action]:
 
 
 def pairs_of(actions: list[Action]) -> Iterator[Candidate]:
-    """Yield two actions in an order in which the second does not take away what the first was about."""
+    """Yield ordered pairs of actions of which the second does not undo the first."""
     for first in actions:
         for second in actions:
             if first is not second and not undoes(first, second):
@@ -88,20 +92,20 @@ def pairs_of(actions: list[Action]) -> Iterator[Candidate]:
 
 
 def undoes(first: Action, second: Action) -> bool:
-    """Tell whether the second action moves what the first was about, or is of the same object by the same predicate."""
+    """Tell whether the second action moves the first one's partner, or repeats its predicate or partner for the same target."""
     if second.target == first.partner or (first.target, first.kind) == (second.target, second.kind):
         return True
     return first.target == second.target and first.partner == second.partner is not None
 
 
 def _is_named(scene: TaskScene, number: int) -> bool:
-    """Tell whether some name of an object fits no other one of the scene."""
+    """Tell whether an object has a name that fits no other object of the scene."""
     name = scene.names[number]
     others = [language for other, language in scene.words.items() if other != name]
     return name in scene.words and tells_apart(scene.words[name], others)
 
 
 def _is_true_already(scene: TaskScene, goal: Goal) -> bool:
-    """Tell whether a literal is true at the beginning, as far as poses tell; one about more than objects is not."""
+    """Tell whether a literal is true at the start, judged by poses; goals with places or fixtures are not."""
     spatial = all(literal.second is None or literal.second in scene.names for literal in goal.literals)
     return spatial and bool(evaluate(scene.state, Goal(goal.literals)).true_already)

@@ -1,4 +1,4 @@
-"""Checking a candidate by planning it: with the same courses as episodes, the second action from the first one's end."""
+"""Feasibility check of task candidates by planning with the courses of episodes; later actions start where earlier ones end."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from manitwin.geometry.rigid_body import PlacedObject, StaticBox
 
 @dataclass(frozen=True)
 class Planned:
-    """A candidate that can be planned: its steps, the goal of all, and how many grasps were tried."""
+    """A feasible candidate: its steps, the goal of all steps, and the number of grasps tried."""
 
     candidate: Candidate
     sequence: GoalSequence
@@ -34,7 +34,7 @@ class Planned:
 
 
 class NoTask(Exception):
-    """There is no task of a candidate; the message is the reason."""
+    """A candidate is not feasible; the message is the reason."""
 
 
 def check(
@@ -59,7 +59,7 @@ def check(
         if end is None and not last:
             raise NoTask("keeps_it_in_hand")
         if end is None and action.target in {before.target for before in candidate.actions[:number]}:
-            raise NoTask("undoes_first")  # what was put somewhere is in the hand at the end
+            raise NoTask("undoes_first")  # an object that was placed ends in the hand
         if end is not None:
             objects = tuple(
                 replace(each, object_to_world=end) if place == action.target else each
@@ -70,7 +70,7 @@ def check(
 
 
 def sequence_of(scene: TaskScene, actions: Sequence[Action], seed: int) -> GoalSequence:
-    """Return the steps of actions with their goals as set beforehand; raises NoTask where one has none."""
+    """Return the steps of actions with their goals before execution; raises NoTask if one has none or they are incompatible."""
     steps = []
     for number, action in enumerate(actions):
         step = scene.step(SKILLS[action.skill], action.target, action.partner, seed, number)
@@ -94,7 +94,7 @@ def sequence_of(scene: TaskScene, actions: Sequence[Action], seed: int) -> GoalS
 
 
 def whole_goal(scene: TaskScene, sequence: GoalSequence) -> Goal:
-    """Return all literals, what their skills ask to stay, and that all objects that take no part stay where they are."""
+    """Return the goal of all literals, with the skills' ``stays`` literals, and ``undisturbed`` for all uninvolved objects."""
     said = sequence.goal.goal
     taking_part = sequence.moved | sequence.partners
     apart = tuple(Literal("undisturbed", name) for name in scene.names if name not in taking_part)
@@ -114,13 +114,13 @@ def _goal_there(
 
 
 def _check_still_true(scene: TaskScene, candidate: Candidate, object_to_world: Sequence[np.ndarray]) -> None:
-    """Raise NoTask where an object that is moved twice is not where the first action put it."""
+    """Raise NoTask if an object that is moved twice is no longer where the first action put it."""
     moved = [action.target for action in candidate.actions]
     state = scene.state_of(object_to_world)
     for place, action in enumerate(candidate.actions):
         if action.target not in moved[place + 1 :]:
             continue
-        second = action.literal.second  # on a peg or at a mark it is no more, once it has been taken again
+        second = action.literal.second  # after it was taken again, it is no longer on a peg or at a mark
         if (second is not None and second not in scene.names) or not judge(state, action.literal).holds:
             raise NoTask("undoes_first")
 

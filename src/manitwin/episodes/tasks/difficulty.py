@@ -1,4 +1,4 @@
-"""How hard a task is, by counting what makes tasks hard."""
+"""Difficulty score of a task, by counting its difficult aspects."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from manitwin.episodes.tasks.task_record import TaskDifficulty
 from manitwin.episodes.tasks.task_scene import TaskScene
 from manitwin.geometry.boxes import separation_m, smallest_enclosing_circle
 
-CLOSE_M = 0.05  # a neighbour nearer than this leaves little room for fingers
-TIGHT_M = 0.01  # between what goes in and the rim
+CLOSE_M = 0.05  # a closer neighbour leaves little room for fingers
+TIGHT_M = 0.01  # clearance between an inserted object and the rim
 MANY_GRASPS = 10
 
 
 def difficulty_of(scene: TaskScene, planned: Planned) -> TaskDifficulty:
-    """Return literals, those that need a functional frame, close neighbours, tight fits, and whether many grasps were tried."""
+    """Return the counts of literals, functional frames, close neighbours and tight fits, and whether many grasps were tried."""
     steps, goals = planned.sequence.steps, [step.goal for step in planned.sequence.steps]
     parts = {
         "literals": len(steps),
@@ -36,7 +36,7 @@ def _is_close(scene: TaskScene, target: int) -> bool:
 
 
 def _is_tight(scene: TaskScene, target: int, partner: int) -> bool:
-    """Tell whether a vessel's rim leaves less than a centimetre around a thing as it stands."""
+    """Tell whether a vessel's rim leaves less than 1 cm around an object in its current orientation."""
     opening = scene.pool.body(scene.objects[partner].twin_id).opening
     placed = scene.objects[target]
     radius_m = smallest_enclosing_circle(footprint_at(placed.body, placed.object_to_world))[1]

@@ -1,4 +1,4 @@
-"""Drawing tasks of a scene: evenly over kinds, each checked by planning, none twice, every one that was dropped counted."""
+"""Task sampling in a scene: balanced over kinds, each task checked by planning, without duplicates, with rejection counts."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from manitwin.episodes.tasks.checking import NoTask, Planned, check
 from manitwin.episodes.tasks.task_scene import TaskScene
 
 Signature = tuple[str, ...]
-MOST_PAIRS = 4000  # candidates of two literals that are kept to be drawn from; all are counted
+MOST_PAIRS = 4000  # two-literal candidates kept for sampling; all are counted
 
 
 @dataclass
 class Tally:
-    """Counts of a scene's candidates by kind, of what was checked and planned, and of what was dropped of which reason."""
+    """Counts of a scene's candidates, checked and plannable tasks by kind, and of rejections by reason."""
 
     candidates: Counter[str] = field(default_factory=Counter)
     checked: Counter[str] = field(default_factory=Counter)
@@ -62,7 +62,7 @@ def draw_tasks(
 
 
 class _Drawing:
-    """The tasks so far; candidates are taken kind by kind in turn, so that a rare kind is not drowned."""
+    """Sampling state; candidates are drawn from the kinds in turn, so that rare kinds are represented."""
 
     def __init__(
         self,
@@ -81,7 +81,7 @@ class _Drawing:
         self._of_kind: Counter[str] = Counter()
 
     def draw(self, candidates: Sequence[Candidate], count: int) -> None:
-        """Take up to ``count`` of some candidates, no more of a kind than its share of all."""
+        """Take up to ``count`` of the candidates, limiting the share of each kind."""
         queues: dict[str, deque[Candidate]] = defaultdict(deque)
         for place in self.rng.permutation(len(candidates)):
             queues[candidates[int(place)].kind].append(candidates[int(place)])
@@ -101,7 +101,7 @@ class _Drawing:
         self.tally.dropped["not_drawn"] += sum(map(len, queues.values()))
 
     def take(self, candidate: Candidate, *, proposed: bool = False) -> bool:
-        """Check a candidate, and keep it or count why not."""
+        """Check a candidate; keep it or count the reason for its rejection."""
         signature = _signature(self.scene, candidate)
         if signature in self._signatures:
             self.tally.dropped["duplicate"] += 1
@@ -124,7 +124,7 @@ class _Drawing:
 
 
 def _signature(scene: TaskScene, candidate: Candidate) -> Signature:
-    """Return what makes two tasks of a scene the same: predicates, categories, and values to two digits."""
+    """Return the key by which tasks of a scene are duplicates: predicates, categories, and values to two digits."""
     said = []
     for action in candidate.actions:
         literal, numbers = action.literal, (action.target, action.partner)

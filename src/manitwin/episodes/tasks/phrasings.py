@@ -1,4 +1,4 @@
-"""Instructions of a task: those of its literals, joined in their order; some templates and joints are held out."""
+"""Instructions of tasks: instructions of the literals joined in order; some templates and conjunctions are held out."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ HELD_OUT_JOINTS = ("{first}; once that is done, {second}",)
 def task_instructions(
     goal: Goal, words: Mapping[str, Language], *, seed: int
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return instructions and held-out ones, which share no template; raises UsageError for a predicate without words."""
+    """Return instructions and held-out instructions, which share no template; raises UsageError for a predicate without
+    templates.
+    """
     told = [_of(literal, words, seed + place, COUNT, held_out=False) for place, literal in enumerate(goal.literals)]
     held = [_of(literal, words, seed + place, HELD_OUT, held_out=True) for place, literal in enumerate(goal.literals)]
     return _joined(told, JOINTS), _joined(held, HELD_OUT_JOINTS)
@@ -27,7 +29,7 @@ def _of(literal: Literal, words: Mapping[str, Language], seed: int, count: int, 
 
 
 def _joined(each: Sequence[Sequence[str]], joints: Sequence[str]) -> tuple[str, ...]:
-    """Return as many sentences as the part with the most has, its parts joined from the left."""
+    """Return as many sentences as the literal with the most instructions has, each joined from left to right."""
     said: dict[str, None] = {}
     for place in range(max(len(part) for part in each)):
         sentence = each[0][place % len(each[0])]

@@ -1,4 +1,4 @@
-"""Tasks that a model proposes: literals over a scene's objects in a strict schema; it writes no code and no predicates."""
+"""Tasks proposed by a language model: literals over a scene's objects in a strict schema, without code or new predicates."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ INSTRUCTIONS = (
 
 
 def propose(scene: TaskScene, chat: ChatClient, count: int) -> tuple[list[Candidate], dict[str, int]]:
-    """Ask a model for tasks of a scene; return those that can be, and how many were thrown away of which reason.
+    """Ask a model for tasks in a scene; return the valid ones, and the number of rejected ones by reason.
 
-    Raises what the model raises, BadReply for an answer that is not of the schema.
+    Raises the model's errors, and BadReply for an answer that does not match the schema.
     """
     answer = answer_type(scene)
     question = Question(
@@ -58,7 +58,7 @@ def propose(scene: TaskScene, chat: ChatClient, count: int) -> tuple[list[Candid
 
 
 def answer_type(scene: TaskScene) -> type[BaseModel]:
-    """Return the type of an answer: the objects' names and the predicates of all skills are enumerations."""
+    """Return the schema type of an answer: object names and the predicates of all skills are enumerations."""
     names = Enum("Object", {name: name for name in scene.names}, type=str)  # type: ignore[misc]
     seconds = Enum("Second", {name: name for name in (*scene.names, NOTHING)}, type=str)  # type: ignore[misc]
     known = sorted({skill.predicate for skill in skills_of(scene.robot)})
@@ -70,7 +70,7 @@ def answer_type(scene: TaskScene) -> type[BaseModel]:
 
 
 def described(scene: TaskScene, count: int) -> str:
-    """Return the objects, where they stand, and the predicates, in words."""
+    """Return a textual description of the objects, their positions, and the predicates."""
     lines = [
         f"Propose up to {count} tasks. The objects, as the robot at the origin sees them (x ahead, y to its left, metres):"
     ]

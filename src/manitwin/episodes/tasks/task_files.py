@@ -1,4 +1,4 @@
-"""Files of tasks, ``TASKS/tasks.jsonl``: one a line, written whole or not at all, read strictly."""
+"""Task files, ``TASKS/tasks.jsonl``: one task per line, written atomically and validated strictly."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ _REMEDY = "make the tasks again with manitwin tasks"
 
 
 def tasks_bytes(tasks: Iterable[TaskRecord]) -> bytes:
-    """Return the content of a file of tasks: the same for equal tasks."""
+    """Return the content of a task file; deterministic for equal tasks."""
     lines = (json.dumps(each.model_dump(mode="json"), sort_keys=True, ensure_ascii=False) for each in tasks)
     return "".join(f"{line}\n" for line in lines).encode()
 
 
 def write_tasks(path: Path, tasks: Iterable[TaskRecord]) -> None:
-    """Write a file of tasks."""
+    """Write a task file atomically."""
     write_bytes_atomically(path, tasks_bytes(tasks))
 
 
 def read_tasks(place: str | Path) -> list[TaskRecord]:
-    """Read a file of tasks, or that of a folder.
+    """Read a task file, or the one in a folder.
 
-    Raises UsageError naming file, line and cause for a file that is not there, another version's, or with a line that is no task.
+    Raises UsageError naming file, line and cause for a missing file, another schema version, or an invalid line.
     """
     path = Path(place) / TASKS if Path(place).is_dir() else Path(place)
     if not path.is_file():
@@ -67,7 +67,7 @@ def _task(line: str, where: str) -> TaskRecord:
 
 
 def one_task(place: str | Path, task_id: str | None) -> TaskRecord:
-    """Return a task of a file by its id; the only one needs none. Raises UsageError for an unknown id, or none of several."""
+    """Return a task of a file by its id, or the only one without an id; raises UsageError for an unknown or ambiguous id."""
     tasks = read_tasks(place)
     if task_id is None and len(tasks) == 1:
         return tasks[0]

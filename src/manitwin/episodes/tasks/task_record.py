@@ -1,4 +1,4 @@
-"""A task: a goal in a scene, the skills that reach it, and the words that ask for it; a line of ``tasks.jsonl``."""
+"""Task record: a goal in a scene, the skills that reach it, and its instructions; one line of ``tasks.jsonl``."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class _Said(BaseModel):
 
 
 class TaskStep(_Said):
-    """One literal's skill: what it takes, and what the literal is about beside that."""
+    """The skill for one literal, with its target and optional partner."""
 
     skill: _Name
     target: _Name
@@ -30,7 +30,7 @@ class TaskStep(_Said):
 
 
 class TaskDifficulty(_Said):
-    """How hard a task is: the sum of its parts, each counted as docs/tasks.md says."""
+    """Difficulty of a task: ``score`` is the sum of the other fields, whose counts docs/tasks.md defines."""
 
     score: int = Field(ge=1)
     literals: int = Field(ge=1, le=MOST_LITERALS)
@@ -41,10 +41,10 @@ class TaskDifficulty(_Said):
 
 
 class TaskRecord(_Said):
-    """A task in a scene; its ``steps`` make the ``goal``'s literals true in their order.
+    """A task in a scene; its ``steps`` achieve the ``goal``'s literals in order.
 
-    ``scene_sha256`` is the digest of the scene's file, ``seed`` draws where fixtures stand and where things are put,
-    ``held_out`` are instructions in templates that no ``instructions`` have. ``source``: enumerated, or proposed by a model.
+    ``scene_sha256`` is the digest of the scene's file, ``seed`` determines the poses of fixtures and placements. ``held_out``
+    are instructions from templates that no ``instructions`` use. ``source``: enumerated, or proposed by a model.
     """
 
     schema_version: Literal[1]
@@ -82,16 +82,16 @@ class TaskRecord(_Said):
 
     @property
     def parsed_goal(self) -> Goal:
-        """The goal; raises UsageError for what is none."""
+        """The goal; raises UsageError if it is invalid."""
         return Goal.from_json(self.goal)
 
 
 def kind_of(goal: Goal) -> str:
-    """Return the kind of a goal: its predicates, ``in+near`` whatever their order."""
+    """Return the kind of a goal: its sorted predicates, such as ``in+near``."""
     return "+".join(sorted(literal.predicate for literal in goal.literals))
 
 
 def task_id_of(scene_sha256: str, robot: str, seed: int, steps: tuple[TaskStep, ...], goal: Goal) -> str:
-    """Return an id by what a task asks for."""
+    """Return an id derived from the content of a task."""
     said = [scene_sha256, robot, seed, [step.model_dump(mode="json") for step in steps], goal.to_json()]
     return sha256_of_json(said)[:16]

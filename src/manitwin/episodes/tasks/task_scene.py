@@ -1,4 +1,4 @@
-"""A scene as tasks see it: who can be taken, the surroundings of each object, words and grasps."""
+"""Scene view for tasks: graspable objects, surroundings of each object, names and grasps."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from manitwin.twin.record import Language
 
 @dataclass(frozen=True)
 class TaskScene:
-    """A scene before a robot; ``grasps`` returns those of a twin that the robot's gripper may use, by its id."""
+    """A scene in front of a robot; ``grasps`` returns a twin's grasps usable by the robot's gripper, by twin id."""
 
     scene: Scene
     pool: Pool
@@ -33,7 +33,7 @@ class TaskScene:
 
     @cached_property
     def objects(self) -> tuple[PlacedObject, ...]:
-        """The objects in the order of their names, which is that of an episode's world; with what a cup seals on."""
+        """The objects sorted by name, as in an episode's world, with their sealing surface if the gripper is a suction cup."""
         placed = sorted(self.scene.placed_objects(), key=lambda each: each.name)
         return tuple(with_surface(each, self.scene.twin(each.twin_id), self.robot.gripper) for each in placed)
 
@@ -44,24 +44,24 @@ class TaskScene:
 
     @cached_property
     def words(self) -> dict[str, Language]:
-        """The words of the objects, by name; of what nobody has described there are none."""
+        """The language records of the objects, by name; missing for undescribed twins."""
         said = {each.name: self.scene.twin(each.twin_id).record.language for each in self.objects}
         return {name: language for name, language in said.items() if language is not None}
 
     @cached_property
     def problem(self) -> PickPlaceProblem:
-        """A problem of everything where it is; the target is the first object and nothing is to be done."""
+        """A problem with everything at its pose; the target is the first object and its goal its current pose."""
         first, *others = self.objects
         boxes = tuple(furniture_boxes(self.scene.record.furniture))
         return PickPlaceProblem(first, first.object_to_world, (), tuple(others), boxes)
 
     @cached_property
     def state(self) -> WorldState:
-        """The state at the beginning, as far as poses tell."""
+        """The initial world state, as far as poses determine it."""
         return self.state_of([each.object_to_world for each in self.objects])
 
     def state_of(self, object_to_world: Sequence[np.ndarray]) -> WorldState:
-        """Return the state with the objects at poses, at rest and touching nothing."""
+        """Return the world state with the objects at the given poses ``(4, 4)``, at rest and without contacts."""
         objects = {
             each.name: ObjectState(each.body, pose, each.object_to_world, True, self.pool.body(each.twin_id).opening)
             for each, pose in zip(self.objects, object_to_world, strict=True)
@@ -69,7 +69,7 @@ class TaskScene:
         return WorldState(objects, frozenset())
 
     def why_not_taken(self, number: int) -> str | None:
-        """Return why an object cannot be taken: ``carries_another``, ``out_of_reach``, ``no_grasp``; None where it can."""
+        """Return why an object cannot be grasped: ``carries_another``, ``out_of_reach`` or ``no_grasp``; None if it can."""
         placed = next(each for each in self.scene.record.objects if each.name == self.names[number])
         workspace = self.robot.workspace
         radius_m = float(np.hypot(*placed.position_m[:2]))
@@ -81,7 +81,7 @@ class TaskScene:
         return None if self.grasps(placed.twin_id) else "no_grasp"
 
     def around(self, number: int) -> Surroundings:
-        """Return the surroundings for one object to be moved: it stays on its support."""
+        """Return the surroundings for moving one object, which stays on its support surface."""
         record = self.scene.record
         surface = next(each.surface for each in record.objects if each.name == self.names[number])
         support = next(each for each in record.furniture.supports if each.name == surface)
@@ -98,9 +98,9 @@ class TaskScene:
         return tuple(each.grasp for each in shuffled(found, np.random.default_rng([seed, 1])))
 
     def beforehand(self, skill: Skill, target: int, partner: int | None, seed: int, number: int) -> SkillGoal | None:
-        """Return a skill's goal as it is set before anything has moved; of a later step without poses, which are drawn then.
+        """Return a skill's goal before anything has moved; for a later step without poses, which are sampled when it starts.
 
-        ``number`` is the step's. None where there is no room for its fixtures or no goal.
+        ``number`` is the number of the step. None if there is no goal or no room for its fixtures.
         """
         around, rng = self.around(target), np.random.default_rng((seed, 2, number))
         if number == 0 or type(skill).set_goal is not Skill.set_goal:
@@ -111,7 +111,7 @@ class TaskScene:
         return SkillGoal(goal, (), None if second is None else second.name, openings_of(around, numbers))
 
     def step(self, skill: Skill, target: int, partner: int | None, seed: int, number: int) -> Step | None:
-        """Return a step with its goal as set beforehand; None where there is none."""
+        """Return a step with its goal before execution; None if there is none."""
         goal = self.beforehand(skill, target, partner, seed, number)
         if goal is None:
             return None

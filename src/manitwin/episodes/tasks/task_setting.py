@@ -1,4 +1,4 @@
-"""A task as an episode's setting: its scene, its sequence of steps as they were set, and the goal of all of them."""
+"""Setting of an episode for a task: scene, steps with their goals, and the combined goal."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Grasps = Callable[[str], Sequence[TargetGrasp]]
 
 @dataclass(frozen=True)
 class TaskSetting:
-    """A task that is ready to be carried out; the fixtures and granules of its ``goal`` are part of the ``problem``'s world."""
+    """A task ready for execution; the fixtures and granules of its ``goal`` belong to the world of ``problem``."""
 
     task: TaskRecord
     scene: TaskScene
@@ -40,7 +40,7 @@ class TaskSetting:
 
     @property
     def several(self) -> GoalSequence | None:
-        """The sequence, None where it has one step."""
+        """The sequence, or None if it has a single step."""
         return self.sequence if len(self.sequence.steps) > 1 else None
 
     @property
@@ -54,9 +54,9 @@ class TaskSetting:
 def task_setting(
     task: TaskRecord, scenes: str | Path, dataset: str | Path, pool: Pool, robot: Robot, grasps: Grasps, *, seed: int
 ) -> TaskSetting | None:
-    """Set a task up; None where the robot has no way to begin. ``seed`` is that of planning.
+    """Set up a task; None if the robot cannot start it. ``seed`` is that of planning.
 
-    Raises UsageError for a scene that is gone or another one than the task was made for, and for an unknown skill.
+    Raises UsageError for a missing scene, a scene other than the one the task was made for, and an unknown skill.
     """
     path = Path(scenes) / scene_name(task.scene_id)
     record = read_scene(path)

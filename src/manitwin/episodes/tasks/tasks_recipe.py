@@ -1,4 +1,4 @@
-"""The recipe of tasks: a scene in, its tasks and the counts of its candidates out."""
+"""Recipe of tasks: from a scene to its tasks and the counts of its candidates."""
 
 from __future__ import annotations
 
@@ -47,18 +47,18 @@ KEPT_TWINS = 256
 
 @dataclass(frozen=True)
 class TaskedScene(Payload):
-    """A scene that tasks are drawn in."""
+    """A scene in which tasks are sampled."""
 
     scene_id: str
 
     @property
     def title(self) -> str:
-        """The scene in words."""
+        """Display title."""
         return f"tasks of {self.scene_id}"
 
 
 class SceneTasksRecord(FolderRecord):
-    """``scene_tasks.json``: how many tasks a scene has."""
+    """``scene_tasks.json``: the number of tasks of a scene."""
 
     schema_version: int
     scene_id: str
@@ -66,7 +66,7 @@ class SceneTasksRecord(FolderRecord):
 
 
 class TasksStage:
-    """Draw the tasks of a scene."""
+    """Stage that samples the tasks of a scene."""
 
     name = "tasks"
     version = "8"
@@ -77,7 +77,7 @@ class TasksStage:
     model: str | None = None
 
     def __init__(self, settings: TasksConfig, dataset: str, scenes: str):
-        """Take the configuration, and where twins and scenes are read from."""
+        """Take the configuration, and the locations of twins and scenes."""
         self.settings, self._dataset, self._scenes = settings, dataset, scenes
         self._grasps = lru_cache(KEPT_TWINS)(self._read_grasps)
 
@@ -125,7 +125,7 @@ class TasksStage:
         )
         try:
             told, held_out = task_instructions(planned.goal, scene.words, seed=seed % (1 << 31))
-        except UsageError:  # a predicate that nobody has put into words yet
+        except UsageError:  # a predicate without templates
             tally.dropped["no_words"] += 1
             return None
         return TaskRecord(
@@ -148,7 +148,7 @@ class TasksStage:
 
 @dataclass(frozen=True)
 class TasksRecipe(FolderRecipe[SceneTasksRecord]):
-    """The tasks of scenes; ``dataset`` and ``scenes`` are where twins and scenes are read from."""
+    """Tasks of scenes; ``dataset`` and ``scenes`` are the locations of twins and scenes."""
 
     payload = TaskedScene
     record = "scene_tasks.json"
@@ -162,14 +162,14 @@ class TasksRecipe(FolderRecipe[SceneTasksRecord]):
 
     @cached_property
     def sha256(self) -> str:
-        """The digest of what decides a task, but for scenes and twins."""
+        """Digest of everything that determines a task except scenes and twins."""
         decides = self.config.model_dump(mode="json", exclude={"run"})
         decides["robot"] = load_robot(self.config.robot).sha256
         return sha256_of_json([decides, TasksStage.version])
 
     @property
     def seed(self) -> int:
-        """The seed of everything random."""
+        """The seed of all random draws."""
         return self.config.seed
 
     def folder_of(self, item_id: str) -> str:
@@ -177,11 +177,11 @@ class TasksRecipe(FolderRecipe[SceneTasksRecord]):
         return f"{SCENE_TASKS}/{scene_name(item_id).partition('/')[2]}"
 
     def identify(self, payload: TaskedScene) -> Identity:
-        """Return the scene's id."""
+        """Return the scene's identity."""
         return Identity(payload.scene_id, "scene")
 
     def stages(self, kind: str) -> list[Stage]:
-        """Return the one stage."""
+        """Return the single stage."""
         return [TasksStage(self.config, self.dataset, self.scenes)]
 
     def write(
@@ -196,5 +196,5 @@ class TasksRecipe(FolderRecipe[SceneTasksRecord]):
         return self.seal(fresh, said, decided_by=[content.decode(), json.loads(counts)])
 
     def ending(self, record: SceneTasksRecord) -> Ending:
-        """Return how a scene's record says that it ended."""
+        """Return the ending stated by a scene's record."""
         return Ending("accepted", record.revision, None, f"{record.tasks} tasks")

@@ -1,4 +1,4 @@
-"""Make the tasks of many scenes: the engine's run, then one file of tasks in which kinds are even, and a report of the rest."""
+"""Task generation for many scenes: the engine's run, then one balanced task file and a report of the rejections."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ from manitwin.twin.store import canonical_json, write_bytes_atomically
 KIND = "tasks"
 REPORT = "tasks_report.json"
 DECIDE_NO_TASK = frozenset(("dataset", "scenes", "run"))
-LEAST_OF_TWO = 0.2  # of all tasks, those of two literals and more
+LEAST_OF_TWO = 0.2  # least share of tasks with two literals or more
 
 
 @dataclass(frozen=True)
 class TaskTotals:
-    """Totals over all scenes; ``dropped`` by reason, also of tasks left out so that no kind is too frequent."""
+    """Totals over all scenes; ``dropped`` counts rejections by reason, including tasks removed to balance the kinds."""
 
     scenes: int
     tasks: int
@@ -56,11 +56,11 @@ def make_tasks(
     twins: str | Path | None = None,
     **run: Unpack[RunOptions],
 ) -> tuple[RunReport, TaskTotals | None]:
-    """Draw tasks in all scenes of a folder and write ``tasks.jsonl`` and ``tasks_report.json``; no totals: not all has ended.
+    """Sample tasks in all scenes of a folder, and write ``tasks.jsonl`` and ``tasks_report.json``.
 
-    Scenes whose tasks are there are left. Raises UsageError for a place without scenes, scenes whose twins stand otherwise now or
-    have grasps of another hand of the name of the robot's, an unknown robot or model, an ``out`` with tasks of other settings,
-    or where another run is at work there.
+    Scenes that already have tasks are skipped. The totals are None if the run has not finished. Raises UsageError for a
+    location without scenes, scenes whose twins have changed or have grasps of a different gripper with the robot's gripper
+    name, an unknown robot or model, an ``out`` with tasks of other settings, and an ``out`` with another run in progress.
     """
     robot = load_robot(config.robot)
     chat_of(config.vlm, "propose tasks")
@@ -82,7 +82,7 @@ def make_tasks(
 
 
 def collect_tasks(out: Path, config: TasksConfig) -> TaskTotals:
-    """Write all scenes' tasks as one file, and the report; returns what is in it."""
+    """Write all scenes' tasks into one file, and the report; return the totals."""
     folders = sorted(path.parent for path in (out / SCENE_TASKS).glob(f"*/*/{TASKS}"))
     everything = [task for folder in folders for task in read_tasks(folder)]
     kept, dropped = evened(everything, config.most_of_kind, config.two_literal_share)
@@ -95,7 +95,7 @@ def collect_tasks(out: Path, config: TasksConfig) -> TaskTotals:
 def evened(
     tasks: Sequence[TaskRecord], most_of_kind: float, two_literal_share: float
 ) -> tuple[list[TaskRecord], Counter[str]]:
-    """Return the tasks without those that make their kind too frequent, or those of two literals too rare; the last ones go."""
+    """Remove tasks, last ones first, until no kind is too frequent and two-literal tasks are not too rare; return the rest."""
     kept, dropped = list(tasks), Counter[str]()
     while True:
         kinds = Counter(task.kind for task in kept)
@@ -142,7 +142,7 @@ def _totals(folders: Sequence[Path], kept: Sequence[TaskRecord], dropped: Counte
 
 
 def export_bddl(out: Path) -> tuple[int, int]:
-    """Write the tasks of a folder as BDDL to ``bddl/`` below it; return how many, and how many BDDL cannot say."""
+    """Write the tasks of a folder as BDDL to its ``bddl/``; return the numbers of written and inexpressible tasks."""
     said = read_json_object(out / CONFIG, UsageError, inside=out, name=str(out / CONFIG))
     tasks = read_tasks(out)
     scenes = {each: read_scene(Path(said["scenes"]) / scene_name(each)) for each in {task.scene_id for task in tasks}}
