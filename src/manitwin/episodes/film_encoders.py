@@ -97,10 +97,8 @@ class _Av1:
 
     def _code(self) -> None:
         first, *rest = self._group
-        alone = (
-            not rest
-            # a single picture would be coded as a still image, which is another kind of track: it is coded twice, and one is used
-        )
+        # A single picture would be coded as a still image, which is another kind of track: it is coded twice, and one is used.
+        alone = not rest
         coded = io.BytesIO()
         first.save(
             coded,

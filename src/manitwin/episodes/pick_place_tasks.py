@@ -1,4 +1,4 @@
-"""Pick-and-place tasks: random starts and goals on a table in front of a robot, with or without other objects."""
+"""Sampling of pick-and-place tasks: random starts and goals on a table in front of a robot, optionally with other objects."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose
 from manitwin.scenes.scene import SupportRegion
 
 MIN_MOVE_M = 0.15
-"""The shortest way from start to goal, as in the episodes of docs/measured/robot_data.md."""
+"""Least distance from start to goal, as in the episodes of docs/measured/robot_data.md."""
 MIN_GAP_M = 0.03
-"""Between the footprints of two objects: room for a finger."""
+"""Clearance between the footprints of two objects: room for a finger."""
 OTHERS_RADIUS_FACTOR = 1.2
 OTHERS_ANGLE_FACTOR = 1.4
-"""How much farther than the target the others may stand: what is beyond the arm's reach is in nobody's way."""
+"""Factors of the workspace for other objects: beyond the arm's reach they obstruct nothing."""
 NEARER_RADIUS_FACTOR = 0.75
-"""How much nearer to its base than its workspace an arm may still put something down."""
+"""Factor of the workspace's inner radius down to which an arm may still put an object down."""
 POSES_TRIED, OTHERS_TRIED = 200, 20
 
 
 @dataclass(frozen=True)
 class Placeable:
-    """A twin as it is set down: its body and the settled placement ``object_to_plane (4, 4)`` that it is used in."""
+    """A twin to be placed: its body and the stable placement used, ``object_to_plane (4, 4)``."""
 
     twin_id: str
     body: RigidBody
@@ -37,28 +37,28 @@ class Placeable:
 
     @classmethod
     def of(cls, pool: Pool, twin: PoolTwin) -> Placeable:
-        """Take the most probable settled placement, an upright one where there is one."""
+        """Use the most probable stable placement, preferably an upright one."""
         best = max(twin.poses, key=lambda pose: (pose.upright, pose.probability))
         return cls(twin.twin_id, pool.body(twin.twin_id).body, best.object_to_plane)
 
     @cached_property
     def footprint(self) -> np.ndarray:
-        """The corners ``(K, 2)`` of what it covers of the plane, in the placement's frame."""
+        """Vertices ``(K, 2)`` of its footprint on the plane, in the placement's frame."""
         return footprint(transform_points(self.object_to_plane, np.concatenate(self.body.hulls)))
 
     def at(self, plane_to_world: np.ndarray) -> np.ndarray:
-        """Return the object's pose where the placement's frame is at a pose."""
+        """Return the object's pose for a pose ``(4, 4)`` of the placement's frame."""
         return plane_to_world @ self.object_to_plane
 
     @classmethod
     def in_pose(cls, pool: Pool, twin: PoolTwin, pose: StandingPose) -> Placeable:
-        """Return a twin in one of its settled placements."""
+        """Use the given stable placement."""
         return cls(twin.twin_id, pool.body(twin.twin_id).body, pose.object_to_plane)
 
 
 @dataclass(frozen=True)
 class PickPlaceTask:
-    """Objects at rest, and where one of them is to go: ``objects[target]`` to ``goal_object_to_world``."""
+    """Objects at rest, of which ``objects[target]`` is to be moved to ``goal_object_to_world``."""
 
     objects: tuple[PlacedObject, ...]
     target: int
@@ -67,13 +67,13 @@ class PickPlaceTask:
 
 @dataclass(frozen=True)
 class PlacingArea:
-    """The area where objects may be put: in a robot's workspace, and wholly on a level surface."""
+    """Area where objects may be placed: within a robot's workspace, and entirely on a level surface."""
 
     workspace: Workspace
     support: SupportRegion
 
     def wider(self) -> PlacingArea:
-        """Return the room for things that nobody has to reach."""
+        """Return the larger area for objects that need not be reached."""
         workspace = self.workspace
         wide = Workspace(
             workspace.min_radius_m,
@@ -83,12 +83,12 @@ class PlacingArea:
         return PlacingArea(wide, self.support)
 
     def beyond(self) -> PlacingArea:
-        """Return where an arm may still put something down: wider, and nearer to its base. Planning tells whether it can."""
+        """Return the area where an arm may be able to put an object down: wider, and closer to its base; planning decides."""
         workspace = self.wider().workspace
         return PlacingArea(replace(workspace, min_radius_m=workspace.min_radius_m * NEARER_RADIUS_FACTOR), self.support)
 
     def draw(self, corners: np.ndarray, taken: Sequence[np.ndarray], rng: np.random.Generator) -> np.ndarray | None:
-        """Draw a pose for a footprint ``(K, 2)`` that is free of those that are ``taken``; None where none was found."""
+        """Sample a pose for a footprint ``(K, 2)`` that is clear of the ``taken`` ones; None if none was found."""
         for _ in range(POSES_TRIED):
             pose = _pose(self.workspace, rng)
             if self.holds(_at(corners, pose)) and _clear(_at(corners, pose), taken):
@@ -96,16 +96,16 @@ class PlacingArea:
         return None
 
     def reaches(self, position_m: np.ndarray, corners: np.ndarray) -> bool:
-        """Tell whether a place ``(2,)`` is in the workspace, and a footprint ``(K, 2)`` there wholly on the surface."""
+        """Tell whether a position ``(2,)`` is in the workspace, and a footprint ``(K, 2)`` entirely on the surface."""
         workspace, radius_m = self.workspace, float(np.linalg.norm(position_m))
         angle_rad = abs(float(np.arctan2(position_m[1], position_m[0])))
         in_reach = workspace.min_radius_m <= radius_m <= workspace.max_radius_m
         return in_reach and angle_rad <= workspace.half_angle_rad and self.holds(corners)
 
     def holds(self, corners: np.ndarray) -> bool:
-        """Tell whether a footprint ``(K, 2)`` is wholly on the surface, and clear of the arm's foot."""
+        """Tell whether a footprint ``(K, 2)`` is entirely on the surface, and clear of the arm's base."""
         inside = np.abs(corners - self.support.center_m) <= self.support.half_extents_m
-        # nothing may stand in the arm's foot, whatever its centre's distance
+        # no vertex may overlap the arm's base, whatever the distance of the object's centre
         clear_of_base = np.linalg.norm(corners, axis=1).min() > self.workspace.min_radius_m / 2
         return bool(inside.all() and clear_of_base)
 
@@ -113,9 +113,9 @@ class PlacingArea:
 def sample_task(
     target: Placeable, others: Callable[[], Placeable], count: int, area: PlacingArea, rng: np.random.Generator
 ) -> PickPlaceTask | None:
-    """Draw start and goal of a target in a room on the table z = 0, and ``count`` drawn ``others`` around.
+    """Sample start and goal of a target on the table z = 0, and ``count`` other objects around; None if there is no room.
 
-    Neither start nor goal is nearer than ``MIN_GAP_M`` to another object. None: no room was found.
+    Neither start nor goal is closer than ``MIN_GAP_M`` to another object.
     """
     for _ in range(OTHERS_TRIED):
         start = area.draw(target.footprint, [], rng)
@@ -136,7 +136,7 @@ def sample_objects(
     area: PlacingArea,
     rng: np.random.Generator,
 ) -> tuple[PlacedObject, ...] | None:
-    """Draw places in reach for those that take part, and ``count`` drawn ``others`` around; None: there is no room."""
+    """Sample reachable places for the participants, and ``count`` other objects around; None if there is no room."""
     for _ in range(OTHERS_TRIED):
         taken, placed = list[np.ndarray](), list[PlacedObject]()
         for number, each in enumerate(taking_part):
@@ -156,7 +156,7 @@ def sample_objects(
 def free_goal(
     objects: Sequence[PlacedObject], target: int, area: PlacingArea, rng: np.random.Generator
 ) -> np.ndarray | None:
-    """Draw a free pose for ``objects[target]`` on its surface, turned about Z alone; None: no area."""
+    """Sample a free pose for ``objects[target]`` on its surface with another heading; None if there is no room."""
     moved = objects[target]
     object_to_plane, corners = on_its_surface(moved, area.support.height_m)
     taken = footprints_of_others(objects, target)
@@ -165,7 +165,7 @@ def free_goal(
 
 
 def on_its_surface(moved: PlacedObject, height_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return an object's pose ``(4, 4)`` turned as it is, above the origin of a level plane at a height, and its footprint."""
+    """Return an object's pose ``(4, 4)`` in its orientation above the origin of a plane at ``height_m``, and its footprint."""
     here = moved.object_to_world
     center = transform(translation=np.array([here[0, 3], here[1, 3], 0.0]))
     object_to_plane = inverse(center) @ here
@@ -175,12 +175,12 @@ def on_its_surface(moved: PlacedObject, height_m: float) -> tuple[np.ndarray, np
 
 
 def footprint_at(body: RigidBody, object_to_world: np.ndarray) -> np.ndarray:
-    """Return the corners ``(K, 2)`` of what a body covers of the ground at a pose."""
+    """Return the vertices ``(K, 2)`` of a body's footprint at a pose."""
     return footprint(transform_points(object_to_world, np.concatenate(body.hulls)))
 
 
 def footprints_of_others(objects: Sequence[PlacedObject], target: int) -> list[np.ndarray]:
-    """Return the footprints ``(K, 2)`` of all objects but ``objects[target]``, in their order, where they are."""
+    """Return the footprints ``(K, 2)`` of all objects except ``objects[target]``, in order."""
     return [footprint_at(each.body, each.object_to_world) for number, each in enumerate(objects) if number != target]
 
 
@@ -193,7 +193,7 @@ def free_poses(
     *,
     count: int,
 ) -> Iterator[np.ndarray]:
-    """Yield up to ``count`` free poses of a body in a placement ``(4, 4)``, clear of the footprints that are ``taken``."""
+    """Yield up to ``count`` free poses of a body in a placement ``(4, 4)``, clear of the ``taken`` footprints."""
     corners = footprint_at(body, object_to_plane)
     for _ in range(count):
         pose = area.draw(corners, taken, rng)
@@ -233,7 +233,7 @@ def _others(
 
 
 def _pose(workspace: Workspace, rng: np.random.Generator) -> np.ndarray:
-    radius = np.sqrt(rng.uniform(workspace.min_radius_m**2, workspace.max_radius_m**2))  # even over the area
+    radius = np.sqrt(rng.uniform(workspace.min_radius_m**2, workspace.max_radius_m**2))  # uniform over the area
     angle, yaw = rng.uniform(-workspace.half_angle_rad, workspace.half_angle_rad), rng.uniform(-np.pi, np.pi)
     cos, sin = np.cos(yaw), np.sin(yaw)
     turn = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1.0]])

@@ -1,4 +1,4 @@
-"""The states and actions of an episode, gathered 20 times a second while it runs."""
+"""Recorder of an episode's states and actions at 20 Hz."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ class _Action(NamedTuple):
 
 
 class Recorder:
-    """Records a first state, then each action with the state that it led to; of two arms, the values of the first come first."""
+    """Records the first state, then each action with the resulting state; values of the first of two arms come first."""
 
     def __init__(self, world: RobotWorld, touches: Touches, hand: np.ndarray):
         """Record the first state; ``hand (h,)`` is the hand's position."""
         self._world = world
         joints = sum(len(each.robot.arm_joints) for each in world.robots)
-        at_rest = Speeds(  # nothing is held yet
+        at_rest = Speeds(  # no object is held yet
             np.zeros(joints),
             np.array([body.linear_velocity for body in world.bodies]),
             np.array([body.angular_velocity for body in world.bodies]),
@@ -61,10 +61,10 @@ class Recorder:
         unplanned: bool,
         literal: int | None = None,
     ) -> None:
-        """Record an action and the state that it led to, which is the world's present one with ``speeds``.
+        """Record an action and the resulting state, which is the world's current state with ``speeds``.
 
-        The action is what the controllers were told: joints ``(n,)`` rad and the hand ``hand_told (h,)``; ``hand (h,)`` is where
-        the hand is now, ``literal`` the number of the goal's literal that the action serves.
+        The action is the command: joints ``(n,)`` rad and ``hand_told (h,)``. ``hand (h,)`` is the hand's current position,
+        ``literal`` the number of the goal's literal that the action serves.
         """
         self._actions.append(_Action(joint_positions_rad, hand_told, phase, literal))
         self._states.append(self._state(speeds, hand))
@@ -72,9 +72,10 @@ class Recorder:
         self._unplanned.append(unplanned)
 
     def recording(self, tip_poses: Callable[[np.ndarray], np.ndarray]) -> Recording:
-        """Return what was recorded; quaternions never change their sign on the way (``without_sign_changes``).
+        """Return the recording; quaternion signs are continuous over time (``without_sign_changes``).
 
-        ``tip_poses`` is the forward kinematics: from the joints ``(n,)`` of all arms to their tips in the world ``(arms, 4, 4)``.
+        ``tip_poses`` is the forward kinematics from the joints ``(n,)`` of all arms to their tips in the world ``(arms, 4,
+        4)``.
         """
         told = _columns(self._actions)
         states = _columns(self._states)
@@ -125,5 +126,5 @@ def _columns(rows: Sequence[_State] | Sequence[_Action]) -> dict[str, list[Any]]
 
 
 def _flat(of_arms: np.ndarray) -> np.ndarray:
-    """Return values of arms ``(T, arms, k)`` side by side, as files of episodes have them, ``(T, arms * k)``."""
+    """Return values of arms ``(T, arms, k)`` concatenated per row, ``(T, arms * k)``, as in episode files."""
     return of_arms.reshape(len(of_arms), -1).astype(np.float32)

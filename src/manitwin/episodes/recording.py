@@ -1,4 +1,4 @@
-"""Recordings of episodes, 20 times a second, and their actions as differences from the states before."""
+"""Recordings of episodes at 20 Hz, and their actions as differences from the preceding states."""
 
 from __future__ import annotations
 
@@ -14,19 +14,23 @@ RATE_HZ = 20
 class Recording:
     """States ``(T + 1, ...)`` and the actions ``(T, ...)`` between them; float32, SI, world frame, quaternions wxyz.
 
-    Action t is what the controllers are told to reach by state t + 1. Speeds are those of the timestep that ended in a state,
-    of objects those of the centre of mass. Objects are in the scene's order, the target at ``target``. ``hand (T + 1, h)`` is
-    what the hand is: the opening of jaws (m), a cup's plunger (m), or the joints of other hands (rad); ``action_hand (T, h)``
-    what it is told: the same, or 1 where a cup's vacuum is on, else 0. The tip is the twin's grasp frame: its origin at the
-    gripper's base, not between the fingertips, +Z approach, X closing. ``phase (T,)`` holds numbers of
-    ``planning.problem.Phase``. ``finger_forces_n`` press on the target from two sides: the jaws, or thumb and palm and the
-    other fingers; a cup's lip, where it has sealed, presses in both with the vacuum's force less the pull.
-    ``unplanned_contact`` says that the robot touched with more than 0.5 N what it should not, since the state before. Where
-    there are granules, ``granule_positions_m (T + 1, N, 3)`` are their middles and ``granules_in_objects (T + 1, O)`` says how
-    many each object holds. Of a goal of several literals ``active_literal (T,)`` is the number of the one that is worked on;
-    the target is that of the last one, while contacts are those of what is handled at the time (``handled_objects``).
+    Action t is the command to be reached by state t + 1. Velocities are those of the time step that ended in a state, for
+    objects of the centre of mass. Objects are in the scene's order, the target at index ``target``.
 
-    Two arms stand side by side in all arrays of joints, hands, tips and fingers, the first one's numbers before the second's.
+    ``hand (T + 1, h)`` is the hand's state: the opening of jaws (m), a cup's plunger (m), or the joints of other hands (rad).
+    ``action_hand (T, h)`` is its command: the same, or for a cup 1 if the vacuum is on, else 0. The tip is the grasp frame:
+    its origin at the gripper's base, not between the fingertips, +Z approach, X closing. ``phase (T,)`` holds numbers of
+    ``planning.problem.Phase``.
+
+    ``finger_forces_n`` are the forces on the target from two sides: of the two jaws, or of thumb and palm and of the other
+    fingers; for a sealed cup, both are the vacuum force less the pull. ``unplanned_contact`` tells whether the robot had an
+    unplanned contact of more than 0.5 N since the preceding state.
+
+    With granules, ``granule_positions_m (T + 1, N, 3)`` are their centres and ``granules_in_objects (T + 1, O)`` the numbers
+    in each object. For a goal of several literals, ``active_literal (T,)`` is the number of the one being worked on;
+    ``target`` is that of the last one, while contacts are those of the object handled at the time (``handled_objects``).
+
+    For two arms, all arrays of joints, hands, tips and fingers contain the first arm's values followed by the second's.
     """
 
     target: int
@@ -53,12 +57,12 @@ class Recording:
 
     @property
     def gripper_opening_m(self) -> np.ndarray:
-        """The distance between the pads of jaws ``(T + 1,)``."""
+        """Distance between the pads of jaws ``(T + 1,)``."""
         return np.asarray(self.hand[:, 0])
 
     @property
     def action_gripper_opening_m(self) -> np.ndarray:
-        """The distance that the pads of jaws are told ``(T,)``."""
+        """Commanded distance between the pads of jaws ``(T,)``."""
         return np.asarray(self.action_hand[:, 0])
 
     @property
@@ -68,17 +72,19 @@ class Recording:
 
 
 def joint_delta(recording: Recording) -> np.ndarray:
-    """Return ``(T, n + h) float32``: the arm's targets less its positions, rad, and what the hand is told itself."""
+    """Return ``(T, n + h) float32``: the arm's targets minus its positions, rad, followed by the hand commands."""
     moved = recording.action_joint_positions_rad - recording.joint_positions_rad[:-1]
     return _with_hand(moved, recording)
 
 
 def tip_delta(recording: Recording) -> np.ndarray:
-    """Return ``(T, 6 + h) float32``: how the tip's target differs from its pose (of two arms each's), and what hands are told.
+    """Return ``(T, 6 + h) float32``: the difference of the tip's target from its pose (for each arm), followed by the hand
+    commands.
 
-    Three metres and a rotation vector of three radians, both along the axes of the world, which are those of the robot's
-    base: ``p_target = p + d[:3]``, ``R_target = exp(d[3:6]) R``. The axes are those of ManiSkill's ``pd_ee_delta_pose``
-    (``root_translation:root_aligned_body_rotation``), not scaled to [-1, 1]; its point is between the fingertips.
+    Three translations (m) and a rotation vector (rad), both along the world axes, which are those of the robot's base:
+    ``p_target = p + d[:3]``, ``R_target = exp(d[3:6]) R``. The axes are those of ManiSkill's ``pd_ee_delta_pose``
+    (``root_translation:root_aligned_body_rotation``), not scaled to [-1, 1]; ManiSkill's reference point is between the
+    fingertips.
     """
     moved = (recording.action_tip_position_m - recording.tip_position_m[:-1]).reshape(-1, 3)
     before = Rotation.from_quat(recording.tip_quaternion_wxyz[:-1].reshape(-1, 4), scalar_first=True)
@@ -88,7 +94,7 @@ def tip_delta(recording: Recording) -> np.ndarray:
 
 
 def tip_poses(position_m: np.ndarray, quaternion_wxyz: np.ndarray) -> np.ndarray:
-    """Return the poses of the tips of one or two arms ``(T, 7 arms)``, arm by arm, of ``(T, 3 arms)`` and ``(T, 4 arms)``."""
+    """Return the tip poses of one or two arms ``(T, 7 arms)``, arm by arm, from ``(T, 3 arms)`` and ``(T, 4 arms)``."""
     rows = len(position_m)
     poses = np.concatenate([position_m.reshape(rows, -1, 3), quaternion_wxyz.reshape(rows, -1, 4)], axis=2)
     return np.asarray(poses.reshape(rows, -1))

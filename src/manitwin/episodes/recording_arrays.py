@@ -1,4 +1,4 @@
-"""The arrays of a stored recording: their types and shapes."""
+"""Types and shapes of the arrays of a stored recording."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ _KINDS: dict[str, type] = {
 """All other arrays are float32."""
 
 GRANULES = ("granule_positions_m", "granules_in_objects")
-"""Only of episodes that have granules."""
+"""Only for episodes with granules."""
 
 LITERAL = "active_literal"
-"""Only of goals of several literals."""
+"""Only for goals of several literals."""
 
 _OF_ACTIONS = ("phase", LITERAL)
 
 
 def is_of_actions(name: str) -> bool:
-    """Tell whether an array of a recording has a row for each action ``(T, ...)``, not for each state ``(T + 1, ...)``."""
+    """Tell whether an array of a recording has a row per action ``(T, ...)`` instead of per state ``(T + 1, ...)``."""
     return name.startswith("action_") or name in _OF_ACTIONS
 
 
 def checked(episode: StoredEpisode) -> Recording:
-    """Return the recording with the types of the file: float32, phases uint8, flags bool.
+    """Return the recording with the file's types: float32, phases uint8, flags bool.
 
-    Raises EpisodesError where shapes do not fit together, a number is not finite, or the target is none of the objects.
+    Raises EpisodesError for inconsistent shapes, non-finite values, or an invalid target.
     """
     recording, name = episode.recording, episode.attempt.episode_id
     steps, things = recording.steps, len(episode.objects)

@@ -1,4 +1,4 @@
-"""Pictures of recorded states: the robot's links by the visual shapes of its URDF, the objects, and the furniture."""
+"""Rendering of recorded states: the robot by the visual shapes of its URDF, the objects, fixtures, granules and furniture."""
 
 from __future__ import annotations
 
@@ -29,27 +29,28 @@ from manitwin.scenes.twin_looks import simplified_twin_looks
 
 FINE_PX = 640
 FINEST_M = 0.0008
-"""The least tolerance that surfaces are simplified by."""
+"""Smallest tolerance of surface simplification."""
 LINKS_M, MOST_OF_LINKS_M = 0.0024, 0.012
-"""Tolerance of a robot's links in pictures of ``FINE_PX``, and at most in those of fewer pixels, in proportion. It bounds the sum
-of a vertex's errors: 99 % of the surface of a Panda or a UR5 stays within 0.4 of it, a pixel's width at 1 m or less."""
+"""Tolerance for a robot's links in pictures of ``FINE_PX``, and its maximum for smaller pictures, in proportion. It bounds
+the sum of a vertex's errors: 99 % of the surface of a Panda or a UR5 stays within 0.4 of it, a pixel's width at 1 m or less.
+"""
 OBJECTS_M, MOST_OF_OBJECTS_M, MOST_OF_FINGERS_M = 0.0008, 0.0024, 0.0016
-"""Of objects and of fingers, which may be thin and which a camera on the hand sees from nearby, fingers the nearest."""
+"""For objects and fingers, which may be thin and are seen from nearby by a camera on the hand, fingers from nearest."""
 FIXTURE_MATERIAL = "metal"
-GRANULE_RGBA = (205, 150, 60, 255)  # grains, more or less
+GRANULE_RGBA = (205, 150, 60, 255)  # roughly the colour of grain
 TABLE = Furniture(
     kind="table",
     support_height_m=0.0,
     boxes=(SurfaceBox(name="table", center_m=(0.4, 0.0, -0.02), half_extents_m=(0.65, 0.7, 0.02), material="wood"),),
 )
-"""What an episode without a scene stands on."""
+"""Furniture of an episode without a scene."""
 
 
 def link_poses(robot: Robot, joint_positions_rad: np.ndarray, hand: np.ndarray) -> dict[str, np.ndarray]:
     """Return every link's ``link_to_world (4, 4)``, by name.
 
-    ``joint_positions_rad`` are the arm's, in the order of ``robot.arm_joints``; ``hand (h,)`` is that of a recording: jaws
-    stand at half of the opening each.
+    ``joint_positions_rad`` are the arm's, in the order of ``robot.arm_joints``; ``hand (h,)`` is as in recordings: each jaw
+    is at half of the opening.
     """
     joints = dict(zip(robot.arm_joints, np.asarray(joint_positions_rad, float), strict=False))
     joints.update(zip(robot.finger_joints, robot.hand_joints(np.asarray(hand, float)).tolist(), strict=True))
@@ -57,25 +58,25 @@ def link_poses(robot: Robot, joint_positions_rad: np.ndarray, hand: np.ndarray) 
 
 
 def link_tolerance_m(picture_px: int) -> float:
-    """Return by how much a robot's links are simplified for pictures of ``picture_px`` a side at most."""
+    """Return the simplification tolerance of a robot's links for pictures of at most ``picture_px`` a side."""
     return min(max(LINKS_M * FINE_PX / picture_px, FINEST_M), MOST_OF_LINKS_M)
 
 
 def object_tolerance_m(picture_px: int, most_m: float = MOST_OF_OBJECTS_M) -> float:
-    """Return by how much objects, or fingers, are simplified for pictures of ``picture_px`` a side at most."""
+    """Return the simplification tolerance of objects or fingers for pictures of at most ``picture_px`` a side."""
     return min(max(OBJECTS_M * FINE_PX / picture_px, FINEST_M), most_m)
 
 
 def twin_drawable(folder: Path, picture_px: int = FINE_PX) -> Drawable:
-    """Return a twin's looks, simplified for pictures of ``picture_px`` at most; kept for the next call. Raises TwinError."""
+    """Return a twin's appearance, simplified for pictures of at most ``picture_px``; cached. Raises TwinError."""
     return simplified_twin_looks(folder, object_tolerance_m(picture_px))
 
 
 class EpisodeReplay:
-    """A robot, objects and furniture, uploaded once, that recordings are shown with. Close it, or use a ``with`` statement.
+    """A robot, objects and furniture, uploaded once, for rendering recordings. Close it, or use a ``with`` statement.
 
-    ``objects`` are those of the recording, in its order: ready to be drawn (``twin_drawable``), or their visual parts in
-    their own frames. ``granules`` are their number and radius, m.
+    ``objects`` are those of the recording, in its order: prepared (``twin_drawable``), or as visual meshes in their own
+    frames. ``granules`` are their number and radius, m.
     """
 
     def __init__(
@@ -90,9 +91,9 @@ class EpisodeReplay:
         seed: int = 0,
         picture_px: int = FINE_PX,
     ) -> None:
-        """Upload everything for pictures of ``picture_px`` a side at most: the fewer, the simpler the links.
+        """Upload everything for pictures of at most ``picture_px`` a side; smaller pictures use simpler links.
 
-        ``seed`` chooses the furniture's textures. Raises RendererMissing, AssetError, UsageError.
+        ``seed`` selects the furniture's textures. Raises RendererMissing, AssetError, UsageError.
         """
         self._robot = robot
         self._renderer = SceneRenderer(lighting, shadows=ShadowRegion().for_pictures_of(picture_px))
@@ -127,12 +128,12 @@ class EpisodeReplay:
         self.close()
 
     def close(self) -> None:
-        """Give back what the driver holds."""
+        """Release the driver's resources."""
         self._renderer.close()
 
     @property
     def ids(self) -> dict[str, int]:
-        """The ids in the pictures: objects first, then ``robot/link``, then furniture, the boxes of fixtures, granules."""
+        """Ids in the segmentation pictures: objects, then ``robot/link``, then furniture, fixture boxes, granules."""
         return self._renderer.ids
 
     def frames(
@@ -145,9 +146,10 @@ class EpisodeReplay:
         every: int = 1,
         geometry: bool = False,
     ) -> Iterator[list[SceneFrame]]:
-        """Yield the pictures of all cameras at states 0, ``every``, 2 ``every`` and so on, of the T + 1 that there are.
+        """Yield the pictures of all cameras at states 0, ``every``, 2 ``every`` and so on, of the T + 1 states.
 
-        With ``geometry``, depth, normals and ids come too. Raises UsageError where the recording has other objects.
+        With ``geometry``, depth, normals and ids are included. Raises UsageError if the recording has another number of
+        objects.
         """
         count = recording.object_positions_m.shape[1]
         if count != len(self._objects):
@@ -168,16 +170,16 @@ class EpisodeReplay:
         *,
         size_px: int,
     ) -> list[np.ndarray]:
-        """Return pictures ``(size, size, 3) uint8`` of a state that is not recorded; poses ``(4, 4)`` in the objects' order.
+        """Return pictures ``(size, size, 3) uint8`` of a state outside a recording; poses ``(4, 4)`` in the objects' order.
 
-        ``hand (h,)`` is as recordings have it.
+        ``hand (h,)`` is as in recordings.
         """
         gripper_to_world = self._place(object_to_world, joint_positions_rad, hand)
         placed = [camera.placed(gripper_to_world, size_px, size_px) for camera in cameras]
         return [frame.rgb for frame in self._renderer.render(placed)]
 
     def _show(self, recording: Recording, state: int) -> np.ndarray:
-        """Move everything to where it is at a state; returns the hand's ``gripper_to_world (4, 4)``."""
+        """Set all poses to those of a state; return the hand's ``gripper_to_world (4, 4)``."""
         rotations = rotation_from_quaternion_wxyz(recording.object_quaternions_wxyz[state])
         positions = recording.object_positions_m[state]
         objects = [transform(rotation, position) for rotation, position in zip(rotations, positions, strict=True)]
@@ -199,7 +201,7 @@ class EpisodeReplay:
 
 @lru_cache(maxsize=4)
 def _moved_by(urdf: str, joints: tuple[str, ...]) -> frozenset[str]:
-    """Return the links that these joints of a URDF move directly."""
+    """Return the child links of these joints of a URDF."""
     tree = UrdfTree.of_text(urdf)
     return frozenset(
         joint.find("child").get("link") for joint in tree.element.findall("joint") if joint.get("name") in joints

@@ -1,4 +1,6 @@
-"""Retire grasps that fail end to end: the trial of one hand in free space does not see tables, long carries, or neighbours."""
+"""Retirement of grasps that fail in episodes: the trial of a hand in free space does not cover tables, long carries or
+neighbours.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,7 @@ OF_THE_FIRST_HAND = ("dropped", "not_lifted")
 
 @dataclass(frozen=True)
 class Retirement:
-    """A grasp that is to be used no more: how often it was executed with its own gripper, and how that failed."""
+    """A grasp to retire: the number of its executions with its own gripper, and the outcomes of the failed ones."""
 
     twin_id: str
     grasp_id: str
@@ -38,15 +40,15 @@ class Retirement:
 
     @property
     def failed(self) -> int:
-        """The number of executions that failed."""
+        """Number of failed executions."""
         return sum(self.outcomes.values())
 
 
 def find_retirements(attempts: Iterable[Attempt], *, failed_share: float) -> list[Retirement]:
-    """Return the grasps of which more than ``failed_share`` of the executions failed, in order of twin and grasp.
+    """Return the grasps of which more than ``failed_share`` of the executions failed, sorted by twin and grasp.
 
-    Transferred grasps do not count: they say nothing of the gripper that a grasp was verified for. Of a handover the grasp is
-    that of the first hand, whose failures are those before the second one takes over.
+    Transferred grasps are ignored, because they say nothing about the gripper for which a grasp was verified. For a handover
+    the grasp is the first hand's, whose failures are those before the second hand takes over.
     """
     executed: Counter[tuple[str, str]] = Counter()
     failed: dict[tuple[str, str], Counter[str]] = {}
@@ -65,10 +67,10 @@ def find_retirements(attempts: Iterable[Attempt], *, failed_share: float) -> lis
 
 
 def retire(twins: TwinSource, found: Iterable[Retirement]) -> int:
-    """Mark grasps as retired in their twins' tables; returns how many were not so before.
+    """Mark grasps as retired in their twins' tables; return the number of newly retired ones.
 
-    A data set's ledger and index follow, and what people said of those twins stands. Raises UsageError for a data set at a URL,
-    whose twins are copies here, or where a run is at work on it.
+    A data set's ledger and index are updated, and reviews of those twins are kept. Raises UsageError for a data set at a URL,
+    whose twins are only cached locally, and if a run is in progress on it.
     """
     by_twin = {twin_id: {each.grasp_id for each in group} for twin_id, group in _by_twin(found)}
     count, revised = 0, dict[str, tuple[str, str]]()
@@ -86,7 +88,7 @@ def retire(twins: TwinSource, found: Iterable[Retirement]) -> int:
     if revised and twins.root.exists(LEDGER):
         _follow(twins.root, {twin_id: revision for twin_id, (_, revision) in revised.items()})
     if revised and twins.root.exists(REVIEWS):
-        with ReviewStore(reviews_path(twins.root)) as store:  # nobody judged which grasps an arm would fail with
+        with ReviewStore(reviews_path(twins.root)) as store:  # reviews do not concern grasps that fail with an arm
             store.follow(revised)
     return count
 
@@ -103,7 +105,7 @@ def _with_column(table: pa.Table, name: str, values: list[bool]) -> bytes:
 
 
 def _follow(root: DatasetRoot, revisions: dict[str, str]) -> None:
-    """Have the ledger and the index say what the folders say."""
+    """Update ledger and index to the twins' new revisions."""
     from manitwin.dataset.index.parts import write_part  # takes a second to import
 
     assert root.local is not None

@@ -1,6 +1,6 @@
-"""What a robot's links look like: the visual shapes of its URDF, simplified for pictures of a size and kept on disk.
+"""Appearance of a robot's links: visual shapes of its URDF, simplified for a picture size and cached on disk.
 
-Reading COLLADA and simplifying takes some CPU seconds for an arm; what comes out is a megabyte or two.
+Reading COLLADA and simplifying takes some CPU seconds for an arm; the result has a megabyte or two.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from manitwin.twin.store import write_bytes_atomically
 
 RUN = logging.getLogger("manitwin.run")
 LOOKS_VERSION = "2"
-"""Another one whenever reading or simplifying links gives other surfaces: what is kept is then made again."""
+"""Change it whenever reading or simplification of links yields other surfaces, which invalidates the cache."""
 WHOLE_FILES = (".dae", ".stl")
-"""Formats of meshes whose colours, but for textures, are in the file itself."""
+"""Mesh formats whose colours, except for textures, are in the file itself."""
 
 
 @lru_cache(maxsize=4)
 def link_visuals(urdf: str) -> dict[str, tuple[trimesh.Trimesh, ...]]:
-    """Return the visual parts of a URDF's links that have any, by name, in the links' frames.
+    """Return the visual meshes of a URDF's links that have any, by name, in the link frames.
 
-    COLLADA files keep their own colours, STL files and plain shapes have those of the URDF. Raises AssetError where a mesh
-    cannot be read.
+    COLLADA files keep their own colours; STL files and primitives have those of the URDF. Raises AssetError if a mesh cannot
+    be read.
     """
     tree = UrdfTree.of_text(urdf)
     shapes = LinkShapes(tree, Path("robot.urdf"), AssetFiles(Path(Path.cwd().anchor)))
@@ -47,9 +47,9 @@ def link_visuals(urdf: str) -> dict[str, tuple[trimesh.Trimesh, ...]]:
 def link_drawables(
     urdf: str, tolerance_m: float, fine_m: float, fingers: frozenset[str] = frozenset()
 ) -> dict[str, Drawable]:
-    """Return the links that have visual parts, ready to be drawn, simplified by about a tolerance; kept for the next run.
+    """Return the links with visual meshes, ready for rendering, simplified by about a tolerance; cached on disk.
 
-    Links of ``fingers``, which a camera on the hand sees from nearby, are simplified by ``fine_m``. Raises AssetError where a
+    Links in ``fingers``, which a camera on the hand sees from nearby, are simplified by ``fine_m``. Raises AssetError if a
     mesh cannot be read.
     """
     kept = _kept_file(urdf, tolerance_m, fine_m, fingers)
@@ -72,9 +72,9 @@ def looks_folder() -> Path:
 
 
 def _kept_file(urdf: str, tolerance_m: float, fine_m: float, fingers: frozenset[str]) -> Path | None:
-    """Return where the looks of a robot are kept, by the content of all that decides them; None where that cannot be told.
+    """Return the cache file of a robot's appearance, named by the digest of all inputs; None if that cannot be determined.
 
-    A file of another format may have its colours in files beside it.
+    None for other mesh formats, whose colours may be in separate files.
     """
     digest = hashlib.sha256(json.dumps([LOOKS_VERSION, tolerance_m, fine_m, sorted(fingers), urdf]).encode())
     try:
@@ -84,12 +84,12 @@ def _kept_file(urdf: str, tolerance_m: float, fine_m: float, fingers: frozenset[
                 return None
             digest.update(hashlib.sha256(path.read_bytes()).digest())
         return looks_folder() / f"{digest.hexdigest()}.npz"
-    except (OSError, RuntimeError):  # reading the mesh says what is wrong; no home
+    except (OSError, RuntimeError):  # unreadable mesh, which is reported when it is loaded; or no home folder
         return None
 
 
 def _read(path: Path) -> dict[str, Drawable] | None:
-    """Return what is kept; None where there is nothing, or what is there is damaged: it is then made and written again."""
+    """Return the cached appearance; None if it is missing or damaged, in which case it is recreated."""
     try:
         with path.open("rb") as stream:
             return drawables_from_bytes(stream.read(MOST_BYTES))
@@ -100,5 +100,5 @@ def _read(path: Path) -> dict[str, Drawable] | None:
 def _write(path: Path, content: bytes) -> None:
     try:
         write_bytes_atomically(path, content)
-    except (OSError, UsageError) as error:  # the looks are there all the same
+    except (OSError, UsageError) as error:  # the appearance is usable without the cache
         RUN.warning("%s: a robot's looks are not kept (%s); look at the folder and the disk", path, error)

@@ -1,4 +1,4 @@
-"""In which placement a thing begins that is to be picked: one in which a hand has room over what it stands on."""
+"""Start placements of a target with room for the hand above its support."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ LEAST_LIKELY = 0.03
 def placement_with_room(
     placements: Sequence[StandingPose], grasps: Sequence[Grasp], gripper: MultiFingerGripper
 ) -> StandingPose | None:
-    """Return the likeliest placement, an upright one first, in which some grasp's hand stays above the plane while it closes.
+    """Return the likeliest placement, preferably upright, in which some grasp's hand stays above the plane while it closes.
 
-    None: no placement is so; those that hardly ever occur are not asked.
+    None if there is none; very unlikely placements are ignored.
     """
     has_room = _room_over_plane(grasps, gripper)
     likely = [pose for pose in placements if pose.probability >= LEAST_LIKELY]
@@ -40,10 +40,10 @@ def placement_with_room(
 def begins_that_lead_there(
     skill: Skill, target: PoolTwin, body: RigidBody, grasps: Callable[[], Sequence[Grasp]], gripper: Gripper
 ) -> Sequence[StandingPose]:
-    """Return the placements that a target may begin in with a skill.
+    """Return the placements in which a target may start with a skill.
 
-    Where it ends in a placement, ``begins_with_room``; where it takes two arms, ``begins_for_two_hands``. ``grasps`` are only
-    asked for then.
+    If the skill ends in a placement, those of ``begins_with_room``; if it needs two arms, those of ``begins_for_two_hands``.
+    ``grasps`` is only called in these cases.
     """
     begins, ends = skill.begins_in(target), skill.ends_in(target)
     if skill.arms == 2:
@@ -59,10 +59,10 @@ def begins_with_room(
     gripper: Gripper,
     body: RigidBody,
 ) -> list[StandingPose]:
-    """Return those of some placements from which a thing can be brought to one of ``ends``.
+    """Return the start placements from which the object can be brought to one of ``ends``.
 
-    A grasp has room in both, and bears the weight of the ``body`` as it is lifted; or two grasps do so with one of ``ways``
-    between them. The plane is all that is asked about, not the arm.
+    Either one grasp has room in both and carries the weight of the ``body`` during the lift, or two grasps do with one of
+    ``ways`` in between. Only the plane is considered, not the arm.
     """
     has_room = _room_over_plane(grasps, gripper)
 
@@ -85,11 +85,11 @@ def begins_for_two_hands(
     gripper: Gripper,
     body: RigidBody,
 ) -> list[StandingPose]:
-    """Return those of some placements from which one hand can lift a thing and another one, beside it, put it down.
+    """Return the start placements from which one hand can lift the object and another, apart from it, can put it down.
 
-    Both bear its weight any way up (``steady_grasps.loads_any_way_up``), their pads are 4 cm apart, the first has room where
-    the thing begins, the second there or in one of ``ends`` (from 3 mm higher, where it may be let go). The plane is all that
-    is asked about, neither the arms nor whether the hands have room beside each other.
+    Both carry its weight in any orientation (``steady_grasps.loads_any_way_up``) and their pads are at least 4 cm apart. The
+    first has room in the start placement, the second there or in one of ``ends`` (from 3 mm higher, where it may release).
+    Only the plane is considered, neither the arms nor the clearance between the hands.
     """
     loads = loads_any_way_up(grasps, body, gripper)
     bearing = [number for number, load in enumerate(loads) if load is not None]
@@ -107,7 +107,7 @@ def begins_for_two_hands(
 def _room_over_plane(
     grasps: Sequence[Grasp], gripper: Gripper, clearance_m: float = CLEARANCE_M
 ) -> Callable[[StandingPose, int], bool]:
-    """Return what tells whether the hand of a grasp, by its number, is above the plane of a placement."""
+    """Return a test whether the hand of a grasp, by number, is above the plane of a placement."""
     corners_of = cache(lambda number: _corners(gripper, grasps[number]))
 
     def has_room(placement: StandingPose, number: int) -> bool:
@@ -118,7 +118,7 @@ def _room_over_plane(
 
 
 def _corners(gripper: Gripper, grasp: Grasp) -> np.ndarray:
-    """Return the corners ``(N, 3)`` of all that a hand covers before it closes and on its way, in the grasp frame."""
+    """Return the vertices ``(N, 3)`` of the hand's boxes before and during closing, in the grasp frame."""
     boxes = gripper.boxes(gripper.opening_m)
     if isinstance(gripper, MultiFingerGripper):
         assert grasp.joints_rad is not None

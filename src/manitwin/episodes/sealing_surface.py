@@ -1,4 +1,4 @@
-"""The true surface of what a suction cup is to hold: hulls smooth over what a lip must follow."""
+"""True surface of objects for suction cups, because hulls smooth over features that a lip must follow."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from manitwin.twin.loaded_twin import Twin
 
 
 def with_surface(placed: PlacedObject, twin: Twin, gripper: Gripper) -> PlacedObject:
-    """Return an object with the surface that its twin shows, where a cup is to seal on it; for other grippers, as it is."""
+    """Return the object with its twin's visual surface if the gripper is a suction cup, otherwise unchanged."""
     if not isinstance(gripper, SuctionGripper):
         return placed
     vertices, faces = trimesh.util.append_faces([m.vertices for m in twin.visual], [m.faces for m in twin.visual])

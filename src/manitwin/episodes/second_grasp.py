@@ -1,4 +1,4 @@
-"""A second grasp: what was left behind, or set down again, is taken once more by another one from where it has come to lie."""
+"""Second grasp: an object that was left behind, or set down again, is taken by another grasp from its current pose."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from manitwin.physics.sapien.world import RobotWorld
 
 
 def carry_out(course: Course, world: RobotWorld, execution: Execution) -> Course:
-    """Carry a planned course out with its watches, once more with other grasps where its own does not hold the target.
+    """Execute a planned course with its watches, and once more with other grasps if its own does not hold the target.
 
-    Returns the course that was carried out last. Raises Ended where it cannot go on; the outcome is that of the first grasp
-    where nothing can be planned with another one.
+    Returns the course executed last. Raises Ended if it cannot be completed; the outcome is that of the first grasp if
+    nothing can be planned with another one.
     """
     before = list(execution.watches)
     execution.watches = [*before, *course.watches(world)]
@@ -36,9 +36,9 @@ def carry_out(course: Course, world: RobotWorld, execution: Execution) -> Course
 
 
 def _taken_anew(course: Course, world: RobotWorld, execution: Execution, *, with_same: bool) -> Course | None:
-    """Bring the open hand home and plan from what is there with the grasps that have not been tried; None: there is no way.
+    """Bring the open hand home and plan from the current poses with the untried grasps; None if there is no plan.
 
-    ``with_same``: where there is no way with those, with all.
+    ``with_same``: if there is no plan with those, all grasps are tried.
     """
     start, facts = course.start, course.facts
     if facts.grasp is None or not isinstance(start.planner, PickPlacePlanner):

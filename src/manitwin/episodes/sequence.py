@@ -1,4 +1,4 @@
-"""Goals of several literals: skills one after the other, each planned from where the one before has left things."""
+"""Goals of several literals: skills in sequence, each planned from where the previous one left the objects."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.contacts import NONE_MEANT
 from manitwin.physics.sapien.world import RobotWorld
 
-DRAWS = 12  # of a later step's poses: two sides at once are a small place
+DRAWS = 12  # draws of a later step's poses: the intersection of two sides is a small area
 
 
 @dataclass(frozen=True)
 class Step:
-    """One literal: the skill that makes it true, of which object (by name), with which partner, held by which grasps.
+    """One literal: the skill that achieves it, the names of target and partner, and the grasps.
 
-    ``goal`` is set beforehand, from where everything is expected to be by then: its fixtures stand in the world from the
-    beginning, its poses are drawn anew when its turn comes.
+    ``goal`` is set before execution, for the expected poses: its fixtures are in the world from the beginning, its poses are
+    sampled again when the step starts.
     """
 
     skill: Skill
@@ -46,29 +46,29 @@ class Step:
 
 @dataclass(frozen=True)
 class GoalSequence:
-    """The steps of a goal in their order, and the surroundings of their objects at the beginning."""
+    """The steps of a goal in order, and the initial surroundings of their objects."""
 
     steps: tuple[Step, ...]
     around: tuple[Surroundings, ...]
 
     @property
     def goal(self) -> SkillGoal:
-        """All of it: what the end is judged by."""
+        """The combined goal, by which the episode is judged."""
         return merged([step.goal for step in self.steps])
 
     @property
     def moved(self) -> frozenset[str]:
-        """The names of the objects that are taken."""
+        """Names of the objects that are taken."""
         return frozenset(step.target for step in self.steps)
 
     @property
     def partners(self) -> frozenset[str]:
-        """The names of the objects that the goal is about beside those."""
+        """Names of the steps' partners."""
         return frozenset(step.partner for step in self.steps if step.partner is not None)
 
 
 def merged(goals: Sequence[SkillGoal]) -> SkillGoal:
-    """Return the conjunction of goals: literals in their order, what stays (said once), and all that they are measured by."""
+    """Return the conjunction of goals: literals in order, unique ``stays`` literals, and all data for judging them."""
     literals = tuple(literal for each in goals for literal in each.goal.literals)
     stays = tuple(dict.fromkeys(stay for each in goals for stay in each.goal.stays))
     first = goals[0]
@@ -86,7 +86,7 @@ def merged(goals: Sequence[SkillGoal]) -> SkillGoal:
 
 
 def course_of(start: Start, facts: EpisodeFacts) -> Course:
-    """Return the course of a start's goal; what one arm does alone is done by the first of two."""
+    """Return the course of a start's goal; for two arms, single-arm tasks are done by the first."""
     if start.skill_goal is not None and start.skill_goal.hands_over:
         return HandoverCourse(start, facts)
     if isinstance(start.planner, TwoArmPlanner):
@@ -102,7 +102,7 @@ def course_of(start: Start, facts: EpisodeFacts) -> Course:
 def later_courses(
     sequence: GoalSequence, start: Start, world: RobotWorld, execution: Execution, facts: EpisodeFacts
 ) -> Iterator[Course]:
-    """Yield the courses of the steps after the first, each planned once the one before has been carried out."""
+    """Yield the courses of the steps after the first, each planned once the previous one has been executed."""
     for number in range(1, len(sequence.steps)):
         yield _next_course(sequence, number, start, world, execution, facts)
 
@@ -110,7 +110,7 @@ def later_courses(
 def _next_course(
     sequence: GoalSequence, number: int, start: Start, world: RobotWorld, execution: Execution, facts: EpisodeFacts
 ) -> Course:
-    """Let all come to rest, bring the arm home, and plan a later step from what is there; raises Ended where there is no way."""
+    """Let everything settle, bring the arm home, and plan a later step from the current poses; raises Ended if that fails."""
     settings, planner, step, around = start.settings, start.planner, sequence.steps[number], sequence.around[number]
     execution.rest(round(settings.max_rest_s / settings.timestep_s))
     objects = tuple(
@@ -140,7 +140,7 @@ def _next_course(
 def problem_of(
     before: PickPlaceProblem, objects: Sequence[PlacedObject], target: int, grasps: tuple[Grasp, ...]
 ) -> PickPlaceProblem:
-    """Return a problem with another target, and everything where it is now."""
+    """Return a problem with another target, and everything at its current pose."""
     return replace(
         before,
         target=objects[target],
@@ -151,10 +151,10 @@ def problem_of(
 
 
 def goal_of_later_step(steps: Sequence[Step], number: int, around: Surroundings, seed: int) -> SkillGoal | None:
-    """Return a later step's goal with poses from where things are; one of a path is made from there anyway. None: no pose.
+    """Return a later step's goal with poses from the current state; None if there is no pose.
 
-    What is taken for a second time goes only where the literals that came true of it stay so: an object that was put left of
-    one thing, and is now put behind another one.
+    A target that is moved a second time only gets poses at which its earlier literals remain true, for example an object that
+    was put left of one object and is now put behind another one. A goal with a path is built from the current state anyway.
     """
     step, names = steps[number], [each.name for each in around.objects]
     target = names.index(step.target)
@@ -175,7 +175,7 @@ def goal_of_later_step(steps: Sequence[Step], number: int, around: Surroundings,
 
 
 def _stays(literals: Sequence[Literal], around: Surroundings, target: int, pose: np.ndarray) -> bool:
-    """Tell whether literals hold with the target at a pose, as far as poses tell."""
+    """Tell whether literals hold with the target at a pose, as far as poses determine it."""
     if not literals:
         return True
     objects = tuple(
@@ -183,5 +183,5 @@ def _stays(literals: Sequence[Literal], around: Surroundings, target: int, pose:
     )
     names = {each.name for each in objects}
     if any(literal.second is not None and literal.second not in names for literal in literals):
-        return False  # on a peg or at a mark it is no more
+        return False  # it is no longer on the peg or at the mark
     return evaluate(state_at_rest(replace(around, objects=objects)), Goal(tuple(literals))).reached

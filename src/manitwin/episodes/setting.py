@@ -1,4 +1,4 @@
-"""What an episode begins with: objects on furniture, which of them is moved, and the goal; drawn on a table or in a scene."""
+"""Initial setting of an episode: objects on furniture, the target, and the goal; sampled on a table or chosen in a scene."""
 
 from __future__ import annotations
 
@@ -23,13 +23,14 @@ from manitwin.scenes.layouts.surroundings import make_furniture, make_lights
 from manitwin.scenes.loaded_scene import Scene, furniture_boxes
 from manitwin.scenes.scene import Furniture, Light
 
-PARTNERS_TRIED, STARTS_TRIED = 40, 24  # of what is to go away from its partner a fifth of the starts are near it
+# for a target that is to move away from its partner, a fifth of the starts are close enough
+PARTNERS_TRIED, STARTS_TRIED = 40, 24
 Begins = Callable[[Skill, PoolTwin], Sequence[StandingPose]]
 
 
 @dataclass(frozen=True)
 class Setting:
-    """An episode before it is planned: the task on its furniture, the scene that it is of, and a goal in words, if any."""
+    """An episode before planning: the task on its furniture, its scene, and a skill's goal, if any."""
 
     task: PickPlaceTask
     furniture: Furniture
@@ -40,7 +41,7 @@ class Setting:
 
     @property
     def fixtures(self) -> tuple[Fixture, ...]:
-        """What the skill needs beside objects."""
+        """The skill's fixtures."""
         return () if self.skill_goal is None else self.skill_goal.fixtures
 
 
@@ -54,9 +55,10 @@ def table_setting(
     rng: np.random.Generator,
     begins: Begins = lambda skill, target: skill.begins_in(target),
 ) -> Setting | None:
-    """Draw a table with a target, the partner that the skill wants, and so many others; None: there is no room, or no partner.
+    """Sample a table with a target, the skill's partner, and ``others`` further objects; None if there is no room or no
+    partner.
 
-    ``begins`` gives the placements that the target may begin in with a skill.
+    ``begins`` returns the placements in which the target may start with a skill.
     """
 
     def other() -> Placeable:
@@ -90,9 +92,9 @@ def scene_setting(
     workspace: Workspace,
     rng: np.random.Generator,
 ) -> Setting | None:
-    """Choose a target in reach and a goal in a scene, and the partner that the skill wants; None: there is none.
+    """Choose a reachable target, the skill's partner and a goal in a scene; None if there is none.
 
-    ``pool`` is only asked for by a skill: it is of all twins, not of the scene's.
+    ``pool`` is only called for a skill; it contains all twins, not only the scene's.
     """
     objects, record = tuple(scene.placed_objects()), scene.record
     supporting = {each.supported_by for each in record.objects}

@@ -1,4 +1,4 @@
-"""Settings of episodes and of their pictures: frozen sections, like those of a build."""
+"""Settings of episodes, tasks and pictures, as frozen sections like those of a build."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from manitwin.geometry.rigid_body import FURNITURE_FRICTION
 from manitwin.scenes.settings import application_run
 
 HANDOVER, TWO_ARMS = "handover", "two_pandas"
-"""The skill of two arms, and the robot that has them where none is named."""
+"""The two-arm skill, and the robot used for it by default."""
 
 
 class EpisodeSettings(Section):
-    """The physics of an episode, and what counts as success (metres, seconds, newtons; angles in degrees).
+    """Physics of an episode, and success criteria (metres, seconds, newtons; angles in degrees).
 
-    ``closing_force_n``: without it the gripper's own. ``solver_iterations_held`` are those while something is held: 24 at
-    1/120 s do as well as 40 at 1/240 s, and 12 drop some (docs/measured/robot_data.md). ``release_height_m`` is how far above
-    its goal an object is let go. What moved less than ``max_placed_m`` and tilted less than ``max_tilt_deg`` from its goal
-    stands where it should, if it moves by no more than ``max_rest_*`` in half a second; ``max_start_*`` is what a start may
-    move until it rests, ``max_disturbed_*`` what may happen to the other objects, ``max_partner_moved_m`` to the one that a
-    goal is about.
+    ``closing_force_n``: by default the gripper's own. ``solver_iterations_held`` are the iterations while an object is held:
+    24 at 1/120 s are as good as 40 at 1/240 s, and 12 drop some objects (docs/measured/robot_data.md). ``release_height_m``
+    is the height above its goal at which an object is released. An object within ``max_placed_m`` and ``max_tilt_deg`` of its
+    goal is placed correctly, if it moves by no more than ``max_rest_*`` in half a second. ``max_start_*`` limits the motion
+    of objects while the start settles, ``max_disturbed_*`` that of the other objects, and ``max_partner_moved_m`` that of the
+    goal's second object.
     """
 
     timestep_s: float = Field(default=1 / 120, gt=0)
@@ -47,11 +47,11 @@ class EpisodeSettings(Section):
 
 
 class TrajectoriesConfig(Section):
-    """Everything that decides what episodes are made of twins or scenes.
+    """Settings that determine the episodes made from twins or scenes.
 
-    ``robot`` is a name or a TOML file; a handover is that of ``two_pandas`` where none is named. ``others`` objects stand around
-    where twins are given and no scenes. ``batch`` episodes of one object are made by one worker, and lost with it. Grasps of
-    which more than ``retire_failed_share`` of the executions failed are retired.
+    ``robot`` is a name or a TOML file; for a handover the default is ``two_pandas``. ``others`` further objects are placed if
+    twins and no scenes are given. ``batch`` episodes of one object are made by one worker, and lost with it. Grasps of which
+    more than ``retire_failed_share`` of the executions failed are retired.
     """
 
     seed: Seed = 0
@@ -72,11 +72,12 @@ class TrajectoriesConfig(Section):
 
 
 class TasksConfig(Section):
-    """Settings of tasks that are drawn in scenes.
+    """Settings of tasks sampled in scenes.
 
-    ``per_scene`` tasks of a scene, ``two_literal_share`` of them of two literals, at most ``most_of_kind`` of one kind;
-    after ``tries_of_kind`` candidates of a kind that could not be planned, the rest of it is left. ``vlm`` proposes up to
-    ``proposals`` tasks a scene: ``openai:MODEL@URL``, ``anthropic:MODEL``, ``replay:FILE``, or ``none``.
+    Each scene gets ``per_scene`` tasks, a share ``two_literal_share`` of them with two literals, and at most a share
+    ``most_of_kind`` of one kind. After ``tries_of_kind`` infeasible candidates of a kind, the rest of the kind is skipped.
+    ``vlm`` proposes up to ``proposals`` tasks per scene: ``openai:MODEL@URL``, ``anthropic:MODEL``, ``replay:FILE``, or
+    ``none``.
     """
 
     seed: Seed = 0
@@ -94,8 +95,9 @@ class TasksConfig(Section):
 class PicturesConfig(Section):
     """Settings of the pictures of episodes.
 
-    ``av1`` and ``vp9`` play in browsers, ``vp9`` in older ones too and for ten times the time; ``mpeg4`` plays in none.
-    ``rate_hz`` is that of pictures, states and actions of the LeRobot set: every second state at 10, every fourth at 5.
+    ``av1`` and ``vp9`` play in browsers; ``vp9`` also plays in older ones, but takes ten times as long to encode. ``mpeg4``
+    plays in none. ``rate_hz`` is the rate of pictures, states and actions of the LeRobot set: every second state at 10, every
+    fourth at 5.
     """
 
     cameras: tuple[str, ...] = ("front", "wrist")

@@ -1,4 +1,4 @@
-"""Grasps by how much the target's weight turns it in the jaws as it is lifted from where it lies."""
+"""Ranking of grasps by the torque with which the target's weight rotates it in the jaws during the lift."""
 
 from __future__ import annotations
 
@@ -15,20 +15,21 @@ from manitwin.physics.trial import GRAVITY_M_S2
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.robots.grippers.parallel import ParallelGripper
 
-LEAST_APART_M = 0.04  # of the pads of two hands on one thing
-EDGE_M = 0.002  # from the pads' ends: by their last row of cells alone
-LIFT_ACCELERATION_M_S2 = 2.0  # of 30 planned lifts in layouts 1.1 in the median and 1.9 at most
+LEAST_APART_M = 0.04  # distance between the pads of two hands on one object
+EDGE_M = 0.002  # contact closer than this to the pads' ends is by their last row of cells alone
+LIFT_ACCELERATION_M_S2 = 2.0  # of 30 planned lifts in layouts: 1.1 in the median and 1.9 at most
 LIFTED_WEIGHT = 1 + LIFT_ACCELERATION_M_S2 / GRAVITY_M_S2
-"""What bears on the jaws as a thing is lifted, as a multiple of its weight."""
-BROAD_SHARE = 0.4  # of a pad's rays: on fewer, fewer of the verified grasps hold, too (``physics.grasp_filters``)
+"""Load on the jaws during a lift, as a multiple of the object's weight."""
+# of a pad's rays: with a smaller contact, fewer of the verified grasps hold (``physics.grasp_filters``)
+BROAD_SHARE = 0.4
 
 
 def steady_tiers(grasps: Sequence[Grasp], target: PlacedObject, gripper: Gripper) -> list[tuple[Grasp, ...]]:
-    """Return grasps in two tiers, each in their order: those that bear to lift the target where it is, and the doubtful.
+    """Return grasps in two tiers, each in order: those that carry the target during the lift, and doubtful ones.
 
-    The doubtful bear it where pads lie flat on it, as a disc of the area that touches does. Left out are those in which a target
-    that is lifted turns about the jaws' axis. The trial of a grasp does not say so: one that lies is held at its end. A tier
-    without grasps is left out too; of other grippers than jaws there is one.
+    Doubtful grasps carry it if the pads lie flat on it, estimated as a disc with the area in contact. Grasps in which the
+    lifted target would rotate about the closing axis are omitted; the grasp trial does not reveal this, because an object
+    held at its end also counts as held. Empty tiers are omitted. For grippers other than jaws there is a single tier.
     """
     if not isinstance(gripper, ParallelGripper):
         return [tuple(grasps)] if grasps else []
@@ -49,11 +50,13 @@ def steady_tiers(grasps: Sequence[Grasp], target: PlacedObject, gripper: Gripper
 def steady_on_the_way(
     grasps: Sequence[Grasp], body: RigidBody, ways: Sequence[np.ndarray], gripper: Gripper
 ) -> list[Grasp]:
-    """Return the grasps in which a body's weight does not turn it all along a way: those first that bear it on a line.
+    """Return the grasps in which a body's weight does not rotate it along a path; those that need only a line contact come
+    first.
 
-    ``ways`` are alternatives, each poses ``(K, 4, 4)`` of the body in the world; of each grasp the gentlest counts. On a face as
-    much is borne as by a disc of the area that touches. A jug that stands hangs straight below jaws at its rim, and bears on them
-    with its whole height once it is tilted to pour. Of other grippers than jaws nothing is known, and all are returned.
+    ``ways`` are alternatives, each poses ``(K, 4, 4)`` of the body in the world; for each grasp the one with the smallest
+    load counts. A face contact carries as much as a disc with the area in contact. A standing jug hangs straight below jaws
+    at its rim, and loads them with its whole height as a lever when it is tilted to pour. For grippers other than jaws all
+    grasps are returned.
     """
     if not isinstance(gripper, ParallelGripper) or not grasps or not ways:
         return list(grasps)
@@ -72,20 +75,22 @@ def steady_on_the_way(
 
 
 def bears_weight(grasp: Grasp, target: PlacedObject, gripper: Gripper) -> bool:
-    """Tell whether a target that is lifted where it is stays as it is in the jaws; of other grippers nothing is known."""
+    """Tell whether a target does not rotate in the jaws during the lift; True for grippers other than jaws."""
     if not isinstance(gripper, ParallelGripper):
         return True
     return LIFTED_WEIGHT * weight_torque_nm(grasp, target, gripper) <= torsion_limits_nm(gripper)[0]
 
 
 def loads_any_way_up(grasps: Sequence[Grasp], body: RigidBody, gripper: Gripper) -> list[int | None]:
-    """Return how the weight of what may be turned any way up loads each grasp, the less the better; None: it is not borne.
+    """Return how the weight loads each grasp if the object may have any orientation, smaller is better; None: it is not
+    carried.
 
-    The largest torque of the weight about the closing axis, in tenths of what two pads bear on a line, divided by the share of
-    the pads that touches. It is borne as on a line where pads touch narrowly (``touch_narrowly``), as on a face else, and not
-    by a corner of a pad, with no more cells than a grasp must have within 2 mm of its end: fingers miss what they reach over
-    by so little. 0 of other grippers than jaws, of which nothing is known. Of 270 lifts, one in which things turned by more
-    than 10 degrees has a larger load than one in which they did not in 79 of 100 pairs, a larger torque in 72.
+    The load is the largest torque of the weight about the closing axis, in tenths of what two pads carry with a line contact,
+    divided by the share of the pads in contact. The torque limit is that of a line contact if the pads touch narrowly,
+    otherwise that of a face. Contact by a corner of a pad does not carry: no more cells than a grasp needs, within 2 mm of
+    the pad's end, which fingers miss by small errors. Returns 0 for grippers other than jaws. Measured on 270 lifts: a lift
+    in which the object rotated by more than 10 degrees has a larger load than one in which it did not in 79 of 100 pairs, and
+    a larger torque in 72.
     """
     if not isinstance(gripper, ParallelGripper) or not grasps:
         return [0] * len(grasps)
@@ -104,17 +109,18 @@ def loads_any_way_up(grasps: Sequence[Grasp], body: RigidBody, gripper: Gripper)
 
 
 def pad_distances_m(grasp: Grasp, others: Sequence[Grasp], gripper: Gripper) -> np.ndarray:
-    """Return how far the middle of a grasp's pads is from those of other grasps ``(N,)``."""
+    """Return the distances ``(N,)`` of a grasp's pad centre from those of other grasps."""
     tip_m = np.array([[0.0, 0, gripper.tip_depth_m]])
     tips = np.array([transform_points(each.gripper_to_object, tip_m)[0] for each in (grasp, *others)])
     return np.asarray(np.linalg.norm(tips[1:] - tips[0], axis=1))
 
 
 def touch_narrowly(grasps: Sequence[Grasp], body: RigidBody, gripper: Gripper) -> list[bool]:
-    """Tell of each grasp whether a pad touches by less than two fifths of it: about a point or a short line, things turn.
+    """Tell for each grasp whether a pad has less than two fifths of its area in contact: objects rotate about a point or a
+    short line.
 
-    Of 270 lifts of 48 things, 26 of the 158 such ones turned by more than 10 degrees, of the others 3 of 112. Of other
-    grippers than jaws nothing is known.
+    Measured on 270 lifts of 48 objects: 26 of the 158 such grasps rotated by more than 10 degrees, and 3 of the 112 others.
+    False for grippers other than jaws.
     """
     if not isinstance(gripper, ParallelGripper):
         return [False] * len(grasps)
@@ -122,22 +128,22 @@ def touch_narrowly(grasps: Sequence[Grasp], body: RigidBody, gripper: Gripper) -
 
 
 def touching_shares(grasps: Sequence[Grasp], body: RigidBody, gripper: ParallelGripper) -> list[float]:
-    """Return the share of the pads that touches in each grasp, of the pad that touches less."""
+    """Return the share of a pad's area in contact for each grasp, of the pad with less."""
     return [int(cells) / PAD_CELLS for cells in _contacts(grasps, body, gripper).cells] if grasps else []
 
 
 def _contacts(grasps: Sequence[Grasp], body: RigidBody, gripper: ParallelGripper) -> PadContacts:
-    """Return how the pads touch."""
+    """Return the pad contacts of the grasps."""
     poses = np.array([each.gripper_to_object for each in grasps])
     return pad_contacts(gripper, poses, RayCaster.of_hulls(body.hulls), body.center_of_mass_m)
 
 
 def torsion_limits_nm(gripper: ParallelGripper) -> tuple[float, float]:
-    """Return the torque about the closing axis that two pads bear by friction, on a line and on a flat face.
+    """Return the torque about the closing axis that two pads carry by friction, with a line contact and with a face contact.
 
-    Pressure is even. On a line across the pad, as of a bottle, 2 * mu F l / 4 with its shorter side l; on a face 2 * 2/3 mu F r
-    with the radius of a disc of its area: the limit surface of Howe and Cutkosky, Practical force-motion models for sliding
-    manipulation, 1996.
+    Pressure is uniform. For a line across the pad, as on a bottle, 2 * mu F l / 4 with its shorter side l; for a face 2 * 2/3
+    mu F r with the radius of a disc of its area: the limit surface of Howe and Cutkosky, Practical force-motion models for
+    sliding manipulation, 1996.
     """
     across_m, along_m = gripper.pad_half_extents_m
     friction_n = gripper.finger_friction * gripper.force_n
@@ -146,7 +152,7 @@ def torsion_limits_nm(gripper: ParallelGripper) -> tuple[float, float]:
 
 
 def weight_torque_nm(grasp: Grasp, target: PlacedObject, gripper: Gripper) -> float:
-    """Return the torque of a target's weight about the closing axis through the pads, where it is."""
+    """Return the torque (N m) of a target's weight at its current pose about the closing axis through the pads."""
     hand = target.object_to_world @ grasp.gripper_to_object
     tip = transform_points(hand, np.array([[0.0, 0, gripper.tip_depth_m]]))[0]
     center = transform_points(target.object_to_world, target.body.center_of_mass_m[None])[0]

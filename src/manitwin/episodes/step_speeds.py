@@ -1,4 +1,4 @@
-"""How fast joints and objects move in a timestep, measured by where they are before and after it."""
+"""Mean velocities of joints and objects over a time step, from poses before and after it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from manitwin.physics.sapien.world import RobotWorld
 
 
 class Speeds(NamedTuple):
-    """The speeds of joints ``(n,)``, of objects' centres of mass ``(O, 3)`` and of their rotation ``(O, 3)``, world frame."""
+    """Velocities of joints ``(n,)``, of objects' centres of mass ``(O, 3)``, and angular velocities ``(O, 3)``, world frame."""
 
     joints_rad_s: np.ndarray
     centers_m_s: np.ndarray
@@ -19,23 +19,24 @@ class Speeds(NamedTuple):
 
 
 class StepSpeeds:
-    """Measures the mean speeds of one timestep of a world.
+    """Measures the mean velocities over one time step of a world.
 
-    PhysX's own speeds are those at the step's end. There stiff drives have slowed joints down, and what is between fingers
-    keeps the speed with which the solver pushed it against them: 0.2 m/s and 14 rad/s of a sponge that stands still.
+    PhysX's own velocities are those at the end of the step. By then stiff drives have decelerated the joints, and an object
+    between fingers keeps the velocity with which the solver pushed it against them: 0.2 m/s and 14 rad/s for a sponge at
+    rest.
     """
 
     def __init__(self, world: RobotWorld, timestep_s: float):
-        """Look at the world as it is."""
+        """Record the current poses."""
         self._world, self._timestep_s = world, timestep_s
         self.begin()
 
     def begin(self) -> None:
-        """Look at where everything is before the step."""
+        """Record the poses before the step."""
         self._joints_rad, self._centers_m, self._turns = self._look()
 
     def end(self) -> Speeds:
-        """Return the speeds of the step that was made since."""
+        """Return the mean velocities since ``begin``."""
         joints_rad, centers_m, turns = self._look()
         return Speeds(
             (joints_rad - self._joints_rad) / self._timestep_s,

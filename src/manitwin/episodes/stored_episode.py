@@ -1,4 +1,4 @@
-"""An episode as it is stored: what was attempted, what was recorded, and by which robot with which objects."""
+"""Stored episode: the attempt, its recording, the robot and the objects."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from manitwin.robots.urdf import UrdfTree
 
 @dataclass(frozen=True)
 class RecordedArm:
-    """One of two arms: its name, how many joints it has, and where its base stands in the world."""
+    """One of two arms: its name, number of joints, and base pose in the world."""
 
     name: str
     joints: int
@@ -28,8 +28,8 @@ class RecordedArm:
 class RecordedRobot:
     """A robot by name and digest, with the names and limits of its joints; the arm's in the order of the recorded arrays.
 
-    ``hand_state`` and ``hand_action`` name what is recorded of the hand and what it is told. ``arms`` are those of a robot of
-    two, in the order of the arrays; of one arm there are none.
+    ``hand_state`` and ``hand_action`` name the recorded hand state and commands. ``arms`` are those of a two-arm robot, in
+    the order of the arrays; empty for a single-arm robot.
     """
 
     name: str
@@ -46,18 +46,18 @@ class RecordedRobot:
 
     @property
     def arm_count(self) -> int:
-        """How many arms there are: one or two."""
+        """The number of arms: one or two."""
         return len(self.arms) or 1
 
     @property
     def has_jaws(self) -> bool:
-        """Whether each hand is two jaws, recorded by their opening."""
+        """Whether each hand is a pair of jaws, recorded by its opening."""
         return bool(self.arms) or self.hand_state == (OPENING,)
 
 
 @dataclass(frozen=True)
 class RecordedObject:
-    """An object of the scene: its name there, and whose twin it is."""
+    """An object of the scene: its name there, and its twin's id."""
 
     name: str
     twin_id: str
@@ -65,9 +65,9 @@ class RecordedObject:
 
 @dataclass(frozen=True)
 class StoredEpisode:
-    """An attempt with its recording; ``objects`` in the recording's order.
+    """An attempt with its recording; ``objects`` are in the recording's order.
 
-    ``facts`` is JSON of whatever else is to be known of it: the goal, the grasp, versions, settings.
+    ``facts`` are further JSON values: the goal, the grasp, versions, settings.
     """
 
     attempt: Attempt
@@ -78,7 +78,7 @@ class StoredEpisode:
 
 
 def recorded_robot(robot: Robot) -> RecordedRobot:
-    """Return what is stored of a robot; the limits of its joints are those of its URDF."""
+    """Return the stored description of a robot; joint limits are those of its URDF."""
     limits = {
         name: (float(limit.get("lower", 0.0)), float(limit.get("upper", 0.0)))
         for name, joint in UrdfTree.of_text(robot.urdf).joints.items()
@@ -111,7 +111,7 @@ def _recorded_arm(arm: Robot) -> RecordedArm:
 
 
 def to_json(episode: StoredEpisode) -> str:
-    """Return all of an episode but its arrays as one line of JSON, the same text for equal values."""
+    """Return an episode's non-array data as one line of JSON, deterministic for equal values."""
     said = {
         "attempt": asdict(episode.attempt),
         "robot": {name: value for name, value in asdict(episode.robot).items() if name != "arms" or value},
@@ -123,7 +123,7 @@ def to_json(episode: StoredEpisode) -> str:
 
 
 def robot_from(said: dict[str, Any]) -> RecordedRobot:
-    """Return the robot of a dict with its fields."""
+    """Return the robot given by a dict of its fields."""
     fields: dict[str, Any] = {n: tuple(value) if isinstance(value, list) else value for n, value in said.items()}
     fields["arms"] = tuple(
         RecordedArm(arm["name"], arm["joints"], tuple(arm["base_position_m"]), tuple(arm["base_quaternion_wxyz"]))

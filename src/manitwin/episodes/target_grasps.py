@@ -1,4 +1,4 @@
-"""The grasps of a twin that an episode may use, in a random order in which robust ones tend to come sooner."""
+"""Usable grasps of a twin in an episode, in a random order biased towards robust ones."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.twin.grasp_table import JOINTS
 from manitwin.twin.loaded_twin import Grasps, Twin
 
-CLEARANCE_M = 0.004  # between the open pads and what they go around, both sides together
-# A grasp of value 1 comes first e^6 = 400 times as often as one of value 0. Of 718 episodes with grasps drawn evenly, 6 of the
-# 194 with values up to 2/3 failed and 1 of 555 with such and higher ones; the lever of the weight, and how far the object
-# moved or turned in the trial, tell how far it turns in the hand but not whether the episode fails.
+CLEARANCE_M = 0.004  # between the open pads and the object, both sides together
+# A grasp of value 1 comes first e^6 = 400 times as often as one of value 0. Of 718 episodes with uniformly drawn grasps, 6 of
+# the 194 with values below 2/3 failed and 1 of the 555 with higher ones. The lever of the weight, and the object's
+# displacement and rotation in the trial, predict its rotation in the hand but not whether the episode fails.
 SHARPNESS = 6.0
 
 
 @dataclass(frozen=True)
 class TargetGrasp:
-    """A grasp that an episode may use; ``value`` (0 to 1) says how good it is thought to be.
+    """A grasp usable in an episode; ``value`` (0 to 1) is its estimated quality.
 
     ``transferred``: it was verified with another parallel gripper. ``grasp_type`` is that of its grasp point.
     """
@@ -37,11 +37,11 @@ class TargetGrasp:
 
 
 def usable_grasps(twin: Twin, gripper: Gripper) -> tuple[TargetGrasp, ...]:
-    """Return the verified grasps that are not retired: the gripper's own, else, of jaws, those of other jaws, transferred.
+    """Return the verified grasps that are not retired: the gripper's own, or else, for jaws, transferred ones of other jaws.
 
-    A transferred grasp has its fingertips where they were verified; what does not fit between the pads is left out. Whose
-    grasps are of jaws their rows tell, as no file of a gripper of one's own need be at hand. Raises UsageError where the twin
-    has grasps of another gripper of this one's name.
+    A transferred grasp keeps its fingertip positions; objects that do not fit between the pads are omitted. Whether a grasp
+    is one of jaws is read from its row, because the file of a custom gripper may not be available. Raises UsageError if the
+    twin has grasps of a different gripper with this gripper's name.
     """
     require_same(gripper, [(twin.record.twin_id, _digest_of(twin, gripper.name))])
     for name in _sources(twin, gripper):
@@ -51,14 +51,14 @@ def usable_grasps(twin: Twin, gripper: Gripper) -> tuple[TargetGrasp, ...]:
 
 
 def shuffled(grasps: Iterable[TargetGrasp], rng: np.random.Generator) -> tuple[TargetGrasp, ...]:
-    """Return them in a random order in which better ones tend to come sooner (Plackett-Luce, drawn by the Gumbel trick)."""
+    """Return the grasps in random order with a bias towards better ones (Plackett-Luce model, sampled by the Gumbel trick)."""
     chosen = tuple(grasps)
     keys = SHARPNESS * np.array([grasp.value for grasp in chosen]) + rng.gumbel(size=len(chosen))
     return tuple(chosen[i] for i in np.argsort(-keys, kind="stable"))
 
 
 def _digest_of(twin: Twin, name: str) -> dict[str, str]:
-    """Return the digest of a gripper's file that a twin has grasps of, by its name; nothing where it has none."""
+    """Return the digest of the gripper file of a twin's grasps, keyed by the gripper's name; empty without such grasps."""
     summary = twin.record.grasps
     if summary is not None and summary.gripper != name:
         other = summary.other_grippers.get(name)
@@ -67,7 +67,7 @@ def _digest_of(twin: Twin, name: str) -> dict[str, str]:
 
 
 def _sources(twin: Twin, gripper: Gripper) -> list[str]:
-    """Return the grippers whose grasps may be used: the one that is wanted, and for jaws all others there are."""
+    """Return the names of grippers whose grasps may be used: the requested one first, and for jaws all others."""
     summary = twin.record.grasps
     if summary is None:
         return []
@@ -83,7 +83,7 @@ def _of_gripper(twin: Twin, name: str, gripper: Gripper) -> tuple[TargetGrasp, .
     jointed, jaws = isinstance(gripper, MultiFingerGripper), isinstance(gripper, ParallelGripper)
     found = []
     for i in range(len(grasps)):
-        # a cup holds at no width, and a hand with joints says where these are
+        # a cup's grasps have no width, and those of a multi-finger hand have joints
         of_jaws = grasps.width_m[i] > 0 and grasps.columns[JOINTS[0]][i] is None
         fits = of_jaws and grasps.width_m[i] + CLEARANCE_M <= gripper.opening_m
         if not (fits or name == gripper.name):
@@ -98,7 +98,7 @@ def _of_gripper(twin: Twin, name: str, gripper: Gripper) -> tuple[TargetGrasp, .
 
 
 def _values(grasps: Grasps) -> list[float]:
-    """Return the posterior mean of the share of perturbed trials that held, where there were any, else the score."""
+    """Return the posterior mean of the success rate in perturbed trials, or the score if there were none."""
     columns = grasps.columns
     return [
         (share * trials + 1) / (trials + 2) if trials else float(score)

@@ -1,4 +1,4 @@
-"""The row of the table of attempts that an episode's facts make."""
+"""Conversion of an episode's facts into a row of the table of attempts."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def told_attempt(
     instructions: tuple[str, ...] = (),
     task_id: str | None = None,
 ) -> Attempt:
-    """Return the row that says what came of an episode: what it set out to do, and its facts."""
+    """Return the row of an episode, from its inputs and its facts."""
     errors, judged = facts.errors, facts.evaluation
     return Attempt(
         episode_id=episode_id,

@@ -1,6 +1,6 @@
-"""Watches of what is done with a tool or with the hand alone: pushed, stirred, wiped, moved along a cut, aimed.
+"""Event watches of tool use and pushing: pushed, stirred, wiped, cut motion, aimed.
 
-Like those of ``events``, each looks at every step that it is shown; what it measures is judged later (``goals.tool_use``).
+Like those of ``events``, each processes every step that it is shown; its measurements are judged later (``goals.tool_use``).
 """
 
 from __future__ import annotations
@@ -21,25 +21,26 @@ from manitwin.geometry.cavity import Opening
 from manitwin.geometry.poses import inverse, transform_points
 from manitwin.physics.sapien.contacts import ContactReader
 
-LEFT_S, STILL_M = 0.25, 0.001  # untouched for so long, moving no farther: what was lifted has been put somewhere
+# a lifted object that is untouched for LEFT_S and moves less than STILL_M has been put down
+LEFT_S, STILL_M = 0.25, 0.001
 SECTORS = 12
-STIRRED_BAND = (0.15, 1.0)  # of the rim's radius
-STIRRED_DEPTH = 0.3  # of the vessel's, below its rim
+STIRRED_BAND = (0.15, 1.0)  # in rim radii
+STIRRED_DEPTH = 0.3  # share of the vessel's depth, below its rim
 CELL_M = 0.01
 WIPING_N = (1.0, 5.0)
-SMOOTHED_LOOKS = 12  # the force of one step is noise: a tenth of a second
+SMOOTHED_LOOKS = 12  # the force of a single step is noisy; averaged over about a tenth of a second
 FACE_RAD = np.radians(15)
-FACE_M = 0.002  # what is no farther from the plane than this belongs to the face
+FACE_M = 0.002  # points within this distance of the lowest one belong to the face
 CUT_OFF_M, CUT_RAD, CUT_STEP_M = 0.005, np.radians(10), 0.005
 AIMED_RAD = 0.15
 
 
 @dataclass
 class PushWatch:
-    """Latches that ``subject`` was touched by bodies of the robot, how high its ``center`` rose and how far it went meanwhile.
+    """Records contact of ``subject`` with bodies of the robot, the rise of its ``center``, and its horizontal displacement.
 
-    What was lifted and stands again, touched by none of them for a quarter of a second, is looked at anew from there: a thing
-    may be put somewhere and pushed then.
+    After a lift, an object that has been at rest and untouched for a quarter of a second is measured anew from there, because
+    it may be put somewhere first and pushed then.
     """
 
     subject: str
@@ -54,14 +55,14 @@ class PushWatch:
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """One event where it was touched: ``rise_m``, and ``way_m`` from where it stood to where it is, level."""
+        """One event if it was touched: ``rise_m``, and ``way_m``, the horizontal displacement from its start."""
         if not self._touched or self._start is None or self._now is None:
             return ()
         way_m = float(np.linalg.norm((self._now - self._start)[:2]))
         return (Event("pushed", self.subject, None, {"rise_m": self._rise_m, "way_m": way_m}),)
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
-        """Look at the contacts of the last step."""
+        """Process the contacts of the last step."""
         push, self._now = reader.push(contacts, self.subject, self.by), (center := self.center())
         self.force_n = 0.0 if push is None else float(np.linalg.norm(push.force_n))
         self._touched = self._touched or self.force_n > 0
@@ -77,10 +78,10 @@ class PushWatch:
 
 @dataclass
 class StirWatch:
-    """Latches through which sectors of a vessel a tool's ``end (3,)`` went, below a third of its depth.
+    """Records the sectors of a vessel that a tool's ``end (3,)`` passed through, deeper than 30 % of its depth.
 
-    ``granules`` gives their middles ``(N, 3)``. Values: ``sectors``, the share of twelve; ``moved``, the share of granules
-    that moved by more than their width.
+    ``granules`` returns their centres ``(N, 3)``. Values: ``sectors``, the share of the twelve sectors; ``moved``, the share
+    of granules that moved by more than their diameter.
     """
 
     tool: str
@@ -96,7 +97,7 @@ class StirWatch:
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """One event where the end was in the vessel."""
+        """One event if the end was in the vessel."""
         if self._start is None or not self._visited.any():
             return ()
         moved = np.linalg.norm(self.granules() - self._start, axis=1) > 2 * self.granule_radius_m
@@ -104,7 +105,7 @@ class StirWatch:
         return (Event("stirred", self.tool, self.vessel, values),)
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
-        """Note the sector of the vessel that the tool's end is in."""
+        """Record the sector of the vessel that contains the tool's end."""
         if self._start is None:
             self._start = self.granules()
         pose, opening = self.vessel_to_world(), self.opening
@@ -122,11 +123,12 @@ class StirWatch:
 
 @dataclass
 class WipeWatch:
-    """Latches which cells (1 cm) of a level patch a tool's face swept while it pressed on ``surface`` with 1 to 5 N.
+    """Records the cells (1 cm) of a level patch that a tool's face swept while pressing on ``surface`` with 1 to 5 N.
 
-    ``patch_to_world`` is the patch's middle with Z up, ``half_m (2,)`` its half extents. ``faces_to_tool (F, 4, 4)`` are the
-    frames of the faces that wipe, Z out: one looks down within 15 degrees while cells count. Values: ``share`` swept,
-    ``force_n`` in the mean while it touched, ``in_band``, the share of that time with such a force, ``by_face``, with a face.
+    ``patch_to_world`` is the patch's centre with Z up, ``half_m (2,)`` its half extents. ``faces_to_tool (F, 4, 4)`` are the
+    frames of the wiping faces, Z outwards, one of which must point down within 15 degrees. Values: ``share`` of swept cells;
+    ``force_n``, the mean over the contact time; ``in_band``, the share of that time with a force of 1 to 5 N; ``by_face``,
+    the share with a face down.
     """
 
     tool: str
@@ -144,14 +146,14 @@ class WipeWatch:
     _swept: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
-        """Lay out the cells."""
+        """Create the cells."""
         axes = [np.arange(-half + CELL_M / 2, half, CELL_M) for half in self.half_m]
         self._cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
         self._swept = np.zeros(len(self._cells), bool)
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """One event where it touched."""
+        """One event if it touched."""
         if not self._forces:
             return ()
         forces = np.array(self._forces)
@@ -161,7 +163,7 @@ class WipeWatch:
         return (Event("wiped", self.tool, self.place, {name: float(value) for name, value in values.items()}),)
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
-        """Look how hard it presses, and on which cells."""
+        """Record the force, and the cells under the face."""
         push = reader.push(contacts, self.tool, frozenset({self.surface}))
         self._recent.append(0.0 if push is None else float(np.linalg.norm(push.force_n)))
         self.force_n = float(np.mean(self._recent))
@@ -182,11 +184,12 @@ class WipeWatch:
 
 @dataclass
 class CutWatch:
-    """Latches how much of a line an edge went along: within 5 mm of it, and 10 degrees from it and from upright.
+    """Records how much of a line an edge moved along: within 5 mm of it, and within 10 degrees of its direction and of
+    upright.
 
-    ``line_to_world`` has its origin in the line's middle, X along it, Z up; ``edge`` gives the edge's frame (X along it, Z out
-    of it). Values: ``share`` of the line; ``drawn``, how far along it the edge moved meanwhile, by its length; ``off_m``,
-    ``angle_rad``, the least that they were.
+    ``line_to_world`` has its origin at the line's centre, X along it, Z up; ``edge`` returns the edge's frame (X along it, Z
+    outwards). Values: ``share`` of the line; ``drawn``, the edge's travel along it over its length; ``off_m`` and
+    ``angle_rad`` at the smallest distance.
     """
 
     tool: str
@@ -202,13 +205,13 @@ class CutWatch:
     _met: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
-        """Lay out the places along the line."""
+        """Create the sample points along the line."""
         self._places_m = np.arange(-self.length_m / 2, self.length_m / 2 + 1e-9, CUT_STEP_M)
         self._met = np.zeros(len(self._places_m), bool)
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """One event where the edge came near."""
+        """One event if the edge came near."""
         if not np.isfinite(self._off_m):
             return ()
         drawn = max(self._along_m[1] - self._along_m[0], 0.0) / self.length_m
@@ -216,7 +219,7 @@ class CutWatch:
         return (Event("cut_motion", self.tool, self.place, values),)
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
-        """Look where the edge is."""
+        """Record the edge's pose relative to the line."""
         edge = inverse(self.line_to_world) @ self.edge()
         along = edge[:3, 0] * (1.0 if edge[0, 0] >= 0 else -1.0)
         cosines = np.clip([along[0], -edge[2, 2]], -1, 1)
@@ -234,7 +237,7 @@ class CutWatch:
 
 @dataclass
 class AimWatch:
-    """Latches the longest while for which a nozzle (Z out of it) pointed at ``target (3,)``, and how well at its best."""
+    """Records the longest time for which a nozzle (Z outwards) pointed at ``target (3,)``, and the best alignment."""
 
     tool: str
     second: str
@@ -248,19 +251,20 @@ class AimWatch:
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """One event: ``angle_rad``, ``distance_m`` at its best, ``held_s``."""
+        """One event: ``angle_rad`` and ``distance_m`` at the best alignment, ``held_s``."""
         if self._best is None:
             return ()
         values = {"angle_rad": self._best[0], "distance_m": self._best[1], "held_s": self._longest * self.timestep_s}
         return (Event("aimed", self.tool, self.second, values),)
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
-        """Look where the nozzle points."""
+        """Record the nozzle's direction."""
         nozzle = self.nozzle()
         way = self.target() - nozzle[:3, 3]
         distance_m = float(np.linalg.norm(way))
         across_m = float(np.linalg.norm(np.cross(nozzle[:3, 2], way)))
-        angle_rad = float(np.arctan2(across_m, nozzle[:3, 2] @ way))  # by its cosine half a milliradian would be 0
+        # atan2, because arccos would return 0 for half a milliradian
+        angle_rad = float(np.arctan2(across_m, nozzle[:3, 2] @ way))
         on_it = angle_rad <= AIMED_RAD and AIMED_M[0] <= distance_m <= AIMED_M[1]
         self._looks = self._looks + 1 if on_it else 0
         self._longest = max(self._longest, self._looks)
@@ -269,7 +273,7 @@ class AimWatch:
 
 
 def _beside(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return two directions across an axis ``(3,)``."""
+    """Return two orthogonal directions perpendicular to an axis ``(3,)``."""
     x = np.cross(axis, [0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [1.0, 0.0, 0.0])
     x = x / np.linalg.norm(x)
     return x, np.cross(axis, x)

@@ -1,4 +1,4 @@
-"""Episodes as films: many in one mp4 for data sets, one as an animated picture for documents."""
+"""Video writers for episodes: many in one mp4 for data sets, one as an animated image for documents."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ANIMATIONS = (".webp", ".gif")
 
 @dataclass(frozen=True)
 class Span:
-    """The place of an episode in its file: ``frames`` pictures from ``first_frame`` on."""
+    """Location of an episode in its file: ``frames`` pictures from ``first_frame``."""
 
     file: Path
     first_frame: int
@@ -29,7 +29,7 @@ class Span:
 
 
 def require_encoder(codec: Codec) -> None:
-    """Raise UsageError, naming the builds that have it, where a codec cannot be written here; nothing stands in for it."""
+    """Raise UsageError, naming suitable builds, if a codec cannot be encoded here; there is no fallback."""
     _require_codec(codec)
     with tempfile.TemporaryDirectory(prefix="manitwin-encoder-") as folder:
         encoder = opened_encoder(codec, Path(folder) / "a.mp4", 64, 64, RATE_HZ)
@@ -45,12 +45,12 @@ def _require_codec(codec: str) -> None:
 
 
 class EpisodesVideo:
-    """An mp4 of episodes, one after the other, at ``rate_hz`` pictures a second. To be used in a ``with`` statement.
+    """An mp4 of consecutive episodes at ``rate_hz`` pictures per second. Use it in a ``with`` statement.
 
-    ``av1`` and ``vp9`` play in browsers; ``vp9`` takes ten times as long, and plays in older ones too; ``mpeg4`` takes a fifth
-    of the time of ``av1``, plays in what learning libraries decode with, and in no browser. All are read back frame by frame
-    exactly; same pictures, same bytes. The file appears when it is complete. Raises UsageError for a size that is odd, for
-    another codec, and as ``require_encoder`` does.
+    ``av1`` and ``vp9`` play in browsers; ``vp9`` takes ten times as long, and also plays in older ones. ``mpeg4`` takes a
+    fifth of the time of ``av1``, and plays in the decoders of learning libraries, but in no browser. All are decoded frame by
+    frame exactly, and encoded deterministically. The file appears when it is complete. Raises UsageError for an odd size, an
+    unknown codec, and as ``require_encoder`` does.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class EpisodesVideo:
             self._unfinished.unlink(missing_ok=True)
 
     def add(self, pictures: Iterable[np.ndarray]) -> Span:
-        """Append an episode's pictures ``(H, W, 3) uint8`` RGB; raises UsageError where one has another size."""
+        """Append an episode's pictures ``(H, W, 3) uint8`` RGB; raises UsageError for a picture of another size."""
         first = self._frames
         for picture in pictures:
             if picture.shape != self._shape or picture.dtype != np.uint8:
@@ -95,9 +95,10 @@ class EpisodesVideo:
 
 
 def write_animation(pictures: Iterable[np.ndarray], path: Path, *, rate_hz: float = 10.0, quality: int = 70) -> None:
-    """Write pictures ``(H, W, 3) uint8`` RGB as an animation that repeats, WebP or GIF by the name's suffix.
+    """Write pictures ``(H, W, 3) uint8`` RGB as a looping animation, WebP or GIF by the file's suffix.
 
-    ``quality`` (1 to 100) is WebP's; a GIF has 256 colours a picture. Raises UsageError for another suffix or no picture.
+    ``quality`` (1 to 100) applies to WebP; a GIF has 256 colours per picture. Raises UsageError for another suffix or no
+    picture.
     """
     images = [Image.fromarray(picture) for picture in pictures]
     if path.suffix not in ANIMATIONS or not images:
