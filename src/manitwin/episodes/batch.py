@@ -27,8 +27,8 @@ REMEDY_OF_REPEATS = "an older version made these in steps; make the episodes aga
 
 @dataclass(frozen=True)
 class Batch(Payload):
-    """Some episodes of a twin, a scene or a task, by their numbers in the run: ``count`` from ``first`` in increments of
-    ``step``.
+    """Some episodes of a twin, a scene or a task, by their numbers in the run: ``count`` numbers from ``first``, ``step``
+    apart.
     """
 
     robot: str
@@ -65,9 +65,7 @@ class Batch(Payload):
         return cls(**(json.loads(fields["text"]) if "text" in fields else fields))
 
     def to_json(self) -> dict[str, Any]:
-        """Return its fields, without a ``step`` of 1 and without an unset ``task_id``, so that ids of older versions stay
-        valid.
-        """
+        """Return the fields, omitting a ``step`` of 1 and an unset ``task_id``, so that ids of older versions stay valid."""
         left_out = {
             name for name, told in (("step", self.step != 1), ("task_id", self.task_id is not None)) if not told
         }

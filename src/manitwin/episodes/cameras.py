@@ -76,9 +76,7 @@ def _front(robot: Robot) -> NamedCamera:
 
 
 def _front_of_two(robot: Robot) -> NamedCamera:
-    """Return a camera that looks across the line between the bases, because the second arm blocks the view from beyond the
-    workspace.
-    """
+    """Return a camera that looks across the line between the bases; beyond the workspace the second arm would block the view."""
     first, second = (base_to_world(arm)[:3, 3] for arm in robot.arms)
     middle, along = (first + second) / 2, (second - first)[:2]
     apart_m = float(np.hypot(*along))

@@ -80,9 +80,7 @@ class PicturesRecord(FolderRecord):
 
 
 class EpisodeFilmsStage:
-    """Stage that renders the kept episodes of a batch: one video per camera with all episodes, frame t of an episode showing
-    state t.
-    """
+    """Stage that renders a batch's kept episodes: one video per camera; frame t of an episode shows state t."""
 
     name = "films"
     version = "8"

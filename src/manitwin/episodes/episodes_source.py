@@ -33,10 +33,10 @@ class EpisodesSource:
 
     @classmethod
     def of(cls, place: str | Path, twins: str | Path | None = None) -> EpisodesSource:
-        """Detect the kind of source; raises UsageError for an invalid one, and for scenes whose twins are missing or have
-        changed.
+        """Detect the kind of source.
 
-        ``twins`` is the current location of the scenes' twins; None: that recorded with the layouts.
+        ``twins`` is the current location of the scenes' twins; None: that recorded with the layouts. Raises UsageError for an
+        invalid source, and for scenes whose twins are missing or have changed.
         """
         root = DatasetRoot(place)
         path = root.absolute()

@@ -212,9 +212,7 @@ class Execution:
         return self._world.object_to_world(self._world.target)
 
     def gripper_to_object(self) -> np.ndarray:
-        """Return the commanded hand pose in the object frame; the arm's tracking error thus counts as a pose change in the
-        hand.
-        """
+        """Return the commanded hand pose in the object frame; the arm's tracking error counts as a pose change in the hand."""
         return inverse(self.target_to_world()) @ self._arm.tip_pose(self.commanded_rad)
 
     def rest(self, max_steps: int, still_rows: int = STILL_ROWS) -> list[list[np.ndarray]]:

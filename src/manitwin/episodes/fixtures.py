@@ -99,9 +99,7 @@ def block(position_m: np.ndarray, yaw_rad: float, *, name: str = "block") -> Fix
 
 
 def board(position_m: np.ndarray, yaw_rad: float, half_m: np.ndarray, *, name: str = "board") -> Fixture:
-    """Return a level board on the table at ``position_m (3,)`` with half extents ``(3,)`` m; its frame is at the centre of
-    its top.
-    """
+    """Return a level board on the table at ``position_m (3,)`` with half extents ``(3,)`` m; its frame is at its top's centre."""
     upright = transform(Rotation.from_euler("z", yaw_rad).as_matrix(), np.asarray(position_m, float))
     high_m = float(half_m[2])
     box = StaticBox(name, np.asarray(half_m, float), upright @ transform(translation=np.array([0.0, 0, high_m])))

@@ -53,8 +53,9 @@ class LocatedView:
 
     @cached_property
     def plane(self) -> Plane:
-        """The table plane, found without the objects' masks, because a large box's side is not a table; raises UsageError if
-        none is seen.
+        """The table plane, found without the objects' masks; raises UsageError if none is seen.
+
+        The masks are excluded because the side of a large box could be taken for the table.
         """
         things = np.any([thing.mask for thing, _ in self.things], axis=0)
         beside = replace(self.view, depth_m=np.where(things, 0.0, self.view.depth_m))

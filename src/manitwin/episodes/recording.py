@@ -78,8 +78,7 @@ def joint_delta(recording: Recording) -> np.ndarray:
 
 
 def tip_delta(recording: Recording) -> np.ndarray:
-    """Return ``(T, 6 + h) float32``: the difference of the tip's target from its pose (for each arm), followed by the hand
-    commands.
+    """Return ``(T, 6 + h) float32``: the difference of each tip's target from its pose, followed by the hand commands.
 
     Three translations (m) and a rotation vector (rad), both along the world axes, which are those of the robot's base:
     ``p_target = p + d[:3]``, ``R_target = exp(d[3:6]) R``. The axes are those of ManiSkill's ``pd_ee_delta_pose``

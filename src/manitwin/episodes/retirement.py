@@ -1,5 +1,6 @@
-"""Retirement of grasps that fail in episodes: the trial of a hand in free space does not cover tables, long carries or
-neighbours.
+"""Retirement of grasps that fail in episodes.
+
+The grasp trial tests a hand in free space, without table, long carry or neighbours.
 """
 
 from __future__ import annotations

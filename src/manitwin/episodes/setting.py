@@ -55,8 +55,7 @@ def table_setting(
     rng: np.random.Generator,
     begins: Begins = lambda skill, target: skill.begins_in(target),
 ) -> Setting | None:
-    """Sample a table with a target, the skill's partner, and ``others`` further objects; None if there is no room or no
-    partner.
+    """Sample a table with a target, the skill's partner, and ``others`` further objects; None without room or partner.
 
     ``begins`` returns the placements in which the target may start with a skill.
     """

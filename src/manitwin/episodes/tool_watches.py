@@ -184,11 +184,10 @@ class WipeWatch:
 
 @dataclass
 class CutWatch:
-    """Records how much of a line an edge moved along: within 5 mm of it, and within 10 degrees of its direction and of
-    upright.
+    """Records how much of a line an edge moved along: within 5 mm, and within 10 degrees of its direction and of upright.
 
     ``line_to_world`` has its origin at the line's centre, X along it, Z up; ``edge`` returns the edge's frame (X along it, Z
-    outwards). Values: ``share`` of the line; ``drawn``, the edge's travel along it over its length; ``off_m`` and
+    outwards). Values: ``share`` of the line; ``drawn``, the edge's travel along it over the line's length; ``off_m`` and
     ``angle_rad`` at the smallest distance.
     """
 

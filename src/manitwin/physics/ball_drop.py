@@ -16,12 +16,11 @@ BALL_SECONDS = 2.0
 
 @dataclass(frozen=True)
 class BallDrop:
-    """A vessel rotated by ``turn (3, 3)`` so that its opening points up (+Z), and a ball of ``radius_m`` that starts at
-    ``start_m``.
+    """A vessel rotated by ``turn (3, 3)`` so that its opening points up (+Z), and a ball of ``radius_m`` at ``start_m``.
 
-    The radius is a third of the rim radius or of the depth, whichever is smaller. The ball starts above the centre of
-    the rim, ``rim_m (3,)``. ``depth_m`` is the depth of the opening, ``widest_m`` the largest horizontal distance of a
-    hull vertex from the rim's centre. Positions are in the frame of the rotated vessel.
+    The radius is a third of the rim radius or of the depth, whichever is smaller. The ball starts above the centre of the
+    rim, ``rim_m (3,)``. ``depth_m`` is the depth of the opening, ``widest_m`` the largest horizontal distance of a hull
+    vertex from the rim's centre. Positions are in the frame of the rotated vessel.
     """
 
     turn: np.ndarray

@@ -21,7 +21,7 @@ MOVED_M, MOVED_RAD = 0.002, 0.05
 
 
 class ConfirmedTrial:
-    """Grasp trial in a first engine whose held grasps with a moved object are repeated in a second engine, which can
+    """Grasp trial in a first engine; held grasps in which the object moved are repeated in a second engine, which can
     overturn them.
     """
 

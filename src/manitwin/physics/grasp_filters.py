@@ -1,5 +1,4 @@
-"""Geometric filters of parallel-jaw grasp proposals: pad contact, and clearance of the open hand from object and support
-plane.
+"""Geometric filters of parallel-jaw grasps: pad contact, and clearance of the open hand from object and support plane.
 
 Pad contact is found by casting a grid of rays from each open pad inwards. A grasp that holds in free space may have its
 fingertips below the plane from which the object will be picked; for the fork, the plate and the scissors of the test set this
@@ -81,8 +80,7 @@ def pad_contacts(
 
 @dataclass(frozen=True)
 class _Touched:
-    """Touching cells of one pad: their number ``cells (N,)``, centre ``center_m (N, 2)`` and bounds ``least_m``,
-    ``most_m (N, 2)``.
+    """Touching cells of one pad: number ``cells (N,)``, centre ``center_m (N, 2)``, bounds ``least_m`` and ``most_m (N, 2)``.
 
     Coordinates are Y (across) and Z (along the approach) of the gripper frame.
     """
@@ -167,8 +165,8 @@ def _touched(touching: np.ndarray, grid: np.ndarray) -> _Touched:
 
 @lru_cache(maxsize=8)
 def _ends_of_cells(grid: tuple[tuple[float, float], ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the count ``(2^C,)`` and the lower and upper bounds ``(2^C, 2)`` of every subset of the cells ``(C, 2)``,
-    by bit mask.
+    """Return the count ``(2^C,)`` and the lower and upper bounds ``(2^C, 2)`` of every subset of cells ``(C, 2)``, by bit
+    mask.
     """
     count: np.ndarray = np.zeros(1, dtype=np.int64)
     least, most = np.full((1, 2), np.inf), np.full((1, 2), -np.inf)
@@ -218,9 +216,7 @@ def _pressed(plus: _Touched, minus: _Touched, width_m: np.ndarray, off_m: np.nda
 
 @dataclass(frozen=True)
 class FilteredGrasps:
-    """Result of ``GraspFilter``: indices of the remaining grasps, their contacts, and the number that passed the pad
-    filter alone.
-    """
+    """Remaining grasps of a ``GraspFilter``: indices, contacts, and the number that passed the pad filter alone."""
 
     index: np.ndarray
     contacts: PadContacts

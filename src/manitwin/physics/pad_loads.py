@@ -59,15 +59,14 @@ def load_share(
     friction: float,
     flat: bool = True,
 ) -> np.ndarray:
-    """Return the share ``(N,)`` of the pads' load limit that weight and slides use in grasps ``(N, 4, 4)``, worst of
-    six directions.
+    """Return the share ``(N,)`` of the pads' load limit that weight and slides use in grasps ``(N, 4, 4)``.
 
-    For each slide direction the share is sqrt(t^2 + mx^2 + my^2 + mz^2): the force across the closing axis over 2 mu F,
-    and each moment over its own limit. The limits are 2 mu F r about the closing axis and F d + mu F w about the two
-    other axes, with the available offset d of the centres of pressure and the width w. The radius r is that of a whole
-    pad if both pads are taken to lie ``flat`` on the object, otherwise that of a disc with the area in contact. The
-    ellipsoid approximates the limit surface (Howe and Cutkosky, Practical force-motion models for sliding manipulation,
-    1996).
+    For each of the six slide directions the share is sqrt(t^2 + mx^2 + my^2 + mz^2): the force across the closing axis over 2
+    mu F, and each moment over its own limit; the largest share counts. The limits are 2 mu F r about the closing axis and F d
+    + mu F w about the two other axes, with the available offset d of the centres of pressure and the width w. The radius r is
+    that of a whole pad if both pads are taken to lie ``flat`` on the object, otherwise that of a disc with the area in
+    contact. The ellipsoid approximates the limit surface (Howe and Cutkosky, Practical force-motion models for sliding
+    manipulation, 1996).
 
     ``gripper_to_object`` and ``center_of_mass_m (3,)`` are in the object frame, whose -Z is the direction of gravity.
     """

@@ -1,9 +1,8 @@
-"""Robustness of held grasps: random perturbations of pose, friction, force and mass, and a sequential test of the
-success rate.
+"""Robustness of held grasps: random perturbations of pose, friction, force and mass, and a sequential test of success.
 
-The test is Wald's sequential probability ratio test (Wald, "Sequential tests of statistical hypotheses", 1945). After
-each trial it evaluates the log likelihood ratio of the success rates ``robust_share`` and ``fragile_share``, and stops
-when the absolute value exceeds ln((1 - error) / error).
+The test is Wald's sequential probability ratio test (Wald, "Sequential tests of statistical hypotheses", 1945). After each
+trial it evaluates the log likelihood ratio of the success rates ``robust_share`` and ``fragile_share``, and stops when the
+absolute value reaches ln((1 - error) / error).
 """
 
 from __future__ import annotations
@@ -112,8 +111,7 @@ class FillCurve:
         return float(np.interp(mass_kg, self.masses_kg, self.uncertainties_m)) / most_m if most_m > 0 else 0.0
 
     def filled(self, body: RigidBody, mass_kg: float) -> RigidBody:
-        """Return the body with the mass properties of the vessel at ``mass_kg``, interpolated linearly between the
-        known states.
+        """Return the body with the vessel's mass properties at ``mass_kg``, interpolated linearly between the known states.
 
         Below the empty and above the full mass, the properties of the nearest known state are scaled.
         """
@@ -129,9 +127,7 @@ class FillCurve:
 
 @dataclass(frozen=True)
 class Perturbation:
-    """One sample: translation (m) and rotation vector (rad) of the hand in its own frame, factors, mass, shift of the
-    centre of mass.
-    """
+    """One sample: translation (m) and rotation vector (rad) of the hand in its own frame, factors, mass, centre of mass shift."""
 
     shift_m: np.ndarray
     turn_rad: np.ndarray
@@ -141,9 +137,7 @@ class Perturbation:
     center_of_mass_shift_m: np.ndarray
 
     def grasp(self, gripper_to_object: np.ndarray, depth_m: float) -> np.ndarray:
-        """Return the grasp ``(4, 4)`` translated, and rotated about the centre of the fingertips, ``depth_m`` along the
-        approach.
-        """
+        """Return the grasp ``(4, 4)`` translated, and rotated about the fingertips' centre, ``depth_m`` along the approach."""
         rotation = gripper_to_object[:3, :3] @ Rotation.from_rotvec(self.turn_rad).as_matrix()
         tip = gripper_to_object[:3, 3] + depth_m * gripper_to_object[:3, 2]
         shift = gripper_to_object[:3, :3] @ self.shift_m

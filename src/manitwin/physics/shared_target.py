@@ -10,17 +10,15 @@ MET_M = 1e-6  # pads closer than this are considered to have met
 
 
 class SharedTarget:
-    """Position target shared by both fingers of a closing parallel hand, limited so that they press with at most the
-    closing force.
+    """Position target shared by both fingers of a closing parallel hand, limited to press with at most the closing force.
 
-    The mechanical coupling of a real hand has the same effect. Two independently saturated fingers would have no
-    lateral stiffness and drift by centimetres.
+    The mechanical coupling of a real hand has the same effect. Two independently saturated fingers would have no lateral
+    stiffness and drift by centimetres.
 
     Coordinates are the distances (m) of the pads from the plane between them. If the pads meet (mean position at most
-    ``met_m``), there is nothing between them: the target returns to the open position, as a gripper opens again that
-    reports an empty hand. Without this rule, fingers that have tunnelled into a thin, light object would hold it.
-    ``presses`` tells whether the fingers have stopped and lag behind the target by the distance that yields the closing
-    force.
+    ``met_m``), there is nothing between them: the target returns to the open position, as a gripper opens again that reports
+    an empty hand. Without this rule, fingers that have tunnelled into a thin, light object would hold it. ``presses`` tells
+    whether the fingers have stopped and lag behind the target by the distance that yields the closing force.
     """
 
     def __init__(self, opening_m: float, settings: TrialSettings, met_m: float = MET_M):

@@ -59,9 +59,7 @@ class TrialSettings:
 
     @property
     def frame_s(self) -> float:
-        """Duration of a frame (s), the time between two updates of the hand: the solver works in steps, the protocol in
-        frames.
-        """
+        """Duration of a frame (s), the time between two updates of the hand; the solver works in steps."""
         return self.steps_per_frame * self.timestep_s
 
 

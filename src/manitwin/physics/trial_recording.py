@@ -77,9 +77,7 @@ class TrialRecorder:
         return look
 
     def recording(self, result: TrialResult, object_to_hand: np.ndarray, joints: np.ndarray) -> TrialRecording:
-        """Return the recorded states; if nothing was simulated, the single initial state given by ``object_to_hand``
-        and ``joints``.
-        """
+        """Return the recorded states; if nothing was simulated, the single state given by ``object_to_hand`` and ``joints``."""
         rows = self._rows or [(np.zeros(3), object_to_hand, joints)]
         return TrialRecording(
             result,

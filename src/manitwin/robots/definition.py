@@ -42,11 +42,10 @@ class PoseField(BaseModel):
 
 
 class UrdfField(BaseModel):
-    """Location of a URDF: below the TOML file's folder, or in an installed ``distribution``, which an ``extra`` of this
-    package installs.
+    """Location of a URDF: below the TOML file's folder, or in an installed ``distribution``, which an ``extra`` installs.
 
     ``package://name/x`` resolves to ``package_folder/name/x``; ``package_folder`` and ``srdf`` are relative to the same root
-    as ``file``.
+    as ``file``. ``extra`` is one of this package.
     """
 
     model_config = STRICT
@@ -172,8 +171,7 @@ def read_definition(path: Path) -> tuple[RobotDefinition, str]:
 
 @dataclass(frozen=True)
 class UrdfFiles:
-    """Resolved paths: the URDF, its SRDF, the folder of its packages, and the boundary folder that no referenced file may
-    leave.
+    """Resolved paths: the URDF, its SRDF, the folder of its packages, and the boundary folder of all referenced files.
 
     Files of an ``installed`` distribution may be symbolic links into the installer's cache.
     """

@@ -88,9 +88,7 @@ def _of_srdf(path: Path, tree: UrdfTree) -> set[tuple[str, str]]:
 
 
 def _check_pairs(shapes: Counter[int], name: str) -> None:
-    """Raise ConfigError if the shapes make too many pairs; ``shapes`` counts them per joint, and shapes of one joint form no
-    pairs.
-    """
+    """Raise ConfigError if the shapes, counted per joint, make too many pairs; shapes of one joint form no pairs."""
     count = shapes.total()
     pairs = (count**2 - sum(each**2 for each in shapes.values())) // 2
     if pairs > MOST_PAIRS:

@@ -197,8 +197,7 @@ def poses_at(links: tuple[Link, ...], joints: dict[str, float]) -> dict[str, np.
 
 @lru_cache(maxsize=16)
 def bodies_of_urdf(urdf: str, palm: str) -> tuple[tuple[Link, ...], dict[str, tuple[str, np.ndarray]]]:
-    """Return the robot's bodies: each link merged with the links fixed to it, except the palm, which stays separate from the
-    wrist.
+    """Return the robot's bodies: each link merged with the links fixed to it, except the palm, which stays separate.
 
     Fewer joints make the simulation faster. The palm is a separate body because it may touch objects that the wrist may not.
     Also returns, for every link, the name of its body and its pose ``(4, 4)`` in that body.

@@ -112,9 +112,7 @@ def _gripper(name: str, folder: Path) -> Gripper:
 
 
 def _beside(name: str, folder: Path, kind: str = "robot") -> str:
-    """Return a shipped name unchanged, or the path of a named file below a folder; raises ConfigError if it does not exist
-    there.
-    """
+    """Return a shipped name unchanged, or the path of a named file below a folder; raises ConfigError if it is missing."""
     if not name.endswith(".toml"):
         return name
     path = (folder / name).resolve()

@@ -38,8 +38,9 @@ class MountedHand:
 
 
 def mount_hand(tree: UrdfTree, definition: RobotDefinition, gripper: Gripper, folder: Path) -> MountedHand:
-    """Add the hand to the arm's tree, in place; raises ConfigError for invalid joints and UsageError for the wrong kind of
-    gripper.
+    """Add the hand to the arm's tree, in place.
+
+    Raises ConfigError for invalid links or names, UsageError for a gripper of the wrong kind.
     """
     hand = definition.hand
     if isinstance(hand, DescribedHand):

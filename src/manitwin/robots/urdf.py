@@ -22,9 +22,7 @@ MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 @dataclass
 class UrdfTree:
-    """A ``<robot>`` element with its links and joints; ``name`` identifies it in messages, ``error`` is the exception type
-    raised.
-    """
+    """A ``<robot>`` element with links and joints; ``name`` identifies it in messages, ``error`` is the exception raised."""
 
     name: str
     element: etree._Element

@@ -174,9 +174,7 @@ def _check_link(tree: UrdfTree, rules: UrdfRules, where: str, link: etree._Eleme
 def _check_attributes(
     tree: UrdfTree, rules: UrdfRules, where: str, parent: etree._Element, paths: tuple[str, ...]
 ) -> None:
-    """Check the required attributes of the elements at ``paths`` below ``parent``, and that their numbers are finite and in
-    range.
-    """
+    """Check the required attributes of the elements at ``paths`` below ``parent``, and the ranges of their numbers."""
     for element in (found for path in paths for found in parent.iterfind(path)):
         required = MOMENTS if element.tag == "inertia" and rules.simulated else _REQUIRED.get(element.tag, ())
         for key in required:

@@ -28,15 +28,15 @@ _Chosen = TypeVar("_Chosen")
 ANOTHER_GRASP = "another_grasp"
 # in the hand: beyond this, a plan made for another pose in the hand is hardly usable
 TURNED_M, TURNED_RAD = 0.01, np.radians(10.0)
-FIRST_SHARE = 0.75  # share of the grasps whose order is kept: those that tend to be good
+FIRST_SHARE = 0.75  # share of the grasps in the first part, which tend to be good
 LEAST_LIFT_SHARE = 0.5  # of the hand's rise: below this, the object was left behind
 
 
 def first_and_last(grasps: Sequence[_Chosen]) -> tuple[Sequence[_Chosen], Sequence[_Chosen]]:
     """Split grasps into the first three quarters and the rest.
 
-    Their order is random with a bias towards good grasps (``target_grasps.shuffled``). Other criteria reorder each part
-    separately; otherwise a barely holding grasp at the end of a handle could be chosen again and again.
+    Their order is random with a bias towards good grasps (``target_grasps.shuffled``). Callers sort each part separately by
+    further criteria; sorting all grasps together could put a barely holding grasp at the end of a handle first every time.
     """
     count = int(np.ceil(FIRST_SHARE * len(grasps)))
     return grasps[:count], grasps[count:]

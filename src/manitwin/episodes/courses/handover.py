@@ -258,10 +258,9 @@ class HandoverCourse(Course):
 
 
 def meetings(target: PlacedObject, middle_m: np.ndarray, rng: np.random.Generator) -> tuple[HeldPath, ...]:
-    """Return sampled paths that bring the target's centre to places in the air near ``middle_m (3,)``, with random
-    orientation.
+    """Return sampled paths that bring the target's centre to places in the air near ``middle_m (3,)``.
 
-    Some keep the target's tilt and change its heading only; most tilt it by up to 100 degrees.
+    Some keep the target's tilt and change its heading only; most also tilt it by up to 100 degrees.
     """
     center = np.mean([points.mean(0) for points in target.body.hulls], axis=0)
     offset = target.object_to_world[:3, :3] @ center

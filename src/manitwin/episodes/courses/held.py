@@ -141,9 +141,7 @@ class HeldCourse(Course):
             self._put_back(execution)
 
     def _take(self, plan: HeldPlan, execution: Execution) -> None:
-        """Grasp, lift, measure the object in the hand, replan carry and path, and carry; replan again if it turned in the
-        meantime.
-        """
+        """Grasp, lift, replan carry and path for the measured pose in the hand, and carry; replan again if the object turned."""
         self.grasp_and_lift(execution, plan.reach, plan.approach, plan.lift)
         self._grasp_now = plan.gripper_to_object
         carry = self._plan_again(plan.held, plan.joints, execution)
@@ -208,10 +206,9 @@ class HeldCourse(Course):
         return been
 
     def _onward(self, part: HeldPath, execution: Execution, place: float) -> CubicSpline:
-        """Plan a spline through poses from the current joints.
+        """Plan a spline through poses from the current joints, with the measured or else the previous pose in the hand.
 
-        Uses the measured pose in the hand, then the previous one, and finally a straight joint motion to the planned position
-        at ``place``.
+        If both fail, move straight in joint space to the planned position at ``place``.
         """
         grasps = [self._grasp_now] if self.task.empty else [execution.gripper_to_object(), self._grasp_now]
         for grasp, name in zip(grasps, ("onward", "onward_unmeasured"), strict=False):
@@ -228,7 +225,7 @@ class HeldCourse(Course):
         """Move until the watched force reaches the guard's limit, then hold still (or yield, after a blow).
 
         The arm completes the current row of samples after contact. A press therefore creeps close to the expected contact,
-        and a blow is delayed such that a row ends at contact. If a blow has not made contact by then, it continues slowly.
+        and a blow is delayed so that a row ends at contact; without contact by then it continues slowly.
         """
         watch = self._watch
         assert watch is not None, "a guarded move asks its watch for the force"

@@ -50,8 +50,7 @@ def pace_of_press(watch: EventWatch, stop_n: float, creeps: int) -> Callable[[in
 
 
 def with_heights(joints: CubicSpline, arm: ArmKinematics, normal: np.ndarray) -> CubicSpline | None:
-    """Return a spline of ``(2 n)`` values: the joints, and their change per metre along ``normal (3,)``; None without
-    solution.
+    """Return a spline of ``(2 n)`` values: the joints, and their change per metre along ``normal (3,)``; None if unsolvable.
 
     Both are exact at the knots. The change is computed for 5 mm up, or down if an arm near its limits cannot move up.
     """

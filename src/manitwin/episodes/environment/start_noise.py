@@ -132,9 +132,7 @@ def _movable(setting: TaskSetting) -> dict[str, str]:
 
 
 def _moved(object_to_world: np.ndarray, center_of_mass_m: np.ndarray, move: np.ndarray) -> np.ndarray:
-    """Return a pose ``(4, 4)`` translated along x and y (m) and rotated about the vertical axis through the centre of mass
-    (rad).
-    """
+    """Return a pose ``(4, 4)`` translated along x and y (m) and rotated (rad) about the vertical through the centre of mass."""
     along_x_m, along_y_m, yaw_rad = move
     cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
     turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])

@@ -75,8 +75,7 @@ def poured(state: WorldState, literal: Literal) -> Judgement:
 
 
 def pressed(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that a point was pressed with one to three times the value's force, within 12 mm of it and 30 degrees of its
-    normal.
+    """Judge that a point was pressed with one to three times the value's force, within 12 mm and 30 degrees of its normal.
 
     The normal points inwards. A single contact must meet all conditions at its force peak; other contacts, such as those of
     grasping fingers, do not matter. The failure reported is that of the hardest contact.
@@ -101,8 +100,8 @@ def pressed(state: WorldState, literal: Literal) -> Judgement:
 
 
 def struck(state: WorldState, literal: Literal) -> Judgement:
-    """Judge the first contact of an object's face with another object: on the face, within 15 degrees, at least at the
-    value's speed.
+    """Judge the first contact of an object's face with another object: on the face, within 15 degrees, at the value's speed
+    or more.
 
     A level face touches with its edge first, and the corners of a square lie outside the circle of equal area by
     ``CORNER_OF_SQUARE``.

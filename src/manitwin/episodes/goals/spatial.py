@@ -82,9 +82,7 @@ def away_from(state: WorldState, literal: Literal) -> Judgement:
 
 
 def on(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that an object is supported by another alone: no other contact, and its centre of mass above the other's
-    footprint.
-    """
+    """Judge that another object alone supports an object, with its centre of mass above the other's footprint."""
     moved, other = _both(state, literal)
     base = other.footprint_m
     outside_m = separation_m(base, moved.center_of_mass_m[None, :2] + _DOT_M)

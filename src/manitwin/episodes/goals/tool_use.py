@@ -43,8 +43,9 @@ def wiped(state: WorldState, literal: Literal) -> Judgement:
 
 
 def cut_motion(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that an edge moved along the value's share of a line, within 5 mm and 10 degrees, and was drawn as far; nothing
-    is divided.
+    """Judge that an edge moved along the value's share of a line, within 5 mm and 10 degrees, and was drawn as far.
+
+    Nothing is divided.
     """
     assert literal.value is not None
     values = _last(state, "cut_motion", literal)

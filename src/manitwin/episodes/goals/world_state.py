@@ -89,9 +89,7 @@ class Peg:
 
 @dataclass(frozen=True)
 class Holder:
-    """A bore: the pose of its rim's centre with Z pointing out ``(4, 4)``, half widths ``(2,)`` and depth (m), names of its
-    boxes.
-    """
+    """A bore: pose of its rim's centre with Z pointing out ``(4, 4)``, half widths ``(2,)`` and depth (m), names of its boxes."""
 
     rim_to_world: np.ndarray
     half_m: np.ndarray

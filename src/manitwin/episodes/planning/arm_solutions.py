@@ -80,9 +80,7 @@ class ArmSolutions:
     def of(
         self, world: CollisionWorld, phase: Phase, gripper_to_world: np.ndarray, near: np.ndarray
     ) -> tuple[list[np.ndarray], bool]:
-        """Return collision-free configurations of a pose, nearest to ``near`` first, and whether any inverse kinematics
-        converged.
-        """
+        """Return collision-free configurations of a pose, nearest to ``near`` first, and whether any solution converged."""
         found: list[np.ndarray] = []
         converged = False
         world.enter(phase)

@@ -108,8 +108,7 @@ class GraspCandidates:
         return inside.reshape(gripper_to_world.shape[:2])
 
     def first_look(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> PlanFailure | None:
-        """Return why a pose is infeasible: out of reach, or the hand collides at the ends of its straight lines; otherwise
-        None.
+        """Return why a pose is infeasible: out of reach, or the hand collides at the ends of its straight lines; or None.
 
         The world then holds the target in this pose.
         """
@@ -141,9 +140,7 @@ class GraspCandidates:
         return None
 
     def look_at_approach(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> PlanFailure | None:
-        """Return why a pose cannot be approached: out of reach, or the hand collides at either end of the line; otherwise
-        None.
-        """
+        """Return why a pose cannot be approached: out of reach, or the hand collides at an end of the line; or None."""
         grasped = world.problem.target.object_to_world @ gripper_to_object
         if self._known.out_of_reach(grasped):
             return "outside_workspace"

@@ -49,10 +49,10 @@ class HeldKnots:
         near_rad: np.ndarray,
         spare_m: float = 0.0,
     ) -> CubicSpline | PlanFailure:
-        """Return the joint spline of a path, starting at the solution nearest to ``near_rad`` or to known configurations; or
-        the failure.
+        """Return the joint spline of a path, or the failure.
 
-        The arm keeps ``spare_m`` of additional clearance.
+        It starts at the solution nearest to ``near_rad`` or to known configurations, and the arm keeps ``spare_m`` of
+        additional clearance.
         """
         if not self.is_hand_free(world, path, gripper_to_object, spare_m):
             return "path_blocked"
@@ -86,10 +86,9 @@ class HeldKnots:
     def is_hand_free(
         self, world: ProblemWorld, path: HeldPath, gripper_to_object: np.ndarray, spare_m: float = 0.0
     ) -> bool:
-        """Tell whether the hand with the held object is free at each pose, regardless of the arm; far cheaper than solving
-        the joints.
+        """Tell whether the hand with the held object is free at each pose, regardless of the arm.
 
-        Tested from the end, where most paths come close to obstacles.
+        Far cheaper than solving the joints. Tested from the end, where most paths come close to obstacles.
         """
         hands, margin_m = path.poses @ gripper_to_object, self._parts.settings.clearance_m
         return all(

@@ -37,9 +37,7 @@ Serves = Callable[[Grasp], bool]
 
 @dataclass(frozen=True)
 class HeldPlan:
-    """Motions of one grasp: reach, approach, (close), lift, carry to the path's first pose; and the joint spline of the path,
-    not timed.
-    """
+    """Motions of one grasp: reach, approach, (close), lift, carry to the path's start; and the path's joint spline, not timed."""
 
     grasp: Grasp
     gripper_to_object: np.ndarray
@@ -293,8 +291,8 @@ class HeldPathPlanner:
         *,
         level_only: bool = False,
     ) -> Motion | PlanFailure | None:
-        """Return the motion to the path: within the task's tilt limit, otherwise little more tilted than the path's start,
-        otherwise any.
+        """Return the motion to the path: within the task's tilt limit, else little more tilted than the path's start, else
+        any.
 
         None: it must be ``level_only``, and only a tilted motion exists.
         """

@@ -93,9 +93,7 @@ class Motions:
         return None
 
     def _smooth(self, world: FreeSpace, phase: Phase, waypoints: np.ndarray) -> Motion | None:
-        """Return the motion with the largest corner radius that is free, or one that stops at the waypoints; None if none is
-        free.
-        """
+        """Return the free motion with the largest corner radius, or one that stops at the waypoints; None if none is free."""
         step_rad = self._settings.check_step_rad
         for radius_rad in CORNER_RADII_RAD if len(waypoints) > 2 else ():
             timed = time_optimal(

@@ -53,8 +53,8 @@ def obstacle_shapes(
     *,
     as_hulls: bool = False,
 ) -> ObstacleShapes:
-    """Represent each obstacle by its convex hull if that loses no free space, otherwise by its own hulls; likewise the
-    carried target.
+    """Represent obstacles and the carried target by their convex hulls if that loses no free space, otherwise by their own
+    hulls.
 
     No free space is lost if the convex hull keeps ``margin_m`` from the target at start and goal, and is either nearly solid
     or out of the hand's way. ``as_hulls``: the target is carried as its hulls in any case.

@@ -34,16 +34,12 @@ class PutDown:
     """Goals of one problem for one arm, and the choice among them for a grasp; deterministic for the problem's seed."""
 
     def __init__(self, arm: PickPlacePlanner, problem: PickPlaceProblem, goals: Sequence[np.ndarray]):
-        """Take resting poses ``(4, 4)`` of the target, best first; ``problem`` contains the other arm, at home, as an
-        obstacle.
-        """
+        """Take resting poses ``(4, 4)`` of the target, best first; the other arm, at home, is an obstacle of ``problem``."""
         self._arm, self._problem, self._goals = arm, problem, tuple(goals)
         self._found: dict[tuple[str, bytes], np.ndarray | None] = {}
 
     def goal_of(self, held: Held) -> np.ndarray | None:
-        """Return the first goal ``(4, 4)`` at which a grasp can put the target down, starting from home; None if there is
-        none.
-        """
+        """Return the first goal ``(4, 4)`` at which a grasp can put the target down, starting from home; or None."""
         key = held.grasp.grasp_id, held.gripper_to_object.tobytes()
         if key not in self._found:
             home = self._arm.arm.home

@@ -153,7 +153,7 @@ class TwoArmPlanner(PickPlacePlanner):
         taker_rad: np.ndarray,
         grasp: Grasp,
     ) -> Motion | None:
-        """Plan the straight retreat of the first hand from the object that the second arm holds by ``grasp``; None if it is
+        """Plan the first hand's straight retreat from the object that the second arm holds by ``grasp``; None if it is
         blocked.
         """
         asked = self.with_taker_at(problem, taker_rad, grasp)
@@ -213,9 +213,7 @@ class TwoArmPlanner(PickPlacePlanner):
     def _at_meeting(
         self, problem: PickPlaceProblem, object_to_world: np.ndarray, giver_rad: np.ndarray, opening_m: float
     ) -> PickPlaceProblem:
-        """Return the second arm's problem: the object in the air, and the first arm with its hand both closed and open as
-        obstacles.
-        """
+        """Return the second arm's problem: the object in the air, and the first arm, its hand closed and open, as obstacles."""
         giver = self._giver_shapes.at(giver_rad, (opening_m, self._open_m))
         return replace(
             problem,

@@ -35,8 +35,7 @@ class Beside(Skill):
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> Iterator[np.ndarray]:
-        """Yield free poses with the centre of mass in the sector: in the workspace first, then beyond it, as far as an arm
-        may reach.
+        """Yield free poses with the centre of mass in the sector: in the workspace, then beyond it as far as an arm may reach.
 
         The same is then repeated closer to the sector's border.
         """

@@ -54,9 +54,7 @@ class CutMotion(HeldSkill):
         return board_in_reach(around, BOARD_HALF_M, BOARD, rng)
 
     def task(self, scene: HeldScene) -> HeldTask:
-        """Return the paths along the line, in both directions, with either side of the knife to the left, for several parts
-        of the edge.
-        """
+        """Return the paths along the line: both directions, both sides of the knife, several parts of the edge."""
         target, (under,) = scene.target, scene.fixtures
         edge = edge_of(scene.frames[target.name])
         assert edge is not None, "only what cuts is drawn along a line"

@@ -1,6 +1,4 @@
-"""Skill ``handover``: one arm picks the target, a second one takes it by another grasp and puts it down on its side of the
-table.
-"""
+"""Skill ``handover``: one arm picks the target, a second one takes it by another grasp and puts it down on its own side."""
 
 from __future__ import annotations
 
@@ -30,9 +28,7 @@ class Handover(Skill):
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> Iterator[np.ndarray]:
-        """Yield the target's pose, then its other stable placements at the same place: the orientations in which it may be
-        put down.
-        """
+        """Yield the target's pose, then its other stable placements at the same place, in which it may be put down."""
         here = around.objects[target].object_to_world
         yield here
         for placement in around.twin(target).poses:

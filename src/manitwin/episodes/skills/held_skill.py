@@ -1,6 +1,4 @@
-"""Base of skills that use a held object: placement of fixtures, and the held path, which is built once all objects are at
-rest.
-"""
+"""Base of skills that use a held object: placement of fixtures, and the held path, built once all objects are at rest."""
 
 from __future__ import annotations
 
@@ -24,9 +22,7 @@ FIXTURES_TRIED = 60
 
 
 class HeldSkill(Skill):
-    """A skill with a held path. A subclass defines ``suits`` (with ``frames_of``), ``task``, ``goal``, and optionally
-    ``fixture``.
-    """
+    """A skill with a held path; a subclass defines ``suits`` (with ``frames_of``), ``task``, ``goal``, and maybe ``fixture``."""
 
     has_partner = False
 
@@ -118,8 +114,8 @@ def tip_of(frames: tuple[TwinFrame, ...], hulls: Sequence[np.ndarray]) -> Tip | 
 
 
 def stick_frame(points_m: np.ndarray, frames: tuple[TwinFrame, ...], up: np.ndarray) -> np.ndarray:
-    """Return the frame ``(4, 4)`` of the working end: Z along the length, pointing out of the outermost vertex; X near ``up
-    (3,)``.
+    """Return the frame ``(4, 4)`` of the working end: origin at the outermost vertex, Z outwards along the length, X near
+    ``up``.
 
     The working end is the one away from the handle if a frame marks it (an axis whose label contains "handle"), otherwise the
     broader one.

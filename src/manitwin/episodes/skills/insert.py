@@ -63,8 +63,8 @@ class Insert(HeldSkill):
         return holder(position_m, float(np.arctan2(place[1, 0], place[0, 0])), bore_m, depth_m, name=HOLDER)
 
     def task(self, scene: HeldScene) -> HeldTask:
-        """Return the paths down into the holder, with the object rotated about its length in steps of 30 degrees (a flat one:
-        180).
+        """Return the paths down into the holder, with the object rotated about its length by steps of 30 degrees (180 if
+        flat).
         """
         target, (into,) = scene.target, scene.fixtures
         bore = into.holder
@@ -143,7 +143,7 @@ class _Section:
 
 
 def _section(points: np.ndarray, stick: np.ndarray, depth_m: float) -> _Section:
-    """Return the cross-section of the part inserted to a depth, with its smallest bounding rectangle over rotations by one
+    """Return the cross-section of the part inserted to a depth; its smallest bounding rectangle is found by steps of one
     degree.
     """
     local = transform_points(inverse(stick), points)

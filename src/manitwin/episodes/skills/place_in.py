@@ -63,8 +63,8 @@ class PlaceIn(Skill):
         goal = self.goal(around.objects[target], around.objects[partner])
 
         def steadiest(poses: Iterator[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
-            """Return the resting poses of drops that reach the goal, slightly raised, with their release poses; smallest
-            motion first.
+            """Return the resting poses, slightly raised, and release poses of drops that reach the goal; smallest motion
+            first.
             """
             rests = [(begun, rest_after_drop(around, target, partner, goal, begun)) for begun in poses]
             found = [(begun, rest) for begun, rest in rests if rest is not None]

@@ -50,8 +50,8 @@ class Pour(HeldSkill):
     name, predicate, has_partner = "pour", "poured", True
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept vessels that open upwards; the partner deeper than a plate, with a rim of at least 3 cm that is wider than
-        the target's.
+        """Accept vessels that open upwards, the partner deeper than a plate, with a rim of at least 3 cm and wider than the
+        target's.
         """
         if partner is None or not (target.vessel and partner.vessel) or lip_frame(target) is None:
             return False

@@ -1,6 +1,4 @@
-"""Skill ``press``: push a button, a lid or another upward frame of an object with the closed fingertips, until a force is
-reached.
-"""
+"""Skill ``press``: push a button, a lid or another upward frame with the closed fingertips, until a force is reached."""
 
 from __future__ import annotations
 
@@ -40,9 +38,7 @@ class Press(HeldSkill):
     name, predicate = "press", "pressed"
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept an object with a button, face or surface that faces upwards in its placement, is solid, and is well above
-        the table.
-        """
+        """Accept an object with a button, face or surface that faces upwards, is solid, and is well above the table."""
         standing = self.begins_in(target)[0].object_to_plane
         frame = pressed_frame(target.frames, standing)
         if frame is None or float((standing @ frame.frame_to_object)[2, 3]) < LEAST_HEIGHT_M:
@@ -87,8 +83,7 @@ class Press(HeldSkill):
 
 
 def pressed_place(frames: tuple[TwinFrame, ...], object_to_world: np.ndarray) -> np.ndarray:
-    """Return the pressed frame ``(4, 4)`` in the world for the object's current pose; the object's own frame if none faces
-    upwards.
+    """Return the pressed frame ``(4, 4)`` in the world for the object's pose; the object's own frame if none faces upwards.
 
     Another step may have changed the object's orientation.
     """
@@ -97,9 +92,7 @@ def pressed_place(frames: tuple[TwinFrame, ...], object_to_world: np.ndarray) ->
 
 
 def pressed_frame(frames: tuple[TwinFrame, ...], object_to_world: np.ndarray) -> TwinFrame | None:
-    """Return the first frame that faces upwards at a pose ``(4, 4)``, buttons before faces and surfaces; None if there is
-    none.
-    """
+    """Return the first frame that faces upwards at a pose ``(4, 4)``, buttons before faces before surfaces; or None."""
     upward = [
         frame
         for frame in frames

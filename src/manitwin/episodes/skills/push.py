@@ -26,9 +26,7 @@ TIPPING = 0.8  # largest ratio of height to width for which a pushed object slid
 
 
 def base_width_m(points: np.ndarray) -> float:
-    """Return the smallest width (m) of an object's base, given vertices ``(N, 3)``; a lying round object has a narrow strip
-    as base.
-    """
+    """Return the smallest width (m) of an object's base, given vertices ``(N, 3)``; a lying round object has a narrow base."""
     base = points[points[:, 2] < points[:, 2].min() + BASE_M, :2]
     angles = np.linspace(0, np.pi, 36, endpoint=False)
     return float(np.ptp(base @ np.array([np.cos(angles), np.sin(angles)]), axis=0).min())
@@ -79,9 +77,7 @@ class Push(Skill):
     def set_goal(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> SkillGoal | None:
-        """Return the goal with its mark; None if no place is free, or if the target would roll or fall over in its present
-        orientation.
-        """
+        """Return the goal with its mark; None if no place is free, or if the target would roll or fall over as it lies."""
         moved = around.objects[target]
         points = transform_points(moved.object_to_world, np.concatenate(moved.body.hulls))
         pose = next(self.poses(around, target, partner, rng), None) if can_be_pushed(points) else None

@@ -26,8 +26,7 @@ BAND_M = 0.012  # to either side of the line: half the width of the closed finge
 
 
 def strokes(moved: PlacedObject, place_m: np.ndarray, fingertips_m: np.ndarray, level_m: float) -> tuple[HeldPath, ...]:
-    """Return paths of the closed hand that push an object through its centre of mass towards a place, for several leans and
-    rolls.
+    """Return paths of the closed hand that push an object through its centre of mass towards a place, for several tilts.
 
     Each goes down behind the object, then along the line slightly beyond what brings the centre of mass to ``place_m (3,)``;
     the course stops there. ``fingertips_m (N, 3)`` are the vertices of the closed fingertips in the grasp frame, ``level_m``

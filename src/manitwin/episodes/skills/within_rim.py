@@ -35,8 +35,7 @@ def on_end(
 def as_it_is(
     body: PoolBody, rotation: np.ndarray, vessel: PlacedParts, mouth: Mouth, rng: np.random.Generator
 ) -> np.ndarray | None:
-    """Draw a pose ``(4, 4)`` with ``rotation (3, 3)`` and a random heading, so that a grasp of the standing object remains
-    usable.
+    """Draw a pose ``(4, 4)`` with ``rotation (3, 3)`` and a random heading, so that a present grasp remains usable.
 
     None if the rim is too narrow, or if the object would lie on it.
     """

@@ -1,6 +1,4 @@
-"""Task candidates: the skills applicable in a scene by annotations, sizes, openings and reach, and rejection counts for the
-rest.
-"""
+"""Task candidates: skills applicable in a scene by annotations, sizes, openings and reach; rejections are counted."""
 
 from __future__ import annotations
 
@@ -49,9 +47,7 @@ class Candidate:
 
 
 def single_actions(scene: TaskScene, dropped: Counter[str]) -> list[Action]:
-    """Return every action allowed by sizes, openings, reach and names, each literal once; count rejections by reason in
-    ``dropped``.
-    """
+    """Return every action allowed by sizes, openings, reach and names, each literal once; count rejections in ``dropped``."""
     found: dict[str, Action] = {}
     able = []
     for number in range(len(scene.objects)):

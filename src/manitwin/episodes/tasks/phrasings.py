@@ -16,9 +16,7 @@ HELD_OUT_JOINTS = ("{first}; once that is done, {second}",)
 def task_instructions(
     goal: Goal, words: Mapping[str, Language], *, seed: int
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return instructions and held-out instructions, which share no template; raises UsageError for a predicate without
-    templates.
-    """
+    """Return instructions and held-out instructions, which share no template; raises UsageError without a template."""
     told = [_of(literal, words, seed + place, COUNT, held_out=False) for place, literal in enumerate(goal.literals)]
     held = [_of(literal, words, seed + place, HELD_OUT, held_out=True) for place, literal in enumerate(goal.literals)]
     return _joined(told, JOINTS), _joined(held, HELD_OUT_JOINTS)

@@ -31,8 +31,9 @@ IMPEDANCE_WIDTH_M, IMPEDANCE_MIDPOINT, IMPEDANCE_POWER = 0.001, 0.5, 2.0  # MuJo
 
 
 class HandScene:
-    """MuJoCo scene of one grasp (``TrialScene``), in the hand's frame; the load is the scene's gravity, compensated on
-    the fingers.
+    """MuJoCo scene of one grasp (``TrialScene``), in the hand's frame.
+
+    The load is the scene's gravity, which is compensated on the fingers.
     """
 
     def __init__(
@@ -117,13 +118,11 @@ def hand_model(body: RigidBody, gripper: ParallelGripper, settings: TrialSetting
 
 
 def even_impedance(mass_kg: float, force_n: float) -> list[float]:
-    """Return the ``solimp`` for which a contact of finger and object penetrates by ``SINK_M`` at the closing force, for
-    any mass.
+    """Return the ``solimp`` for which finger contacts penetrate by ``SINK_M`` at the closing force, for any object mass.
 
     A contact at rest that carries f penetrates by r = R f / k, with R = (1 - d) / d (1/m + 1/m_finger) and k = 1 / (d
-    timeconst dampratio)^2 (MuJoCo manual, "Computation", "Parameters"): at a fixed impedance d, lighter objects
-    penetrate more. The equation is solved for d. The impedance at first touch is lower in the same proportion as in
-    MuJoCo's default.
+    timeconst dampratio)^2 (MuJoCo manual, "Computation", "Parameters"): at a fixed impedance d, lighter objects penetrate
+    more. The equation is solved for d. The impedance at first touch is lower in the same proportion as in MuJoCo's default.
     """
     per_mass = 1 / mass_kg + 1 / FINGER_MASS_KG
     stiffness = 1 / (STIFF_SOLREF[0] * STIFF_SOLREF[1]) ** 2

@@ -53,9 +53,7 @@ class MujocoTrial:
         settings: TrialSettings,
         joints_rad: np.ndarray | None = None,
     ) -> list[TrialResult]:
-        """Try the grasps ``gripper_to_object (N, 4, 4)``; the time step of ``settings`` is replaced by MuJoCo's own
-        (``frozen``).
-        """
+        """Try the grasps ``gripper_to_object (N, 4, 4)``; MuJoCo's own time step replaces that of ``settings`` (``frozen``)."""
         if not len(gripper_to_object):
             return []
         settings, hand = frozen(settings), of_kind(gripper, ParallelGripper)
@@ -78,9 +76,7 @@ class MujocoTrial:
 
 
 class _HandModels:
-    """Cache of the last compiled model of each body, kept while the body exists; compiling takes a fifth of the time of
-    a trial.
-    """
+    """Cache of the last compiled model of each body, while the body exists; compiling takes a fifth of the time of a trial."""
 
     def __init__(self) -> None:
         self._by_body: dict[int, tuple[ParallelGripper, TrialSettings, mujoco.MjModel]] = {}

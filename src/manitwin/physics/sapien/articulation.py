@@ -37,9 +37,7 @@ def build_articulation(
     contact_offset_m: float,
     root_to_scene: np.ndarray | None = None,
 ) -> dict[str, physx.PhysxArticulationLinkComponent]:
-    """Build links, parents before children, into a scene with the root fixed at a pose ``(4, 4)``; return the components by
-    name.
-    """
+    """Build links, parents before children, with the root fixed at a pose ``(4, 4)``; return the components by name."""
     built: list[physx.PhysxArticulationLinkComponent] = []
     entities = []
     for link in links:

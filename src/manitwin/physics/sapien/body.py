@@ -55,8 +55,7 @@ def dynamic_component(
     restitution: float = 0.0,
     soft_pad: bool = False,
 ) -> physx.PhysxRigidDynamicComponent:
-    """Return the body as a dynamic component with its own mass properties, which SAPIEN would otherwise derive from the
-    shapes.
+    """Return the body as a dynamic component with its own mass properties; SAPIEN would derive them from the shapes.
 
     ``shapes`` are those of all its hulls, or of a relevant subset. Without ``contact_offset_m`` the scene's default applies.
     ``soft_pad`` is for objects that a hand grasps (``shapes.set_contact``). Raises RuntimeError if a shape belongs to another

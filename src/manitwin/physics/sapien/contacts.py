@@ -1,6 +1,4 @@
-"""Contact reading in a robot world: finger forces on the target, contact of target and support, and unplanned contacts of the
-robot.
-"""
+"""Contact reading in a robot world: finger forces on the target, support of the target, unplanned contacts of the robot."""
 
 from __future__ import annotations
 
@@ -46,9 +44,7 @@ NONE_MEANT = MeantContacts()
 
 @dataclass(frozen=True)
 class Push:
-    """Resultant contact force ``(3,)`` N on a body, along the contact normals, and its mean point ``(3,)`` m, in the world
-    frame.
-    """
+    """Resultant contact force ``(3,)`` N on a body, along the contact normals, and its mean point ``(3,)`` m; world frame."""
 
     force_n: np.ndarray
     at_m: np.ndarray
@@ -188,9 +184,7 @@ class ContactReader:
 
 
 def _forbidden(in_hand: bool) -> list[list[bool]]:
-    """Return a table over two roles in either order: whether they must not touch. Precomputed, as it is read for every
-    contact.
-    """
+    """Return a table over two roles in either order: whether they must not touch; precomputed, as every contact needs it."""
 
     def is_forbidden(part: Role, other: Role) -> bool:
         if part >= Role.TARGET or other < Role.TARGET:

@@ -1,6 +1,4 @@
-"""Falling objects: larger contact offset and slow depenetration, so that they are neither missed by nor thrown out of a
-surface.
-"""
+"""Falling bodies: a larger contact offset and slower depenetration keep them from being thrown out of what they land on."""
 
 from __future__ import annotations
 

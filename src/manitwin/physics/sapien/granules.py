@@ -66,9 +66,7 @@ def fill(name: str, opening: Opening, hulls: Sequence[np.ndarray], rng: np.rando
 def _lattice(
     opening: Opening, hulls: Sequence[np.ndarray], count: int, radius_m: float, rng: np.random.Generator
 ) -> np.ndarray | None:
-    """Fill layers from the bottom, each in random order, until there are ``count``; None if they would rise too far above the
-    rim.
-    """
+    """Fill layers from the bottom, each in random order, up to ``count``; None if they would rise too far above the rim."""
     wide_m, step_m = max(_WIDTH_SHARE * opening.rim_radius_m - radius_m, 1.01 * radius_m), _SPACING * radius_m
     planes = [ConvexHull(hull).equations for hull in hulls]
     to_object = rotation_between(np.array([0.0, 0, 1]), opening.axis)

@@ -40,9 +40,7 @@ _ALONG_X, _ALONG_MINUS_X = (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
 
 @dataclass(frozen=True)
 class FreeFrame:
-    """State of a hand after a frame without contact: each finger's position (m) and speed (m/s) along X, and the shared
-    target.
-    """
+    """State of a hand after a frame without contact: position (m) and speed (m/s) of each finger along X, and the target."""
 
     along_x: tuple[tuple[float, float], ...]
     target: SharedTarget

@@ -126,7 +126,10 @@ def settle(
 
 @dataclass(frozen=True)
 class Settled:
-    """A body after it was set down: pose, displacement of its centre of mass, and whether it is at rest."""
+    """A body after it was set down: pose, displacement of its centre of mass, and whether it is at rest.
+
+    The displacement is relative to the pose without the drop height.
+    """
 
     object_to_plane: np.ndarray
     moved_m: float

@@ -58,8 +58,7 @@ def hull_shapes(hulls: Hulls) -> HullShapes:
 
 
 class HullCache:
-    """Cache of cooked hulls by content, lent to one scene after another, because cooking costs more than many simulation
-    steps.
+    """Cache of cooked hulls by content, lent to one scene after another; cooking costs more than many simulation steps.
 
     Shapes of the least recently used bodies are dropped first, so that at most ``KEPT_HULLS`` are cached.
     """

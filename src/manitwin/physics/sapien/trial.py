@@ -157,7 +157,7 @@ def _try_once(
         return TrialResult("misses", 0.0, 0.0, 0.0, (0.0, 0.0), 0)  # nothing touches the object
 
     def simulate(some: np.ndarray) -> tuple[TrialResult | None, np.ndarray]:
-        """Return what became of the object with some of its shapes, and the poses at which it was looked at."""
+        """Return the result of the trial with some of the object's shapes, and the object poses at which it was checked."""
         chosen = [shape for shape, is_in in zip(grasp.shapes, some, strict=True) if is_in]
         travel_m = reach.free_travel_m(gripper, object_to_hand, some, 2 * settings.contact_offset_m + CLEAR_M)
         approach = free_frames(gripper, settings, travel_m)

@@ -144,9 +144,7 @@ class RobotWorld:
             look()
 
     def expect_load(self, held: bool) -> None:
-        """Select the solver iterations for a hand that holds an object or is empty; a closing hand ends the treatment of
-        falling objects.
-        """
+        """Select the solver iterations for a holding or an empty hand; a closing hand ends the treatment of falling objects."""
         if held and not self._expects_load:
             self._falling.end()
         self._expects_load = held

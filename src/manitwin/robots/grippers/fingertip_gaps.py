@@ -28,17 +28,13 @@ class Fingertips:
         ]
 
     def bounds_m(self, joints_rad: np.ndarray) -> np.ndarray:
-        """Return the lower and upper corner of each fingertip's bounding box, ``(F, 2, 3)`` in the grasp frame, at joints
-        ``(J,)``.
-        """
+        """Return the corners of each fingertip's bounding box, ``(F, 2, 3)`` in the grasp frame, at joints ``(J,)``."""
         poses = self._hand.link_poses(joints_rad)[self.links]
         corners_m = [transform_points(pose, points) for pose, points in zip(poses, self._corners_m, strict=True)]
         return np.array([(points.min(0), points.max(0)) for points in corners_m])
 
     def gaps_m(self, joints_rad: np.ndarray) -> np.ndarray:
-        """Return the gap along X between the thumb's tip and each other fingertip, ``(F - 1,)``; negative if they overlap
-        along X.
-        """
+        """Return the gap along X from the thumb's tip to each other fingertip, ``(F - 1,)``; negative if they overlap along X."""
         bounds_m = self.bounds_m(joints_rad)
         return np.asarray(bounds_m[1:, 0, 0] - bounds_m[0, 1, 0])
 

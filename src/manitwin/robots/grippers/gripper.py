@@ -166,9 +166,7 @@ def load_gripper(name_or_path: str | Path, *, checked: bool = True) -> Gripper:
 
 
 def _check_name(name: str, path: Path, content: bytes) -> None:
-    """Raise ValueError if a different gripper has the name of a shipped one, since exports, pages and robots refer to it by
-    name.
-    """
+    """Raise ValueError if a different gripper has a shipped one's name, by which exports, pages and robots refer to it."""
     shipped = _shipped_folder() / f"{name}.toml"
     if content != read_bytes(shipped, MAX_TOML_BYTES, UsageError, name=str(shipped)):
         raise ValueError(f"name: {name!r} is the name of a shipped gripper; choose another name")

@@ -99,7 +99,7 @@ class HandReach:
         return HandReach(tuple(self._hulls[index] for index in np.flatnonzero(some)))
 
     def gaps_m(self, gripper: ParallelGripper, object_to_gripper: np.ndarray) -> np.ndarray:
-        """Return lower bounds ``(P, H)`` on the distance of palm and closing fingers from each hull, for object poses ``(P,
+        """Return lower bounds ``(P, H)`` m on the distance of palm and closing fingers from each hull, for object poses ``(P,
         4, 4)``.
 
         Measured along the gripper's axes, between bounding boxes of the hulls and of the volumes that the hand sweeps as it
@@ -149,11 +149,11 @@ _MIRRORS = (np.array([1.0, 1.0, 1.0]), np.array([-1.0, 1.0, 1.0]))
 
 @lru_cache(maxsize=8)
 def _facing_fingers(gripper: ParallelGripper, clear_m: float) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Return, for each finger of the open hand seen from it, the start and end of its boxes along X ``(B,)`` and plane
-    offsets ``(B, 25)``.
+    """Return for each finger of the open hand, seen from it, the start and end of its boxes along X ``(B,)``, and plane
+    offsets.
 
-    The offsets are the minima of the Y and Z terms of ``_FACING`` over the volume that each box sweeps. All boxes are
-    enlarged by ``clear_m``.
+    The offsets ``(B, 25)`` are the minima of the Y and Z terms of ``_FACING`` over the volume that each box sweeps. All boxes
+    are enlarged by ``clear_m``.
     """
     boxes, first, count = gripper.boxes(gripper.opening_m), len(gripper.palm_boxes), len(gripper.finger_boxes)
     fingers = []

@@ -132,8 +132,7 @@ class MultiFingerGripper(HandNumbers):
 
 
 def find_mesh(path: Path, root: Path, name: str) -> Path:
-    """Return the path of a mesh: relative to the URDF's folder, or for ``package://`` to the nearest parent folder that
-    contains it.
+    """Return the path of a mesh: relative to the URDF, or for ``package://`` to the nearest parent folder that contains it.
 
     Raises ConfigError if the mesh does not exist below ``root``.
     """

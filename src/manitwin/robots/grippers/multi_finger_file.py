@@ -29,9 +29,7 @@ MAX_MESH_BYTES = 64 << 20
 
 
 class _UrdfField(BaseModel):
-    """Location of the URDF: below the gripper file's folder, or in an installed distribution, which an extra of this package
-    installs.
-    """
+    """Location of the URDF: below the gripper file's folder, or in an installed distribution, which an extra installs."""
 
     model_config = STRICT
     file: str

@@ -31,8 +31,7 @@ def gripper_of(name: str, sha256: str, given: Sequence[Gripper] = ()) -> Gripper
 
 
 def is_another(gripper: Gripper, grippers: Mapping[str, str]) -> bool:
-    """Tell whether a twin has grasps of a different gripper with the same name; ``grippers`` maps its gripper names to
-    digests.
+    """Tell whether a twin has grasps of a different gripper with the same name; ``grippers`` maps names to digests.
 
     A different digest of a shipped gripper is accepted: no other file can have its name, so it can only be another version.
     """
@@ -42,10 +41,10 @@ def is_another(gripper: Gripper, grippers: Mapping[str, str]) -> bool:
 
 
 def require_same(gripper: Gripper, twins: Iterable[tuple[str, Mapping[str, str]]], carrier: str = "") -> None:
-    """Raise UsageError if a twin has grasps of a different gripper with the same name, since they were verified with other
-    dimensions.
+    """Raise UsageError if a twin has grasps of a different gripper with the same name.
 
-    ``twins`` are pairs of a twin's identity and its gripper digests by name; ``carrier`` is the robot that has the gripper.
+    Such grasps were verified with other dimensions. ``twins`` are pairs of a twin's identity and its gripper digests by name;
+    ``carrier`` is the robot that has the gripper.
     """
     given = list(twins)
     others = [twin for twin, grippers in given if is_another(gripper, grippers)]

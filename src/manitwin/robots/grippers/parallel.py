@@ -33,9 +33,7 @@ class ParallelGripper:
     source: Source
 
     def boxes(self, opening_m: float) -> list[PlacedBox]:
-        """Return ``(box_to_gripper (4, 4), half_extents_m (3,))`` of palm and both fingers at a given opening between the
-        pads.
-        """
+        """Return the boxes of palm and both fingers, ``(box_to_gripper (4, 4), half_extents_m (3,))``, at a given opening."""
         placed = [box.placed() for box in self.palm_boxes]
         for side in (1, -1):
             placed += [box.placed(opening_m / 2, side) for box in self.finger_boxes]

@@ -53,9 +53,7 @@ class SuctionGripper:
         return 1.0
 
     def boxes(self, opening_m: float) -> list[PlacedBox]:
-        """Return ``(box_to_gripper (4, 4), half_extents_m (3,))`` of the body, which must not touch the object; the opening
-        is unused.
-        """
+        """Return the body's boxes, ``(box_to_gripper (4, 4), half_extents_m (3,))``, which must not touch the object."""
         return [box.placed() for box in self.body_boxes]
 
     def symbol(self, width_m: float) -> list[PlacedBox]:

@@ -1,5 +1,4 @@
-"""Suction cup controller: the cup seals where its lip touches with vacuum on, and detaches when the lip's load limits are
-exceeded.
+"""Suction cup controller: the cup seals where its lip touches with vacuum on, and detaches beyond the lip's load limits.
 
 To seal, the lip must be in contact with the object, and its ring must seal on the true surface at that pose
 (``suction.seal``). The object is then attached to the lip by a stiff spring of limited force. The load on the lip is the
@@ -32,9 +31,7 @@ TURN_STIFFNESS_NM_RAD, TURN_DAMPING_NM_S_RAD = 50.0, 1.0
 
 @dataclass
 class _Sealed:
-    """Object attached to the lip, by its number in the world; ``center_m`` and ``inward (3,)`` of the lip's plane in its
-    frame.
-    """
+    """Object attached to the lip, by its number in the world; ``center_m``, ``inward (3,)`` of the lip's plane in its frame."""
 
     number: int
     drive: physx.PhysxDriveComponent

@@ -72,9 +72,7 @@ class FingersControl:
         return iter(())
 
     def opening(self) -> Iterator[np.ndarray]:
-        """Release all fingers at once, so that none pushes the object over, then yield targets back to the joints before
-        closing.
-        """
+        """Release all fingers at once, so that none pushes the object over, then yield targets to the joints before closing."""
         self._closing = None
         here_rad = self._world.robot.hand_positions().copy()
         return chain([here_rad], self._from(here_rad, self._before))

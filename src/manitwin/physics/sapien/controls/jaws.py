@@ -1,6 +1,4 @@
-"""Parallel jaw controller: one target for both jaws, which close until they press with the closing force and follow
-compliance.
-"""
+"""Parallel jaw controller: both jaws share one target, which closes them until they press and keeps pressing."""
 
 from __future__ import annotations
 
