@@ -26,11 +26,11 @@ SLIDE_DIRECTIONS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1
 # other six are skipped for such grasps. After three strokes the threshold is half as large, which is the same rate of
 # creep.
 LOADED_ONCE, LOADED_TWICE, SURE_SHARE = (0, 2, 4), 6, 0.2
-# Brief trial. An object at rest under the peak load of the lift, before the hand decelerates, has carried the largest
-# load of the lift: the hand then continues at constant speed. Shorter strokes with the same accelerations load the
-# object once along each direction. If it does not move, it is held; otherwise it goes through whole strokes as well,
-# with a tighter limit because a box that friction cannot carry moves by the square of the stroke's time. A loss in a
-# brief trial is no verdict: the grasp goes through the whole trial. Objects that have turned far are not tried briefly.
+# Brief trial. An object at rest under the peak load of the lift, before the hand decelerates, has carried the largest load of
+# the lift: the hand then continues at constant speed. Shorter strokes with the same accelerations load the object once along
+# each direction. It is held if it moves by less than STEADY_SHARE of the limit, since an object that friction cannot carry
+# slips by the square of the stroke's time; otherwise whole strokes follow. A loss in a brief trial is no verdict: the whole
+# trial is run. Objects that have turned far are not tried briefly.
 PEAK_SHARE, EVEN_SHARE, REST_M, REST_RAD = 0.25, 0.5, 0.0002, 0.02  # REST_M and REST_RAD are limits between two checks
 BRIEF_STROKE_S = 0.0875  # 21 steps of 1/240 s sample the peak acceleration exactly, 24 steps miss it by 0.6 %
 STEADY_SHARE, TURNED_RAD = 0.02, 0.15
