@@ -59,9 +59,10 @@ class PlacementPlanner:
     def _spaces(
         self, world: ProblemWorld, start: np.ndarray, gripper_to_world: np.ndarray, *, level_only: bool
     ) -> Sequence[FreeSpace]:
-        """Return the free spaces to search in order: for a target to be kept level, the tilt-constrained space twice.
+        """Return the free spaces to search, in order.
 
-        A target that is already tilted at the start, as after use, may keep that tilt.
+        For a target to be kept level, these are the tilt-constrained space twice, followed by the unconstrained one unless
+        ``level_only``. A target that is already tilted at the start, as after use, may keep that tilt.
         """
         if not goes_level(world.problem, world.goal_object_to_world):
             return (world.arm,)

@@ -9,7 +9,7 @@ from manitwin.episodes.planning.libraries import toppra_library
 
 ACCELERATING_SHARES = (0.5, 0.4, 0.3, 0.22, 0.15, 0.1, 0.06, 0.03)
 LOOKED_AT = 41
-BETWEEN_LOOKS = 0.01  # safety factor for what lies between the sampled parameters
+BETWEEN_LOOKS = 0.01  # safety factor for the path between the sampled parameters
 
 LEAST_GRID = 41
 

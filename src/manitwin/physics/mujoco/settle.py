@@ -1,7 +1,7 @@
 """Settling on a plane and ball drop in MuJoCo, which confirm that rest poses do not depend on a single solver.
 
-Contacts have MuJoCo's default softness, which is what a scene has into which a twin is loaded. A round body that lies
-on a narrow facet of its hulls stays there on stiff contacts (5 ms) and rolls off on these.
+Contacts have MuJoCo's default softness, as in a scene into which a twin is loaded. A round body that lies on a narrow facet
+of its hulls stays there on stiff contacts (5 ms) and rolls off on these.
 """
 
 from __future__ import annotations

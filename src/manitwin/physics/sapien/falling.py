@@ -1,4 +1,4 @@
-"""Falling bodies: a larger contact offset and slower depenetration keep them from being thrown out of what they land on."""
+"""Falling bodies: a larger contact offset and slower depenetration keep them from being thrown out of a surface on impact."""
 
 from __future__ import annotations
 
