@@ -74,8 +74,8 @@ class Recorder:
     def recording(self, tip_poses: Callable[[np.ndarray], np.ndarray]) -> Recording:
         """Return the recording; quaternion signs are continuous over time (``without_sign_changes``).
 
-        ``tip_poses`` is the forward kinematics from the joints ``(n,)`` of all arms to their tips in the world ``(arms, 4,
-        4)``.
+        ``tip_poses`` is the forward kinematics from the joints ``(n,)`` of all arms to their tips in the world
+        ``(arms, 4, 4)``.
         """
         told = _columns(self._actions)
         states = _columns(self._states)

@@ -1,22 +1,20 @@
 """Contact model of a suction cup: whether its lip seals on a surface, and the load that a sealed lip can carry.
 
-The lip's ring is projected onto the surface along the approach, and the deformation that the cup needs to follow the
-surface is bounded. This is the idea of Dex-Net 3.0's quasi-static spring model (Mahler et al., ICRA 2018, section
-IV-A), with bounds in the units of a cup's data sheet (tilt of the bellows, bending of the lip, surface angle) instead
-of one strain limit for all springs.
+The lip's ring is projected onto the surface along the approach, and the deformation that the cup needs to follow the surface
+is bounded. This is the idea of Dex-Net 3.0's quasi-static spring model (Mahler et al., ICRA 2018, section IV-A), with bounds
+in the units of a cup's data sheet (tilt of the bellows, bending of the lip, surface angle) instead of one strain limit for
+all springs.
 
-The sealed lip presses on the surface with N = V - T: the vacuum force V less the pull T along the lip's axis. It holds
-if
+The sealed lip presses on the surface with N = V - T: the vacuum force V less the pull T along the lip's axis. It holds if
 
-- friction carries shear and twist: hypot(S, M_n / r) <= mu N, the limit surface of Howe and Cutkosky (1996) as an
-ellipsoid, whose twist limit mu N r is exact for a thin ring;
-- the lip stays pressed on all around: M_t <= N r / 2, where the pressure of a thin elastic ring, N / (2 pi r) (1 + a
-  cos)
-with M_t = a N r / 2, becomes zero at one edge.
+- friction carries shear and twist: hypot(S, M_n / r) <= mu N, the limit surface of Howe and Cutkosky (1996) as an ellipsoid,
+  whose twist limit mu N r is exact for a thin ring;
+- the lip stays pressed on all around: M_t <= N r / 2, where the pressure of a thin elastic ring, N / (2 pi r) (1 + a cos)
+  with M_t = a N r / 2, becomes zero at one edge.
 
-The first condition is that of Dex-Net 3.0 (section IV-B) without its linearisation. The second replaces its elastic
-moment limit, which needs a material constant of the cup. Both conditions are linear in the load: they read ``(S / mu +
-T) / V <= 1`` and ``(2 M_t / r + T) / V <= 1``.
+The first condition is that of Dex-Net 3.0 (section IV-B) without its linearisation. The second replaces its elastic moment
+limit, which needs a material constant of the cup. Both conditions are linear in the load: they read
+``(S / mu + T) / V <= 1`` and ``(2 M_t / r + T) / V <= 1``.
 """
 
 from __future__ import annotations

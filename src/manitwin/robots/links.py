@@ -59,8 +59,8 @@ class Link:
 
     ``parent`` is the index of the parent link (-1 for the root). ``joint_to_parent`` is the joint frame, whose X axis is the
     joint axis, in the parent's frame; ``joint_to_link`` is the same frame in the link's own. ``limits`` are in rad, or m for
-    a prismatic joint. ``moments_kg_m2 (3,)`` are the principal moments about ``center_of_mass_m (3,)``, ``principal_axes (3,
-    3)`` their axes in the link frame.
+    a prismatic joint. ``moments_kg_m2 (3,)`` are the principal moments about ``center_of_mass_m (3,)``,
+    ``principal_axes (3, 3)`` their axes in the link frame.
     """
 
     name: str

@@ -24,9 +24,9 @@ MEASURED_TIMES = 4
 class HeldScene:
     """Scene for a skill once all objects are at rest: poses, frames, fixtures, and the hand.
 
-    ``openings`` and ``places_m`` are those of the goal. ``fingers`` are the names of the finger links; ``fingertips_m (N,
-    3)`` the vertices of the closed fingertips in the grasp frame, ``tip_depth_m`` the coordinate of the pads' centre along
-    its Z.
+    ``openings`` and ``places_m`` are those of the goal. ``fingers`` are the names of the finger links;
+    ``fingertips_m (N, 3)`` the vertices of the closed fingertips in the grasp frame, ``tip_depth_m`` the coordinate of the
+    pads' centre along its Z.
     """
 
     target: PlacedObject

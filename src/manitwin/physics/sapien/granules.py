@@ -50,8 +50,8 @@ class GranuleFill:
 def fill(name: str, opening: Opening, hulls: Sequence[np.ndarray], rng: np.random.Generator) -> GranuleFill | None:
     """Return 60 granules for a vessel, or fewer if they would be too small; None if it has no room for ten.
 
-    They fill ``FILL_SHARE`` of its volume and start in a loose lattice above its floor, clear of its ``hulls``, each ``(V,
-    3)`` m.
+    They fill ``FILL_SHARE`` of its volume and start in a loose lattice above its floor, clear of its ``hulls``, each
+    ``(V, 3)`` m.
     """
     content_m3 = FILL_SHARE * PACKING * opening.volume_m3
     most_m = min(RADIUS_M[1], MOST_OF_RIM * opening.rim_radius_m)

@@ -51,8 +51,8 @@ def _resolved(tree: UrdfTree, given: dict[str, Coupling], name: str) -> Coupling
 def with_followers(
     named: tuple[str, ...], positions_rad: np.ndarray, links: tuple[Link, ...], couplings: dict[str, Coupling]
 ) -> tuple[tuple[str, ...], np.ndarray]:
-    """Return all movable joints, the ``named`` ones first, and their positions ``(K, J)``, given those of the named ``(K,
-    N)``.
+    """Return all movable joints, the ``named`` ones first, and their positions ``(K, J)``, given those of the named
+    ``(K, N)``.
 
     A mimic joint that is not named follows its leader, clipped to its limits. Raises ValueError if a mimic joint is named
     with a different position, or if a leader is not named.

@@ -99,8 +99,8 @@ class HandReach:
         return HandReach(tuple(self._hulls[index] for index in np.flatnonzero(some)))
 
     def gaps_m(self, gripper: ParallelGripper, object_to_gripper: np.ndarray) -> np.ndarray:
-        """Return lower bounds ``(P, H)`` m on the distance of palm and closing fingers from each hull, for object poses ``(P,
-        4, 4)``.
+        """Return lower bounds ``(P, H)`` m on the distance of palm and closing fingers from each hull, for object poses
+        ``(P, 4, 4)``.
 
         Measured along the gripper's axes, between bounding boxes of the hulls and of the volumes that the hand sweeps as it
         closes. Negative if these boxes overlap.
