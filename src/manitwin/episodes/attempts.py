@@ -154,8 +154,7 @@ def read_tables(path: Path) -> Iterator[pa.Table]:
 
 
 def merge_attempts(files: Iterable[Path], place: Path) -> tuple[int, int]:
-    """Write the rows of all files in order into one file, with ``episode_index``; return the numbers of rows and kept
-    attempts.
+    """Write the rows of all files in order into one file, with ``episode_index``; return the numbers of rows and kept rows.
 
     Kept attempts are numbered in order, as ``hdf5_merge.merge_episodes`` numbers the trajectories of the same batches. About
     one row group is in memory at a time.

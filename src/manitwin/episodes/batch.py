@@ -27,9 +27,7 @@ REMEDY_OF_REPEATS = "an older version made these in steps; make the episodes aga
 
 @dataclass(frozen=True)
 class Batch(Payload):
-    """Some episodes of a twin, a scene or a task, by their numbers in the run: ``count`` numbers from ``first``, ``step``
-    apart.
-    """
+    """Some episodes of a twin, a scene or a task, by their numbers in the run: ``count`` from ``first``, ``step`` apart."""
 
     robot: str
     first: int

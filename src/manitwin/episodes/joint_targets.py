@@ -22,10 +22,9 @@ class JointTargets:
         self._lowest, self._highest = lowest_rad, highest_rad
 
     def towards(self, target_rad: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return targets ``(count, n)`` rad at uniform times up to the step's end, and speeds; the last one is
-        ``target_rad (n,)``.
+        """Return targets ``(count, n)`` rad at uniform times up to the step's end, and speeds.
 
-        Speeds ``(count, n)`` are in rad per step, 0 for joints at their limits.
+        The last target is ``target_rad (n,)``. Speeds ``(count, n)`` are in rad per step, 0 for joints at their limits.
         """
         clipped_rad = np.clip(np.asarray(target_rad, float), self._lowest, self._highest)
         samples = np.concatenate([self._last, clipped_rad[None]])

@@ -21,9 +21,7 @@ MOVED_M, MOVED_RAD = 0.002, 0.05
 
 
 class ConfirmedTrial:
-    """Grasp trial in a first engine; held grasps in which the object moved are repeated in a second engine, which can
-    overturn them.
-    """
+    """Grasp trial in a first engine; held grasps in which the object moved are repeated in a second, which can overturn them."""
 
     def __init__(self, first: GraspTrial, second: GraspTrial):
         """Take both engines. ``name`` is that of the first, ``confirmed_by`` that of the second."""

@@ -165,9 +165,7 @@ def _touched(touching: np.ndarray, grid: np.ndarray) -> _Touched:
 
 @lru_cache(maxsize=8)
 def _ends_of_cells(grid: tuple[tuple[float, float], ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the count ``(2^C,)`` and the lower and upper bounds ``(2^C, 2)`` of every subset of cells ``(C, 2)``, by bit
-    mask.
-    """
+    """Return the count ``(2^C,)`` and the bounds ``(2^C, 2)`` of every subset of cells ``(C, 2)``, by bit mask."""
     count: np.ndarray = np.zeros(1, dtype=np.int64)
     least, most = np.full((1, 2), np.inf), np.full((1, 2), -np.inf)
     for cell in grid:

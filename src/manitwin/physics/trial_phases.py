@@ -274,9 +274,7 @@ class _Phases:
         return rotation_angle_rad(self.scene.object_rotation() @ self.closed_rotation.T)
 
     def _loads(self, acceleration_m_s2: np.ndarray) -> np.ndarray:
-        """Return the loads ``(N, 3)`` m/s^2 on the object, in the hand's frame, for the hand's accelerations along the
-        object's axes.
-        """
+        """Return the object's loads ``(N, 3)`` m/s^2 in the hand's frame, given the hand's accelerations in the object's axes."""
         return ([0, 0, -GRAVITY_M_S2] - acceleration_m_s2) @ self.object_to_hand.T
 
     def _check_hold(self, outcome: Outcome) -> None:

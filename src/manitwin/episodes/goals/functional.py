@@ -100,11 +100,10 @@ def pressed(state: WorldState, literal: Literal) -> Judgement:
 
 
 def struck(state: WorldState, literal: Literal) -> Judgement:
-    """Judge the first contact of an object's face with another object: on the face, within 15 degrees, at the value's speed
-    or more.
+    """Judge the first contact of an object's face with another object: on the face, within 15 degrees, and fast enough.
 
-    A level face touches with its edge first, and the corners of a square lie outside the circle of equal area by
-    ``CORNER_OF_SQUARE``.
+    The value is the least speed. A level face touches with its edge first, and the corners of a square lie outside the circle
+    of equal area by ``CORNER_OF_SQUARE``.
     """
     assert literal.value is not None
     found = _events(state, "struck", literal)

@@ -63,8 +63,7 @@ class ArmKinematics:
     def inverse(
         self, gripper_to_world: np.ndarray, start: np.ndarray, iterations: int = ITERATIONS
     ) -> np.ndarray | None:
-        """Return joint positions ``(n,)`` for a pose ``(4, 4)`` of the grasp frame, by damped least squares from ``start``;
-        or None.
+        """Return joint positions ``(n,)`` for a grasp frame pose ``(4, 4)``, by damped least squares from ``start``; or None.
 
         Levenberg-Marquardt with the damping of Sugihara (2011, IEEE T-RO 27:5); steps are capped and clipped to the limits.
         """

@@ -44,9 +44,7 @@ def _body_of(link: Link) -> RigidBody:
 
 
 def _corners_of(shape: LinkShape) -> np.ndarray:
-    """Return the vertices ``(V, 3)`` of a shape's convex hull in the link frame; for a sphere, of an icosphere of 80
-    triangles.
-    """
+    """Return the vertices ``(V, 3)`` of a shape's convex hull in the link frame; spheres become icospheres of 80 triangles."""
     if shape.half_extents_m is not None:
         return box_corners(shape.half_extents_m, shape.shape_to_link)
     if shape.radius_m is not None:

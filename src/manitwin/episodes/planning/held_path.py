@@ -291,8 +291,7 @@ class HeldPathPlanner:
         *,
         level_only: bool = False,
     ) -> Motion | PlanFailure | None:
-        """Return the motion to the path: within the task's tilt limit, else little more tilted than the path's start, else
-        any.
+        """Return the motion to the path: within the task's tilt limit, else little more tilted than its start, else any.
 
         None: it must be ``level_only``, and only a tilted motion exists.
         """

@@ -53,8 +53,7 @@ def obstacle_shapes(
     *,
     as_hulls: bool = False,
 ) -> ObstacleShapes:
-    """Represent obstacles and the carried target by their convex hulls if that loses no free space, otherwise by their own
-    hulls.
+    """Represent obstacles and the carried target by their convex hulls if that loses no free space, else by their own hulls.
 
     No free space is lost if the convex hull keeps ``margin_m`` from the target at start and goal, and is either nearly solid
     or out of the hand's way. ``as_hulls``: the target is carried as its hulls in any case.

@@ -15,8 +15,9 @@ LEAST_GRID = 41
 
 
 def trapezoid(share: float | np.ndarray, moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return position and speed on [0, 1] at moments in [0, 1]; acceleration and deceleration each take a ``share`` of the
-    time.
+    """Return position and speed on [0, 1] at moments in [0, 1] of a trapezoidal profile.
+
+    Acceleration and deceleration each take a ``share`` of the time.
     """
     peak = 1 / (1 - share)
     first, last = moments**2 / (2 * share), (1 - moments) ** 2 / (2 * share)

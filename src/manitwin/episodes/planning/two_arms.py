@@ -153,9 +153,7 @@ class TwoArmPlanner(PickPlacePlanner):
         taker_rad: np.ndarray,
         grasp: Grasp,
     ) -> Motion | None:
-        """Plan the first hand's straight retreat from the object that the second arm holds by ``grasp``; None if it is
-        blocked.
-        """
+        """Plan the first hand's straight retreat from the object that the second arm holds by ``grasp``; None if blocked."""
         asked = self.with_taker_at(problem, taker_rad, grasp)
         return plan_withdrawal(self.parts, asked, object_to_world, giver_rad, blind=False)
 

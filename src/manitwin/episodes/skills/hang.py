@@ -90,8 +90,7 @@ class Hang(HeldSkill):
 def _hanging(
     hulls: Sequence[np.ndarray], hole_m: np.ndarray, axis: np.ndarray, center_of_mass_m: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """Return the up direction ``(3,)`` of an object hanging at rest, and the distance (m) from the hole's centre to its edge
-    there.
+    """Return the up direction ``(3,)`` of an object hanging at rest, and the distance (m) from the hole's centre to its edge.
 
     The edge that rests on the peg is vertically above the centre of mass; found by fixed-point iteration.
     """

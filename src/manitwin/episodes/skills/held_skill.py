@@ -114,11 +114,10 @@ def tip_of(frames: tuple[TwinFrame, ...], hulls: Sequence[np.ndarray]) -> Tip | 
 
 
 def stick_frame(points_m: np.ndarray, frames: tuple[TwinFrame, ...], up: np.ndarray) -> np.ndarray:
-    """Return the frame ``(4, 4)`` of the working end: origin at the outermost vertex, Z outwards along the length, X near
-    ``up``.
+    """Return the frame ``(4, 4)`` of the working end: origin at the outermost vertex, Z outwards, X near ``up (3,)``.
 
-    The working end is the one away from the handle if a frame marks it (an axis whose label contains "handle"), otherwise the
-    broader one.
+    Z is along the length. The working end is the one away from the handle if a frame marks it (an axis whose label contains
+    "handle"), otherwise the broader one.
     """
     middle = points_m.mean(0)
     axis = np.linalg.eigh(np.cov(points_m.T))[1][:, 2]

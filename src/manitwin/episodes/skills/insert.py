@@ -63,8 +63,9 @@ class Insert(HeldSkill):
         return holder(position_m, float(np.arctan2(place[1, 0], place[0, 0])), bore_m, depth_m, name=HOLDER)
 
     def task(self, scene: HeldScene) -> HeldTask:
-        """Return the paths down into the holder, with the object rotated about its length by steps of 30 degrees (180 if
-        flat).
+        """Return the paths down into the holder, with the object rotated about its length by steps of 30 degrees.
+
+        A flat object fits in two rotations only.
         """
         target, (into,) = scene.target, scene.fixtures
         bore = into.holder
@@ -143,9 +144,7 @@ class _Section:
 
 
 def _section(points: np.ndarray, stick: np.ndarray, depth_m: float) -> _Section:
-    """Return the cross-section of the part inserted to a depth; its smallest bounding rectangle is found by steps of one
-    degree.
-    """
+    """Return the cross-section of the part inserted to a depth; its bounding rectangle is found by steps of one degree."""
     local = transform_points(inverse(stick), points)
     entering = local[local[:, 2] > local[:, 2].max() - depth_m, :2]
     turns = [Rotation.from_euler("z", each, degrees=True).as_matrix() for each in range(180)]

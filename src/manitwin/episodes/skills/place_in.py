@@ -63,9 +63,7 @@ class PlaceIn(Skill):
         goal = self.goal(around.objects[target], around.objects[partner])
 
         def steadiest(poses: Iterator[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
-            """Return the resting poses, slightly raised, and release poses of drops that reach the goal; smallest motion
-            first.
-            """
+            """Return the raised resting poses and the release poses of drops that reach the goal; smallest motion first."""
             rests = [(begun, rest_after_drop(around, target, partner, goal, begun)) for begun in poses]
             found = [(begun, rest) for begun, rest in rests if rest is not None]
             found.sort(key=lambda each: _farthest_m(around.body(target).parts.whole, *each))

@@ -50,8 +50,9 @@ class Pour(HeldSkill):
     name, predicate, has_partner = "pour", "poured", True
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept vessels that open upwards, the partner deeper than a plate, with a rim of at least 3 cm and wider than the
-        target's.
+        """Accept vessels that open upwards; the partner's rim is at least 3 cm and wider than the target's.
+
+        The partner must also be deeper than a plate and hold the target's granules.
         """
         if partner is None or not (target.vessel and partner.vessel) or lip_frame(target) is None:
             return False

@@ -43,8 +43,7 @@ class ArticulatedTrial:
         settings: TrialSettings,
         joints_rad: np.ndarray | None = None,
     ) -> list[TrialResult]:
-        """Try the grasps ``gripper_to_object (N, 4, 4)`` with ``joints_rad (N, 2, J)``: joints before closing and closing
-        goal.
+        """Try the grasps ``gripper_to_object (N, 4, 4)``; ``joints_rad (N, 2, J)`` are joints before closing and closing goal.
 
         The ratio of ``settings.force_n`` to the gripper's own force scales the torques with which its joints press.
         """

@@ -101,9 +101,7 @@ class SapienRobot:
         self.put(positions_rad, np.full(2, opening_m / 2))
 
     def put(self, positions_rad: np.ndarray, hand: np.ndarray) -> None:
-        """Set the positions of arm ``(n,)`` and hand ``(J,)`` joints, clipped to their limits, at rest, with the targets
-        there.
-        """
+        """Set positions of arm ``(n,)`` and hand joints ``(J,)``, clipped to their limits, at rest, with the targets there."""
         state = np.empty(len(self._arm_at) + len(self._fingers_at), np.float32)
         state[self._arm_at] = positions_rad
         state[self._fingers_at] = hand
@@ -170,9 +168,7 @@ class SapienRobot:
 
 
 def _contact_of(robot: Robot, link: Link, pads: physx.PhysxMaterial, *, second: bool) -> LinkContact:
-    """Return a link's contact properties: pads are soft; fingers of a multi-finger hand collide with each other as in its
-    trial.
-    """
+    """Return a link's contact properties: pads are soft, and fingers of a multi-finger hand collide with each other."""
     groups: tuple[int, ...] = SECOND_ARM_COLLISION_GROUPS if second else HAND_COLLISION_GROUPS
     if isinstance(robot.gripper, MultiFingerGripper):
         owners = {

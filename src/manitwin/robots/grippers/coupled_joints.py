@@ -51,11 +51,10 @@ def _resolved(tree: UrdfTree, given: dict[str, Coupling], name: str) -> Coupling
 def with_followers(
     named: tuple[str, ...], positions_rad: np.ndarray, links: tuple[Link, ...], couplings: dict[str, Coupling]
 ) -> tuple[tuple[str, ...], np.ndarray]:
-    """Return all movable joints, the ``named`` ones first, and their positions ``(K, J)``, given those of the named
-    ``(K, N)``.
+    """Return all movable joints, the ``named`` ones first, and their positions ``(K, J)``, given those of the named ones.
 
-    A mimic joint that is not named follows its leader, clipped to its limits. Raises ValueError if a mimic joint is named
-    with a different position, or if a leader is not named.
+    ``positions_rad (K, N)`` are those of the named joints. A mimic joint that is not named follows its leader, clipped to its
+    limits. Raises ValueError if a mimic joint is named with a different position, or if a leader is not named.
     """
     left_out = [link.joint for link in links if link.joint in couplings and link.joint not in named]
     limits = {link.joint: link.limits for link in links}

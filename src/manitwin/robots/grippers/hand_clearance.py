@@ -99,11 +99,10 @@ class HandReach:
         return HandReach(tuple(self._hulls[index] for index in np.flatnonzero(some)))
 
     def gaps_m(self, gripper: ParallelGripper, object_to_gripper: np.ndarray) -> np.ndarray:
-        """Return lower bounds ``(P, H)`` m on the distance of palm and closing fingers from each hull, for object poses
-        ``(P, 4, 4)``.
+        """Return lower bounds ``(P, H)`` m on the distance of palm and closing fingers from each hull.
 
-        Measured along the gripper's axes, between bounding boxes of the hulls and of the volumes that the hand sweeps as it
-        closes. Negative if these boxes overlap.
+        ``object_to_gripper (P, 4, 4)`` are object poses. Measured along the gripper's axes, between bounding boxes of the
+        hulls and of the volumes that the hand sweeps as it closes. Negative if these boxes overlap.
         """
         rotations, origins = object_to_gripper[:, :3, :3].transpose(0, 2, 1), object_to_gripper[:, None, :3, 3]
         corners = self._corners @ rotations + origins
@@ -149,8 +148,7 @@ _MIRRORS = (np.array([1.0, 1.0, 1.0]), np.array([-1.0, 1.0, 1.0]))
 
 @lru_cache(maxsize=8)
 def _facing_fingers(gripper: ParallelGripper, clear_m: float) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Return for each finger of the open hand, seen from it, the start and end of its boxes along X ``(B,)``, and plane
-    offsets.
+    """Return, per finger of the open hand and seen from it, start and end of its boxes along X ``(B,)``, and plane offsets.
 
     The offsets ``(B, 25)`` are the minima of the Y and Z terms of ``_FACING`` over the volume that each box sweeps. All boxes
     are enlarged by ``clear_m``.

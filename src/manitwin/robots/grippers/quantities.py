@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import AfterValidator
 
 MAX_LENGTH_M = 1.0
-"""No gripper is larger than the largest object that is accepted (``ShapeConfig.max_longest_side_m``)."""
+"""No gripper is larger than the largest object that is accepted (``GateConfig.max_longest_side_m``)."""
 MAX_VACUUM_PA = 101_325.0
 """Standard atmosphere: the largest possible pressure difference."""
 KILOPASCALS = MAX_VACUUM_PA / 1000
