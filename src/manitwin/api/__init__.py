@@ -1,6 +1,6 @@
-"""The functions of ``manitwin``: build twins, make scenes and episodes of them, load, export, import and count them.
+"""Public Python API: build, load, export and import twins; make scenes, tasks and episodes from them; compute statistics.
 
-What only a build needs takes 2 CPU-seconds to import, so each function imports what it calls when it is called.
+Each function imports its implementation when it is called: the dependencies of a build alone take 2 CPU-seconds to import.
 """
 
 from manitwin.api.assets import import_assets

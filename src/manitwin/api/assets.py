@@ -1,4 +1,4 @@
-"""Import the assets of other tools."""
+"""Import simulation assets (URDF, MJCF, SDF, USD and mesh files) as inputs of a build."""
 
 from __future__ import annotations
 
@@ -20,14 +20,17 @@ def import_assets(
     each_object: bool = False,
     root: str | Path | None = None,
 ) -> list[Imported]:
-    """Import all assets at and below ``paths`` into folders below ``out`` that ``build`` takes; return what became of each.
+    """Import every asset at or below ``paths`` into a folder of its own below ``out``; return one result per asset.
 
-    What moves by joints is kept with its links and joints (URDF, MJCF, SDF, USD), of other formats the first rigid part is taken;
-    with ``lock_joints`` all of it (the same formats) is one rigid body as the file stands. With ``each_object`` every
-    object of an MJCF file that is free to move is an asset, else the first one alone. Nothing is read above ``root``, which is
-    each asset's repository, package or own folder where it is not given. An asset that cannot be read has an
-    ``error`` and no folder. Nothing is written over. Raises UsageError for a path that is not there or not below ``root``, and
-    where a folder of another kind has an asset's name.
+    The written folders are valid inputs of ``build``.
+
+    - ``lock_joints``: an articulated asset (URDF, MJCF, SDF, USD) becomes one rigid body with its joints fixed where the file
+      puts them. Otherwise it keeps its links and joints. Of any other format the first rigid part is imported.
+    - ``each_object``: import every freely moving object of an MJCF file as an asset of its own, not only the first one.
+    - ``root``: no file above this folder is read. Default: the repository, package or folder of each asset.
+
+    An asset that cannot be read is returned with an ``error`` and without a folder. Existing files are not overwritten. Raises
+    UsageError if a path does not exist or is not below ``root``, or if a folder of another kind already has an asset's name.
     """
     from manitwin.assets.importers.importer import import_assets as imported
 

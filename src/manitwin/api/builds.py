@@ -1,4 +1,4 @@
-"""Build twins from inputs, as ``manitwin build`` does."""
+"""Build twins from Python, as the command ``manitwin build`` does."""
 
 from __future__ import annotations
 
@@ -44,41 +44,43 @@ def build(
 ) -> BuildReport:
     """Build twins from images, meshes, folders, manifests and ``texts`` into the data set ``out``, a folder or a URL.
 
-    Without inputs a build goes on with what is there. What was built under the same configuration and seed is not built again;
-    under another one, the inputs that are given are (where none is given, all that are there), from the first stage that
-    it changes.
+    Without inputs, the build resumes the items that the data set already has. An item that was built with the same
+    configuration and seed is not built again. If the configuration has changed, the given inputs (without inputs: all items)
+    are rebuilt from the first stage that the change affects.
 
-    What a manifest's row may say for one input, these say for all others:
+    Default values of manifest columns, for inputs that do not state their own:
 
-    - ``name``, ``license``, ``attribution``; ``units`` m|cm|mm|none|auto and ``up`` y|z|auto of meshes
-    - ``longest_side_m``: the longest of length, width and height as the thing stands
-    - ``mask``: a picture of the thing's outline in one photo, white where it is; ``box_px``: left, top, right, bottom of it
+    - ``name``, ``license``, ``attribution``; for meshes ``units`` (m|cm|mm|none|auto) and ``up`` (y|z|auto)
+    - ``longest_side_m``: the largest of length, width and height of the object as it stands
+    - ``mask``: mask image of the object in one photo, white on the object; ``box_px``: its bounding box as left, top, right,
+      bottom
 
-    What the inputs are:
+    Interpretation of the inputs:
 
-    - ``count``: so many variations of each text, which differ in what it leaves open
-    - ``views``: they are photos of one thing, which becomes one twin. ``turns_deg`` are the camera's turns about the vertical in
-      these, counter-clockwise seen from above; or ``poses`` is a transforms.json or the folder of a COLMAP model that states
-      the cameras, whose unit and up axis are then ``units`` and ``up``
-    - ``strict``: a column of a manifest that nobody knows is an error
+    - ``count``: number of variations built from each text; they differ in what the text leaves open
+    - ``views``: the inputs are photos of one object and make one twin. ``turns_deg`` gives the camera's rotation about the
+      vertical for each photo, counter-clockwise seen from above. Alternatively ``poses`` is a transforms.json file or a COLMAP
+      model folder with the cameras; ``units`` and ``up`` then describe that file
+    - ``strict``: an unknown manifest column is an error
 
-    ``config`` None is what the data set was built with, else the defaults. ``flags`` change it:
+    ``config`` None takes the configuration that the data set was built with, or else the defaults. ``flags`` override it:
 
-    - ``seed``; ``grippers``, names or .toml files, the first one's grasps are the twin's own
-    - ``vlm``, ``generator``, ``grasper`` and ``matting`` choose backends (docs/backends.md); ``record`` is a file that a VLM's
-      answers are added to
-    - ``max_cost_usd``: once services have charged so much, items that would cost more are left unfinished
-    - ``require_agreement`` verifies only grasps that a second engine holds too; ``second_opinion`` "sample" tries 20 of the held
-      ones there instead of all; ``quick`` leaves out second engine, robustness and second trials of
+    - ``seed``; ``grippers``: names or .toml files; the grasps of the first gripper are the twin's own
+    - ``vlm``, ``generator``, ``grasper``, ``matting``: backends (docs/backends.md); ``record``: a file to which all VLM answers
+      are appended
+    - ``max_cost_usd``: items whose next paid stage would exceed this sum are left unfinished
+    - ``require_agreement``: verify only grasps that a second engine confirms; ``second_opinion`` "sample": try 20 of the
+      successful grasps there instead of all; ``quick``: skip the second engine, the robustness trials and the second trials of
       doubtful grasps
-    - ``link``: of things with joints, which are locked, both fingertips of each grasp touch this link
+    - ``link``: for articulated objects, whose joints are locked: both fingertips of each grasp must touch this link
 
-    ``executor`` is local (``jobs`` processes), ray (a cluster at ``address``), or inline, in this process. ``on_estimate`` is
-    called with about what services charge for a twin (USD) by the kind of its input, ``on_start`` with the number of items and of
-    those that are to be done, ``on_stage`` and ``on_result`` with each event of a stage and each item that has ended.
+    ``executor`` is "local" (``jobs`` processes), "ray" (a cluster at ``address``) or "inline" (this process).
 
-    Raises UsageError for wrong arguments, and where another build is at work there; what happens to one item is in the report
-    and never raised.
+    Callbacks: ``on_estimate`` gets the approximate service cost of a twin in USD by kind of input, ``on_start`` the number of
+    items and how many of them are to be built, ``on_stage`` each event of a stage, ``on_result`` each item that has ended.
+
+    Raises UsageError for invalid arguments and if another build is writing to ``out``. Failures of single items are never
+    raised; they are in the report.
     """
     from manitwin.pipeline.settings import request_build
 

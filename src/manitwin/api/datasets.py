@@ -1,4 +1,4 @@
-"""Write the index of a data set and its statistics, and query them."""
+"""Write and query the index and the statistics of a data set."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ def write_index(
     on_start: Callable[[int], None] = lambda twins: None,
     on_read: Callable[[int], None] = lambda twins: None,
 ) -> Rebuilt:
-    """Write the index of a data set again from its twins alone, in ``jobs`` processes; the old one serves until then.
+    """Rebuild the index of a data set from its twins with ``jobs`` processes; the old index stays in use until the new one is
+    done.
 
-    ``on_start`` is called with the number of twins, ``on_read`` with that of those just read.
-    Raises UsageError where there is no data set, TwinError where a process dies: nothing has changed then.
+    ``on_start`` is called with the number of twins, ``on_read`` with the number of twins just read. Raises UsageError if there
+    is no data set, and TwinError if a process dies; the old index is then unchanged.
     """
     from manitwin.dataset.index.rebuild import rebuild
     from manitwin.engine.machine_share import available_cores
@@ -33,9 +34,10 @@ def write_index(
 
 
 def write_statistics(dataset: str | Path, out: str | Path | None = None) -> WrittenReport:
-    """Write the statistics of a data set, or of a folder of episodes, as a page, its figures, and its numbers with their SQL.
+    """Write the statistics of a data set, or of a folder of episodes: a page, its figures, and the numbers with their SQL
+    queries.
 
-    ``out`` None: ``statistics/`` below it. Raises UsageError where a data set has no index.
+    ``out`` None is ``statistics/`` below the data set. Raises UsageError if a data set has no index.
     """
     from manitwin.dataset.statistics.report import WrittenReport, write_dataset_report
     from manitwin.episodes.attempts import ATTEMPTS
@@ -52,9 +54,9 @@ def write_statistics(dataset: str | Path, out: str | Path | None = None) -> Writ
 
 
 def statistics_connection(dataset: str | Path) -> duckdb.DuckDBPyConnection:
-    """Return DuckDB with the tables of a data set's index and the macros of ``manitwin stats``, for queries of its report.
+    """Return a DuckDB connection with the index tables of a data set and the SQL macros that ``manitwin stats`` uses.
 
-    Raises UsageError where there is no index.
+    Raises UsageError if the data set has no index.
     """
     from manitwin.dataset.statistics.query import ReportTables
     from manitwin.twin.dataset_root import DatasetRoot

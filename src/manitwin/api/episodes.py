@@ -1,4 +1,4 @@
-"""Make episodes of twins and scenes, and draw their films."""
+"""Make episodes with twins or in scenes, and render their videos."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class EpisodesReport:
-    """The outcome of ``make_episodes``.
+    """The result of ``make_episodes``.
 
-    ``totals`` and ``lines``, the same in words, are None and empty where the run has not ended; ``retired`` are all grasps
-    that fail end to end, ``newly_retired`` how many of them were retired just now.
+    ``totals`` holds the attempt counts and ``lines`` the same in words; they are None and empty if the run has not finished.
+    ``retired`` lists all grasps that fail in episodes, ``newly_retired`` counts those that this call has retired.
     """
 
     run: RunReport
@@ -44,12 +44,12 @@ def make_episodes(
     jobs: int | None = None,
     **run: Unpack[RunOptions],
 ) -> EpisodesReport:
-    """Attempt ``count`` episodes of a skill with the twins of a data set or in scenes, and keep what succeeded.
+    """Attempt ``count`` episodes of a skill with the twins of a data set or in scenes, and keep the successful ones.
 
-    ``out`` gets ``attempts.parquet`` and the data sets of ``formats`` (docs/episodes.md); episodes that are there stay.
-    ``twins``: where the twins of scenes are now. ``retire`` marks grasps that fail in their twins' records.
-    Raises UsageError for a source without twins or scenes, an unknown robot or format, an ``out`` made with other settings,
-    or where another run is at work there.
+    ``out`` receives ``attempts.parquet`` and one data set per format of ``formats`` (docs/episodes.md). Existing episodes are
+    kept. ``twins``: the current location of the twins, if it has changed since the scenes were made. ``retire``: mark grasps
+    that fail in the records of their twins. Raises UsageError for a source without twins or scenes, an unknown robot or format,
+    an ``out`` that was made with other settings, or if another run is writing there.
     """
     from manitwin.episodes.collect import chosen_formats, collect
     from manitwin.episodes.episodes_run import make_episodes as make_batches
@@ -74,10 +74,11 @@ def render_episodes(
     on_written: Callable[[LeRobotSummary], None] = lambda summary: None,
     **run: Unpack[RunOptions],
 ) -> RunReport:
-    """Draw the kept episodes of a folder by showing their states again, and write its LeRobot data set with the films.
+    """Render the successful episodes of a folder by replaying their recorded states, and write the LeRobot data set with videos.
 
-    ``twins``: where their twins are now. What is drawn already stays. Raises EpisodesError where there are no episodes,
-    UsageError for an unknown camera, RendererMissing, and Unavailable without an encoder.
+    ``twins``: the current location of the twins. Episodes that are already rendered are not rendered again. Raises
+    EpisodesError if there are no episodes, UsageError for an unknown camera, RendererMissing without a renderer, and
+    Unavailable without a video encoder.
     """
     from manitwin.episodes.episode_pictures import draw_episodes, write_with_pictures
     from manitwin.episodes.settings import PicturesConfig

@@ -1,4 +1,4 @@
-"""Make scenes of a data set's twins, find, load and export them."""
+"""Make scenes from the twins of a data set; find, load and export scenes."""
 
 from __future__ import annotations
 
@@ -24,11 +24,12 @@ def make_layouts(
     jobs: int | None = None,
     **run: Unpack[RunOptions],
 ) -> RunReport:
-    """Sample ``count`` scenes of a data set's twins at rest below ``out``; those that are there stay (docs/layouts.md).
+    """Sample ``count`` scenes of twins at rest into the folder ``out``; existing scenes are kept (docs/layouts.md).
 
-    ``config``: the settings or a TOML file of them; with its ``pictures`` each scene is drawn. ``jobs``: how many processes,
-    by default one a core. ``find_scenes`` lists the accepted ones. Raises UsageError for a data set without twins, categories
-    that it has not, scenes of other settings at ``out``, or where another run is at work there.
+    ``config``: the settings, or a TOML file with them; if its ``pictures`` is set, each scene is rendered. ``jobs``: number of
+    processes, by default one per core. ``find_scenes`` lists the accepted scenes. Raises UsageError for a data set without
+    twins, for categories that it does not contain, for an ``out`` with scenes of other settings, or if another run is writing
+    there.
     """
     from manitwin.scenes.layouts.layouts_run import make_layouts as make
     from manitwin.scenes.settings import LayoutsConfig
@@ -38,9 +39,9 @@ def make_layouts(
 
 
 def find_scenes(place: str | Path) -> list[Path]:
-    """Return the files of the scenes at ``place``: a file, a scene's folder, or all that ``make_layouts`` wrote there.
+    """Return the scene files at ``place``: a scene file, a scene's folder, or a folder written by ``make_layouts``.
 
-    Raises UsageError where there is none.
+    Raises UsageError if there are none.
     """
     from manitwin.scenes.scene_files import scene_files
 
@@ -51,9 +52,9 @@ def find_scenes(place: str | Path) -> list[Path]:
 
 
 def load_scene(scene: str | Path, dataset: str | Path | None = None) -> Scene:
-    """Load a scene of ``manitwin layout`` by its file or folder; ``dataset`` None: the one that it was sampled from.
+    """Load a scene by its file or folder; ``dataset`` None is the data set that it was sampled from.
 
-    Raises UsageError where the scene cannot be read, or does not lie in the folder that says whose twins it has.
+    Raises UsageError if the scene cannot be read, or if its folder does not state the data set.
     """
     from manitwin.scenes.loaded_scene import Scene
     from manitwin.scenes.scene_files import dataset_of
@@ -62,10 +63,10 @@ def load_scene(scene: str | Path, dataset: str | Path | None = None) -> Scene:
 
 
 def export_scene(scene: Scene | str | Path, to: str | Iterable[str], out: str | Path) -> dict[str, Path]:
-    """Write a scene in formats (``"mjcf"``, ``["sdf", "usd"]``, ``"all"``) below ``out``; return the file to open of each.
+    """Export a scene to one or more formats (``"mjcf"``, ``["sdf", "usd"]``, ``"all"``) below ``out``.
 
-    An earlier export there is replaced. Raises UsageError for an unknown format and a scene or twin that is not there,
-    ExportError for what cannot be written.
+    Returns the main file of each format. An earlier export is replaced. Raises UsageError for an unknown format and for a
+    missing scene or twin, and ExportError if a format cannot represent the scene.
     """
     from manitwin.assets.writers.write import write_exported
     from manitwin.errors import choose_from

@@ -1,4 +1,4 @@
-"""The settings of what is made of twins: given, or of a TOML file."""
+"""Resolve the settings of layouts, tasks, episodes and videos."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ Settings = TypeVar("Settings", "LayoutsConfig", "TasksConfig", "TrajectoriesConf
 
 
 def settings_of(kind: type[Settings], config: Settings | str | Path | None, jobs: int | None) -> Settings:
-    """Return an application's settings: given, of a TOML file, or the default ones; raises ConfigError and UsageError."""
+    """Return settings of type ``kind`` from an instance, a TOML file, or the defaults; ``jobs`` overrides ``run.cpu``.
+
+    Raises ConfigError for an invalid file and UsageError for an invalid ``jobs``.
+    """
     from manitwin.config import MOST_SLOTS, load_config
 
     if jobs is not None and not 1 <= jobs <= MOST_SLOTS:

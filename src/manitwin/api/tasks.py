@@ -1,4 +1,4 @@
-"""Find tasks in scenes, and make environments of them."""
+"""Find tasks in scenes, and make Gymnasium environments from them."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TasksReport:
-    """The outcome of ``make_tasks``; ``totals`` are None where the run has not ended.
+    """The result of ``make_tasks``; ``totals`` is None if the run has not finished.
 
-    ``bddl`` has how many tasks were written as BDDL and how many could not be, None where that was not asked for.
+    ``bddl`` is the number of tasks written as BDDL and the number that BDDL cannot express; None if BDDL was not requested.
     """
 
     run: RunReport
@@ -39,10 +39,11 @@ def make_tasks(
     jobs: int | None = None,
     **run: Unpack[RunOptions],
 ) -> TasksReport:
-    """Find tasks in the scenes of a folder, check each by planning, and write ``tasks.jsonl`` with instructions.
+    """Find tasks in the scenes of a folder, check each by motion planning, and write ``tasks.jsonl`` with language instructions.
 
-    ``twins``: where the twins of the scenes are now. ``bddl`` also writes what BDDL can say. Raises UsageError for a place
-    without scenes, an unknown robot, an ``out`` made with other settings, or where another run is at work there.
+    ``twins``: the current location of the scenes' twins. ``bddl``: also write the tasks that BDDL can express. Raises
+    UsageError for a folder without scenes, an unknown robot, an ``out`` that was made with other settings, or if another run is
+    writing there.
     """
     from manitwin.episodes.settings import TasksConfig
     from manitwin.episodes.tasks.tasks_run import export_bddl
@@ -64,12 +65,13 @@ def make_env(
     rate_hz: int = 20,
     start_noise: StartNoise | None = None,
 ) -> TaskEnvironment:
-    """Return the Gymnasium environment of a task of a file or folder of tasks; the only one needs no ``task_id``.
+    """Return the Gymnasium environment of one task; ``task_id`` may be omitted if ``tasks`` contains a single task.
 
-    Observations are states, with pictures of ``cameras`` besides; docs/policies.md says what is in them and what an action is.
-    ``twins``: where the twins are now. There are ``rate_hz`` actions a second, 20, 10 or 5: as many as in the data that a policy
-    learned from. An episode is cut off after ``max_steps`` steps. With ``start_noise`` the seeds of ``reset`` draw other starts.
-    Raises UsageError for an unknown task or camera, another rate, and a scene that is another one than the task's.
+    ``tasks`` is a file or folder of tasks. Observations are states, plus images of ``cameras``; docs/policies.md describes the
+    observation and action spaces. ``twins``: the current location of the twins. ``rate_hz``: actions per second, 20, 10 or 5;
+    use the rate of the data that the policy was trained on. An episode is truncated after ``max_steps`` steps. With
+    ``start_noise``, the seed of ``reset`` also perturbs the initial state. Raises UsageError for an unknown task or camera,
+    another rate, or a scene that differs from the one that the task was made for.
     """
     from manitwin.episodes.environment.make import make_env as make
 

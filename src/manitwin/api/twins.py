@@ -1,4 +1,4 @@
-"""Load a finished twin, export it, and the schema of its record."""
+"""Load and export a finished twin; get the JSON schema of its record."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def load(folder: str | Path, verify: bool = False) -> Twin:
-    """Load a finished twin; with ``verify``, check the digest of every file. Raises TwinError."""
+    """Load a finished twin; with ``verify``, check the SHA-256 digest of every file. Raises TwinError."""
     from manitwin.twin.loaded_twin import Twin
 
     return Twin(folder, verify=verify)
@@ -20,9 +20,11 @@ def load(folder: str | Path, verify: bool = False) -> Twin:
 def export_twin(
     twin: Twin | str | Path, to: str | Iterable[str], out: str | Path, *, license_allow: Iterable[str] | None = None
 ) -> dict[str, Path]:
-    """Write a twin in formats (``"mjcf"``, ``["urdf", "usd"]``, ``"all"``) below ``out``; returns the file to open of each.
+    """Export a twin to one or more formats (``"mjcf"``, ``["urdf", "usd"]``, ``"all"``) below ``out``; return the main file of
+    each.
 
-    Raises UsageError for an unknown format, ExportError for a licence that is not allowed or a twin that a format cannot take.
+    Raises UsageError for an unknown format, and ExportError for a licence not in ``license_allow`` or a twin that a format
+    cannot represent.
     """
     from manitwin.assets.writers.exporter import TwinContent
     from manitwin.assets.writers.registry import chosen_formats

@@ -1,6 +1,6 @@
-"""The frozen configuration of a build: one section a stage, the paper's numbers as the defaults.
+"""The immutable configuration of a build: one section per stage, with the paper's numbers as defaults.
 
-Every section belongs to one stage and is part of that stage's key: a changed value re-runs that stage and what follows.
+A section is part of the key of its stage: changing a value re-runs that stage and all stages that depend on it.
 """
 
 from manitwin.config.build import BuildConfig

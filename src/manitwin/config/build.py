@@ -1,4 +1,4 @@
-"""All settings of a build, one section a stage."""
+"""The complete configuration of a build, with one section per stage."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from manitwin.config.shape import CollisionConfig, GateConfig, MeshConfig, Physi
 from manitwin.config.views import CandidatesConfig, ViewsConfig
 
 RETIRED_SECTIONS = ("caption", "points", "finish")
-"""Sections that once were there without any setting in them: empty ones are read over."""
+"""Sections of earlier versions that had no settings; they are ignored if empty."""
 
 
 class BuildConfig(Section):
-    """Everything that decides what a build makes of its inputs."""
+    """All settings that determine the result of a build."""
 
     seed: Seed = 0
     generator: str = "lift"

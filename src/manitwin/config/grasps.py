@@ -1,4 +1,4 @@
-"""Grasps: how they are proposed, tried, tried in a second engine, and tried under perturbations."""
+"""Settings of grasps: proposal, physics trial, trial in a second engine, and robustness trials."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from manitwin.config.section import Section
 
 
 class GraspConfig(Section):
-    """Proposals (paper, implementation details: 4,000 candidates, 3 cm, 7-DoF farthest point sampling to 100).
+    """Grasp proposals (paper, implementation details: 4,000 candidates, 3 cm, 7-DoF farthest point sampling to 100).
 
-    ``on_support_share`` of those that are tried leave room for the plane of each placement that the object is picked from.
-    At each grasp point ``least_per_point`` should hold: where they do not, up to ``tries_per_point`` more of those that a
-    denser sample finds there are tried. ``link``: of a twin with joints, which are locked, both fingertips of each grasp touch
-    this link (none: any).
+    A share of ``on_support_share`` of the simulated grasps clears the support plane of at least one placement, so that the
+    object can be picked up from it. Each grasp point should get ``least_per_point`` successful grasps: if it has fewer, up to
+    ``tries_per_point`` further grasps from a denser sample are tried. ``link``: for articulated twins, whose joints are locked,
+    both fingertips of each grasp must touch this link (none: any link).
     """
 
     max_proposals: int = Field(default=4000, ge=1)
@@ -31,9 +31,11 @@ class GraspConfig(Section):
 
 
 class VerifyConfig(Section):
-    """The grasp trial (paper, "Simulation Verification": three stable frames, 1 cm, 2,000 steps); no force: the gripper's own.
+    """The grasp trial (paper, "Simulation Verification": three stable frames, 1 cm, 2,000 steps). No ``force_n``: the gripper's
+    force.
 
-    What falls, or is held only just, is tried again at 1/960 s and with 40 iterations where ``doubts_tried_again``.
+    ``doubts_tried_again``: a grasp that fails or succeeds only just is tried again with steps of 1/960 s and 40 solver
+    iterations.
     """
 
     force_n: float | None = Field(default=None, gt=0)
@@ -47,10 +49,10 @@ class VerifyConfig(Section):
 
 
 class SecondOpinionConfig(Section):
-    """The same grasps in a second engine: all that held, a share of those that failed, and jittered ones as controls.
+    """Trials in a second engine: all successful grasps, a share of the failed ones, and jittered grasps as negative controls.
 
-    ``sample_of_held`` grasps that held, spread evenly over the directions of approach, stand for all of them (none: all are
-    tried); the twin then says how far their share may be off.
+    ``sample_of_held``: try only so many of the successful grasps, spread evenly over the approach directions (none: all of
+    them); the twin then states the uncertainty of the estimated agreement.
     """
 
     enabled: bool = True
@@ -63,9 +65,10 @@ class SecondOpinionConfig(Section):
 
 
 class RobustnessConfig(Section):
-    """Held grasps tried again under perturbations (uniform), until a sequential test tells robust from fragile ones.
+    """Repeated trials of successful grasps under uniform perturbations, until a sequential test classifies them as robust or
+    fragile.
 
-    ``friction`` and ``force`` are factors; mass and centre of mass vary within the twin's own Estimates.
+    ``friction`` and ``force`` are factors; mass and centre of mass vary within the uncertainty of the twin's own estimates.
     """
 
     enabled: bool = True

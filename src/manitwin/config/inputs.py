@@ -1,4 +1,6 @@
-"""What a build does before there is a mesh: keep the input, cut a photo out, name its object, ask a generator."""
+"""Settings of the stages before there is a mesh: keeping the input, cutting out a photo, naming its object, calling a
+generator.
+"""
 
 from __future__ import annotations
 
@@ -10,20 +12,20 @@ from manitwin.config.section import Section
 
 
 class SourceConfig(Section):
-    """What a twin's folder keeps of its input: a ``copy`` byte for byte, or a ``reference``, names, sizes and digests.
+    """How a twin's folder keeps its input: as a byte-exact ``copy``, or as a ``reference`` with names, sizes and digests.
 
-    Of a scan the input is most of the folder.
+    For scans the input is most of the folder's size.
     """
 
     keep: Literal["copy", "reference"] = "copy"
 
 
 class MattingConfig(Section):
-    """Reading a photo and cutting its object out. ``frame`` chooses a picture of an animation, counted from 0.
+    """Reading a photo and cutting its object out. ``frame`` selects a frame of an animation, counted from 0.
 
-    ``network`` is asked besides the built-in one: ``isnet`` or ``u2net``, once ``manitwin models add`` has fetched it, or an ONNX
-    file of U2-Net, IS-Net or BiRefNet; two of them by a comma. Below ``min_confidence``, the probability that the cut-out is
-    right, a photo is rejected.
+    ``network`` is a matting network used in addition to the built-in method: ``isnet`` or ``u2net``, once downloaded with
+    ``manitwin models add``, or an ONNX file of U2-Net, IS-Net or BiRefNet; separate two of them by a comma. A photo is rejected
+    if the estimated probability that its cut-out is correct is below ``min_confidence``.
     """
 
     network: str | None = Field(default=None, min_length=1, max_length=4096)
@@ -36,16 +38,17 @@ class MattingConfig(Section):
 
 
 class NamingConfig(Section):
-    """Naming what nobody has named, from its photo or its views; less likely than ``min_probability``, it stays unknown."""
+    """Naming unnamed objects from their photo or rendered views; below ``min_probability`` the name stays unknown."""
 
     enabled: bool = True
     min_probability: float = Field(default=0.7, gt=0, le=1)
 
 
 class GenerateConfig(Section):
-    """Asking a generator: a mesh that is no closed solid, or a job that fails, is asked for again, ``attempts`` times in all.
+    """Calling a generator. A mesh that is not a closed solid, or a failed job, is requested again, up to ``attempts`` calls in
+    all.
 
-    ``options`` go to the service as they are, on top of what is asked for by itself (``tier = "Gen-2"``).
+    ``options`` are passed to the service unchanged, in addition to the built-in options (``tier = "Gen-2"``).
     """
 
     max_wait_s: float = Field(default=1800.0, gt=0)

@@ -1,4 +1,7 @@
-"""Settings read from TOML files and validated: an error names the key, the nearest valid one and all of them."""
+"""Read settings from TOML files and validate them.
+
+An error message names the invalid key, the nearest valid key and all valid keys.
+"""
 
 from __future__ import annotations
 
@@ -25,22 +28,24 @@ def load_config(path: str | Path) -> BuildConfig: ...
 @overload
 def load_config(path: str | Path, kind: type[Kind]) -> Kind: ...
 def load_config(path: str | Path, kind: Any = BuildConfig) -> Any:
-    """Read a TOML file of settings: of a build, or of another ``kind``, such as ``LayoutsConfig``.
+    """Read a TOML file of settings: those of a build, or of another ``kind`` such as ``LayoutsConfig``.
 
-    Raises ConfigError naming the key, the nearest valid one and all of them.
+    Raises ConfigError, which names the invalid key, the nearest valid one and all valid ones.
     """
     return validated(kind, read_toml(Path(path)), str(path))
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Return the content of a TOML file of settings; raises ConfigError."""
+    """Return the content of a TOML file of settings. Raises ConfigError if it does not exist or cannot be parsed."""
     if not os.path.exists(path):
         raise ConfigError(f"{path}: not found; give a TOML file of settings")
     return toml_file.read_toml(path, ConfigError, name=str(path))
 
 
 def validated(kind: type[Kind], data: dict[str, Any], where: str) -> Kind:
-    """Return the settings of one kind; raises ConfigError as ``load_config``, which says ``where`` they are from."""
+    """Return validated settings of one kind. Raises ConfigError like ``load_config``; ``where`` names the source in its
+    message.
+    """
     try:
         return kind(**data)
     except ValidationError as error:
@@ -48,11 +53,13 @@ def validated(kind: type[Kind], data: dict[str, Any], where: str) -> Kind:
 
 
 def _cause(error: ErrorDetails) -> str:
-    """Return what is wrong with a value: the words of our own validators, or pydantic's with the value."""
+    """Return the cause of a validation error: the message of our own validators, or pydantic's message with the value."""
     if error["type"] == "value_error":
         return printable_line(error["msg"].removeprefix("Value error, "), max_characters=_SHOWN_CHARACTERS)
     value = error["input"]
-    huge = isinstance(value, int) and abs(value) > LARGEST_SEED  # Python writes no integer of many thousand digits
+    huge = (
+        isinstance(value, int) and abs(value) > LARGEST_SEED
+    )  # Python does not print integers of many thousand digits
     shown = "a larger integer" if huge else printable_line(repr(value), max_characters=_SHOWN_CHARACTERS)
     return f"{error['msg']} (it is {shown})"
 

@@ -1,4 +1,4 @@
-"""How a run goes: its resources, slots, retries and patience."""
+"""Settings of a run: resources, slots, retries and time limits."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from pydantic import Field
 from manitwin.config.section import Section
 
 Resource = Literal["cpu", "gpu", "vlm", "generator"]
-"""The resource that a stage runs on; each has slots of its own in a run."""
+"""The resource that a stage runs on. A run has a separate number of slots for each."""
 
 MOST_SLOTS = 1024
 
 DEFAULT_MEMORY_GB = 16.0
-"""Measured: a worker has at most 9.6 GiB of heap and stacks for 4 million triangles with an 8k texture, 1.9 for 2.4 MB."""
+"""Measured peak of a worker: 9.6 GiB of heap and stacks for 4 million triangles with an 8k texture, 1.9 GiB for a 2.4 MB file."""
 
 
 class RunConfig(Section):
-    """Slots, retries and patience of a run; nothing here decides what a twin is.
+    """Slots, retries and time limits of a run; none of these settings affects the content of a twin.
 
-    ``cpu``, ``gpu``, ``vlm`` and ``generator`` are slots: so many stages of that kind at a time (cpu 0: one a core, as memory
-    allows). On a Ray cluster the gpu slots are its cards, and cpu 0 is all of its cores.
-    ``vlm_per_minute`` bounds how many stages that ask a VLM begin in a minute. A stage that kills its worker or fails is
-    tried ``attempts`` times. A service that is down is asked again for ``patience_s`` before its items are left for the
-    next run. ``memory_gb`` is how much memory (2^30 bytes of heap and stacks) each worker process may take: an input that
-    asks for more is rejected as ``too_large`` (0: no limit). ``in_flight`` bounds the items that are begun and not ended. The
-    tables get ``index_every`` twins at a time (0: none, ``manitwin index`` writes them).
+    ``cpu``, ``gpu``, ``vlm`` and ``generator`` are the numbers of stages of that resource that run at the same time (cpu 0: one
+    per core, as far as memory allows). On a Ray cluster the gpu slots are its GPUs, and cpu 0 means all of its cores.
+    ``vlm_per_minute`` limits how many stages that call a VLM start per minute. A stage that fails or kills its worker is tried
+    ``attempts`` times. A service that is down is called again for ``patience_s`` before its items are left for the next run.
+    ``memory_gb`` is the memory limit of each worker process (units of 2^30 bytes, heap and stacks): an input that needs more is
+    rejected as ``too_large`` (0: no limit). ``in_flight`` limits the items that have started and not ended. The index tables
+    are updated after every ``index_every`` twins (0: never; ``manitwin index`` writes them).
     """
 
     cpu: int = Field(default=0, ge=0, le=MOST_SLOTS)

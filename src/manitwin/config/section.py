@@ -1,4 +1,4 @@
-"""The base of all settings: what a section accepts, and the kinds of values that several have."""
+"""The base class of all settings sections, and value types that several sections share."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from typing import Annotated, Self
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 AbsolutePath = Annotated[Path, AfterValidator(Path.absolute)]
-"""A path that means the same from any folder."""
+"""A path that is made absolute, so that it does not depend on the working directory."""
 
 LARGEST_SEED = 2**63 - 1
-"""What ledgers, tables and generators of random numbers hold in 64 bits."""
+"""The largest seed that ledgers, tables and random number generators store in 64 bits."""
 LARGEST_COUNT = 10**9
 
 Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
 
 
 class Section(BaseModel):
-    """A part of the configuration: unknown keys are errors, values do not change, numbers are finite and whole ones bounded."""
+    """A frozen section of the configuration: unknown keys are errors, floats are finite, and integers are bounded."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -33,4 +33,4 @@ class Section(BaseModel):
 _OF_ANY_SIZE = frozenset({"seed", "max_bytes"})
 
 NO_SETTINGS = Section()
-"""The settings of a stage that has nothing to choose."""
+"""The settings of a stage that has no settings."""

@@ -1,4 +1,4 @@
-"""Services: how a vision-language model is asked, what services cost, and how they are reached."""
+"""Settings of external services: calls to a vision-language model, prices, timeouts and retries."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from manitwin.config.section import AbsolutePath, Section
 
 
 class VlmConfig(Section):
-    """Asking a vision-language model. ``picture_px`` is the side of the pictures that it sees; ``votes`` are for grasp points."""
+    """Calls to a vision-language model. ``picture_px``: side of the images sent; ``votes``: number of answers about grasp
+    points.
+    """
 
     picture_px: int = Field(default=768, ge=256, le=2048)
     max_tokens: int = Field(default=4096, ge=64)
@@ -18,14 +20,14 @@ class VlmConfig(Section):
 
 
 class ServicesConfig(Section):
-    """Prices of services, and how they are reached; nothing here decides what a twin is.
+    """Prices of services and connection settings; none of these settings affects the content of a twin.
 
-    ``usd_per_million_tokens`` is ``[read, written]``, ``usd_per_job`` that of the generator: what your plan says. A server
-    on this machine costs nothing; for any other one a price has to be known, so that ``max_cost_usd`` can hold.
-    ``record`` is a file that every answer of a VLM is added to, for ``replay:FILE``. ``submit_again``: a generator's job
-    whose submit was broken off before its answer came is submitted again, although the first may have been taken and paid.
-    ``timeout_s`` is for a whole request, from the look-up of its name to the last byte (of a file: one second more for each
-    MiB that has come).
+    ``usd_per_million_tokens`` is ``[input, output]`` and ``usd_per_job`` the price of a generator job, according to your plan.
+    A server on this machine costs nothing; for any other server the price must be given for ``max_cost_usd`` to work.
+    ``record`` is a file to which every VLM answer is appended, for ``replay:FILE``. ``submit_again``: if a generator request
+    was interrupted before its answer arrived, submit it again, although the first job may have been accepted and charged.
+    ``timeout_s`` limits a whole request, from name resolution to the last byte (for file downloads, plus one second per MiB
+    received).
     """
 
     usd_per_million_tokens: tuple[float, float] | None = None

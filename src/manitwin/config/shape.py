@@ -1,4 +1,4 @@
-"""What is made of a mesh: repair, limits, physical properties, hulls and placements."""
+"""Settings of the mesh stages: repair, limits, physical properties, convex hulls and placements."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from manitwin.config.section import Section
 
 
 class RepairConfig(Section):
-    """Limits of repair (``geometry.repair``); shares are of the bounding box's diagonal."""
+    """Limits of mesh repair (``geometry.repair``); shares are relative to the diagonal of the bounding box."""
 
     weld_tolerance: float = Field(default=1e-4, gt=0, lt=0.01)
     lid_length: float = Field(default=0.15, gt=0)
@@ -18,7 +18,7 @@ class RepairConfig(Section):
 
 
 class MeshConfig(Section):
-    """Limits of a mesh file's size, and of its textures."""
+    """Limits on the size of a mesh file and of its textures."""
 
     max_bytes: int = Field(default=1 << 30, gt=0, le=1 << 40)
     max_faces: int = Field(default=4_000_000, gt=0)
@@ -28,27 +28,29 @@ class MeshConfig(Section):
 
 
 class GateConfig(Section):
-    """Limits beyond which nothing is built (paper, "Quality Verification"); shares of the box's diagonal unless said."""
+    """Limits beyond which an input is rejected (paper, "Quality Verification"); shares of the bounding box's diagonal unless
+    noted.
+    """
 
     min_longest_side_m: float = Field(default=0.005, gt=0)
     max_longest_side_m: float = Field(default=1.0, gt=0)
     min_thickness_share: float = Field(default=1e-4, ge=0)
     max_gap_share: float = Field(default=0.02, ge=0)
-    object_share: float = Field(default=0.05, gt=0, le=1)  # of the summed area or hull volume: smaller parts are specks
+    object_share: float = Field(default=0.05, gt=0, le=1)  # of the summed area or hull volume; smaller parts are specks
 
 
 class PhysicalConfig(Section):
-    """Limits of size, mass and density beyond which there is no such thing; margins are factors beyond the prior's interval."""
+    """Plausible limits of size, mass and density; the margins are factors that widen the prior's interval."""
 
     size_margin: float = Field(default=2.0, ge=1)
     mass_margin: float = Field(default=2.0, ge=1)
-    min_density_kg_m3: float = Field(default=2.0, ge=0)  # expanded foam has 10 and more
-    max_density_kg_m3: float = Field(default=23_000.0, gt=0)  # osmium has 22,590
+    min_density_kg_m3: float = Field(default=2.0, ge=0)  # expanded foam: 10 and more
+    max_density_kg_m3: float = Field(default=23_000.0, gt=0)  # osmium: 22,590
     max_texture_size: int = Field(default=2048, ge=16)
 
 
 class CollisionConfig(Section):
-    """The convex hulls that stand for the object in physics (at most 32 of at most 64 vertices: what PhysX takes)."""
+    """Convex decomposition for collision (at most 32 hulls of at most 64 vertices: the limits of PhysX)."""
 
     max_hulls: int = Field(default=32, ge=1, le=32)
     max_vertices: int = Field(default=64, ge=8, le=64)
@@ -58,10 +60,11 @@ class CollisionConfig(Section):
 
 
 class PlacementConfig(Section):
-    """Setting the object down, and the limits within which it counts as staying (2 s, 1 cm, 5 degrees).
+    """Simulated placements of the object, and the limits within which it counts as stable (2 s, 1 cm, 5 degrees).
 
-    ``tilt_rise_m`` is how far the centre of mass must rise to tilt by ``max_turned_deg``. Of 120 quasi-static poses of 25
-    objects released 1 mm up in MuJoCo, 13 of the 27 below 0.08 mm turned by more than 5 degrees, none of the 93 above it.
+    ``tilt_rise_m`` is the least rise of the centre of mass on tilting by ``max_turned_deg``. Measured on 120 quasi-static poses
+    of 25 objects released 1 mm above the ground in MuJoCo: 13 of the 27 poses below 0.08 mm turned by more than 5 degrees, none
+    of the 93 above it.
     """
 
     max_placements: int = Field(default=6, ge=1, le=20)

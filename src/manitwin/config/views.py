@@ -1,4 +1,4 @@
-"""The pictures that an annotator sees: of the object, and of candidate points on it."""
+"""Settings of the images that an annotator sees: views of the object, and candidate points on it."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ Elevation = Annotated[float, Field(ge=-80, le=80)]
 
 
 class ViewsConfig(Section):
-    """The eight pictures of the object (paper, "Physical Property Estimation"); no size: the one the annotator reads best.
+    """The eight views of the object (paper, "Physical Property Estimation"). No ``size_px``: the size the annotator reads best.
 
-    ``elevations_deg`` are the heights that they are seen from, one by one around the object; ``fov_y_deg`` is the angle of a
-    picture's longer side, ``size_px`` squared about its pixels.
+    ``elevations_deg`` are the camera elevations of the eight views, which are evenly spaced in azimuth. ``fov_y_deg`` is the
+    field of view along the longer side of an image; ``size_px`` squared is about its number of pixels.
     """
 
     size_px: int | None = Field(default=None, ge=64, le=4096)
@@ -34,7 +34,7 @@ class ViewsConfig(Section):
 
 
 class CandidatesConfig(Section):
-    """The candidate points and the pictures that show them (paper, "Candidate Point Sampling")."""
+    """Candidate points and the images that show them (paper, "Candidate Point Sampling")."""
 
     samples: int = Field(default=8_000, ge=1000)
     count: int = Field(default=42, ge=4, le=99)

@@ -1,4 +1,4 @@
-"""Do jobs on this machine: a pool of processes for each resource, in which a crash or a hang costs one job."""
+"""Executor on this machine: one process pool per resource; a crash or hang costs one job."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ from manitwin.engine.worker_processes import hidden_main_module
 from manitwin.errors import Unavailable
 
 RUN = logging.getLogger("manitwin.run")
-JOBS_A_PROCESS = 2000  # then a new process starts, which bounds what native code leaks
+JOBS_A_PROCESS = 2000  # per process, to bound the memory that native code leaks
 LONGEST_STEP_S = 5.0
-"""At most so much of the time since the last look counts against a job: this process may itself have been stopped."""
-FAILED_POOLS = 5  # in a row, without an answer in between: then it is the installation, not one crash
+"""The most time since the last check that counts towards a job's timeout: the driver itself may have been suspended."""
+FAILED_POOLS = 5  # consecutive pool failures without an answer; the installation is then at fault, not a single crash
 
 
 @dataclass
 class _Given:
-    """A job that was given to a pool, how long it has run, and whether that was too long."""
+    """A submitted job, its run time so far, and whether it exceeded the timeout."""
 
     job: Job
     future: Any = None
@@ -51,12 +51,11 @@ class _Given:
 
 
 class LocalExecutor:
-    """One process pool a resource, made when it is first needed; one process for all of them where there is one item.
+    """Executor with one process pool per resource, created on first use; a single pool serves all resources if there is one item.
 
-    ``items`` is how many there are to do (None: many): no pool gets more processes, each of which imports the stages for seconds.
-    ``tell`` is called with a line where memory allows less than a process a core.
-
-    Owns: the pools, and a folder for what dying workers leave behind.
+    ``items`` is the number of items to process (None: many). It bounds the processes of a pool, because each process spends
+    seconds on imports. ``tell`` is called with a message if memory allows fewer workers than cores. Owns the pools, and a
+    temporary folder for the stack traces of dying workers.
     """
 
     def __init__(
@@ -81,7 +80,7 @@ class LocalExecutor:
         self._looked_at, self._counted_at = 0.0, time.monotonic()
         self._main = hidden_main_module()
         self._main.__enter__()
-        atexit.register(self.close)  # an interrupt may come just before: a worker that nobody ends would be waited for
+        atexit.register(self.close)  # an interrupt may come before __enter__: exit would wait for the workers
 
     def __enter__(self) -> LocalExecutor:
         return self
@@ -92,18 +91,18 @@ class LocalExecutor:
         self.close()
 
     def slots(self, needs: Resource) -> int:
-        """Return how many jobs of a resource run at a time."""
+        """Return how many jobs of a resource run concurrently."""
         return self._slots[needs]
 
     def submit(self, ticket: int, job: Job) -> None:
-        """Give a job to the pool of what it needs."""
+        """Submit a job to the pool of the resource it needs."""
         with deferred_interrupts():
             given = _Given(job)
             given.future = self._schedule(ticket, given)
             self._given[ticket] = given
 
     def ended(self, timeout_s: float) -> list[tuple[int, Reply]]:
-        """Wait for the next job that ends, and return all that have; end those that take too long."""
+        """Wait for the next job that ends and return all ended jobs; cancel jobs that exceed the timeout."""
         ended = []
         try:
             ended.append(self._ended.get(timeout=timeout_s))
@@ -117,14 +116,14 @@ class LocalExecutor:
         return ended
 
     def parts(self) -> dict[int, StagePart]:
-        """Return what the workers have left beside their stacks, once a second."""
+        """Return the progress notes of running stages by ticket; they are read at most once a second."""
         if time.monotonic() - self._looked_at < EVERY_S:
             return {}
         self._looked_at = time.monotonic()
         return read_notes(Path(self._stacks.name))
 
     def close(self) -> None:
-        """Stop all processes at once."""
+        """Stop all processes immediately."""
         with deferred_interrupts():
             atexit.unregister(self.close)
             for pool in self._pools.values():
@@ -136,12 +135,12 @@ class LocalExecutor:
             self._main.__exit__(None, None, None)
 
     def _schedule(self, ticket: int, given: _Given) -> Any:
-        """Give a job to its pool; to a new one where all processes of the pool died before they had a job."""
+        """Schedule a job in its pool; replace the pool if all of its processes died before they got a job."""
         while True:
             pool = self._pool(given.job.needs)
             try:
                 return pool.schedule(do, (ticket, given.job), on_end=partial(self._hand_over, ticket, given))
-            except RuntimeError as error:  # pebble's, of a pool that is broken
+            except RuntimeError as error:  # raised by pebble for a broken pool
                 self._failed_pools += 1
                 if self._failed_pools >= FAILED_POOLS:
                     raise Unavailable(
@@ -153,16 +152,16 @@ class LocalExecutor:
                 pool.stop()
 
     def _end_overdue(self) -> None:
-        """End the jobs that have run longer than they may. Time is monotonic: no clock that is set ends or spares one."""
+        """Cancel jobs that exceed the timeout. Monotonic time is used, so that setting the system clock has no effect."""
         now = time.monotonic()
         step, self._counted_at = min(now - self._counted_at, LONGEST_STEP_S), now
-        with deferred_interrupts():  # a future has a lock, which the threads of its pool want too
+        with deferred_interrupts():  # a future has a lock that threads of its pool also take
             for given in list(self._given.values()):
                 if not given.late and given.future.running():
                     given.seconds += step
                     if given.seconds > self._settings.stage_timeout_s:
                         given.late = True
-                        given.future.cancel()  # pebble ends its process
+                        given.future.cancel()  # pebble kills its process
 
     def _pool(self, needs: Resource) -> WorkerPool:
         needs = "cpu" if self._one_pool else needs
@@ -176,7 +175,7 @@ class LocalExecutor:
         return self._pools[needs]
 
     def _hand_over(self, ticket: int, given: _Given, future: Any) -> None:
-        drop_note(Path(self._stacks.name), ticket)  # of a worker that died, or was ended as it took too long
+        drop_note(Path(self._stacks.name), ticket)  # left by a worker that died or was killed on timeout
         self._ended.put((ticket, self._reply(given, future)))
 
     def _reply(self, given: _Given, future: Any) -> Reply:
@@ -185,7 +184,7 @@ class LocalExecutor:
             self._failed_pools = 0
             return reply
         except ProcessExpired as error:
-            self._failed_pools = 0  # it had a job
+            self._failed_pools = 0  # the process had started a job, so the pool works
             return self._died(given.job, error)
         except CancelledError:
             if not given.late:
@@ -194,11 +193,11 @@ class LocalExecutor:
             return Failure("timeout", f"took longer than run.stage_timeout_s = {limit:g} s")
         except BrokenProcessPool:
             return Failure("died", "all worker processes died while it waited for one; the next job starts new ones")
-        except Exception as error:  # what cannot be sent back, say: the other jobs go on
+        except Exception as error:  # e.g. a reply that cannot be pickled; the other jobs continue
             return Failure("error", " ".join(f"{type(error).__name__}: {error}".split()))
 
     def _died(self, job: Job, error: ProcessExpired) -> Reply:
-        """Say how a process ended, in one line; an item that was refused memory is too large."""
+        """Describe in one line how a process died; reject the item as too large if it ran out of memory."""
         words = LastWords.read(Path(self._stacks.name), error.pid)
         if words.no_memory and isinstance(job, RunStage) and self._setup.recipe.can_reject:
             return StageRejected(too_large(job, self._setup.memory_gb), StageCost(0.0, 0.0, 0.0))

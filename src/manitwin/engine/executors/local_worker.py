@@ -1,4 +1,4 @@
-"""The worker process on this machine, which does jobs, and the reading of one that died."""
+"""Entry points of local worker processes, and diagnosis of a worker that died."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ STACK_LINES = 12
 SAID_CHARACTERS = 200
 READ_BYTES = 1 << 16
 NO_MEMORY = ("bad_alloc", "out of memory", "cannot allocate memory", "memory allocation of")
-"""How C++, LLVM and the GNU and Rust libraries put it when memory was refused, in lower case."""
+"""Lower-case messages of C++, LLVM, glibc and Rust for a failed memory allocation."""
 
 _worker: Worker | None = None
 _stack_file: TextIO | None = None
 
 
 def start(setup: WorkerSetup, stacks: str, driver: int) -> None:
-    """Prepare this process: it dies with its driver, at once when it is told to, and within its limit of memory."""
+    """Initialize this worker process: link its life to the driver's, restore SIGTERM, capture stderr, and limit memory."""
     global _worker, _stack_file
     die_with(parent_of_workers(driver))
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # pebble's own handler waits for native code to return
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # pebble's handler would wait for native code to return
     _stack_file = (Path(stacks) / f"{os.getpid()}.txt").open("a")
     faulthandler.enable(_stack_file)
-    # what native code says before it ends the process is kept for the driver, and does not come between its lines
+    # Output of native code before it aborts goes to a file for the driver, and does not mix with the driver's own output.
     sys.stderr = os.fdopen(os.dup(2), "w", buffering=1, errors="backslashreplace")
     os.dup2(_stack_file.fileno(), 2)
     limit_memory(setup.memory_gb)
@@ -45,9 +45,9 @@ def start(setup: WorkerSetup, stacks: str, driver: int) -> None:
 
 
 def do(ticket: int, job: Job) -> Reply:
-    """Return the job's answer."""
+    """Run a job and return its reply."""
     assert _worker is not None and _stack_file is not None
-    os.ftruncate(_stack_file.fileno(), 0)  # of the jobs before, which were survived
+    os.ftruncate(_stack_file.fileno(), 0)  # discard output of earlier jobs
     if not isinstance(job, RunStage):
         return _worker.do(job)
     try:
@@ -59,7 +59,7 @@ def do(ticket: int, job: Job) -> Reply:
 
 @dataclass(frozen=True)
 class LastWords:
-    """What a dying process left: what native code said last, its innermost calls, and whether memory was refused to it."""
+    """What a dead process left: the last line of native code, its innermost calls, and whether an allocation failed."""
 
     said: str = ""
     calls: str = ""
@@ -67,7 +67,7 @@ class LastWords:
 
     @classmethod
     def read(cls, stacks: Path, pid: int | None) -> LastWords:
-        """Read what a process left in the folder of stacks: nothing where it was just killed."""
+        """Read the file that a process left in the stack folder; empty if the process was killed without writing anything."""
         path = stacks / f"{pid}.txt"
         if not path.is_file():
             return cls()

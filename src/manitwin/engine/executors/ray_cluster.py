@@ -1,4 +1,4 @@
-"""Do jobs on a Ray cluster: machines come, go and die, and each job comes back once, with an answer or a Failure."""
+"""Executor on a Ray cluster: machines may come, go and die; each job returns exactly once, with an answer or a Failure."""
 
 from __future__ import annotations
 
@@ -26,37 +26,37 @@ from manitwin.twin.dataset_root import DatasetRoot
 
 ASK_EVERY_S = 1.0
 SILENCE_S = 45.0
-"""Then the head is taken for lost. Ray itself ends the whole process after 60 s (gcs_rpc_server_reconnect_timeout_s)."""
+"""The head node counts as lost after this time. Ray kills the whole process after 60 s (gcs_rpc_server_reconnect_timeout_s)."""
 CONNECT_S = 5.0
-CURRENT_CLUSTER = "ray/ray_current_cluster"  # where `ray start` notes its address, below its temporary folder
+CURRENT_CLUSTER = "ray/ray_current_cluster"  # where `ray start` writes its address, below its temporary folder
 OVERDUE_EVERY_S = 1.0
-NODES_LOST = 3  # a job under which so many nodes died is taken for the cause
+NODES_LOST = 3  # a job during which so many nodes died is considered the cause
 THREADS: dict[Resource, int] = {"cpu": 1, "gpu": 1, "vlm": 8, "generator": 4}
-"""Jobs at a time in one worker: many where they wait for a service, one where they work."""
+"""Concurrent jobs per worker: several for jobs that wait for a service, one for jobs that compute."""
 TAKES: dict[Resource, dict[str, float]] = {
     "cpu": {"num_cpus": 1},
     "gpu": {"num_cpus": 0, "num_gpus": 1},
     "vlm": {"num_cpus": 0},
     "generator": {"num_cpus": 0},
 }
-OBJECT_STORE_BYTES = 80 * 2**20  # about Ray's least: only ids, names and short texts cross
+OBJECT_STORE_BYTES = 80 * 2**20  # about Ray's minimum: only ids, names and short texts are sent
 
 
 class RayExecutor:
-    """Workers on a cluster: one a core, one a GPU, and few with many threads for what waits for a service.
+    """Executor on a Ray cluster: one worker per core, one per GPU, and few workers with many threads for jobs that wait for
+    services.
 
-    ``address`` is ``host:port``, or ``auto`` for the cluster of this machine; None starts one here, which ends with ``close``.
-    Where this process is connected to a cluster already, that one is used and left as it is.
+    ``address`` is ``host:port``, or ``auto`` for the cluster of this machine; None starts a cluster here, which ``close``
+    stops. If this process is already connected to a cluster, that connection is used and left open.
 
-    A worker that dies costs the job that it had: died. Of several jobs in its threads none is blamed until it has been alone in
-    a worker that died. A node that dies is nobody's fault: its jobs are unavailable, which is no attempt, unless it
-    is the third one that dies under the same job (one that fills the memory takes its machine along).
-
-    Owns: the connection, the workers, and the cluster that it started.
+    If a worker dies, its job fails as "died". If the worker ran several jobs in threads, each is repeated alone in a worker,
+    and only a job that kills such a worker fails. If a node dies, its jobs become "unavailable", which does not count as an
+    attempt, unless it is the third node to die under the same job (a job that exhausts memory can take its machine down). Owns
+    the connection, the workers and any cluster that it started.
     """
 
     def __init__(self, setup: WorkerSetup, settings: RunConfig, address: str | None = None):
-        """Raises UsageError where Ray is not installed, and Unavailable where no cluster answers."""
+        """Connect to the cluster. Raises UsageError if Ray is not installed, and Unavailable if no cluster answers."""
         self._ray = _import_ray()
         self._settings = settings
         self._temporary: Path | None = None
@@ -64,7 +64,7 @@ class RayExecutor:
         if self._connected:
             self._connect(address)
         self._make = self._ray.remote(max_restarts=0, max_task_retries=0)(RayWorker)
-        root = DatasetRoot(setup.root_url)  # a worker's working directory is not the driver's
+        root = DatasetRoot(setup.root_url)  # the working directory of a worker is not the driver's
         self._setup = self._ray.put(replace(setup, root_url=str(root.local or root.url)))
         self._version = installed_version()
         self._pools: dict[tuple[Resource, bool], RayPool] = {}
@@ -81,9 +81,9 @@ class RayExecutor:
         self.close()
 
     def slots(self, needs: Resource) -> int:
-        """Return how many jobs of a resource run at a time: the cores and GPUs of the nodes that are there now.
+        """Return how many jobs of a resource run concurrently, from the cores and GPUs of the nodes alive now.
 
-        ``run.cpu`` asks for so many cores, also where they are not there yet: an autoscaler sees it.
+        ``run.cpu``, if set, is returned even if fewer cores are alive, so that an autoscaler sees the demand.
         """
         if needs == "cpu":
             return self._settings.cpu or max(1, self._head.total("CPU"))
@@ -92,14 +92,14 @@ class RayExecutor:
         return self._settings.vlm if needs == "vlm" else self._settings.generator
 
     def submit(self, ticket: int, job: Job) -> None:
-        """Give a job to the pool of what it needs. Raises Unavailable where the cluster's head is lost."""
+        """Submit a job to the pool of the resource it needs. Raises Unavailable if the cluster's head is lost."""
         self._head.check()
         pool = self._pool(job.needs, alone=False)
         pool.submit(ticket, job)
         pool.dispatch(self.slots(job.needs))
 
     def ended(self, timeout_s: float) -> list[tuple[int, Reply]]:
-        """Wait for the next job that ends, and return all that have. Raises Unavailable where the cluster's head is lost."""
+        """Wait for the next job that ends and return all ended jobs. Raises Unavailable if the cluster's head is lost."""
         until = time.monotonic() + timeout_s
         ended: list[tuple[int, Reply]] = []
         while True:
@@ -118,13 +118,13 @@ class RayExecutor:
                 return ended
 
     def parts(self) -> dict[int, StagePart]:
-        """Return nothing: what a worker would say on the way is not worth a message to every machine."""
+        """Return an empty dict: progress within a stage is not sent across the cluster."""
         return {}
 
     def close(self) -> None:
-        """Stop the workers and disconnect; a cluster that was started here ends."""
+        """Stop the workers and disconnect; stop the cluster if it was started here."""
         self._head.close()
-        if self._head.silent_s < 5.0:  # one that is lost cannot be told, and the workers end with the connection
+        if self._head.silent_s < 5.0:  # a lost head cannot be told; the workers end with the connection
             for pool in self._pools.values():
                 pool.close()
         self._pools.clear()
@@ -138,7 +138,7 @@ class RayExecutor:
         if address is not None:
             self._ray.init(address=reachable(address), **quiet)
         else:
-            self._temporary = Path(tempfile.mkdtemp(prefix="mt-", dir="/tmp"))  # sockets below it: 107 characters
+            self._temporary = Path(tempfile.mkdtemp(prefix="mt-", dir="/tmp"))  # a socket path has at most 107 bytes
             self._ray.init(
                 num_cpus=self._settings.cpu or available_cores(),
                 include_dashboard=False,
@@ -146,7 +146,7 @@ class RayExecutor:
                 _temp_dir=str(self._temporary),
                 **quiet,
             )
-        # Ray prints pages on every worker that dies to stdout, whatever it is told; the reason is in the Failure.
+        # Ray prints pages about every dead worker to stdout regardless of its settings; the reason is in the Failure.
         self._ray._private.worker._worker_logs_enabled = False
 
     def _ready(self, timeout_s: float) -> list[Any]:
@@ -175,7 +175,7 @@ class RayExecutor:
         return self._pools[needs, alone]
 
     def _blame(self, running: Running, actor: Actor, together: int) -> Reply:
-        """Return what a job's end says whose worker or node died; None where it is to be done again, alone."""
+        """Return the reply for a job whose worker or node died; None if the job is submitted again to a worker of its own."""
         job, cause = running.job, actor.cause
         if actor.death == "unreachable":
             return Failure("unavailable", f"its worker stopped answering: {cause}")
@@ -202,9 +202,10 @@ def _import_ray() -> ModuleType:
 
 
 def reachable(address: str) -> str:
-    """Return the ``host:port`` of a cluster's head, known to answer: Ray tries a dead one for minutes.
+    """Return the ``host:port`` of a cluster's head after checking that it accepts connections: Ray retries a dead one for
+    minutes.
 
-    ``auto`` is the cluster of this machine. Raises Unavailable where nobody answers, and UsageError for no such address.
+    ``auto`` is the cluster of this machine. Raises Unavailable if nothing answers, and UsageError for an invalid address.
     """
     if address == "auto":
         noted = Path(os.environ.get("RAY_TMPDIR", "/tmp")) / CURRENT_CLUSTER
@@ -226,9 +227,9 @@ def reachable(address: str) -> str:
 
 
 class Head:
-    """The last answer of the cluster's head.
+    """The latest node list reported by the cluster's head.
 
-    Owns: a thread that asks it. A head that is lost never answers, and the call hangs: so nobody else asks.
+    Owns a thread that polls the head. A call to a lost head never returns, so that only this thread calls it.
     """
 
     def __init__(self) -> None:
@@ -242,11 +243,11 @@ class Head:
 
     @property
     def silent_s(self) -> float:
-        """For how long the head has not answered."""
+        """Seconds since the head last answered."""
         return time.monotonic() - self._heard_at
 
     def check(self) -> None:
-        """Raise Unavailable where the head is lost."""
+        """Raise Unavailable if the head is lost."""
         if self.silent_s > SILENCE_S:
             raise Unavailable(
                 f"the head of the Ray cluster is lost ({self._error} since {self.silent_s:.0f} s); "
@@ -254,7 +255,7 @@ class Head:
             )
 
     def total(self, resource: str) -> int:
-        """Return how much of a resource all nodes have that are alive."""
+        """Return the total amount of a resource on all live nodes."""
         return int(self._totals.get(resource, 0))
 
     def has_lost(self, node: str) -> bool:
@@ -262,15 +263,15 @@ class Head:
         return node in self._dead
 
     def close(self) -> None:
-        """Stop asking."""
+        """Stop polling."""
         self._stop.set()
-        self._thread.join(2 * ASK_EVERY_S)  # one that hangs in a call to a lost head ends with the process
+        self._thread.join(2 * ASK_EVERY_S)  # a thread that hangs in a call to a lost head ends with the process
 
     def _keep_asking(self) -> None:
         while not self._stop.wait(ASK_EVERY_S):
             try:
                 self._ask()
-            except Exception as error:  # whatever it is, it is no answer: ``check`` tells when it has lasted
+            except Exception as error:  # any error counts as no answer; ``check`` raises once it has lasted
                 self._error = " ".join(f"{type(error).__name__}: {error}".split())
 
     def _ask(self) -> None:

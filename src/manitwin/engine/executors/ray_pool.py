@@ -1,8 +1,9 @@
-"""The workers of one kind on a cluster: Ray actors, made when needed, replaced when they die, with the jobs they have.
+"""Pools of Ray actors: workers of one kind, started on demand, replaced when they die, and the jobs they run.
 
-Why actors for everything, and not Ray tasks: of a task nobody knows where it runs. On a machine that vanished without closing
-its connections a task never ends (measured with Ray 2.60: the node was declared dead after 64 s, the task still open), it
-cannot be told when it began, nor which crashed process was its own. An actor has a node, a process, and one job a thread.
+Actors are used for all jobs, not Ray tasks, because the location of a task is unknown. On a machine that vanished without
+closing its connections a task never ends (measured with Ray 2.60: the node was declared dead after 64 s, the task was still
+pending). It is also unknown when a task started and which crashed process ran it. An actor has a known node and process, and
+one job per thread.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from manitwin.engine.executors.ray_worker import last_words
 from manitwin.engine.jobs import Failure, Job, Reply
 from manitwin.errors import Unavailable
 
-JOBS_A_WORKER = 2000  # then a new worker starts, which bounds what native code leaks
+JOBS_A_WORKER = 2000  # per worker, to bound the memory that native code leaks
 START_PATIENCE_S = 120.0
-FAILED_STARTS = 5  # in a row: then it is the installation, not a node that died meanwhile
+FAILED_STARTS = 5  # consecutive; the installation is then at fault, not a node that died meanwhile
 CAUSE_CHARACTERS = 300
 
 Death = Literal["node", "worker", "unreachable"]
@@ -28,7 +29,7 @@ Ended = list[tuple[int, Reply]]
 
 @dataclass
 class Running:
-    """A job on a worker."""
+    """A job that runs on a worker; ``since`` is its start in monotonic seconds."""
 
     ticket: int
     job: Job
@@ -37,7 +38,7 @@ class Running:
 
 @dataclass
 class Actor:
-    """One worker process; without a node it is still starting, and one that ``leaves`` gets no more jobs."""
+    """One worker process. ``node`` is empty while it starts; once ``leaves`` is set it gets no more jobs."""
 
     handle: Any
     node: str = ""
@@ -50,9 +51,9 @@ class Actor:
 
 
 class RayPool:
-    """Workers with so many threads each, and the jobs that wait for one.
+    """A pool of workers with ``threads`` threads each, and a backlog of jobs.
 
-    ``start`` makes an actor; ``blame`` turns a job whose worker or node died into a reply, or None to have it done again.
+    ``start`` makes an actor. ``blame`` turns a job whose worker or node died into a reply, or None if the job is run again.
     """
 
     def __init__(
@@ -74,15 +75,17 @@ class RayPool:
 
     @property
     def refs(self) -> list[Any]:
-        """The object references to ask Ray for."""
+        """The object references to wait for with Ray."""
         return list(self._of)
 
     def submit(self, ticket: int, job: Job) -> None:
-        """Have a job done."""
+        """Add a job to the backlog."""
         self._backlog.append((ticket, job))
 
     def dispatch(self, size: int) -> None:
-        """Give waiting jobs to free workers, and start workers while there are fewer than jobs and ``size``."""
+        """Give backlog jobs to free workers; start workers while the backlog exceeds those starting and ``size`` is not
+        reached.
+        """
         if not self._backlog:
             return
         for actor in self._actors:
@@ -101,18 +104,18 @@ class RayPool:
             coming, workers = coming + self._threads, workers + 1
 
     def settle(self, ref: Any) -> Ended:
-        """Take note of something that Ray has an answer to; returns the jobs that ended by it."""
+        """Process an object reference that is ready; return the jobs that ended with it."""
         import ray
 
         actor = self._of.pop(ref, None)
-        if actor is None:  # of a worker that died meanwhile
+        if actor is None:  # of a worker that has died meanwhile
             return []
         if ref in self._inquests:
             self._inquests.discard(ref)
             return self._buried(actor, self._verdict(actor, ref))
         try:
             answer = ray.get(ref)
-        except ray.exceptions.RayTaskError as error:  # of a job: what cannot be sent, say; the worker lives
+        except ray.exceptions.RayTaskError as error:  # of one job, e.g. an unpicklable reply
             answer = Failure("error", _line(error.cause if error.cause is not None else error))
         except ray.exceptions.RayError as error:
             return self._died(actor, error)
@@ -123,7 +126,7 @@ class RayPool:
         return self._done(actor, ref, answer)
 
     def overdue(self) -> Ended:
-        """Give up jobs that take too long, workers on nodes that are gone, and waiting for workers that do not come."""
+        """End jobs that exceed the timeout, bury workers on dead nodes, and end the backlog if no worker starts in time."""
         now, ended = time.monotonic(), Ended()
         for actor in list(self._actors):
             if actor.node and self._has_lost(actor.node):
@@ -135,16 +138,16 @@ class RayPool:
                 if now - running.since > self._timeout_s:
                     ended.append((running.ticket, self._too_long()))
                     del actor.jobs[ref], self._of[ref]
-                    actor.leaves = True  # with the thread that hangs; what its other threads do may end
+                    actor.leaves = True  # one of its threads hangs; the jobs of its other threads may finish
             self._dismiss(actor)
         for ref in list(self._inquests):
-            if self._has_lost(self._of[ref].node):  # and can no more be asked
+            if self._has_lost(self._of[ref].node):  # the node can no longer be asked
                 self._inquests.discard(ref)
                 ended += self._buried(self._of.pop(ref), "node")
         return ended + self._stalled(now)
 
     def close(self) -> None:
-        """Stop all workers."""
+        """Kill all workers."""
         for actor in list(self._actors):
             self._forget(actor)
         self._backlog.clear()
@@ -168,14 +171,16 @@ class RayPool:
         self._of = {ref: of for ref, of in self._of.items() if of is not actor}
 
     def _died(self, actor: Actor, error: Exception) -> Ended:
-        """Save what a worker still answered, and have its node asked what it left: no answer is one, too."""
+        """Collect answers that a dead worker still gave, and ask its node for its last words to tell a worker's death from a
+        node's.
+        """
         import ray
 
         ended = Ended()
         for ref in list(actor.jobs):
             try:
                 ended += self._done(actor, ref, ray.get(ref, timeout=0))
-            except ray.exceptions.RayError:  # its fate is decided below
+            except ray.exceptions.RayError:  # ``_buried`` decides what becomes of it
                 continue
         actor.cause = _cause(error)
         actor.death = "unreachable" if isinstance(error, ray.exceptions.ActorUnavailableError) else "worker"
@@ -207,7 +212,7 @@ class RayPool:
         except ray.exceptions.RayTaskError as error:
             actor.cause += f"; its stack cannot be read: {_line(error)}"
             return actor.death
-        except ray.exceptions.RayError:  # nobody there to be asked
+        except ray.exceptions.RayError:  # the node does not answer
             return "node"
         if words:
             actor.cause = words
@@ -228,7 +233,7 @@ class RayPool:
         return Failure("timeout", f"took longer than run.stage_timeout_s = {self._timeout_s:g} s")
 
     def _stalled(self, now: float) -> Ended:
-        """End waiting jobs for which no worker has started in time, as where no node has a GPU."""
+        """End the backlog as unavailable if no worker has started in time, e.g. if no node has a GPU."""
         if not self._backlog or any(actor.node for actor in self._actors):
             self._stalled_since = None
         elif self._stalled_since is None:
@@ -247,7 +252,7 @@ def _line(error: BaseException) -> str:
 
 
 def _cause(error: Exception) -> str:
-    """Return the line of a report on a dead actor that says why."""
+    """Return the line of Ray's report on a dead actor that states the cause."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     why = [line for line in lines if line.startswith(("The actor is dead because", "The actor died because"))]
     raised = [line for line in lines[1:] if "Error: " in line]

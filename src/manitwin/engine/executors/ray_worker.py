@@ -1,4 +1,4 @@
-"""The worker process on a cluster's nodes, which does jobs, and the reading of one that died."""
+"""The worker process on a node of a Ray cluster, and diagnosis of a worker that died."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from manitwin.errors import UsageError
 from manitwin.formats.installation import installed_version
 
 STACK_LINES = 12
-STALE_S = 3600.0  # a stack that nobody asked for by then is of a worker whose run is over
+STALE_S = 3600.0  # older stack files belong to workers of runs that are over
 
 
 class RayWorker:
-    """Does jobs in a process of its own, in several threads where those mostly wait.
+    """Ray actor that runs jobs in its own process, in several threads if the jobs mostly wait.
 
-    Owns: a file on its node, into which the interpreter writes where it was when native code crashed.
+    Owns a file on its node to which faulthandler writes the stack when native code crashes.
     """
 
     def __init__(self, setup: WorkerSetup, wanted_version: str):
-        """Raises UsageError where the node has another manitwin than the driver: its results would be others."""
+        """Initialize the process. Raises UsageError if this node has another version of manitwin than the driver."""
         here = installed_version()
         if here != wanted_version:
             raise UsageError(
@@ -45,13 +45,13 @@ class RayWorker:
         faulthandler.enable(self._stack_file, all_threads=False)
 
     def where(self) -> tuple[str, str]:
-        """Return the node's id, and the path there of the file with the stack."""
+        """Return the node's id and the path of the stack file on it."""
         import ray
 
         return ray.get_runtime_context().get_node_id(), str(self._stack)
 
     def do(self, job: Job) -> Reply:
-        """Return the job's answer. A Worker serves one thread at a time: stages need not be safe for several."""
+        """Run a job and return its reply. Each thread has its own Worker, because stages need not be thread-safe."""
         try:
             worker = self._idle.get_nowait()
         except queue.Empty:
@@ -64,7 +64,9 @@ class RayWorker:
 
 
 def last_words(path: str) -> str:
-    """Return what a dead worker of this node left: the signal and its innermost calls; empty where it was just killed."""
+    """Return the signal and innermost calls that a dead worker on this node left; empty if it was killed without writing
+    anything.
+    """
     stack = Path(path)
     lines = stack.read_text(errors="replace").splitlines() if stack.is_file() else []
     stack.unlink(missing_ok=True)
@@ -74,7 +76,7 @@ def last_words(path: str) -> str:
 
 
 def _stack_folder() -> Path:
-    """Return the node's folder of stacks, swept of those of earlier runs."""
+    """Return the node's folder of stack files; remove stale files of earlier runs."""
     folder = Path(tempfile.gettempdir()) / f"manitwin-stacks-{os.getuid()}"
     folder.mkdir(exist_ok=True)
     for old in folder.glob("*.txt"):

@@ -1,4 +1,4 @@
-"""What a stage says of itself while it runs, as a small file that its worker writes and the driver reads."""
+"""Progress notes of running stages: small files that workers write and the driver reads."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _failure_told = False
 
 @contextmanager
 def parts_noted(folder: Path, ticket: int) -> Iterator[None]:
-    """Note in a folder what the stage that runs in the ``with`` statement says of itself, under the ticket of its job."""
+    """Write the progress of the stage run within the ``with`` statement to a file named by its job's ticket."""
     with heard_by(_Notes(folder / f"{ticket}{NOTE}")):
         try:
             yield
@@ -30,7 +30,7 @@ def parts_noted(folder: Path, ticket: int) -> Iterator[None]:
 
 
 def read_notes(folder: Path) -> dict[int, StagePart]:
-    """Return what part of each job is done, by ticket; a job that has ended may still be among them."""
+    """Return the progress of each job by ticket; jobs that have just ended may be included."""
     found = {}
     for path in folder.glob(f"*{NOTE}"):
         with suppress(FileNotFoundError):  # its stage has ended meanwhile
@@ -39,12 +39,12 @@ def read_notes(folder: Path) -> dict[int, StagePart]:
 
 
 def drop_note(folder: Path, ticket: int) -> None:
-    """Remove the note of a job that has ended."""
+    """Remove the progress file of an ended job."""
     (folder / f"{ticket}{NOTE}").unlink(missing_ok=True)
 
 
 class _Notes:
-    """Write down what a stage says of itself, once a second at most."""
+    """Write the progress of a stage to a file, at most once a second."""
 
     def __init__(self, path: Path):
         self._path, self._at = path, -EVERY_S
@@ -54,7 +54,7 @@ class _Notes:
             return
         self._at = time.monotonic()
         fresh = self._path.with_suffix(".fresh")
-        try:  # renamed, so that nobody reads a half, but not synced: it is of no use after a power cut
+        try:  # renamed to be atomic, but not synced: progress is of no use after a power cut
             fresh.write_text(json.dumps([part.done, part.total, part.unit]))
             os.replace(fresh, self._path)
         except OSError as error:
@@ -62,7 +62,7 @@ class _Notes:
 
 
 def _tell_once(error: OSError) -> None:
-    """Log that a note was not written: the stage does its work all the same."""
+    """Log once that progress could not be written; the stage continues."""
     global _failure_told
     if not _failure_told:
         _failure_told = True
