@@ -1,1 +1,1 @@
-"""Tasks, stages, driver, ledger, executors: how work is done, whatever it is."""
+"""Execution engine: tasks, stages, driver, ledger and executors. It is independent of what the stages compute."""

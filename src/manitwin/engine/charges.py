@@ -1,4 +1,4 @@
-"""Charges of services for the work that is done, whether they only rehearse it, and the budget of a run."""
+"""Accounting of service charges: the bill of the current work, the rehearsal mark, and the budget of a run."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 
 REHEARSAL_MARK = "x-manitwin-rehearsal"
-"""The header, or the field of a message, that every answer of a rehearsal server has, and that of no other."""
+"""Header or message field that marks every answer of a rehearsal server (``manitwin fake``) and no other answer."""
 
 
 @dataclass
 class Bill:
-    """The amount that has been charged so far; ``rehearsed``: a rehearsal server (``manitwin fake``) answered, not a model."""
+    """The amount charged so far; ``rehearsed``: a rehearsal server (``manitwin fake``) answered instead of a model."""
 
     usd: float = 0.0
     rehearsed: bool = False
@@ -23,14 +23,14 @@ _current: ContextVar[Bill | None] = ContextVar("bill", default=None)
 
 
 def charge(usd: float) -> None:
-    """Add to the bill of the work that is being done; outside of ``counted`` nobody keeps it."""
+    """Add to the bill of the current work; without an enclosing ``counted`` the charge is not recorded."""
     bill = _current.get()
     if bill is not None:
         bill.usd += usd
 
 
 def note_rehearsal() -> None:
-    """Say that what answered was a rehearsal server: what is made of it is no model's work."""
+    """Mark the current work as rehearsed: a rehearsal server answered, so the result is not a model's."""
     bill = _current.get()
     if bill is not None:
         bill.rehearsed = True
@@ -38,7 +38,9 @@ def note_rehearsal() -> None:
 
 @contextmanager
 def counted() -> Iterator[Bill]:
-    """Count what is charged inside, also where it ends with an error; an outer count includes it."""
+    """Record the charges made within the ``with`` statement, even if it raises; they are added to an enclosing ``counted`` as
+    well.
+    """
     bill, outer = Bill(), _current.get()
     token = _current.set(bill)
     try:
@@ -51,9 +53,9 @@ def counted() -> Iterator[Bill]:
 
 
 class Budget:
-    """Money of one run, in USD; with ``max_usd`` None there is no limit.
+    """The budget of one run in USD; ``max_usd`` None is unlimited.
 
-    What a job will cost is only expected, so that the limit holds to within the errors of what is under way.
+    The cost of a running job is only an estimate, so the limit can be exceeded by the estimation errors of the running jobs.
     """
 
     def __init__(self, max_usd: float | None):
@@ -61,28 +63,30 @@ class Budget:
         self._expected: dict[int, float] = {}
 
     def allows(self, expected_usd: float) -> bool:
-        """Tell whether a job may begin: with it and those under way the run stays within the limit."""
+        """Return whether a job may start: the sum spent plus the expected costs of it and all running jobs is within the
+        limit.
+        """
         if self.max_usd is None or expected_usd <= 0:
             return True
         return self.spent_usd + sum(self._expected.values()) + expected_usd <= self.max_usd
 
     def begin(self, ticket: int, expected_usd: float) -> None:
-        """Note a job that begins, with what it is expected to be charged."""
+        """Record a job that starts, with its expected cost."""
         if expected_usd > 0:
             self._expected[ticket] = expected_usd
 
     def end(self, ticket: int, charged_usd: float) -> None:
-        """Note what a job was charged in the end."""
+        """Record the actual cost of a job that has ended."""
         self._expected.pop(ticket, None)
         self.spent_usd += charged_usd
 
     @property
     def nothing_under_way(self) -> bool:
-        """True where no paid job is under way: what is spent now is all that will be."""
+        """True if no paid job is running, so that the sum spent is final."""
         return not self._expected
 
     def why_stopped(self, expected_usd: float) -> str:
-        """Say why a job may not begin."""
+        """Return the message for a job that may not start."""
         return (
             f"the next question costs about {expected_usd:.4f} USD, and {self.spent_usd:.4f} of at most"
             f" {self.max_usd:g} USD are spent; raise max_cost_usd, then rerun the command to resume"

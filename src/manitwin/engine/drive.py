@@ -1,4 +1,4 @@
-"""Drive a run below a root: tasks in, a ledger that says what became of each, finished folders and tables out."""
+"""Drive a run on a data set: add tasks to the ledger, run their stages, and write finished folders and tables."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ EXECUTORS: tuple[ExecutorName, ...] = get_args(ExecutorName)
 
 
 class RunOptions(TypedDict, total=False):
-    """Options of a run that decide nothing of its results: where it runs, and the callbacks of those who watch it.
+    """Options of a run that do not affect its results: where it runs, and callbacks.
 
-    ``executor`` is local by default; ``address`` is that of a Ray cluster. ``on_start`` is called with the number of items of
-    the data set and of those to do, ``on_stage`` and ``on_ended`` with the events of stages and items.
+    ``executor`` is "local" by default; ``address`` is that of a Ray cluster. ``on_start`` is called with the number of items in
+    the data set and the number to do, ``on_stage`` and ``on_ended`` with the events of stages and items.
     """
 
     executor: ExecutorName
@@ -46,10 +46,10 @@ class RunOptions(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class RunReport:
-    """The outcome of a run: items of the whole data set by state, and why it stopped where it did before its end.
+    """The result of a run: item counts by state over the whole data set, and the reason if it stopped early.
 
-    ``left`` counts the items that wait for a service. ``given`` are the numbers of those that this run was given, and
-    ``counts_of_given`` has them by state; where none was given, all are meant.
+    ``left`` counts the items that wait for a service. ``given`` lists the numbers of the items that this run was given, and
+    ``counts_of_given`` counts them by state; if no items were given, both refer to all items.
     """
 
     counts: dict[str, int]
@@ -61,12 +61,12 @@ class RunReport:
 
     @property
     def open(self) -> bool:
-        """True where the same run again would go on: what failed is not tried again by itself."""
+        """True if running again would continue; failed items are not retried automatically."""
         return bool(self.stopped or self.counts.get("open"))
 
     @property
     def exit_code(self) -> int:
-        """0 all accepted, 3 some rejected, 4 some failed, or open and resumable."""
+        """Exit status: 0 all accepted, 3 some rejected, 4 some failed, or unfinished and resumable."""
         if self.open or self.counts.get("failed"):
             return 4
         return 3 if self.counts.get("rejected") else 0
@@ -87,12 +87,13 @@ def drive(
     on_stage: OnStage = lambda event: None,
     on_ended: Callable[[ItemEnded], None] = lambda event: None,
 ) -> RunReport:
-    """Add tasks to the ledger below a root and make of each what the recipe says, until all that are open have ended.
+    """Add tasks to the ledger below a root and process all open items with the recipe until each has ended.
 
-    Items that ended under another recipe are made again where the recipe replaces them: those that are given, or all where none
-    is. What is made again for that, and what stays, is remarked.
-    ``configuration`` is left beside the ledger. What was remarked while they were read is in ``remarks``,
-    and how many were there already is added to it. Raises UsageError for wrong arguments, or where another run is at work there.
+    If ``recipe.replaces``, items that ended under another recipe are made again: the given items, or all if none is given. The
+    report's remarks say how many are made again and how many stay as they are.
+
+    ``configuration`` is written next to the ledger. ``remarks`` are those from reading the inputs; the number of inputs that
+    were already in the data set is added. Raises UsageError for invalid arguments, or if another run is writing there.
     """
     if executor not in EXECUTORS:
         raise UsageError(choose_from("executor", executor, EXECUTORS))
@@ -130,7 +131,10 @@ def drive(
 
 
 def _opened_with(payloads: Iterable[Payload], recipe: Recipe, path: Path) -> tuple[Ledger, list[int], int]:
-    """Open the ledger and add items; returns the given ones' numbers and how many are new. A new one that fails is removed."""
+    """Open the ledger and add items; return the numbers of the given items and how many are new.
+
+    If this fails, a newly created ledger is removed.
+    """
     made_folder = not path.parent.exists()
     ledger = Ledger(path)
     try:
@@ -141,13 +145,13 @@ def _opened_with(payloads: Iterable[Payload], recipe: Recipe, path: Path) -> tup
     except BaseException:
         ledger.close(remove_new=True)
         if made_folder:
-            with suppress(OSError):  # not empty: another run has begun there
+            with suppress(OSError):  # not empty: another run has started there
                 path.parent.rmdir()
         raise
 
 
 def _of_others(ledger: Ledger, recipe: Recipe, given: list[int]) -> list[str]:
-    """Return remarks about items that ended under another recipe: how many are made again, how many stay as they were made."""
+    """Return remarks on items that ended under another recipe: how many are made again, and how many stay as they are."""
     others = len(ledger.ended_under_others(recipe.sha256))
     if not recipe.replaces:
         stay = others - len(ledger.ended_under_others(recipe.sha256, replaces=False))

@@ -1,7 +1,8 @@
-"""Drive a run: admit items, give the next stage of each to a free slot of what it needs, and keep the ledger.
+"""The driver of a run: admit items, submit the next stage of each to a free slot of its resource, and update the ledger.
 
-One thread, one writer. An item that waits for a service holds no slot, and nearly finished items go first, so that few are
-under way. What is lost by a crash is at most what was running: results that are there are found again by their keys.
+The driver runs in one thread and is the only writer of the ledger. An item that waits for a service holds no slot, and items
+that are nearly finished go first, so that few are in progress. A crash loses at most the running stages: completed results are
+found again by their keys.
 """
 
 from __future__ import annotations
@@ -35,17 +36,17 @@ FAILED_AS = {"died": "crashed", "timeout": "timeout"}
 
 @dataclass
 class RunResult:
-    """The end of a run: ``stopped`` says why before its end, ``left`` how many items wait for a service."""
+    """The end of a run: ``stopped`` is the reason if it stopped early, ``left`` counts the items that wait for a service."""
 
     stopped: str | None = None
     left: int = 0
 
 
 class Driver:
-    """One run over a ledger's open items; ``sweep`` deletes what a worker left half-made of an item that is given up,
-    ``remove`` the finished folder of an id.
+    """One run over a ledger's open items.
 
-    ``given`` are the numbers of the items that are made again where another recipe made them; none: all.
+    ``sweep`` deletes partial results of an item that is given up, ``remove`` the finished folder of an item id. ``given`` are
+    the numbers of the items that are made again if another recipe made them; empty means all.
     """
 
     def __init__(
@@ -81,7 +82,7 @@ class Driver:
         self.result = RunResult()
 
     def run(self) -> RunResult:
-        """Work until every open item has ended, waits for a service that was given up, or something stops the run."""
+        """Run until every open item has ended or waits for a service that was given up, or until something stops the run."""
         run = self.ledger.begin_run(self.recipe.sha256, self._given, replaces=self.recipe.replaces)
         RUN.info("run %d begins: recipe %s, seed %d", run, self.recipe.sha256[:16], self.recipe.seed)
         how = "interrupted"
@@ -93,7 +94,7 @@ class Driver:
             self.ledger.end_run(run, how)
         except LedgerFull as error:
             self.result.stopped = f"{error}; {MAKE_ROOM}"
-            self._let_end()  # nothing can be noted any more: the next run finds what is there
+            self._let_end()  # the ledger cannot be written any more; the next run finds the results
         except BaseException:
             with suppress(LedgerFull):
                 self.ledger.end_run(run, how)
@@ -123,18 +124,18 @@ class Driver:
         return True
 
     def _let_end(self) -> None:
-        """Wait for what is under way, so that no worker is stopped in the middle of a folder."""
+        """Wait for all running jobs, so that no worker is stopped while it writes a folder."""
         while self._running:
             for ticket, _ in self.executor.ended(LONGEST_WAIT_S):
                 self._running.pop(ticket)
 
     def _wait_s(self) -> float:
-        """Return how long to wait for an answer: no longer than until a gate opens for those that wait behind it."""
+        """Return how long to wait for a reply: at most until the next gate opens for queued items."""
         waits = [self._gates[needs].opens_in_s() for needs in RESOURCES if self._queues[needs]]
         return min([LONGEST_WAIT_S, *(wait for wait in waits if wait > 0)])
 
     def _admit(self) -> None:
-        """Take up items while cores would else be idle."""
+        """Admit items while the queue of CPU jobs is short."""
         while self._more and self._flights < self.settings.in_flight:
             missing = 2 * self.executor.slots("cpu") - len(self._queues["cpu"])
             if missing <= 0:
@@ -156,7 +157,7 @@ class Driver:
             if gate.given_up:
                 self._leave(queue)
             slots = self.executor.slots(needs)
-            most = 2 * slots if needs == "cpu" else slots  # the next job waits beside each core, so that none is idle
+            most = 2 * slots if needs == "cpu" else slots  # one job waits per core, so that no core is idle
             while queue and self._outstanding[needs] < most and gate.opens_in_s() <= 0:
                 if not self._budget.allows(queue[0][1].expected_usd):
                     self._wait_for_money(queue)
@@ -169,7 +170,7 @@ class Driver:
         self._give_tables(self._tables.due())
 
     def _wait_for_money(self, queue: list[tuple[tuple[int, int], Flight]]) -> None:
-        """Leave what costs too much, once nothing is under way that may cost less than expected; the rest goes on."""
+        """Leave items that exceed the budget once no paid job is running, as running jobs may cost less than expected."""
         if self._budget.nothing_under_way:
             self._no_money = self._budget.why_stopped(queue[0][1].expected_usd)
             self._leave(queue)
@@ -187,7 +188,7 @@ class Driver:
         return job is not None
 
     def _leave(self, queue: list[tuple[tuple[int, int], Flight]]) -> None:
-        """Leave the items that wait for a service to the next run."""
+        """Leave the queued items to the next run."""
         self.result.left += len(queue)
         self._flights -= len(queue)
         queue.clear()
@@ -225,7 +226,7 @@ class Driver:
         )  # fmt: skip
         self._announcer.stage_ended(flight, INPUT, "done" if answer is None else "rejected", detail=answer or "")
         superseded = self.ledger.superseded_rejection(flight.number, reply.item_id)
-        if superseded is not None:  # the reason why something else was rejected that stood in the input's place
+        if superseded is not None:  # the input has changed: remove the rejected folder of its previous content
             self._remove(superseded)
             self._tables.removed(superseded)
         other = self.ledger.identify(flight.number, reply.item_id, reply.kind)
@@ -268,9 +269,9 @@ class Driver:
         self._announcer.item_ended(flight, ending.status, ending.detail_and_hint, found, ending.reason)
 
     def _failed(self, flight: Flight, gate: Gate, failure: Failure) -> None:
-        """Try again later, or soon, or no more: what a service or the disk does is not the item's fault."""
+        """Retry a failed stage later (outages, which do not count as attempts) or soon, or end the item as failed."""
         stage, number, attempts = flight.stage, flight.number, flight.attempt(flight.stage)
-        if failure.kind == "changed":  # the next run begins it anew
+        if failure.kind == "changed":  # the next run starts over
             self._flights -= 1
             self.ledger.stage_ended(number, stage, "waiting", attempts=attempts - 1, error=failure.message)
             self._announcer.stage_waits(flight, stage, failure.message, "", None)

@@ -1,4 +1,4 @@
-"""The events of a run, as they happen: for whoever watches it, and for the log."""
+"""Events of a run, for callbacks and for the log."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ StageState = Literal["done", "there already", "rejected", "waiting", "failed"]
 
 @dataclass(frozen=True)
 class StageStarted:
-    """A stage of an item was given to a worker."""
+    """A stage of an item was submitted to a worker."""
 
     task: Task
     stage: str
@@ -28,7 +28,7 @@ class StageStarted:
 
 @dataclass(frozen=True)
 class StageAdvanced:
-    """A long stage of an item has done a part of what it does."""
+    """A long stage of an item has completed part of its work."""
 
     task: Task
     stage: str
@@ -37,9 +37,9 @@ class StageAdvanced:
 
 @dataclass(frozen=True)
 class StageEnded:
-    """A stage of an item has ended, or waits to be tried again; ``trace`` is the traceback of what went wrong, if any.
+    """A stage of an item has ended, or waits for a retry; ``trace`` is the traceback of an error, if any.
 
-    ``given_up_in_s``: of one that waits for a service that is down, for how many seconds that is still asked again.
+    ``given_up_in_s``: for a stage that waits for a service that is down, the seconds for which it is still retried.
     """
 
     task: Task
@@ -53,7 +53,7 @@ class StageEnded:
 
 @dataclass(frozen=True)
 class ItemEnded:
-    """An item has ended; ``found`` where its folder was there already, ``reason`` is the code of a rejection or failure."""
+    """An item has ended; ``found``: its folder existed already; ``reason``: the code of a rejection or failure."""
 
     task: Task
     state: ItemState
@@ -62,18 +62,18 @@ class ItemEnded:
     reason: str | None = None
 
     def row(self) -> ItemRow:
-        """Return what a ledger keeps of the item."""
+        """Return the ledger's row of the item."""
         task = self.task
         return ItemRow(task.number, task.payload.to_json(), task.item_id, self.state, self.reason, self.detail)
 
 
 StageEvent = StageStarted | StageAdvanced | StageEnded
 OnStage = Callable[[StageEvent], None]
-"""Hears of stages: one that begins, has done a part, or has ended."""
+"""Callback for the events of stages."""
 
 
 def log_stage(event: StageStarted | StageEnded) -> None:
-    """Tell the log of a stage that began or ended."""
+    """Log the start or end of a stage."""
     of = f"{event.stage} of {event.task.payload.title}" + (f" ({event.task.item_id})" if event.task.item_id else "")
     if isinstance(event, StageStarted):
         RUN.debug("%s begins", of)
@@ -87,24 +87,24 @@ def log_stage(event: StageStarted | StageEnded) -> None:
 
 
 def log_item(event: ItemEnded) -> None:
-    """Tell the log what became of an item."""
+    """Log the end of an item."""
     found = " (there already)" if event.found else ""
     task = event.task
     RUN.info("item %d %s %s %s%s: %s", task.number, task.payload.title, task.item_id, event.state, found, event.detail)
 
 
 class Announcer:
-    """Makes the events of a driver's items; what part of a stage is done is not for the log."""
+    """Creates the events of a driver's items, logs them and calls the callbacks; progress within a stage is not logged."""
 
     def __init__(self, on_stage: OnStage, on_ended: Callable[[ItemEnded], None]):
         self._on_stage, self._on_ended = on_stage, on_ended
 
     def stage_started(self, flight: Flight) -> None:
-        """Tell that the next stage of an item was given to a worker."""
+        """Report that the next stage of an item was submitted."""
         self._stage(StageStarted(flight.task, flight.stage))
 
     def stages_advanced(self, parts: Mapping[int, StagePart], running: Mapping[int, Flight | None]) -> None:
-        """Tell what part of each stage is done, by the ticket of its job; of a job that runs no more nothing is told."""
+        """Report the progress of running stages by the ticket of their jobs; tickets that are not in ``running`` are ignored."""
         for ticket, part in parts.items():
             if flight := running.get(ticket):
                 self._on_stage(StageAdvanced(flight.task, flight.stage, part))
@@ -112,17 +112,17 @@ class Announcer:
     def stage_ended(
         self, flight: Flight, stage: str, state: StageState, seconds: float = 0.0, detail: str = "", trace: str = ""
     ) -> None:
-        """Tell that a stage has ended."""
+        """Report that a stage has ended."""
         self._stage(StageEnded(flight.task, stage, state, seconds, detail, trace))
 
     def stage_waits(self, flight: Flight, stage: str, detail: str, trace: str, given_up_in_s: float | None) -> None:
-        """Tell that a stage waits to be tried again."""
+        """Report that a stage waits for a retry."""
         self._stage(StageEnded(flight.task, stage, "waiting", 0.0, detail, trace, given_up_in_s))
 
     def item_ended(
         self, flight: Flight, state: ItemState, detail: str, found: bool = False, reason: str | None = None
     ) -> None:
-        """Tell what became of an item."""
+        """Report that an item has ended."""
         event = ItemEnded(flight.task, state, detail, found, reason)
         log_item(event)
         self._on_ended(event)

@@ -1,4 +1,4 @@
-"""One item on its way through the stages, as the driver sees it."""
+"""The state of one item on its way through the stages, as the driver keeps it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from manitwin.engine.task import Task
 
 @dataclass(frozen=True)
 class PlannedStage:
-    """A stage as the driver sees it: what it runs on, and about what services will charge for it."""
+    """A stage as the driver sees it: its resource, and the approximate charge by services."""
 
     name: str
     needs: Resource
@@ -21,15 +21,15 @@ class PlannedStage:
 
     @classmethod
     def of(cls, stage: Stage) -> PlannedStage:
-        """Return what the driver has to know of a stage."""
+        """Return the driver's view of a stage."""
         return cls(stage.name, stage.needs, stage.expected_usd if isinstance(stage, PaidStage) else 0.0)
 
 
 @dataclass
 class Flight:
-    """The state of an item under way; ``plan`` names its stages and what each needs, once its kind is known.
+    """The state of an item in progress; ``plan`` lists its stages once its kind is known.
 
-    ``attempts`` counts how often stages that are not done were tried, in earlier runs as well.
+    ``attempts`` counts the attempts at unfinished stages, including those of earlier runs.
     """
 
     task: Task
@@ -47,7 +47,7 @@ class Flight:
 
     @property
     def stage(self) -> str:
-        """The stage that comes next."""
+        """The next stage."""
         if self.plan is None:
             return INPUT
         if self.rejected is not None or len(self.done) == len(self.plan):
@@ -56,21 +56,21 @@ class Flight:
 
     @property
     def needs(self) -> Resource:
-        """The resource that the next job runs on."""
+        """The resource of the next job."""
         return self.plan[len(self.done)].needs if self.plan is not None and self.stage != ASSEMBLE else "cpu"
 
     @property
     def expected_usd(self) -> float:
-        """About what services will charge for the next job."""
+        """The approximate charge by services for the next job, in USD."""
         return self.plan[len(self.done)].expected_usd if self.plan is not None and self.stage != ASSEMBLE else 0.0
 
     @property
     def priority(self) -> tuple[int, int]:
-        """Smaller goes first: items that are nearly there, then those that came first."""
+        """Sort key, smallest first: items with the most completed stages, then the lowest number."""
         return (-1000 if self.stage == ASSEMBLE else -len(self.done), self.number)
 
     def attempt(self, stage: str) -> int:
-        """Return which attempt at a stage the next one is, from 1."""
+        """Return the number of the next attempt at a stage, starting from 1."""
         return self.attempts.get(stage, 0) + 1
 
     def job(self) -> Job:

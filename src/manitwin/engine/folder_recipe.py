@@ -1,4 +1,6 @@
-"""The part that all recipes share: a folder is written afresh, its record last, and a finished one says how it ended."""
+"""Base class of all recipes: the folder is written from scratch with its record last, and the record states how the item
+ended.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ from manitwin.twin.store import canonical_json, sha256_of_json, write_bytes_atom
 
 
 class FolderRecord(BaseModel):
-    """The record of a finished folder: the digest of the recipe that made it, and a revision by all that decides the folder."""
+    """The record of a finished folder: the digest of its recipe, and a revision that hashes everything that determines the
+    folder.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -33,9 +37,9 @@ RecordT = TypeVar("RecordT", bound=BaseModel)
 
 
 class FolderRecipe(ABC, Generic[RecordT]):
-    """A recipe whose results are folders with a record of one type, called ``record``, in which no tables are kept.
+    """A recipe whose results are folders with a record of one type in the file ``record``; it keeps no tables.
 
-    Records that are not of ``FolderRecord`` override ``parse`` and ``is_current``.
+    Subclasses with records that are not a ``FolderRecord`` override ``parse`` and ``is_current``.
     """
 
     payload: ClassVar[type[Payload]]
@@ -50,33 +54,35 @@ class FolderRecipe(ABC, Generic[RecordT]):
     @property
     @abstractmethod
     def sha256(self) -> str:
-        """The digest of everything in it that decides a result."""
+        """The digest of everything in the recipe that determines a result."""
 
     @abstractmethod
     def ending(self, record: RecordT) -> Ending:
-        """Return how a record says that its item ended."""
+        """Return how the item of a record ended."""
 
     @abstractmethod
     def write(
         self, draft: Draft, kind: str, costs: dict[str, StageCost], rejected: Rejected | None, stage: str, fresh: Path
     ) -> RecordT:
-        """Write the files and the record into the empty folder ``fresh``; ``stage`` is the last one that ran."""
+        """Write all files and the record into the empty folder ``fresh``; ``stage`` is the last stage that ran."""
 
     def parse(self, record: bytes) -> RecordT:
-        """Read a record; raises ValueError or ManiTwinError where it cannot be read, of a newer version NewerVersion."""
+        """Parse a record. Raises NewerVersion for the schema of a newer version, else ValueError or ManiTwinError if it is
+        malformed.
+        """
         version = parse_json_object(record, self.record, TwinError).get("schema_version")
         if is_newer(version, self.record_schema):
             raise NewerVersion(of_newer_schema(self.record, version, self.record_schema))
         return self.record_type.model_validate_json(record)  # type: ignore[return-value]
 
     def is_current(self, record: RecordT) -> bool:
-        """Tell whether this recipe would make the same folder."""
+        """Return whether this recipe would produce the same folder."""
         return isinstance(record, FolderRecord) and record.config_sha256 == self.sha256
 
     def finish(
         self, draft: Draft, kind: str, costs: dict[str, StageCost], rejected: Rejected | None, stage: str, fresh: Path
     ) -> Ending:
-        """Write the finished folder at ``fresh``; raises ManiTwinError for a rejection where there can be none."""
+        """Write the finished folder at ``fresh``. Raises ManiTwinError for a rejection if the recipe cannot reject items."""
         if rejected is not None and not self.can_reject:
             raise ManiTwinError(f"{kind} {draft.item_id}: {rejected}; this item cannot be rejected as a whole")
         shutil.rmtree(fresh, ignore_errors=True)
@@ -84,21 +90,22 @@ class FolderRecipe(ABC, Generic[RecordT]):
         return self.ending(self.write(draft, kind, costs, rejected, stage, fresh))
 
     def damage(self, root: DatasetRoot, item_id: str) -> str | None:
-        """Return what is wrong with a finished folder: that it is not there."""
+        """Return what is wrong with a finished folder, None if nothing is; only the presence of its record is checked."""
         return None if root.exists(f"{self.folder_of(item_id)}/{self.record}") else f"its folder lacks {self.record}"
 
     @abstractmethod
     def folder_of(self, item_id: str) -> str:
-        """Return the name of an item's finished folder below the data set's root."""
+        """Return the path of an item's finished folder relative to the data set's root."""
 
     def amended_sha256(self, record: RecordT) -> str | None:
-        """Return the digest of the amendments that a folder was made with; None: of none."""
+        """Return the digest of the amendments that a folder was made with; None if it was made without."""
         return None
 
     def ending_of(self, record: bytes, amended_sha256: str | None = None) -> Ending | None:
-        """Return how a finished folder ended; None where it cannot be read, or this recipe or amendment makes another one.
+        """Return how a finished folder ended; None if it is unreadable, or if this recipe or these amendments would make another
+        one.
 
-        Raises NewerVersion for one that a newer version of this package has written: it is not to be replaced by an older one.
+        Raises NewerVersion for a folder written by a newer version of this package, which an older version must not replace.
         """
         try:
             read = self.parse(record)
@@ -110,7 +117,9 @@ class FolderRecipe(ABC, Generic[RecordT]):
         return self.ending(read) if current else None
 
     def seal(self, fresh: Path, said: dict[str, Any], *, decided_by: Any = None) -> RecordT:
-        """Write the record last: what is said of the folder, and its revision, by ``decided_by`` as well where that is given."""
+        """Write the record, last of all files, with its revision: the digest of ``said``, together with ``decided_by`` if
+        given.
+        """
         said = {**said, "config_sha256": self.sha256}
         revision = sha256_of_json(said if decided_by is None else [said, decided_by])
         record: Any = self.record_type(**said, revision=revision)

@@ -1,8 +1,8 @@
-"""A process that forks the workers from what it has imported: they start at once, and share the memory of that.
+"""Fork server for worker processes: workers start at once and share the memory of the imported modules.
 
-It is forked itself, from a program that has imported what its workers need as it needs it too. multiprocessing's own fork
-server is a fresh process, which would import all of it again. Only a program that knows all of its threads may do this, and
-where another one runs, workers are spawned: a lock that a thread holds in that moment is held in the fork for ever.
+The server is a fork of this program, which has imported the modules that its workers need. The fork server of multiprocessing
+is a fresh process that would import them again. Forking is only safe if no unknown threads run, because a lock that another
+thread holds at that moment stays locked in the fork for ever. In that case workers are spawned instead.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from manitwin.engine.process_bounds import die_with, one_thread_each
 
 RUN = logging.getLogger("manitwin.run")
 LAST_PYTHON = (3, 13)
-"""Later ones have a fork server that wants a key as well."""
+"""Later versions have a fork server that requires an authentication key."""
 BREAK_IN_FORKS = ("sapien", "torch", "ray")
-"""Libraries that have drivers, devices or connections open, once they are loaded."""
+"""Libraries that keep drivers, devices or connections open once loaded."""
 THREADS_THAT_MAY_RUN = frozenset({"jemalloc_bg_thd"})
-"""Arrow's allocator holds its own locks during a fork, and does without the thread after it (``jemalloc_prefork``)."""
+"""Arrow's allocator acquires its own locks during a fork, and works without this thread afterwards (``jemalloc_prefork``)."""
 
 _state: Any = forkserver._forkserver
 _forked_by: int | None = None
 
 
 def why_not_forked(idle_threads: Collection[str] = ()) -> str | None:
-    """Return what keeps this process from being forked; None: nothing.
+    """Return why this process must not be forked; None if it may be.
 
-    ``idle_threads`` are the names of Python's threads that hold no lock.
+    ``idle_threads`` are the names of Python threads that hold no lock.
     """
     if not sys.platform.startswith("linux") or sys.version_info[:2] > LAST_PYTHON:
         return f"this is {sys.platform} with Python {sys.version_info.major}.{sys.version_info.minor}"
@@ -61,9 +61,9 @@ def why_not_forked(idle_threads: Collection[str] = ()) -> str | None:
 
 @contextmanager
 def forked_workers(modules: Iterable[str], idle_threads: Collection[str] = ()) -> Iterator[None]:
-    """Import modules, and have the workers that are started in the ``with`` statement forked from this process as it is now.
+    """Import modules, and fork the workers that are started within the ``with`` statement from this process as it is now.
 
-    Where that is not safe they are spawned. ``idle_threads`` are the names of Python's threads that hold no lock.
+    If forking is not safe, workers are spawned. ``idle_threads`` are the names of Python threads that hold no lock.
     """
     for name in modules:
         import_module(name)
@@ -80,18 +80,18 @@ def forked_workers(modules: Iterable[str], idle_threads: Collection[str] = ()) -
 
 
 def start_forked(process: BaseProcess) -> Any:
-    """Start a process from the server and return what multiprocessing knows it by; None where no server runs."""
+    """Fork a process from the server and return its multiprocessing Popen object; None if no server runs."""
     if not _runs():
         return None
     try:
         return ForkServerProcess._Popen(process)
-    except (EOFError, OSError):  # it was killed just now
+    except (EOFError, OSError):  # the server was killed just now
         _stop()
         return None
 
 
 def parent_of_workers(driver: int) -> int:
-    """Return the process that has started this worker: the server that forked it, or else the driver."""
+    """Return the pid of this worker's parent: the fork server, or else the driver."""
     return driver if _forked_by is None else _forked_by
 
 
@@ -100,7 +100,7 @@ def _thread_names() -> list[str]:
 
 
 def _start() -> None:
-    """Fork the server, and tell multiprocessing of it; a signal that comes is the program's, of which the server is a copy."""
+    """Fork the server and register it with multiprocessing; signals are deferred, as the server is a copy of the program."""
     with deferred_interrupts():
         _fork_server()
 
@@ -114,10 +114,10 @@ def _fork_server() -> None:
         if not address.startswith("\0"):
             os.chmod(address, 0o600)
         listener.listen()
-        alive, kept = os.pipe()  # the server ends when nobody has the second end any more
-        gc.freeze()  # else the first collection of each worker would write into all objects, which copies their memory
+        alive, kept = os.pipe()  # the server ends when all copies of the write end are closed
+        gc.freeze()  # otherwise the first collection in each worker would write to all objects and so copy their pages
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)  # of Python 3.12 and later: idle threads are threads
+            warnings.simplefilter("ignore", DeprecationWarning)  # Python 3.12 and later warn of idle threads too
             before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
             server = os.fork()
         if server == 0:
@@ -130,7 +130,7 @@ def _fork_server() -> None:
 
 
 def _serve(driver: int, listener: int, alive: int) -> NoReturn:
-    """Fork workers until the driver ends."""
+    """Run the server process: fork workers until the driver ends."""
     global _forked_by
     try:
         die_with(driver)
@@ -143,9 +143,9 @@ def _serve(driver: int, listener: int, alive: int) -> NoReturn:
 
 
 def _forget_program() -> None:
-    """Drop what a program would not have passed on to a process that it spawned: handlers of signals, of its log, of its end.
+    """Reset state that a spawned process would not inherit: signal handlers, log handlers and exit handlers.
 
-    SIGINT stays blocked, as ``spared_from_interrupts`` has it.
+    SIGINT stays blocked, as in ``spared_from_interrupts``.
     """
     atexit._clear()
     sys.unraisablehook = sys.__unraisablehook__
@@ -159,7 +159,7 @@ def _forget_program() -> None:
 
 
 def _runs() -> bool:
-    """Tell whether there is a server; of one that was killed nothing is known any more."""
+    """Return whether the server is alive; clear its state if it has ended."""
     if _state._forkserver_pid is None:
         return False
     try:
@@ -172,7 +172,7 @@ def _runs() -> bool:
 
 
 def _stop() -> None:
-    """End the server, and with it all workers that are left."""
+    """Kill the server, and with it all remaining workers."""
     with deferred_interrupts():
         if _runs():
             server = _state._forkserver_pid

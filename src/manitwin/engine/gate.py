@@ -1,4 +1,4 @@
-"""Rate limiter and circuit breaker of a service: its rate, and the pause after it failed."""
+"""Rate limiter and circuit breaker of a resource: limits the rate of jobs, and pauses after failures of a service."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ FIRST_PAUSE_S, LONGEST_PAUSE_S = 1.0, 60.0
 
 
 class Gate:
-    """Open while jobs of a resource may begin.
+    """Decides when the next job of a resource may start.
 
-    A rate (jobs a minute, None: any) is kept by a token bucket of ten seconds' worth. A service that is down is left alone
-    for a time that doubles; ``patience_s`` after the first failure without an answer in between it is given up.
+    The rate (jobs per minute, None: unlimited) is limited by a token bucket that holds ten seconds' worth. After a failure the
+    service is paused for a time that doubles with each further failure. It is given up ``patience_s`` after the first failure
+    if no answer came in between.
     """
 
     def __init__(self, per_minute: float | None, patience_s: float, clock: Callable[[], float]):
@@ -24,7 +25,7 @@ class Gate:
         self._down_since: float | None = None
 
     def opens_in_s(self) -> float:
-        """Return how long to wait until the next job may begin; 0: now."""
+        """Return the seconds until the next job may start; 0: now."""
         now = self._clock()
         wait = max(0.0, self._paused_until - now)
         if self._per_second is not None:
@@ -34,23 +35,23 @@ class Gate:
         return wait
 
     def begin(self) -> None:
-        """Count a job that begins against the rate of the service."""
+        """Count a starting job against the rate limit."""
         if self._per_second is not None:
             self._tokens -= 1
 
     def answered(self) -> None:
-        """Note that the service works."""
+        """Record an answer of the service: reset the failure state."""
         self._down_since, self._pause_s = None, FIRST_PAUSE_S
 
     def wait(self, seconds: float | None) -> None:
-        """Leave the service alone for as long as it asks, or as it was left alone last time and again as long."""
+        """Pause the service for ``seconds``, as it asked, or for the current pause, which then doubles."""
         if seconds is None:
             seconds = self._pause_s
             self._pause_s = min(2 * self._pause_s, LONGEST_PAUSE_S)
         self._paused_until = max(self._paused_until, self._clock() + seconds)
 
     def down(self) -> None:
-        """Note that the service did not answer. Jobs that began before its pause say nothing new."""
+        """Record that the service did not answer. Failures of jobs that started before the current pause are ignored."""
         now = self._clock()
         if now < self._paused_until:
             return
@@ -59,12 +60,12 @@ class Gate:
 
     @property
     def given_up_in_s(self) -> float | None:
-        """For how many seconds a service that is down is still asked again; None where it is not down."""
+        """Seconds for which a service that is down is still retried; None if it is not down."""
         if self._down_since is None:
             return None
         return max(0.0, self._down_since + self._patience_s - self._clock())
 
     @property
     def given_up(self) -> bool:
-        """True where the service has been down for longer than a run waits."""
+        """True if the service has been down for longer than ``patience_s``."""
         return self.given_up_in_s == 0

@@ -1,4 +1,4 @@
-"""What a run puts right before it begins: folders that are gone or damaged are made again, and so are tables."""
+"""Repair of a data set before a run: missing or damaged folders and tables are made again."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ RUN = logging.getLogger("manitwin.run")
 
 
 def refuse_links(root: DatasetRoot) -> None:
-    """Raise UsageError where a folder that a run writes into is a link out of the root."""
+    """Raise UsageError if a folder that a run writes into is a symbolic link out of the root."""
     if root.local is None:
         return
     inside = root.local.resolve()
@@ -31,10 +31,10 @@ def refuse_links(root: DatasetRoot) -> None:
 
 
 def heal(ledger: Ledger, root: DatasetRoot, recipe: Recipe, given: Collection[int]) -> list[str]:
-    """Open what ended and is not there as it was written, of the given items or all; returns remarks about it.
+    """Reopen items that ended but whose folders are missing or damaged, among the given items or all; return remarks on them.
 
-    Looked at is what costs next to nothing on a local disk; at a URL, where each look takes a request, ``manitwin check``
-    is to be asked.
+    Only cheap checks on a local disk are made. A data set at a URL is not checked, because each check would be a request: use
+    ``manitwin check`` there.
     """
     remarks: list[str] = []
     if root.local is None:
@@ -44,7 +44,7 @@ def heal(ledger: Ledger, root: DatasetRoot, recipe: Recipe, given: Collection[in
         wrong = recipe.damage(root, item_id)
         if wrong:
             RUN.warning("item %d, %s: %s; it is made again", number, item_id, wrong)
-            root.remove(f"{recipe.folder_of(item_id)}/{recipe.record}")  # the rest stays until another takes its place
+            root.remove(f"{recipe.folder_of(item_id)}/{recipe.record}")  # the other files stay until they are replaced
             damaged.append(number)
     if damaged:
         ledger.reopen(damaged)

@@ -1,9 +1,9 @@
-"""Put interrupts off while something is done that may not be left in the middle.
+"""Defer signal handlers during code that must not be interrupted.
 
-Python calls the handler of a signal in the main thread between any two steps of what runs there, so a KeyboardInterrupt may come
-where a library has taken a lock and not yet entered the statement that gives it back: ``threading.Condition`` is written in
-Python, and with it queues, events and futures. Whoever wants that lock next waits for ever. The same holds for a process that
-is started and that nobody has noted yet.
+Python calls signal handlers in the main thread between any two bytecodes, so a KeyboardInterrupt may be raised after a library
+has acquired a lock and before it enters the ``with`` block that releases it. ``threading.Condition`` is written in Python, and
+so are the queues, events and futures built on it: the next thread that wants such a lock waits for ever. Similarly, a process
+that has just been started may not be registered yet.
 """
 
 from __future__ import annotations
@@ -19,20 +19,21 @@ from typing import Any
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 _deferred = [0]
-"""How many signals wait for the end of a ``with`` statement, the only one that this module changes."""
+"""The number of deferred signals; the only state of this module."""
 
 
 def is_deferred() -> bool:
-    """Tell whether a signal has come that waits for the end of ``deferred_interrupts``."""
+    """Return whether a signal is waiting for the end of ``deferred_interrupts``."""
     return _deferred[0] > 0
 
 
 @contextmanager
 def deferred_interrupts() -> Iterator[None]:
-    """Call no handler of a signal in the ``with`` statement: the one of a signal that comes is called as the statement ends.
+    """Defer Python signal handlers until the end of the ``with`` statement.
 
-    A second signal is not put off: both handlers are called where it comes. Only handlers written in Python are put off, those of
-    ``SIGNALS``; elsewhere than in the main thread, where none is called, nothing is done. May be nested.
+    A second signal is not deferred: both handlers are then called immediately. Only handlers written in Python and only the
+    signals in ``SIGNALS`` are deferred. Outside the main thread, where handlers are never called, this does nothing. It may be
+    nested.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -65,7 +66,7 @@ def deferred_interrupts() -> Iterator[None]:
         deferring = True
         yield
     finally:
-        deferring = False  # one that comes from here on goes to the handler that it is meant for
+        deferring = False  # later signals go to the original handlers
         for each, handler in before.items():
             signal.signal(each, handler)
         call_first(sys._getframe())

@@ -1,4 +1,4 @@
-"""Remember which job was submitted for which request, so that a crash does not pay for it twice."""
+"""Memory of submitted service jobs by request, so that a crash does not pay for a job twice."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from manitwin.twin.dataset_root import DatasetRoot
 
 
 class JobMemory(Protocol):
-    """Job ids by the digest of what was asked."""
+    """Job ids by the digest of the request."""
 
     def recall(self, request: str) -> str | None:
-        """Return the job that was submitted for a request, None where there is none."""
+        """Return the id of the job submitted for a request; None if there is none."""
         ...
 
     def note(self, request: str, job_id: str) -> None:
-        """Keep a job's id; it is there for the next process once this returns."""
+        """Store a job's id durably; the next process can read it once this returns."""
         ...
 
     def forget(self, request: str) -> None:
-        """Drop a job that came to nothing."""
+        """Remove the id of a failed job."""
         ...
 
 
@@ -31,13 +31,13 @@ _REMEDY = "find the job id in your account at the service and enter it, or remov
 
 @dataclass(frozen=True)
 class RootJobMemory:
-    """One small file a request below ``name`` of a data set's root, local or at a URL."""
+    """Job memory as one small file per request below ``name`` in a data set's root, local or at a URL."""
 
     root: DatasetRoot
     name: str
 
     def recall(self, request: str) -> str | None:
-        """Return the job that was submitted for a request, None where there is none."""
+        """Return the id of the job submitted for a request; None if there is none. Raises TwinError for a damaged file."""
         place = self._place(request)
         if not self.root.exists(place):
             return None
@@ -47,11 +47,11 @@ class RootJobMemory:
         return job_id
 
     def note(self, request: str, job_id: str) -> None:
-        """Keep a job's id; it is there for the next process once this returns."""
+        """Store a job's id durably; the next process can read it once this returns."""
         self.root.write_bytes(self._place(request), json.dumps({"job_id": job_id}).encode())
 
     def forget(self, request: str) -> None:
-        """Drop a job that came to nothing."""
+        """Remove the id of a failed job."""
         self.root.remove(self._place(request))
 
     def _place(self, request: str) -> str:
@@ -59,14 +59,14 @@ class RootJobMemory:
 
 
 class NoMemory:
-    """Remembers nothing: for generators whose jobs end with the process."""
+    """Job memory that stores nothing, for generators whose jobs end with the process."""
 
     def recall(self, request: str) -> str | None:
-        """Return None: no job is remembered."""
+        """Return None: no job is stored."""
         return None
 
     def note(self, request: str, job_id: str) -> None:
-        """Do nothing: no job is remembered."""
+        """Do nothing."""
 
     def forget(self, request: str) -> None:
-        """Do nothing: there is no job to forget."""
+        """Do nothing."""

@@ -1,4 +1,4 @@
-"""Jobs of workers and their results: ids, names and short texts, never meshes."""
+"""Jobs and replies exchanged between driver and workers. They carry ids, names and short texts, never meshes."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ FailureKind = Literal[
     "unavailable", "rate_limited", "denied", "unsupported", "no_space", "changed", "error", "died", "timeout"
 ]
 MAKE_ROOM = "free disk space, then rerun the command to resume"
-"""The remedy where a disk is full, behind what says so."""
+"""The remedy for a full disk, appended to the message."""
 
 
 @dataclass(frozen=True)
 class WorkerSetup:
-    """Settings sent to every worker of a run: the data set, the recipe, and a folder for copies where the root is a URL.
+    """Settings sent to every worker of a run; ``cache`` is the folder for local copies if the root is a URL.
 
-    ``memory_gb`` is how much memory a worker process may take (0: no limit, as in the process that drives the run).
+    ``memory_gb`` is the memory limit of a worker process (0: no limit, as in the process that drives the run).
     """
 
     root_url: str
@@ -36,7 +36,7 @@ class WorkerSetup:
 
 @dataclass(frozen=True)
 class Survey:
-    """Find the id of what a task makes, and what of it is there already."""
+    """Job: find the id of a task's result, and which stages and finished folder already exist."""
 
     task: Task
     needs: Resource = "cpu"
@@ -44,7 +44,7 @@ class Survey:
 
 @dataclass(frozen=True)
 class Surveyed:
-    """The state of an item: the finished folder's ending, or the stages that need not run again."""
+    """The reply to ``Survey``: how the existing finished folder ended, or the stages that need not run again."""
 
     item_id: str
     kind: str
@@ -55,7 +55,7 @@ class Surveyed:
 
 @dataclass(frozen=True)
 class RunStage:
-    """Run the stage at a position of an item's list, given the results of those before it."""
+    """Job: run the stage at a position of an item's plan, given the results of the stages before it."""
 
     task: Task
     kind: str
@@ -67,7 +67,7 @@ class RunStage:
 
 @dataclass(frozen=True)
 class StageRejected:
-    """A stage's answer that nothing is to be made of the item; it cost as well. ``rehearsed``: a rehearsal server's answer."""
+    """A stage rejected the item, at a cost. ``rehearsed``: the answer came from a rehearsal server."""
 
     answer: Rejected
     cost: StageCost
@@ -77,7 +77,7 @@ class StageRejected:
 
 @dataclass(frozen=True)
 class Finish:
-    """Put the finished folder together; ``stage`` is the last one that ran."""
+    """Job: assemble the finished folder; ``stage`` is the last stage that ran."""
 
     task: Task
     kind: str
@@ -89,7 +89,7 @@ class Finish:
 
 @dataclass(frozen=True)
 class WriteTables:
-    """Add finished folders to the tables, and take out those that are gone; with no ids, merge what was added in parts."""
+    """Job: add finished folders to the tables, and remove rows of missing folders; without ids, merge the table parts."""
 
     item_ids: tuple[str, ...]
     needs: Resource = "cpu"
@@ -97,9 +97,9 @@ class WriteTables:
 
 @dataclass(frozen=True)
 class Failure:
-    """The reason why a job has no answer, in one line, with the native stack where a worker died and left one.
+    """Why a job has no result, in one line, with the native stack if a dead worker left one.
 
-    ``charged_usd`` is what services charged all the same; ``trace`` is the traceback of an error that nobody expected.
+    ``charged_usd`` is what services charged nevertheless; ``trace`` is the traceback of an unexpected error.
     """
 
     kind: FailureKind
@@ -109,7 +109,9 @@ class Failure:
     trace: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "message", encodable(self.message))  # other libraries quote names of files as they are
+        object.__setattr__(
+            self, "message", encodable(self.message)
+        )  # messages of other libraries quote file names unencoded
 
 
 Job = Survey | RunStage | Finish | WriteTables
@@ -117,24 +119,24 @@ Reply = Surveyed | StageRun | StageRejected | Ending | Failure | None
 
 
 class Executor(Protocol):
-    """Slots for each resource; a job that is submitted comes back exactly once, with an answer or a Failure."""
+    """Runs jobs in slots per resource; each submitted job returns exactly once, with a reply or a Failure."""
 
     def slots(self, needs: Resource) -> int:
-        """Return how many jobs of a resource run at a time, now: machines may come and go."""
+        """Return the current number of jobs of a resource that run concurrently; machines may come and go."""
         ...
 
     def submit(self, ticket: int, job: Job) -> None:
-        """Give a job to a free slot, or to the short queue before it; ``ticket`` names it in ``ended``."""
+        """Submit a job to a free slot or the short queue before it; ``ended`` identifies it by ``ticket``."""
         ...
 
     def ended(self, timeout_s: float) -> list[tuple[int, Reply]]:
-        """Wait until a job has ended, or the time is up; returns all that have ended."""
+        """Wait until a job has ended or the timeout has passed; return all ended jobs."""
         ...
 
     def parts(self) -> dict[int, StagePart]:
-        """Return how much the stages that run have done, by ticket, where they say so and it is time to look."""
+        """Return the progress of running stages by ticket, if they report it and it is time to poll."""
         ...
 
     def close(self) -> None:
-        """Stop: jobs that run are cut off."""
+        """Stop; running jobs are aborted."""
         ...

@@ -1,4 +1,4 @@
-"""What services charged for attempts at a stage that came to nothing: kept beside its results for the attempt that ends."""
+"""Service charges of failed attempts at a stage: stored beside its results, and added to the cost of the attempt that ends."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from manitwin.formats.json_file import json_number, parse_json
 from manitwin.twin.store import canonical_json, write_bytes_atomically
 
 LOST = "lost_usd.json"
-"""The file in a stage's folder with the sum: the attempt that succeeds, or is rejected, counts it."""
+"""The file in a stage's folder with the sum of lost charges in USD."""
 MAX_LOST_BYTES = 64
 
 
 @contextmanager
 def kept_bill(stage_folder: Path) -> Iterator[Bill]:
-    """Count what is charged; where the work fails, keep it for the attempt that will not."""
+    """Record charges; if the work fails, add them to the stage's lost charges."""
     with counted() as bill:
         try:
             yield bill
@@ -31,7 +31,7 @@ def kept_bill(stage_folder: Path) -> Iterator[Bill]:
 
 
 def lost_usd(stage_folder: Path) -> float:
-    """Return what was charged for attempts at a stage that came to nothing."""
+    """Return the charges of failed attempts at a stage, in USD."""
     lost = stage_folder / LOST
     if not lost.is_file():
         return 0.0

@@ -1,6 +1,6 @@
-"""What of a machine a run may use: the cores and the memory that its container, or whoever started it, leaves it.
+"""CPU and memory limits of this process: affinity, control groups (containers) and free memory.
 
-Source: Linux, Documentation/admin-guide/cgroup-v2.rst, ``cpu.max`` and ``memory.max``; of version 1 scheduler/sched-bwc.rst,
+Source: Linux, Documentation/admin-guide/cgroup-v2.rst, ``cpu.max`` and ``memory.max``; for version 1 scheduler/sched-bwc.rst,
 ``cpu.cfs_quota_us``, and cgroup-v1/memory.rst, ``memory.limit_in_bytes``; proc_meminfo(5), ``MemAvailable``.
 """
 
@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 WORKER_BYTES = 3 * 2**28
-"""What a worker fills at its peak, with some room: 0.6 GB of the 25 meshes and 28 photos that were measured."""
+"""Peak memory of a worker with some margin: 0.6 GB was measured over 25 meshes and 28 photos."""
 
 _SYSTEM = Path("/")
 
@@ -20,10 +20,10 @@ _SYSTEM = Path("/")
 def available_workers(
     most: int | None = None, system: Path = _SYSTEM, *, tell: Callable[[str], None] = lambda line: None
 ) -> int:
-    """Return how many workers this machine is good for, at least 1: one a core, and no more than there is memory for.
+    """Return how many workers this machine supports, at least 1: one per core, as far as memory allows.
 
-    ``most`` is how many there is work for; ``tell`` is called with a line where memory bounds them. In ``system`` are the folders
-    ``proc`` and ``sys``.
+    ``most`` bounds the number by the available work. ``tell`` is called with a message if memory limits it. ``system`` is the
+    folder that contains ``proc`` and ``sys``.
     """
     cores, memory = available_cores(system), available_memory_bytes(system)
     cores = cores if most is None else max(1, min(cores, most))
@@ -38,10 +38,10 @@ def available_workers(
 
 
 def available_cores(system: Path = _SYSTEM) -> int:
-    """Return how many cores this process may use, at least 1: those that it is bound to, and no more than its container's quota.
+    """Return how many cores this process may use, at least 1: its CPU affinity, bounded by the quota of its container.
 
-    A container of 2 CPUs on a machine of 64 sees all 64, and is stopped for most of the time once it has used its share. The
-    quota is that of its control group or of one around it.
+    A container with 2 CPUs on a machine with 64 sees all 64, and is throttled once it has used its share. The smallest quota of
+    its control group and the groups above it applies.
     """
     bound = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1  # macOS has none
     quotas = []
@@ -56,7 +56,7 @@ def available_cores(system: Path = _SYSTEM) -> int:
 
 
 def available_memory_bytes(system: Path = _SYSTEM) -> int | None:
-    """Return how much more memory can be filled without swapping, of the machine or of its container; None: it cannot be told."""
+    """Return how many bytes can be allocated without swapping on the machine or in its container; None if unknown."""
     free = [1024 * number for name, number in _numbers(system / "proc/meminfo") if name == "MemAvailable:"]
     for folder, version in _groups(system, "memory"):
         limit, used, cache = (
@@ -72,9 +72,9 @@ def available_memory_bytes(system: Path = _SYSTEM) -> int | None:
 
 
 def _groups(system: Path, controller: str) -> Iterator[tuple[Path, int]]:
-    """Yield the folders of the control groups that this process is in for a controller, and of those around, with their version.
+    """Yield the folders of this process's control groups for a controller and of their ancestors, with the cgroup version.
 
-    Within a container its own group can be the one that is mounted.
+    Ancestors include the root, because inside a container its own group may be mounted there.
     """
     for line in _text_of(system / "proc/self/cgroup").splitlines():
         _, controllers, group = [*line.split(":", 2), "", ""][:3]
@@ -86,7 +86,7 @@ def _groups(system: Path, controller: str) -> Iterator[tuple[Path, int]]:
 
 
 def _numbers(path: Path) -> Iterator[tuple[str, int]]:
-    """Yield the lines of a name and a number, whatever its unit."""
+    """Yield the name and number of each line that has both, ignoring units."""
     for line in _text_of(path).splitlines():
         words = line.split()
         if len(words) >= 2 and words[1].isdecimal():

@@ -1,4 +1,4 @@
-"""What bounds a process that works for another: its driver's life, one thread, so much memory."""
+"""Limits of worker processes: parent-death signal, one thread, bounded memory."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ONE_THREAD = {"OMP_NUM_THREADS": "1", "LP_NUM_THREADS": "0"}
 
 
 def die_with(driver: int) -> None:
-    """Have this process killed when the driver is: an orphan would work on beside the next run."""
+    """Have the kernel kill this process when its parent ``driver`` dies: an orphan would interfere with the next run."""
     try:
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     except (OSError, AttributeError):  # not Linux: an orphan ends after its job, whose result is found by its key
@@ -24,10 +24,10 @@ def die_with(driver: int) -> None:
 
 
 def one_thread_each() -> None:
-    """Keep libraries that are loaded later from starting threads of their own, where the environment does not say.
+    """Limit libraries that are loaded later to one thread, unless the environment says otherwise.
 
-    OpenMP's and linear algebra's, and those of Mesa's lavapipe, which 0 makes draw in the thread that asks: two workers on two
-    cores then spend a sixth less on a picture.
+    This covers OpenMP, linear algebra, and Mesa's lavapipe, which with 0 renders in the calling thread: two workers on two
+    cores then need a sixth less time per image.
     """
     for name, threads in ONE_THREAD.items():
         os.environ.setdefault(name, threads)
@@ -35,10 +35,10 @@ def one_thread_each() -> None:
 
 @contextmanager
 def one_thread_in_new_processes() -> Iterator[None]:
-    """Keep processes that are started in the ``with`` statement to one thread each, and leave this one as it is.
+    """Limit processes that are started within the ``with`` statement to one thread each; this process is unchanged.
 
-    A spawned process has loaded NumPy before anything of ours runs in it, and NumPy's linear algebra starts its threads as it is
-    loaded: on two cores they waited for each other during a sixth of a twin's CPU time.
+    A spawned process has loaded NumPy before any of our code runs, and NumPy's linear algebra library starts its threads on
+    loading. On two cores these threads waited for each other during a sixth of a twin's CPU time.
     """
     added = [name for name in ONE_THREAD if name not in os.environ]
     one_thread_each()
@@ -50,11 +50,12 @@ def one_thread_in_new_processes() -> Iterator[None]:
 
 
 def limit_memory(gigabytes: float) -> None:
-    """Bound the heap, the arrays and the stacks of this process (2^30 bytes each; 0: no limit): more is a MemoryError.
+    """Limit heap, arrays and stacks of this process to ``gigabytes`` * 2^30 bytes (0: no limit); beyond that, MemoryError is
+    raised.
 
-    RLIMIT_DATA, which counts private writable memory (Linux 4.7 and later): RLIMIT_AS would also count the addresses that
-    libraries and drivers reserve and never fill, hundreds of gigabytes with CUDA. The hard limit stays, for programs of the
-    user that a stage starts.
+    RLIMIT_DATA counts private writable memory (Linux 4.7 and later). RLIMIT_AS would also count address space that libraries
+    and drivers reserve and never use, hundreds of gigabytes with CUDA. The hard limit is unchanged, for programs that a stage
+    starts.
     """
     if gigabytes:
         _, hard = resource.getrlimit(resource.RLIMIT_DATA)

@@ -1,6 +1,6 @@
-"""Recipes: what a run makes of each item. They are the interface between the engine and what it runs: twins, layouts, episodes.
+"""Recipe protocol: the interface between the engine and what it makes (twins, layouts, episodes).
 
-A twin, a layout, a batch of episodes and its pictures are each a folder that is finished once its record is in it.
+Each result (a twin, a layout, a batch of episodes or its videos) is a folder that is finished once it contains its record.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from manitwin.twin.dataset_root import DatasetRoot
 
 @dataclass(frozen=True)
 class Ending:
-    """How an item ended: ``reason`` is the code of a rejection, ``revision`` that of its finished folder.
+    """How an item ended: ``reason`` is the code of a rejection, ``revision`` the revision of its finished folder.
 
-    ``hint`` says what would give a better result from the same input.
+    ``hint`` says how the same input could give a better result.
     """
 
     status: Literal["accepted", "rejected"]
@@ -32,13 +32,13 @@ class Ending:
 
     @property
     def detail_and_hint(self) -> str:
-        """The detail and the hint, in one line for a person."""
+        """The detail and the hint in one line."""
         return "; ".join(filter(None, (self.detail, self.hint)))
 
 
 @dataclass(frozen=True)
 class Identity:
-    """The id of what a task makes, the kind of its input, and why nothing can be made of it where that is so."""
+    """The id of a task's result, the kind of its input, and a rejection if the input cannot be processed."""
 
     item_id: str
     kind: str
@@ -46,70 +46,70 @@ class Identity:
 
 
 class Tables(Protocol):
-    """Tables over all finished folders of a data set, written by workers while a run goes on. It is sent to every worker."""
+    """Tables over all finished folders of a data set, written by workers during a run. Pickled to every worker."""
 
     def add(self, root: DatasetRoot, ids: Sequence[str]) -> None:
-        """Add finished folders, new or made again; of ids whose folder is gone the rows are taken out."""
+        """Add finished folders, new or updated; remove the rows of ids whose folder is gone."""
         ...
 
     def merge(self, root: DatasetRoot) -> None:
-        """Merge what was added in parts, once a run is at its end."""
+        """Merge the table parts at the end of a run."""
         ...
 
     def heal(self, root: DatasetRoot) -> bool:
-        """Remove tables that cannot be read; returns True where there are none, so that all folders are to be added."""
+        """Remove unreadable tables; return True if there are none, so that all folders must be added."""
         ...
 
 
 class Recipe(Protocol):
-    """The stages of every kind of input, and how their results become a folder. It is sent to every worker."""
+    """The stages for every kind of input, and the assembly of their results into a folder. Pickled to every worker."""
 
     @property
     def sha256(self) -> str:
-        """The digest of everything in it that decides a result; items that ended under another digest are run again."""
+        """The digest of everything in the recipe that determines a result; items that ended under another digest run again."""
         ...
 
     @property
     def tables(self) -> Tables | None:
-        """The tables that are kept of what it makes; None: none are."""
+        """The tables of its results; None if it keeps none."""
         ...
 
     @property
     def seed(self) -> int:
-        """The seed of everything random."""
+        """The random seed."""
         ...
 
     @property
     def record(self) -> str:
-        """The file that makes a folder a finished one; it is written last."""
+        """The file name of the record, which is written last and marks a folder as finished."""
         ...
 
     @property
     def payload(self) -> type[Payload]:
-        """The type of what its tasks ask for."""
+        """The payload type of its tasks."""
         ...
 
     @property
     def can_reject(self) -> bool:
-        """Whether an item may end as rejected; else what cannot be made of it is a failure."""
+        """Whether an item may end as rejected; otherwise a rejection is a failure."""
         ...
 
     @property
     def replaces(self) -> bool:
-        """Whether what ended under another recipe is made again; else it stays as it is, and only what is missing is made."""
+        """Whether items that ended under another recipe are made again; otherwise only missing items are made."""
         ...
 
     @property
     def made_again(self) -> str:
-        """What becomes of items that are made again as they ended under another recipe, in words for a person."""
+        """A message on items that are made again because they ended under another recipe."""
         ...
 
     def folder_of(self, item_id: str) -> str:
-        """Return the name of an item's finished folder below the data set's root."""
+        """Return the path of an item's finished folder relative to the data set's root."""
         ...
 
     def identify(self, payload: Any) -> Identity:
-        """Return the id of what is asked for; of files by their bytes."""
+        """Return the identity of a payload; files are identified by their content."""
         ...
 
     def stages(self, kind: str) -> list[Stage]:
@@ -119,13 +119,15 @@ class Recipe(Protocol):
     def finish(
         self, draft: Draft, kind: str, costs: dict[str, StageCost], rejected: Rejected | None, stage: str, fresh: Path
     ) -> Ending:
-        """Write the finished folder at ``fresh``; ``stage`` is the last one that ran."""
+        """Write the finished folder at ``fresh``; ``stage`` is the last stage that ran."""
         ...
 
     def damage(self, root: DatasetRoot, item_id: str) -> str | None:
-        """Return what is wrong with a finished folder, by cheap checks alone; None where nothing is."""
+        """Return what is wrong with a finished folder, using cheap checks only; None if nothing is."""
         ...
 
     def ending_of(self, record: bytes, amended_sha256: str | None = None) -> Ending | None:
-        """Return how an item ended by its folder's ``record``; None where this recipe or amendment would make another folder."""
+        """Return how an item ended from the bytes of its ``record``; None if this recipe or amendment would make another
+        folder.
+        """
         ...

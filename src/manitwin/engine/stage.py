@@ -1,8 +1,8 @@
-"""The protocol of a stage, and the handle that it works on: what the stages before it have made of an item.
+"""The Stage protocol, and the Draft on which a stage works: an item with the results of its earlier stages.
 
-Artifacts have names. A bare word (``physical``) is a field: JSON. A name with a suffix (``solid.npz``) is a file, one that
-ends in ``/`` (``views/``) a folder. Each is written by exactly one stage and read by those that declare it; a name in
-``reads`` that ends in ``?`` is read where it is there.
+Artifacts are identified by name. A bare word (``physical``) is a field, a JSON value. A name with a suffix (``solid.npz``) is a
+file, and a name that ends in ``/`` (``views/``) a folder. Each artifact is written by exactly one stage and read by the stages
+that declare it. A name in ``reads`` that ends in ``?`` is optional.
 """
 
 from __future__ import annotations
@@ -23,23 +23,21 @@ from manitwin.engine.task import PayloadT
 from manitwin.errors import ManiTwinError
 
 INPUT, ASSEMBLE = "input", "assemble"
-"""The two steps around the stages: to read what was given, and to put the folder together."""
+"""The two steps around the stages: reading the input, and assembling the folder."""
 
 
 def is_field(name: str) -> bool:
-    """Tell a field (JSON) from a file or folder artifact by its name."""
+    """Return whether an artifact is a field (JSON) rather than a file or folder, from its name."""
     return not name.endswith("/") and "." not in name
 
 
 @dataclass
 class Draft(Generic[PayloadT]):
-    """An item in the making: fields and paths with their digests, by artifact name. Cheap to send to another process.
+    """An item in progress: fields, paths and digests by artifact name. Cheap to send to another process.
 
-    ``payload`` is what its task asks for.
-
-    ``jobs`` remembers what was asked of services that are paid by the job. ``rehearsed`` are the stages, among those whose
-    results are here and those that these were made of, whose backend was a rehearsal server (``manitwin fake``).
-    ``amendments`` is what people have put right, by stage; a stage that runs has its own alone.
+    ``payload`` is that of its task. ``jobs`` remembers jobs submitted to services that charge per job. ``rehearsed`` names the
+    stages, among those with results here and their predecessors, whose backend was a rehearsal server (``manitwin fake``).
+    ``amendments`` holds manual corrections by stage; a running stage gets only its own.
     """
 
     item_id: str
@@ -53,11 +51,11 @@ class Draft(Generic[PayloadT]):
     amendments: dict[str, dict[str, Any]] = dataclass_field(default_factory=dict)
 
     def names(self) -> set[str]:
-        """Return the names of all artifacts that are there."""
+        """Return the names of all available artifacts."""
         return self.fields.keys() | self.paths.keys()
 
     def field(self, name: str) -> Any:
-        """Return the JSON value of a field artifact; raises ManiTwinError where no stage has written it."""
+        """Return the JSON value of a field artifact. Raises ManiTwinError if no stage has written it."""
         if name not in self.fields:
             raise ManiTwinError(
                 f"no stage has written field {name!r}; there are: {', '.join(sorted(self.fields)) or 'none'}"
@@ -65,7 +63,7 @@ class Draft(Generic[PayloadT]):
         return self.fields[name]
 
     def path(self, name: str) -> Path:
-        """Return the path of a file or folder artifact; raises ManiTwinError where no stage has written it."""
+        """Return the path of a file or folder artifact. Raises ManiTwinError if no stage has written it."""
         if name not in self.paths:
             raise ManiTwinError(f"no stage has written {name!r}; there are: {', '.join(sorted(self.paths)) or 'none'}")
         return self.paths[name]
@@ -73,45 +71,45 @@ class Draft(Generic[PayloadT]):
 
 @runtime_checkable
 class Stage(Protocol):
-    """One step of the paper.
+    """One step of the pipeline.
 
-    ``run`` writes its files below ``folder`` under their artifact names, and returns its fields. It may raise ``Rejected``.
-    It is a pure function of what it ``reads``, ``settings``, ``backend``, ``model``, ``draft.payload`` and ``draft.seed``.
+    ``run`` writes its files into ``folder`` under their artifact names, and returns its fields. It may raise ``Rejected``. It
+    must be a pure function of what it ``reads``, ``settings``, ``backend``, ``model``, ``draft.payload`` and ``draft.seed``.
     """
 
     @property
     def name(self) -> str:
-        """The stage's name, and that of its folder."""
+        """The name of the stage and of its folder."""
         ...
 
     @property
     def version(self) -> str:
-        """Raised whenever the same inputs give another result."""
+        """The version of the algorithm; changed whenever the same inputs give another result."""
         ...
 
     @property
     def reads(self) -> tuple[str, ...]:
-        """The artifacts that decide its result."""
+        """The artifacts that determine the result."""
         ...
 
     @property
     def writes(self) -> tuple[str, ...]:
-        """The artifacts that it makes."""
+        """The artifacts that the stage writes."""
         ...
 
     @property
     def needs(self) -> Resource:
-        """The resource that it runs on."""
+        """The resource that the stage runs on."""
         ...
 
     @property
     def settings(self) -> BaseModel:
-        """The stage's own slice of the configuration."""
+        """The stage's section of the configuration."""
         ...
 
     @property
     def backend(self) -> str:
-        """The backend that does the work."""
+        """The backend that the stage uses."""
         ...
 
     @property
@@ -120,26 +118,26 @@ class Stage(Protocol):
         ...
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
-        """Do the stage's work for an item: write its files into ``folder`` and return its fields, those that ``writes`` names.
+        """Run the stage: write its files into ``folder`` and return its fields, as declared by ``writes``.
 
-        Raises Rejected where nothing can be made of the item, and a BackendError where a backend cannot work now.
+        Raises Rejected if the item cannot be processed, and a BackendError if a backend is not available now.
         """
         ...
 
 
 @runtime_checkable
 class PaidStage(Protocol):
-    """A stage that services charge for."""
+    """A stage for which services charge money."""
 
     @property
     def expected_usd(self) -> float:
-        """About what services charge for the stage of one item, USD."""
+        """The approximate charge for the stage per item, in USD."""
         ...
 
 
 @dataclass(frozen=True)
 class StagePart:
-    """A stage has done ``done`` of ``total`` things, which ``unit`` names in the plural."""
+    """Progress of a stage: ``done`` of ``total`` units, named by the plural noun ``unit``."""
 
     done: int
     total: int
@@ -150,7 +148,7 @@ _hear: ContextVar[Callable[[StagePart], None] | None] = ContextVar("hear_stage_p
 
 
 def tell_part(done: int, total: int, unit: str) -> None:
-    """Say how much of the stage that runs here is done; cheap where nobody listens."""
+    """Report the progress of the stage that runs in this context; cheap if nobody listens."""
     hear = _hear.get()
     if hear is not None:
         hear(StagePart(done, total, unit))
@@ -158,7 +156,7 @@ def tell_part(done: int, total: int, unit: str) -> None:
 
 @contextmanager
 def heard_by(hear: Callable[[StagePart], None]) -> Iterator[None]:
-    """Have the stages that run in the ``with`` statement heard."""
+    """Call ``hear`` with the progress of stages that run within the ``with`` statement."""
     token = _hear.set(hear)
     try:
         yield

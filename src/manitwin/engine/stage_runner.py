@@ -1,9 +1,8 @@
-"""Run one stage, or take its result up again: results live in ``.work/<item_id>/<stage>/<key>``, by what decided them.
+"""Run a stage or reuse its cached result: results live in ``.work/<item_id>/<stage>/<key>``, keyed by their inputs.
 
-They are kept below the data set's root; where that is a URL, this machine has copies.
-
-``result.json`` beside a stage's files holds its fields, the digests of all that it wrote, what it cost, and, where its backend or
-that of a stage before it was a rehearsal server, the names of these stages.
+They are stored below the data set's root; if that is a URL, this machine keeps copies. ``result.json`` beside a stage's files
+holds its fields, the digests of everything it wrote, its cost, and the names of the stages, among it and its predecessors,
+whose backend was a rehearsal server.
 """
 
 from __future__ import annotations
@@ -31,12 +30,12 @@ RUN = logging.getLogger("manitwin.run")
 RESULT = "result.json"
 _ANEW = "remove its folder to run the stage again"
 JOBS = "jobs"
-"""The folder of a twin's work that remembers jobs of services, beside those of the stages."""
+"""The folder, beside those of the stages, with the ids of submitted service jobs."""
 
 
 @dataclass(frozen=True)
 class StageCost:
-    """The cost of a stage when it ran: wall and CPU seconds, and money."""
+    """The cost of a stage when it ran: wall and CPU seconds, and charges in USD."""
 
     seconds: float
     cpu_seconds: float
@@ -45,9 +44,9 @@ class StageCost:
 
 @dataclass(frozen=True)
 class StageRun:
-    """A stage's way to its result: the key, what it cost when it ran, and whether that was in an earlier run.
+    """The outcome of a stage: its key, its cost when it ran, and whether the result was reused from an earlier run.
 
-    ``charged_usd`` is what services charged for it now; ``cost`` has what they charged in vain before as well.
+    ``charged_usd`` is what services charged in this run; ``cost`` also includes the charges of failed attempts.
     """
 
     key: str
@@ -57,7 +56,7 @@ class StageRun:
 
 
 def stage_key(stage: Stage, draft: Draft) -> str:
-    """Return the hash of everything that decides a stage's result: same key, same bytes."""
+    """Return the hash of everything that determines a stage's result: equal keys mean equal bytes."""
     decides = {
         "twin": draft.item_id,
         "name": stage.name,
@@ -74,7 +73,7 @@ def stage_key(stage: Stage, draft: Draft) -> str:
 
 
 def present_reads(stage: Stage, names: Collection[str]) -> list[str]:
-    """Return what the stage reads, given the names that are there; one that ends in ``?`` is read where it is there."""
+    """Return the artifacts that a stage reads out of those available; optional ones (``?``) only if available."""
     reads = []
     for name in stage.reads:
         optional = name.endswith("?")
@@ -92,11 +91,10 @@ def _digest(name: str, draft: Draft) -> str:
 
 
 def run_stage(stage: Stage, draft: Draft, work: Path, require_same: Callable[[], None] = lambda: None) -> StageRun:
-    """Bring a stage's results into the draft, from an earlier run where one with the same key is there.
+    """Run a stage, or reuse the result with the same key, and load the result into the draft.
 
-    ``require_same`` raises where what the stage has read is not any more what the key stands for. Raises what the stage
-    raises; then nothing of it is left behind. Raises ManiTwinError where a stage does not write what
-    it declares: that is a defect of the stage.
+    ``require_same`` raises if the stage's input has changed since the key was computed. An exception of the stage propagates,
+    and its partial output is deleted. Raises ManiTwinError if a stage does not write exactly what it declares, which is a bug.
     """
     key = stage_key(stage, draft)
     place = work / stage.name / key
@@ -107,7 +105,7 @@ def run_stage(stage: Stage, draft: Draft, work: Path, require_same: Callable[[],
 
 
 def take_up(place: Path, names: Iterable[str], draft: Draft) -> StageCost:
-    """Bring what a stage wrote at ``place`` into the draft."""
+    """Load the result of a stage at ``place`` into the draft; return its cost. Raises TwinError if it is malformed."""
     result = read_json_object(place / RESULT, TwinError, name=str(place / RESULT), remedy=_ANEW)
     try:
         fields = {name: result["fields"][name] for name in names if is_field(name)}
@@ -118,12 +116,12 @@ def take_up(place: Path, names: Iterable[str], draft: Draft) -> StageCost:
     draft.fields.update(fields)
     draft.digests.update(digests)
     draft.paths.update({name: place / name for name in digests if name not in fields})
-    draft.rehearsed.update(result.get("rehearsed", ()))  # results of earlier versions do not say
+    draft.rehearsed.update(result.get("rehearsed", ()))  # results of earlier versions lack this entry
     return cost
 
 
 def is_whole(place: Path, *, digests: bool = True) -> bool:
-    """Tell whether a result is there and, with ``digests``, whether its files are what was written."""
+    """Return whether a result is complete and, with ``digests``, whether its files match their digests."""
     if not (place / RESULT).is_file():
         return False
     try:
@@ -184,18 +182,19 @@ StageKey = tuple[str, str]
 
 
 class WorkFolder:
-    """The folder in which the stages of one item read and write.
+    """The working folder of one item's stages.
 
-    Owns: the local folder. Of a URL it holds copies: a result is complete there once its ``result.json`` is, which goes last.
+    Owns the local folder. If the root is a URL, the folder holds copies; a result at the URL is complete once it has its
+    ``result.json``, which is uploaded last.
     """
 
     def __init__(self, root: DatasetRoot, item_id: str, cache: Path):
         self.root, self.name = root, f"{WORK}/{item_id}"
         self.place = (root.local or cache) / WORK / item_id
-        self.fresh = self.place.with_name(f"{item_id}.finished")  # where the finished folder is put together
+        self.fresh = self.place.with_name(f"{item_id}.finished")  # the finished folder is assembled here
 
     def has(self, stage: str, key: str) -> bool:
-        """Tell whether a result is there."""
+        """Return whether a result exists."""
         return (self.place / stage / key / RESULT).is_file() or (
             self.root.local is None and self.root.exists(f"{self.name}/{stage}/{key}/{RESULT}")
         )
@@ -203,7 +202,9 @@ class WorkFolder:
     def load(
         self, draft: Draft, done: Iterable[StageKey], stages: dict[str, Stage], wanted: set[str] | None
     ) -> dict[str, StageCost]:
-        """Bring the results of stages into the draft, of files and folders only the ``wanted`` ones (None: all)."""
+        """Load the results of stages into the draft; fetch only the ``wanted`` files and folders (None: all). Return the
+        costs.
+        """
         costs = {}
         for name, key in done:
             writes = stages[name].writes
@@ -212,7 +213,7 @@ class WorkFolder:
         return costs
 
     def run(self, stage: Stage, draft: Draft, require_same: Callable[[], None] = lambda: None) -> StageRun:
-        """Run a stage, or find its result, and leave it below the root; ``require_same`` as ``run_stage`` has it."""
+        """Run a stage or reuse its result, and store it below the root; ``require_same`` as in ``run_stage``."""
         if self.root.local is not None:
             return run_stage(stage, draft, self.place, require_same)
         with self._shared_bill(stage.name):
@@ -223,7 +224,7 @@ class WorkFolder:
 
     @contextmanager
     def _shared_bill(self, stage: str) -> Iterator[None]:
-        """Keep what was charged in vain at the URL: the next attempt may be on another machine."""
+        """Share the lost charges of a stage through the URL: the next attempt may run on another machine."""
         name, place = f"{self.name}/{stage}/{LOST}", self.place / stage / LOST
         if self.root.exists(name):
             self.root.fetch_file(name, place)
@@ -236,7 +237,7 @@ class WorkFolder:
         self.root.remove(name)
 
     def find(self, stage: Stage, draft: Draft) -> StageRun | None:
-        """Return the stage's result where it is there already, and bring it into the draft."""
+        """Load a stage's existing result into the draft and return it; None if there is none."""
         key = stage_key(stage, draft)
         if not self.has(stage.name, key):
             return None
@@ -249,12 +250,12 @@ class WorkFolder:
         return StageRun(key, take_up(self.place / stage.name / key, stage.writes, draft), True)
 
     def sweep(self) -> None:
-        """Delete what stages that were cut off left half-made."""
+        """Delete partial results of interrupted stages."""
         for stale in (*self.place.glob("*/.*"), self.fresh):
             shutil.rmtree(stale, ignore_errors=True)
 
     def drop(self) -> None:
-        """Delete everything: the item has ended and nobody wants to resume it."""
+        """Delete all results: the item has ended and will not be resumed."""
         shutil.rmtree(self.place, ignore_errors=True)
         if self.root.local is None:
             self.root.remove(self.name)
@@ -285,5 +286,5 @@ class WorkFolder:
 
 
 def sweep(root: DatasetRoot, item_id: str) -> None:
-    """Delete what workers left half-made of an item."""
+    """Delete partial results of an item's interrupted stages."""
     WorkFolder(root, item_id, cache_folder(root)).sweep()

@@ -1,4 +1,4 @@
-"""The tables of a run: which items they still lack, and what to write next."""
+"""Scheduling of table updates: which finished items the tables lack, and the next job."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from manitwin.engine.ledger.ledger import Ledger
 
 
 class TableWriter:
-    """Give out one job at a time: tables of every so many items, and at a run's end the rest, merged into few.
+    """Issues one table job at a time: an update after every ``every`` ended items, and at the end the rest, then a merge.
 
-    ``every`` items that ended make a job due (0: no tables at all); ``attempts`` failures in a row stop the run. A run that
-    has nothing to add merges nothing either, and so starts no worker.
+    ``every`` 0 disables tables. ``attempts`` consecutive failures stop the run. A run that has nothing to add does not merge
+    either, so that it starts no worker.
     """
 
     def __init__(self, ledger: Ledger, every: int, attempts: int):
@@ -21,27 +21,27 @@ class TableWriter:
         self._merged = True
 
     def item_ended(self) -> None:
-        """Count an item that may have left a twin for the tables."""
+        """Count an ended item, which may have added a twin."""
         self._ended += 1
 
     def removed(self, item_id: str) -> None:
-        """Note that a finished folder was removed: the tables are to lose its rows."""
+        """Record that a finished folder was removed, so that its rows are removed from the tables."""
         self._removed.add(item_id)
 
     def due(self) -> WriteTables | None:
-        """Return the next job once enough items have ended and no other job is under way."""
+        """Return the next job if enough items have ended and no other table job is running; otherwise None."""
         if not self._every or self._ended < self._every or self._under_way is not None:
             return None
         return self._of_unwritten_twins()
 
     def due_at_the_end(self) -> WriteTables | None:
-        """Return the next job, no item being under way any more; None when all is written and merged."""
+        """Return the next job once no item is in progress; None when everything is written and merged."""
         if not self._every:
             return None
         return self._of_unwritten_twins() or (None if self._merged else self._begun(WriteTables(())))
 
     def written(self, reply: Reply) -> str | None:
-        """Take the answer to the job under way; returns why the run must stop, if it must."""
+        """Process the reply to the running table job; return the reason if the run must stop."""
         job, self._under_way = self._under_way, None
         if isinstance(reply, Failure):
             self._failures += 1

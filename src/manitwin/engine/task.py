@@ -1,4 +1,4 @@
-"""A task of a run, and what it asks for: the engine carries payloads between processes and never looks into them."""
+"""Tasks of a run and their payloads. The engine passes payloads between processes without inspecting them."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from typing import Any, Generic, Self, TypeVar
 
 @dataclass(frozen=True)
 class Payload(ABC):
-    """The content of a task: a frozen dataclass of JSON values, so that it is hashable, picklable and kept in a ledger."""
+    """The content of a task: a frozen dataclass of JSON values, which is hashable, picklable and stored in the ledger."""
 
     @property
     @abstractmethod
     def title(self) -> str:
-        """A short name for a person."""
+        """A short name for messages."""
 
     @property
     def modified_at(self) -> float | None:
-        """When what it names was last changed, in seconds since the epoch; None where nothing of it can change."""
+        """When the input was last modified, in seconds since the epoch; None if it cannot change."""
         return None
 
     def to_json(self) -> dict[str, Any]:
-        """Return the fields as a ledger keeps them: the same payload gives the same ones in every version."""
+        """Return the fields as stored in the ledger; the same payload must give the same fields in every version."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @classmethod
     def from_json(cls, fields: Mapping[str, Any]) -> Self:
-        """Return the payload that a ledger of this version or an earlier one keeps."""
+        """Return the payload from a ledger of this version or an earlier one."""
         return cls(**fields)
 
 
@@ -37,7 +37,7 @@ PayloadT = TypeVar("PayloadT", bound=Payload)
 
 @dataclass(frozen=True)
 class Task(Generic[PayloadT]):
-    """One item of a run by its number in the ledger; ``item_id`` names what it makes, and is empty until that is known."""
+    """One item of a run by its number in the ledger; ``item_id`` is empty until it is known."""
 
     number: int
     payload: PayloadT

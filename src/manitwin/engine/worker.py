@@ -1,4 +1,4 @@
-"""Do one job: what runs in a worker process, on this machine or another."""
+"""Execution of one job in a worker process."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ from manitwin.twin.store import WORK
 
 NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 TOO_LARGE = "too_large"
-"""The reason of an item for which a stage needs more memory than a worker may take; every recipe that rejects has it."""
+"""The rejection reason if a stage exceeds a worker's memory; every recipe that can reject items defines it."""
 
 
 class Worker:
-    """Does jobs one after the other; owns the stages, which are made once a kind."""
+    """Runs jobs one at a time; owns the stages, which are created once per kind of input."""
 
     def __init__(self, setup: WorkerSetup):
         self.setup, self.root = setup, DatasetRoot(setup.root_url)
@@ -59,7 +59,7 @@ class Worker:
         self._amends = self.root.exists(AMENDMENTS)
 
     def do(self, job: Job) -> Reply:
-        """Return the job's answer; never raises but for what ends a process."""
+        """Run a job and return the reply; exceptions become a Failure, except those that end the process."""
         with counted() as bill:
             reply = self._reply(job)
         if isinstance(reply, Failure | StageRun | StageRejected):
@@ -79,7 +79,7 @@ class Worker:
             return Failure("unsupported", _line(error))
         except InputChanged as error:
             return Failure("changed", " ".join(str(error).split()))
-        except NewerVersion as error:  # of no other folder either should an older one take the place: the run stops
+        except NewerVersion as error:  # an older version must not replace any folder: stop the run
             return Failure("denied", " ".join(str(error).split()))
         except BackendError as error:
             return Failure("error", _line(error))
@@ -133,7 +133,7 @@ class Worker:
             return recipe.ending_of(self.root.read_bytes(name), amended) if self.root.exists(name) else None
         except NewerVersion as error:
             raise NewerVersion(f"{recipe.folder_of(item_id)}/{error}") from error
-        except TwinError:  # no file that is read: what is made takes its place
+        except TwinError:  # not a readable record: the new folder replaces it
             return None
 
     def _run(self, job: RunStage) -> StageRun | StageRejected:
@@ -144,7 +144,7 @@ class Worker:
             self._draft(job.task.item_id, job.task.payload),
         )
         draft.amendments = {name: each for name, each in draft.amendments.items() if name == stage.name}
-        work.sweep()  # of a worker that died at it
+        work.sweep()  # remains of a worker that died at this stage
         wanted = {name.removesuffix("?") for name in stage.reads}
         writers = {s.name for s in stages if wanted & set(s.writes)}
         work.load(draft, [d for d in job.done if d[0] in writers], {s.name: s for s in stages}, wanted)
@@ -174,11 +174,11 @@ class Worker:
             ending = self.setup.recipe.finish(draft, job.kind, costs, answer, job.stage, work.fresh)
             self._require_same(job.task)
             self.root.put_folder(work.fresh, self.setup.recipe.folder_of(job.task.item_id), self.setup.recipe.record)
-        except Rejected:  # as a file of the input is gone: a finished folder has nothing to reject by itself
+        except Rejected:  # e.g. an input file is gone; assembling does not reject by itself
             self._require_same(job.task)
             raise
         except InputChanged:
-            work.drop()  # nobody knows which of its results are of the bytes that the id stands for
+            work.drop()  # it is unknown which results belong to the bytes that the id stands for
             raise
         finally:
             shutil.rmtree(work.fresh, ignore_errors=True)
@@ -187,7 +187,7 @@ class Worker:
         return ending
 
     def _require_same(self, task: Task) -> None:
-        """Raise InputChanged where the input is not any more what the item's id stands for."""
+        """Raise InputChanged if the input no longer matches the item's id."""
         if self.setup.recipe.identify(task.payload).item_id != task.item_id:
             raise InputChanged(f"{task.payload.title}: was changed while it was processed; rerun the same command")
 
@@ -215,11 +215,11 @@ class Worker:
 
 
 def _nothing() -> None:
-    """Do nothing: the stage reads no input."""
+    """Do nothing: the stage does not read the input."""
 
 
 def too_much_memory(memory_gb: float) -> str:
-    """Return what is said of work that a worker's memory did not suffice for."""
+    """Return the message for work that exceeded a worker's memory."""
     return (
         f"needs more than run.memory_gb = {memory_gb:g} GB of memory"
         if memory_gb
@@ -228,15 +228,15 @@ def too_much_memory(memory_gb: float) -> str:
 
 
 def too_large(job: RunStage, memory_gb: float) -> Rejected:
-    """Return the rejection of an item for which a stage needs more memory than a worker may take."""
+    """Return the rejection of an item for which a stage exceeded a worker's memory."""
     said = f"{job.task.payload.title}: stage {job.stage} {too_much_memory(memory_gb)}"
     return Rejected(TOO_LARGE, f"{said}; simplify the mesh, reduce the size of its textures, or raise run.memory_gb")
 
 
 class InlineExecutor:
-    """Do every job at once in this process: to look at a stage with a debugger, and to test what drives it.
+    """Runs each job synchronously in this process, for debugging and tests.
 
-    Neither ``stage_timeout_s`` nor ``memory_gb`` holds here.
+    ``stage_timeout_s`` and ``memory_gb`` are not enforced.
     """
 
     def __init__(self, setup: WorkerSetup, slots: int = 1):
@@ -244,26 +244,26 @@ class InlineExecutor:
         self._ended: list[tuple[int, Reply]] = []
 
     def slots(self, needs: Resource) -> int:
-        """Return how many jobs may be given at a time, the same for all resources."""
+        """Return how many jobs may be submitted at a time, the same for all resources."""
         return self._slots
 
     def submit(self, ticket: int, job: Job) -> None:
-        """Do a job at once; ``ended`` returns its reply."""
+        """Run a job immediately; ``ended`` returns its reply."""
         self._ended.append((ticket, self._worker.do(job)))
 
     def ended(self, timeout_s: float) -> list[tuple[int, Reply]]:
-        """Return what was done since the last call; sleep where that is nothing."""
+        """Return the replies since the last call; sleep for the timeout if there are none."""
         if not self._ended:
             time.sleep(timeout_s)
         ended, self._ended = self._ended, []
         return ended
 
     def parts(self) -> dict[int, StagePart]:
-        """Return nothing: while a stage runs in this process, nobody asks."""
+        """Return an empty dict: nothing can poll while a stage runs in this process."""
         return {}
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: no resources are held."""
 
 
 def _line(error: Exception) -> str:

@@ -1,4 +1,4 @@
-"""A pool of worker processes that no interrupt leaves half started, half stopped, or with a lock that is held for ever."""
+"""A process pool that is safe against interrupts: no worker is left half started or stopped, and no lock stays held."""
 
 from __future__ import annotations
 
@@ -13,12 +13,10 @@ from manitwin.engine.worker_processes import WorkerContext, spared_from_interrup
 
 
 class WorkerPool:
-    """Do calls in worker processes, where a crash or a hang costs one of them.
+    """Runs function calls in worker processes; a crash or hang costs one of them.
 
-    ``workers`` processes are started with the first call; each calls ``initializer`` first, and ends after ``max_tasks`` calls
-    (0: with the pool). Of pebble's pool and futures nothing is asked but while interrupts are put off.
-
-    Owns: the processes.
+    ``workers`` processes are started with the first call. Each calls ``initializer`` first, and exits after ``max_tasks`` calls
+    (0: never). Pebble's pool and futures are only used while interrupts are deferred. Owns the processes.
     """
 
     def __init__(
@@ -42,9 +40,9 @@ class WorkerPool:
         timeout_s: float | None = None,
         on_end: Callable[[Any], None] = lambda future: None,
     ) -> Any:
-        """Have a function called and return a future of what it returns; ``on_end`` is called with that as it ends.
+        """Submit a function call and return its future; ``on_end`` is called with the future when it is done.
 
-        Raises RuntimeError where all processes have died before.
+        Raises RuntimeError if all processes have died before.
         """
         with deferred_interrupts():
             with spared_from_interrupts():
@@ -53,8 +51,8 @@ class WorkerPool:
             return future
 
     def result(self, future: Any) -> Any:
-        """Wait for a call to end and return what it returned; raises what it raised, and pebble's and its pool's own errors."""
-        ended: queue.SimpleQueue[Any] = queue.SimpleQueue()  # written in C: an interrupt leaves none of its locks held
+        """Wait for a call and return its result; raises its exception, or an error of pebble or its pool."""
+        ended: queue.SimpleQueue[Any] = queue.SimpleQueue()  # implemented in C: an interrupt leaves no lock held
         with deferred_interrupts():
             future.add_done_callback(ended.put)
         ended.get()
@@ -62,12 +60,12 @@ class WorkerPool:
             return future.result()
 
     def refuse(self) -> None:
-        """Begin no call any more, nor a process."""
+        """Accept no further calls and start no further processes."""
         with deferred_interrupts():
             self._processes.stop()
 
     def stop(self) -> None:
-        """End all processes at once, also one that is stopped (SIGSTOP) or in native code."""
+        """Kill all processes immediately, including stopped ones (SIGSTOP) and those in native code."""
         with deferred_interrupts():
             self._processes.stop()
             self._context.kill()

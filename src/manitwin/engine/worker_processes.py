@@ -1,4 +1,4 @@
-"""Worker processes: forked, or spawned without the script that started them, and spared from interrupts."""
+"""Worker processes: forked or spawned, shielded from Ctrl-C, with memory returned to the system."""
 
 from __future__ import annotations
 
@@ -16,30 +16,34 @@ from typing import Any
 from manitwin.engine.fork_server import start_forked
 from manitwin.engine.process_bounds import one_thread_in_new_processes
 
-LARGE_BYTES = 2 << 20  # blocks from this size on are mapped each by itself
+LARGE_BYTES = 2 << 20  # blocks from this size on are mapped individually
 M_MMAP_THRESHOLD = -3  # mallopt(3)
 KEPT_BYTES = 16 << 20  # free memory that stays mapped for the next stage
 
 
 @contextmanager
 def spared_from_interrupts() -> Iterator[None]:
-    """Keep Ctrl-C from the processes that threads started in here will spawn.
+    """Shield processes that are spawned by threads started within the ``with`` statement from Ctrl-C.
 
-    A terminal sends it to all of them, and one that is still importing would answer with a traceback. A thread inherits
-    the mask of the one that starts it, and a process that of its thread (pthread_sigmask(3)). The resource tracker is
-    started before: starting it lifts the mask of the thread that does (bugs.python.org/issue33613).
+    A terminal sends SIGINT to all of them, and a process that is still importing would print a traceback. A thread inherits the
+    signal mask of its creator, and a process that of its thread (pthread_sigmask(3)). The resource tracker is started before,
+    because starting it unblocks the signal in the calling thread (bugs.python.org/issue33613).
     """
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
     try:
-        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # raises what a handler does, the mask set
+        signal.pthread_sigmask(
+            signal.SIG_BLOCK, {signal.SIGINT}
+        )  # raises what a pending handler raises, with the mask set
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class _AllocatorState(ctypes.Structure):
-    """``struct mallinfo2`` (mallinfo(3), glibc 2.33 and later); ``fordblks`` are the bytes that are free and kept."""
+    """``struct mallinfo2`` (mallinfo(3), glibc 2.33 and later); ``fordblks`` is the number of free bytes kept by the
+    allocator.
+    """
 
     _fields_ = tuple(
         (name, ctypes.c_size_t)
@@ -50,15 +54,15 @@ class _AllocatorState(ctypes.Structure):
 
 
 def keep_imported() -> None:
-    """Exempt all objects that exist now from garbage collection, which then looks through later ones only, in milliseconds."""
+    """Exempt all current objects from garbage collection, which then takes milliseconds for newer objects."""
     gc.freeze()
 
 
 def map_large_blocks() -> None:
-    """Have large blocks of memory go back to the system as they are freed; elsewhere than with glibc nothing is done.
+    """Make glibc return large memory blocks to the system when they are freed; without glibc this does nothing.
 
-    By itself glibc raises its limit for that to the largest block that was freed, up to 32 MB (mallopt(3)): arrays and textures
-    then leave holes between what stays, which a stage that needs much comes on top of.
+    By default glibc raises its mmap threshold to the largest block freed so far, up to 32 MB (mallopt(3)): freed arrays and
+    textures then leave holes between live blocks, on top of which a stage with a large demand allocates.
     """
     library = ctypes.CDLL(None)
     if hasattr(library, "mallopt"):
@@ -66,11 +70,11 @@ def map_large_blocks() -> None:
 
 
 def return_free_memory() -> None:
-    """Give the memory back that this process has freed and its allocator keeps, between jobs of which each has other needs.
+    """Return free memory of this process to the system between jobs, whose demands differ.
 
-    Meshes and their caches, and what lies in cycles with them, a hundred megabytes, are collected first. glibc keeps what
-    lies below anything still in use, for a worker of a long run several hundred megabytes. Less than ``KEPT_BYTES`` stay, for
-    the next job. Elsewhere than with glibc none is given back.
+    First, meshes and their caches, which contain reference cycles, are garbage-collected (about a hundred megabytes). glibc
+    keeps free memory below any live block, several hundred megabytes in the worker of a long run. Up to ``KEPT_BYTES`` are kept
+    for the next job. Without glibc, nothing is returned.
     """
     gc.collect()
     library = ctypes.CDLL(None)
@@ -82,10 +86,10 @@ def return_free_memory() -> None:
 
 
 class _WorkerProcess(SpawnProcess):
-    """A process whose libraries keep to one thread."""
+    """A process whose libraries use one thread."""
 
     @staticmethod
-    def _Popen(process_obj: Any) -> Any:  # multiprocessing's own name, called by start()
+    def _Popen(process_obj: Any) -> Any:  # the name that multiprocessing's start() calls
         forked = start_forked(process_obj)
         if forked is not None:
             return forked
@@ -94,10 +98,11 @@ class _WorkerProcess(SpawnProcess):
 
 
 class WorkerContext(SpawnContext):
-    """Start the workers of one pool, whose locks last as long as this context: forked where a server does that, else spawned.
+    """Multiprocessing context of one pool: workers are forked if a fork server runs, else spawned; locks live as long as the
+    context.
 
-    pebble takes its locks away before it ends its last workers (``WorkerChannel.close``): one that is starting at that
-    moment does not find them, and says so with a traceback.
+    Pebble drops its locks before it stops its last workers (``WorkerChannel.close``). A worker that is just starting would not
+    find them, and print a traceback.
     """
 
     def __init__(self) -> None:
@@ -112,13 +117,13 @@ class WorkerContext(SpawnContext):
         return process
 
     def kill(self) -> None:
-        """End all processes that were started here, also those that are stopped (SIGSTOP) or in native code."""
+        """Kill all processes started from this context, including stopped ones (SIGSTOP) and those in native code."""
         for process in self._started:
             if process.is_alive():
                 process.kill()
 
     def RLock(self) -> RLock:
-        """Return a lock that is there until this context is gone."""
+        """Return a lock that this context keeps alive."""
         lock = super().RLock()
         self._kept.append(lock)
         return lock
@@ -126,7 +131,7 @@ class WorkerContext(SpawnContext):
 
 @contextmanager
 def hidden_main_module() -> Iterator[None]:
-    """Keep spawned workers from importing the script that started them: without a guard it would start them again."""
+    """Prevent spawned workers from importing the main script, which without a main guard would start workers again."""
     main = sys.modules["__main__"].__dict__
     hidden: dict[str, Any] = {name: main[name] for name in ("__file__", "__spec__") if name in main}
     main.pop("__file__", None)

@@ -1,1 +1,1 @@
-"""The ledger of a run: what became of every item and every stage, in one SQLite file that only the driver writes."""
+"""The ledger of a run: the state of every item and stage, in one SQLite file that only the driver writes."""

@@ -1,4 +1,4 @@
-"""Write a ledger, and read from it as a run goes on."""
+"""The ledger for the driver: write the state of items and stages, and query it during a run."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ LEDGER = "ledger.sqlite"
 
 
 class LedgerFull(BackendError):
-    """The disk has no room for another row: what was not committed is lost, and found again by the next run."""
+    """The disk is full: uncommitted rows are lost, and the next run finds the results again."""
 
 
 class Ledger:
-    """One ledger file, open for writing by one process at a time.
+    """A ledger file, open for writing by one process at a time.
 
-    Owns: the connection and the lock. Changes are kept together until ``commit``.
+    Owns the connection and the lock. Changes accumulate in a transaction until ``commit``.
     """
 
     def __init__(self, path: Path):
-        """Open or make a ledger; raises UsageError where another run holds it, LedgerDamaged for a file that is none."""
+        """Open or create a ledger. Raises UsageError if another run holds it, LedgerDamaged if the file is not a ledger."""
         path.parent.mkdir(parents=True, exist_ok=True)
         self.path = path
         self._lock = hold_lock(path)
@@ -50,7 +50,7 @@ class Ledger:
         try:
             self.connection.execute("PRAGMA trusted_schema = OFF")
             self.connection.execute("PRAGMA journal_mode = WAL")
-            # a power cut may lose the last rows, which are found again
+            # a power cut may lose the last rows; their results are found again
             self.connection.execute("PRAGMA synchronous = NORMAL")
             migrate(self.connection, str(self.path))
             check_whole(self.connection, self.path)
@@ -60,13 +60,13 @@ class Ledger:
             raise
 
     def commit(self) -> None:
-        """Make everything since the last commit permanent."""
+        """Commit the transaction and begin a new one. Raises LedgerFull if the disk is full."""
         try:
             self.connection.execute("COMMIT")
         except sqlite3.OperationalError as error:
             if error.sqlite_errorcode != sqlite3.SQLITE_FULL:
                 raise
-            if self.connection.in_transaction:  # SQLite may have rolled back by itself
+            if self.connection.in_transaction:  # SQLite may have rolled back already
                 self.connection.execute("ROLLBACK")
             raise LedgerFull(f"{self.path}: {error}") from error
         finally:
@@ -74,7 +74,7 @@ class Ledger:
                 self.connection.execute("BEGIN")
 
     def close(self, remove_new: bool = False) -> None:
-        """Commit and give the ledger free; ``remove_new``: one that was made here and got no items is removed before."""
+        """Commit and release the ledger; with ``remove_new``, delete it if it was created here and has no items."""
         removed = False
         try:
             self.commit()
@@ -82,13 +82,15 @@ class Ledger:
             self.connection.execute("ROLLBACK")
         finally:
             self.connection.close()
-            if removed:  # while the lock is held: nobody else can have made or filled it
+            if removed:  # while the lock is held, so that no other run can have created or filled it
                 self.path.unlink()
                 lock_file(self.path).unlink()
             self._lock.close()
 
     def add_items(self, payloads: Iterable[Payload]) -> tuple[list[int], int]:
-        """Add items that are not there yet, in order, all or none; returns the numbers of all given, and how many are new."""
+        """Add all items that are not in the ledger, in order and atomically; return the numbers of all given items, and how many
+        are new.
+        """
         given: dict[int, None] = {}
         new = 0
         self.commit()
@@ -110,9 +112,9 @@ class Ledger:
         return int(self.connection.execute("SELECT number FROM items WHERE item = ?", text).fetchone()[0])
 
     def restate(self, read: Callable[[Mapping[str, Any]], Payload]) -> None:
-        """Rewrite payloads that an earlier version wrote in another form; all of a ledger have one form, so the first tells.
+        """Rewrite payloads of an earlier version in the current form; ``read`` parses both forms.
 
-        ``read`` reads both forms.
+        All payloads of a ledger have the same form, so that only the first is compared.
         """
         rows = self.connection.execute("SELECT number, item FROM items ORDER BY number")
         first = rows.fetchone()
@@ -123,10 +125,11 @@ class Ledger:
         self.commit()
 
     def begin_run(self, recipe_sha256: str, given: Collection[int] = (), *, replaces: bool = True) -> int:
-        """Note the begin of a run: what an earlier one left running was cut off, which is nobody's failed attempt.
+        """Record the start of a run and return its number.
 
-        Items that ended under another recipe are opened again, their attempts forgotten: those with the ``given`` numbers, or
-        where none is given all. Where the recipe ``replaces`` nothing, only those that failed: there is nothing of them.
+        Stages left "running" by an earlier run were interrupted, which does not count as a failed attempt. Items that ended
+        under another recipe are reopened and their attempts reset: those with the ``given`` numbers, or all if none is given.
+        If not ``replaces``, only failed items are reopened, because they have no result.
         """
         run = self.connection.execute(
             "INSERT INTO runs (started_at, recipe_sha256) VALUES (?, ?)", (time.time(), recipe_sha256)
@@ -138,19 +141,19 @@ class Ledger:
         return int(run or 0)
 
     def end_run(self, run: int, how: str) -> None:
-        """Note how a run ended."""
+        """Record how a run ended."""
         self.connection.execute("UPDATE runs SET ended_at = ?, ended_how = ? WHERE run = ?", (time.time(), how, run))
         self.commit()
 
     def next_open(self, after: int, count: int) -> list[OpenItem]:
-        """Return the next open items behind a number, in order."""
+        """Return the next ``count`` open items with numbers above ``after``, in order."""
         rows = self.connection.execute(
             "SELECT number, item FROM items WHERE state = 'open' AND number > ? ORDER BY number LIMIT ?", (after, count)
         ).fetchall()
         return [OpenItem(number, _payload(text), self._attempts(number)) for number, text in rows]
 
     def payload(self, number: int) -> dict[str, Any]:
-        """Return the JSON of an item's payload."""
+        """Return an item's payload as JSON."""
         (text,) = self.connection.execute("SELECT item FROM items WHERE number = ?", (number,)).fetchone()
         return dict(_payload(text))
 
@@ -161,7 +164,7 @@ class Ledger:
         return dict(rows)
 
     def superseded_rejection(self, number: int, twin_id: str) -> str | None:
-        """Return the id under which an item was rejected before its input was changed, where no other item has it."""
+        """Return the id under which an item was rejected before its input changed, if no other item has that id."""
         row = self.connection.execute(
             "SELECT twin_id FROM items WHERE number = ? AND twin_id <> ? AND reason IS NOT NULL AND revision IS NOT NULL"
             " AND twin_id NOT IN (SELECT twin_id FROM items WHERE number <> ? AND twin_id IS NOT NULL)",
@@ -170,7 +173,7 @@ class Ledger:
         return None if row is None else str(row[0])
 
     def identify(self, number: int, twin_id: str, kind: str) -> int | None:
-        """Note whose twin an item is; where another item makes the same twin, end this one and return the other's number."""
+        """Store an item's twin id; if another item has the same id, end this one as a duplicate and return the other's number."""
         first = self.connection.execute(
             "SELECT number FROM items WHERE twin_id = ? AND state <> 'duplicate' AND number <> ?", (twin_id, number)
         ).fetchone()
@@ -184,7 +187,7 @@ class Ledger:
         return int(first[0])
 
     def stage_started(self, number: int, stage: str, attempts: int) -> None:
-        """Note that a stage is given to a worker."""
+        """Record that a stage was submitted to a worker."""
         self.connection.execute(
             "INSERT INTO stages (number, stage, state, attempts, at) VALUES (?, ?, 'running', ?, ?)"
             " ON CONFLICT DO UPDATE SET state = 'running', attempts = excluded.attempts, at = excluded.at",
@@ -205,7 +208,7 @@ class Ledger:
         cost_usd: float = 0.0,
         error: str | None = None,
     ) -> None:
-        """Note how a stage ended: done (``ran`` now, or found), rejected, waiting for a service, or failed for good."""
+        """Record how a stage ended: done (``ran`` now, or reused), rejected, waiting for a retry, or failed."""
         self.connection.execute(
             "INSERT INTO stages (number, stage, key, state, attempts, runs, seconds, cpu_seconds, cost_usd, error, at)"
             " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET key = excluded.key,"
@@ -225,7 +228,7 @@ class Ledger:
         detail: str = "",
         revision: str | None = None,
     ) -> None:
-        """Note how an item ended; a twin of a new revision is to be indexed again."""
+        """Record how an item ended; a twin with a new revision is marked for indexing."""
         self.connection.execute(
             "UPDATE items SET state = ?, reason = ?, detail = ?, recipe_sha256 = ?, ended_at = ?,"
             " indexed = CASE WHEN revision IS ? THEN indexed ELSE 0 END, revision = ? WHERE number = ?",
@@ -233,7 +236,7 @@ class Ledger:
         )
 
     def changed_since_end(self, numbers: Iterable[int], read: Callable[[Mapping[str, Any]], Payload]) -> list[int]:
-        """Return those of the items with these numbers whose input was changed after they had ended."""
+        """Return the numbers among ``numbers`` of items whose input was modified after they had ended."""
         found = []
         for number in numbers:
             row = self.connection.execute(
@@ -245,10 +248,10 @@ class Ledger:
         return found
 
     def reopen(self, numbers: Iterable[int]) -> int:
-        """Open ended items again, their attempts forgotten; returns how many."""
+        """Reopen ended items and reset their attempts; return how many."""
         count = 0
         for number in numbers:
-            # a duplicate has the twin of another item, until its own bytes are read again
+            # a duplicate has another item's twin id until its own bytes are read again
             self.connection.execute(
                 "UPDATE items SET twin_id = CASE state WHEN 'duplicate' THEN NULL ELSE twin_id END, state = 'open'"
                 " WHERE number = ?",
@@ -260,13 +263,13 @@ class Ledger:
         return count
 
     def revised(self, twin_id: str, revision: str) -> None:
-        """Note that a finished twin was amended; it is to be indexed again."""
+        """Record that a finished twin was amended, and mark it for indexing."""
         self.connection.execute(
             "UPDATE items SET revision = ?, indexed = 0 WHERE twin_id = ? AND state = 'accepted'", (revision, twin_id)
         )
 
     def counts(self, numbers: Iterable[int] | None = None) -> dict[str, int]:
-        """Return how many items are in each state: of all, or of those with these numbers."""
+        """Return the number of items by state: of all items, or of those with the given numbers."""
         if numbers is None:
             return dict(self.connection.execute("SELECT state, count(*) FROM items GROUP BY state"))
         wanted = set(numbers)
@@ -274,14 +277,14 @@ class Ledger:
         return dict(Counter(state for number, state in rows if number in wanted))
 
     def totals(self, recipe_sha256: str, given: Collection[int] = (), *, replaces: bool = True) -> tuple[int, int]:
-        """Return how many items there are, and how many are open, or are opened again as ``begin_run`` does."""
+        """Return the total number of items, and how many are open or would be reopened by ``begin_run``."""
         row = self.connection.execute("SELECT count(*), coalesce(sum(state = 'open'), 0) FROM items").fetchone()
         return int(row[0]), int(row[1]) + len(self.ended_under_others(recipe_sha256, given, replaces=replaces))
 
     def ended_under_others(
         self, recipe_sha256: str, given: Collection[int] = (), *, replaces: bool = True
     ) -> list[int]:
-        """Return the numbers of items that ended under another recipe: of the given ones or of all, as ``begin_run`` does."""
+        """Return the numbers of items that ended under another recipe: among the given ones or all, as in ``begin_run``."""
         rows = self.connection.execute(
             "SELECT number FROM items WHERE state NOT IN ('open', 'duplicate') AND recipe_sha256 <> ?"
             " AND (? OR state = 'failed')",
@@ -299,7 +302,7 @@ class Ledger:
         return [(number, twin_id) for number, twin_id in rows if not wanted or number in wanted]
 
     def any_indexed(self) -> bool:
-        """Tell whether any twin is marked as indexed."""
+        """Return whether any twin is marked as indexed."""
         return self.connection.execute("SELECT 1 FROM items WHERE indexed = 1 LIMIT 1").fetchone() is not None
 
     def forget_indexed(self) -> None:
@@ -308,7 +311,7 @@ class Ledger:
         self.commit()
 
     def not_indexed(self, count: int) -> list[str]:
-        """Return ids of finished twins that no table has yet."""
+        """Return the ids of up to ``count`` finished twins that are not yet in the tables."""
         rows = self.connection.execute(
             "SELECT twin_id FROM items WHERE indexed = 0 AND state IN ('accepted', 'rejected') AND revision IS NOT NULL"
             " ORDER BY number LIMIT ?",
@@ -317,7 +320,7 @@ class Ledger:
         return [twin_id for (twin_id,) in rows]
 
     def indexed(self, twin_ids: Iterable[str]) -> None:
-        """Note that the tables have these twins."""
+        """Mark twins as indexed."""
         self.connection.executemany("UPDATE items SET indexed = 1 WHERE twin_id = ?", ((i,) for i in twin_ids))
 
 

@@ -1,4 +1,4 @@
-"""The place of a data set's ledger and log: beside its folders, or for a URL on this machine, with a copy at the URL."""
+"""Locations of a data set's ledger and log: inside the data set, or on this machine with a copy at the data set's URL."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ COPY_EVERY_S = 60.0
 
 
 def ledger_path(root: DatasetRoot) -> Path:
-    """Return where the ledger lies on this machine: in the data set, or of a URL in the user's state folder."""
+    """Return the local path of the ledger: in the data set, or for a URL in the user's state folder."""
     if root.local is not None:
         return root.local / LEDGER
     state = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "manitwin"
@@ -30,7 +30,7 @@ def ledger_path(root: DatasetRoot) -> Path:
 
 
 def local_ledger(root: DatasetRoot) -> Path:
-    """Return the path of the ledger; of a URL it is made from the copy there where this machine has none."""
+    """Return the local path of the ledger; for a URL, download the copy if this machine has no ledger."""
     path = ledger_path(root)
     if root.local is None and not path.is_file() and root.exists(LEDGER):
         root.fetch_file(LEDGER, path)
@@ -38,7 +38,7 @@ def local_ledger(root: DatasetRoot) -> Path:
 
 
 def copy_ledger(root: DatasetRoot, copy: Path) -> None:
-    """Copy the ledger that a run would take up, also while one writes it; there is no copy where there is no ledger."""
+    """Copy the ledger that a run would use, even while a run writes it; does nothing if there is no ledger."""
     path = ledger_path(root)
     if os.path.lexists(path):
         with read_ledger(path) as source, closing(sqlite3.connect(copy)) as target:
@@ -48,7 +48,7 @@ def copy_ledger(root: DatasetRoot, copy: Path) -> None:
 
 
 def local_log(root: DatasetRoot) -> Path:
-    """Return the path of the log of a data set's runs: beside the ledger."""
+    """Return the path of the run log, which lies beside the ledger. Raises UsageError if it is a link or not a regular file."""
     ledger = local_ledger(root)
     log = ledger.with_name(RUN_LOG) if root.local is not None else ledger.with_suffix(".log")
     if log.is_symlink() or (log.exists() and not log.is_file()):
@@ -57,7 +57,7 @@ def local_log(root: DatasetRoot) -> Path:
 
 
 def cache_folder(root: DatasetRoot) -> Path:
-    """Return where a worker keeps copies of what lies at a URL; of a local data set nothing is copied."""
+    """Return the folder for local copies of a data set at a URL; a local data set is used in place."""
     if root.local is not None:
         return root.local
     return cache_home() / _digest(root.url)
@@ -68,18 +68,18 @@ def _digest(url: str) -> str:
 
 
 class LedgerCopy:
-    """The copy of a ledger beside the folders at a URL, as the driver's machine may be lost too; a local data set has none."""
+    """The copy of a ledger at a data set's URL, in case the driver's machine is lost; does nothing for a local data set."""
 
     def __init__(self, root: DatasetRoot, path: Path):
         self._root, self._path, self._at = root, path, time.monotonic()
 
     def refresh(self) -> None:
-        """Copy the ledger again where the last copy is a minute old."""
+        """Upload the ledger if the last copy is more than a minute old."""
         if time.monotonic() - self._at > COPY_EVERY_S:
             self.upload()
 
     def upload(self) -> None:
-        """Copy the ledger."""
+        """Upload the ledger."""
         if self._root.local is not None:
             return
         with tempfile.NamedTemporaryFile(suffix=".sqlite") as copy:

@@ -1,4 +1,4 @@
-"""The lock beside a ledger, which ends with the process that holds it: one run writes at a time."""
+"""The lock file of a ledger, held by one writing run at a time and released when its process ends."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from manitwin.errors import UsageError
 
 
 def lock_file(ledger: Path) -> Path:
-    """Return the path of a ledger's lock."""
+    """Return the path of a ledger's lock file."""
     return ledger.with_suffix(".lock")
 
 
 def _opened(path: Path, flags: int) -> TextIO:
-    """Open a lock; a link, pipe or device in its place is refused: it would be written, or waited for."""
+    """Open a lock file. Links, pipes and devices are refused, because opening them could write elsewhere or block."""
     try:
         descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
     except OSError as error:
@@ -32,7 +32,7 @@ def _opened(path: Path, flags: int) -> TextIO:
 
 
 def hold_lock(ledger: Path) -> TextIO:
-    """Return the lock of a ledger, held until it is closed; raises UsageError where another run holds it."""
+    """Acquire the lock of a ledger and return the open file that holds it. Raises UsageError if another run holds it."""
     path = lock_file(ledger)
     while True:
         lock = _opened(path, os.O_RDWR | os.O_CREAT)
@@ -44,11 +44,11 @@ def hold_lock(ledger: Path) -> TextIO:
         with suppress(FileNotFoundError):
             if os.path.samestat(path.stat(), os.fstat(lock.fileno())):
                 return lock
-        lock.close()  # the run that held it removed it after it was opened here
+        lock.close()  # the previous holder deleted the file after it was opened here
 
 
 def is_written(ledger: Path) -> bool:
-    """Tell whether a run is at work on a ledger now."""
+    """Return whether a run is writing a ledger now."""
     try:
         lock = _opened(lock_file(ledger), os.O_RDONLY)
     except FileNotFoundError:

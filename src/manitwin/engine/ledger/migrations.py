@@ -1,4 +1,4 @@
-"""The ledger's schema as numbered steps; ``PRAGMA user_version`` says how many a file has taken."""
+"""The ledger's schema as numbered migrations; ``PRAGMA user_version`` counts those applied to a file."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ MIGRATIONS = (
 
 
 def schema_of(connection: sqlite3.Connection, path: str) -> int:
-    """Return how many steps a ledger has taken; raises UsageError for one of a newer version of this package."""
+    """Return how many migrations a ledger has had. Raises UsageError for a ledger of a newer version of this package."""
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if is_newer(version, len(MIGRATIONS)):
         raise UsageError(of_newer_schema(path, version, len(MIGRATIONS)))
@@ -61,7 +61,7 @@ def schema_of(connection: sqlite3.Connection, path: str) -> int:
 
 
 def migrate(connection: sqlite3.Connection, path: str) -> None:
-    """Bring a ledger to the newest schema; raises UsageError for one of a newer version of this package."""
+    """Migrate a ledger to the latest schema. Raises UsageError for a ledger of a newer version of this package."""
     version = schema_of(connection, path)
     for number, script in enumerate(MIGRATIONS[version:], version + 1):
         connection.executescript(f"BEGIN; {script}; PRAGMA user_version = {number}; COMMIT;")

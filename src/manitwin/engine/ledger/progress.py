@@ -1,4 +1,4 @@
-"""Progress by a ledger: how far a run is, how fast, what it cost, what became of one item, and what was not accepted."""
+"""Queries on a ledger: progress, rate and cost of a run, the history of one item, and the items that were not accepted."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class StageRow:
 
 @dataclass(frozen=True)
 class StageProgress:
-    """One stage over all items; seconds are the mean of those that ran it."""
+    """Totals of one stage over all items; the mean seconds are over the items that ran it."""
 
     stage: str
     done: int
@@ -48,9 +48,10 @@ class StageProgress:
 
 @dataclass(frozen=True)
 class Progress:
-    """The progress of a data set. ``items_per_hour`` is of the last ten minutes of work, None before anything ended.
+    """The progress of a data set.
 
-    ``of_another_recipe`` ended under another version of this package, or with other settings, than the last run had.
+    ``items_per_hour`` is over the last ten minutes of work, None before any item has ended. ``of_another_recipe`` counts the
+    items that ended under another version of this package, or with other settings, than those of the last run.
     """
 
     items: dict[str, int]
@@ -67,7 +68,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class ItemStory:
-    """All that the ledger knows of one item."""
+    """The ledger's data on one item."""
 
     number: int
     item: dict[str, Any]
@@ -82,9 +83,9 @@ class ItemStory:
 def read_progress(
     connection: sqlite3.Connection, at_work: bool, place_of: StageOrder = lambda stage: 0, now: float | None = None
 ) -> Progress:
-    """Count everything; the ledger may be written at the same time: ``at_work`` tells whether it is.
+    """Return the progress; the ledger may be written at the same time, and ``at_work`` says whether it is.
 
-    ``place_of`` sorts a recipe's stages as they run, by name.
+    ``place_of`` maps a stage's name to its sort key, in the order in which the recipe's stages run.
     """
     now = time.time() if now is None else now
     states = dict.fromkeys(ITEM_STATES, 0)
@@ -118,7 +119,7 @@ def _stages(connection: sqlite3.Connection, place_of: StageOrder) -> list[StageP
     def place(row: StageProgress) -> tuple[int, Any]:
         return (row.stage == ASSEMBLE) - (row.stage == INPUT), place_of(row.stage)
 
-    # stages of another recipe stay in the order of the query: no item comes to a stage before it was at those before
+    # stages of another recipe keep the order of the query: each was reached by at most as many items as those before it
     return sorted((StageProgress(**dict(row)) for row in rows), key=place)
 
 
@@ -148,9 +149,9 @@ def _rate(connection: sqlite3.Connection, run: sqlite3.Row | None, now: float) -
 
 
 def read_story(connection: sqlite3.Connection, which: str) -> ItemStory:
-    """Return what is known of an item, given by its number, (the begin of) its twin's id, or a part of its file's name.
+    """Return the data on an item, found by its number, a prefix of its twin's id, or a substring of its file name.
 
-    Raises UsageError where none or several are meant.
+    Raises UsageError if no item or several items match.
     """
     columns = "number, item, twin_id, state, reason, detail, indexed"
     for condition, value in (
@@ -174,7 +175,7 @@ def read_story(connection: sqlite3.Connection, which: str) -> ItemStory:
 
 
 def told(payload: Mapping[str, Any]) -> str:
-    """Return what a payload says, in a line for a person."""
+    """Return a payload as one readable line."""
     return ", ".join(f"{key} {value}" for key, value in payload.items() if value is not None)
 
 
@@ -183,11 +184,10 @@ UnacceptedState = Literal["rejected", "failed", "waiting"]
 
 @dataclass(frozen=True)
 class Unaccepted:
-    """One item: ``which`` names it to a person, ``reason`` is a code, ``message`` says in words what happened.
+    """An item that was not accepted: ``which`` is its number, ``reason`` a code, ``message`` a description.
 
-    The message of an error begins with its class, behind the stage and the attempts where these are told.
-
-    ``waiting`` is open and had to wait for a service as the run ended.
+    An error message starts with the exception's class, preceded by the stage and the attempts where known. ``waiting`` items
+    are open and were waiting for a service when the run ended.
     """
 
     which: str
@@ -197,7 +197,7 @@ class Unaccepted:
 
 
 def read_unaccepted(connection: sqlite3.Connection) -> Iterator[Unaccepted]:
-    """Yield the items that were rejected or failed, then those that wait."""
+    """Yield rejected and failed items, then waiting ones."""
     for row in connection.execute(
         "SELECT number, state, reason, detail FROM items WHERE state IN ('rejected', 'failed') ORDER BY number"
     ):
@@ -210,7 +210,7 @@ def read_unaccepted(connection: sqlite3.Connection) -> Iterator[Unaccepted]:
 
 
 def read_items(connection: sqlite3.Connection) -> Iterator[ItemRow]:
-    """Yield all items in the order of their numbers."""
+    """Yield all items by number."""
     rows = connection.execute(
         "SELECT number, item, coalesce(twin_id, ''), state, reason, CASE state WHEN 'open' THEN coalesce((SELECT error FROM"
         " stages s WHERE s.number = i.number AND s.state = 'waiting' ORDER BY at DESC LIMIT 1), '') ELSE detail END"
@@ -221,7 +221,7 @@ def read_items(connection: sqlite3.Connection) -> Iterator[ItemRow]:
 
 
 def stage_rows(connection: sqlite3.Connection, number: int) -> list[StageRow]:
-    """Return the stages of one item in the order in which they were last touched."""
+    """Return the stages of one item, ordered by their last change."""
     columns = "stage, key, state, attempts, seconds, cpu_seconds, cost_usd, error"
     rows: list[Any] = connection.execute(
         f"SELECT {columns} FROM stages WHERE number = ? ORDER BY at", (number,)

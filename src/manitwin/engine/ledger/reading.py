@@ -1,4 +1,4 @@
-"""Open a ledger for reading alone, also while a run writes it."""
+"""Open a ledger read-only, also while a run writes it."""
 
 from __future__ import annotations
 
@@ -16,12 +16,14 @@ from manitwin.errors import UsageError
 
 @contextmanager
 def read_ledger(path: Path) -> Iterator[sqlite3.Connection]:
-    """Open a ledger for reading, also while a run writes it; raises UsageError where there is none, a damaged one, or one of
-    a newer version of this package.
+    """Open a ledger read-only, also while a run writes it.
 
-    Nothing is left beside one that no run writes: SQLite's reader of a write-ahead log makes files there and does not remove
-    them, so where that log holds nothing it is told to leave it alone (https://sqlite.org/uri.html, ``immutable``). What
-    watches a ledger opens it anew each time: a run that begins meanwhile is not seen through such a connection.
+    Raises UsageError if there is none, or if it was written by a newer version of this package, and LedgerDamaged if it is
+    damaged.
+
+    A ledger that no run writes is opened without leaving files behind: SQLite's reader of a write-ahead log creates files
+    beside the database, so the log is bypassed if it is empty (https://sqlite.org/uri.html, ``immutable``). To watch a ledger,
+    open it anew each time: such a connection does not see the changes of a run that starts later.
     """
     if not os.path.lexists(path):
         raise UsageError(f"{path}: no ledger found; `manitwin build INPUT... -o DATASET` creates one")
@@ -33,7 +35,7 @@ def read_ledger(path: Path) -> Iterator[sqlite3.Connection]:
     try:
         with sound(path):
             connection.execute("PRAGMA trusted_schema = OFF")
-            # first: tables of a newer one are no damage, and nothing is to be put aside
+            # checked first: tables of a newer version are not damage
             schema_of(connection, str(path))
             check_whole(connection, path)
             yield connection

@@ -1,4 +1,4 @@
-"""The rows of a ledger as others get them, and the states that they know."""
+"""Row types of a ledger, and the states of items and stages."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ ITEM_STATES = ("open", "accepted", "rejected", "failed", "duplicate")
 
 @dataclass(frozen=True)
 class OpenItem:
-    """An item that has not ended, with the JSON of its payload and how often each of its stages was tried."""
+    """An open item, with its payload as JSON and the number of attempts at each stage."""
 
     number: int
     payload: dict[str, Any]
@@ -21,7 +21,7 @@ class OpenItem:
 
 @dataclass(frozen=True)
 class ItemRow:
-    """One item as the ledger keeps it; ``detail`` of an open one says what it waits for."""
+    """One item of the ledger; ``detail`` of an open item says what it waits for."""
 
     number: int
     payload: dict[str, Any]

@@ -1,4 +1,4 @@
-"""Is a file a ledger? SQLite opens regular files alone, and what is no ledger ends in one line with its remedy."""
+"""Integrity checks of a ledger file: it must be a regular file and a sound database with the expected tables."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ _OF_THE_DISK = frozenset(
     {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED}
     | {sqlite3.SQLITE_NOMEM, sqlite3.SQLITE_INTERRUPT, sqlite3.SQLITE_CANTOPEN}
 )
-"""SQLite's codes for what is no fault of the file."""
+"""SQLite error codes that are not caused by the file's content."""
 
 REMEDY = "run manitwin check DATASET, which moves it aside, then rerun the build with its inputs: it finds the finished twins"
 
 
 class LedgerDamaged(UsageError):
-    """A ledger that cannot be read: nothing is lost with it that the folders and the inputs do not have."""
+    """A ledger that cannot be read. Its content can be rebuilt from the finished folders and the inputs."""
 
 
 def damaged(path: Path, cause: object) -> LedgerDamaged:
-    """Return the one line about a ledger that cannot be read."""
+    """Return the error for an unreadable ledger, as one line with its remedy."""
     said = printable_line(str(cause), max_characters=120)
     remedy = REMEDY.replace("DATASET", str(path.parent))
     return LedgerDamaged(f"{path}: not a readable ledger ({said}); {remedy}")
@@ -35,7 +35,7 @@ def damaged(path: Path, cause: object) -> LedgerDamaged:
 
 @contextmanager
 def sound(path: Path) -> Iterator[None]:
-    """Turn SQLite's errors about a damaged file into LedgerDamaged, those about the disk into UsageError."""
+    """Turn SQLite's errors on damaged files into LedgerDamaged, and errors of the disk into UsageError."""
     try:
         yield
     except sqlite3.DatabaseError as error:
@@ -48,7 +48,9 @@ def sound(path: Path) -> Iterator[None]:
 
 
 def require_regular(path: Path) -> None:
-    """Raise LedgerDamaged where a ledger, or what SQLite keeps beside it, is no regular file, or a link out of its folder."""
+    """Raise LedgerDamaged if a ledger, or a file that SQLite keeps beside it, is not a regular file or links out of its
+    folder.
+    """
 
     def refuse(line: str) -> LedgerDamaged:
         return damaged(path, line.split(";")[0])
@@ -59,12 +61,12 @@ def require_regular(path: Path) -> None:
 
 
 def beside(path: Path) -> tuple[Path, Path]:
-    """Return the files that SQLite keeps beside a database in write-ahead mode."""
+    """Return the paths of the files that SQLite keeps beside a database in write-ahead mode."""
     return path.with_name(f"{path.name}-wal"), path.with_name(f"{path.name}-shm")
 
 
 def check_whole(connection: sqlite3.Connection, path: Path) -> None:
-    """Raise LedgerDamaged where pages are damaged, or tables and columns are not those of this version; it is migrated."""
+    """Raise LedgerDamaged if pages are damaged, or if the tables and columns of a migrated ledger differ from this version's."""
     (said,) = connection.execute("PRAGMA quick_check(1)").fetchone()
     if said != "ok":
         raise damaged(path, said)
@@ -72,7 +74,9 @@ def check_whole(connection: sqlite3.Connection, path: Path) -> None:
 
 
 def check_tables(connection: sqlite3.Connection, path: Path) -> None:
-    """Raise LedgerDamaged where tables and columns are not those of this version: views and triggers are none of ours."""
+    """Raise LedgerDamaged if the database objects or columns differ from this version's; extra views and triggers count as
+    well.
+    """
     with closing(sqlite3.connect(":memory:")) as ours:
         migrate(ours, ":memory:")
         for what, of in (("tables", _objects), ("columns", _columns)):
@@ -94,13 +98,13 @@ def _columns(connection: sqlite3.Connection) -> list[tuple[str, ...]]:
 
 
 def put_aside(path: Path) -> Path:
-    """Rename a damaged ledger and what SQLite keeps beside it, out of the way of the next; returns its new place."""
+    """Rename a damaged ledger and delete SQLite's files beside it; return the new path."""
     place, number = path.with_name(f"{path.name}.damaged"), 1
     while os.path.lexists(place):
         number += 1
         place = path.with_name(f"{path.name}.damaged.{number}")
     for each in beside(path):
-        if os.path.lexists(each):  # of no use without the ledger, and taken for the next one's
+        if os.path.lexists(each):  # useless without the ledger, and would be taken for the next ledger's
             os.unlink(each)
     os.rename(path, place)
     return place
