@@ -1,1 +1,1 @@
-"""A finished twin: its record, its folder, its table of grasps."""
+"""A finished twin: its record (twin.json), its folder and its grasp table."""

@@ -1,14 +1,16 @@
-"""The root of a data set: a local folder, or any URL that fsspec reads and writes (``s3://``, ``gs://``, ``memory://``).
+"""The root of a data set: a local folder, or any URL that fsspec can read and write (``s3://``, ``gs://``, ``memory://``).
 
-DATASET/
-  config.json                 what was asked for: the whole configuration
-  ledger.sqlite               the run's ledger (of a URL: a copy, the ledger itself is local)
-  twins/<2 hex>/<twin_id>/    finished twins, accepted and rejected
-  index/                      Parquet tables
-  reviews.sqlite              what people have said of twins
-  reviews.access.json         who of them was let in before: digests of links and cookies
-  amendments/<2 hex>/<twin_id>.json   what they have put right
-  .work/<twin_id>/<stage>/<key>/   results of stages
+Layout::
+
+  DATASET/
+    config.json                 the complete configuration of the build
+    ledger.sqlite               the run's ledger (for a URL a copy; the ledger itself is local)
+    twins/<2 hex>/<twin_id>/    finished twins, accepted and rejected
+    index/                      Parquet tables
+    reviews.sqlite              reviewers' judgements of twins
+    reviews.access.json         reviewers who were let in: digests of links and cookies
+    amendments/<2 hex>/<twin_id>.json   manual corrections
+    .work/<twin_id>/<stage>/<key>/   results of stages
 """
 
 from __future__ import annotations
@@ -34,25 +36,25 @@ from manitwin.twin.store import RECORD, file_beside, replace_folder, write_bytes
 TWINS = "twins"
 _PASSWORD = re.compile(r"://[^/@\s]*:[^/@\s]*@")
 MAX_FILE_BYTES = 2 << 30
-"""Of one file of a data set: that of a scan of millions of triangles with its pictures has some hundred million."""
+"""Size limit of one file; the file of a scan with millions of triangles and textures has some hundred million bytes."""
 
 
 def twin_name(twin_id: str) -> str:
-    """Return a twin's folder below the root: 256 prefixes, so that no folder has more than some hundred entries."""
+    """Return a twin's folder relative to the root; 256 prefixes keep the number of entries per folder small."""
     return f"{TWINS}/{twin_id[:2]}/{twin_id}"
 
 
 class DatasetRoot:
-    """Read and write below one folder or URL; names are relative and use ``/``.
+    """File access below one folder or URL; names are relative and use ``/``.
 
-    Raises UsageError for a URL whose protocol is unknown or not installed, or that holds a password.
+    Raises UsageError for a URL whose protocol is unknown or not installed, or that contains a password.
     """
 
     def __init__(self, url: str | Path):
-        if _PASSWORD.search(str(url)):  # first of all: what comes after shows the URL, and writes it
+        if _PASSWORD.search(str(url)):  # before anything else, because later messages and files contain the URL
             raise UsageError("the URL of a data set contains a password or a key; pass these in the environment only")
         try:
-            self.fs, self.path = url_to_fs(str(url), use_listings_cache=False)  # others write there as well
+            self.fs, self.path = url_to_fs(str(url), use_listings_cache=False)  # other processes write there as well
         except (ValueError, ImportError) as error:
             raise UsageError(f"{url}: {error}; give a folder, or a URL such as s3://bucket/name") from error
         self.url = str(url)
@@ -60,12 +62,14 @@ class DatasetRoot:
 
     @cached_property
     def flat(self) -> bool:
-        """True for the layout of earlier versions: twin folders directly below it. It is read, and no longer written."""
+        """True for the layout of earlier versions, with twin folders directly below the root; it is read but no longer
+        written.
+        """
         return self.local is not None and not self.exists(TWINS) and any(self._flat_ids())
 
     @property
     def has_twins(self) -> bool:
-        """True where it holds twins, or will: in the layout of today or of earlier versions."""
+        """True if the data set holds twins, in the current layout or that of earlier versions."""
         return self.exists(TWINS) or self.flat
 
     def _flat_ids(self) -> Iterator[str]:
@@ -74,30 +78,31 @@ class DatasetRoot:
             yield record.parent.name
 
     def twin_name(self, twin_id: str) -> str:
-        """Return the name of a twin's folder."""
+        """Return a twin's folder relative to the root, in the data set's layout."""
         return twin_id if self.flat else twin_name(twin_id)
 
     def __reduce__(self) -> tuple[type, tuple[str]]:
         return type(self), (self.path if self.local else self.url,)
 
     def absolute(self) -> str:
-        """Return a folder's absolute path, for workers that run elsewhere; a URL stays as it is."""
+        """Return the absolute path, for workers with another working directory; a URL is returned unchanged."""
         return self.url if self.local is None else str(self.local.resolve())
 
     def full(self, name: str) -> str:
-        """Return the name as the file system knows it. Raises UsageError for one that leaves the root."""
+        """Return the full path or URL of a name. Raises UsageError if the name leads out of the root."""
         if name.startswith("/") or ".." in PurePosixPath(name).parts:
             raise UsageError(f"{name}: lies outside the data set {self.url}; give a path below it")
         return f"{self.path.rstrip('/')}/{name}"
 
     def exists(self, name: str) -> bool:
-        """Tell whether a file or folder is there."""
+        """Return whether a file or folder exists."""
         return bool(self.fs.exists(self.full(name)))
 
     def read_bytes(self, name: str, refuse: Refusal = TwinError, *, limit_bytes: int = MAX_FILE_BYTES) -> bytes:
-        """Return a file's content; raises FileNotFoundError.
+        """Return a file's content. Raises FileNotFoundError.
 
-        On a local root, what is no regular file below it, or larger than the limit, raises what ``refuse`` makes of one line.
+        On a local root, a file that is not a regular file below the root, or is larger than ``limit_bytes``, raises the
+        exception that ``refuse`` returns for a message.
         """
         full = self.full(name)
         if self.local is None:
@@ -108,21 +113,23 @@ class DatasetRoot:
         return read_bytes(Path(full), limit_bytes, refuse, inside=self.local, name=full)
 
     def read_json(self, name: str, refuse: Refusal = TwinError, *, remedy: str = MEND) -> dict[str, Any]:
-        """Return the object that a JSON file holds; raises FileNotFoundError, and what ``refuse`` makes of one line."""
+        """Return the object in a JSON file. Raises FileNotFoundError, or the exception that ``refuse`` returns for a malformed
+        file.
+        """
         content = self.read_bytes(name, refuse, limit_bytes=MAX_JSON_BYTES)
         return parse_json_object(content, self.full(name), refuse, remedy=remedy)
 
     def write_bytes(self, name: str, content: bytes) -> None:
-        """Write a file whole or not at all."""
+        """Write a file atomically."""
         if self.local is not None:
             place = Path(self.full(name))
             place.parent.mkdir(parents=True, exist_ok=True)
             write_bytes_atomically(place, content)
         else:
-            self.fs.pipe_file(self.full(name), content)  # an object appears when it is complete
+            self.fs.pipe_file(self.full(name), content)  # object stores make an object visible when it is complete
 
     def put_file(self, source: Path, name: str) -> None:
-        """Copy a local file to a name, whole or not at all."""
+        """Copy a local file to ``name`` atomically."""
         if self.local is not None:
             place = Path(self.full(name))
             place.parent.mkdir(parents=True, exist_ok=True)
@@ -132,25 +139,25 @@ class DatasetRoot:
             self.fs.put_file(str(source), self.full(name))
 
     def fetch_file(self, name: str, to: Path) -> None:
-        """Copy a file to a local path; raises FileNotFoundError."""
+        """Copy a file to a local path. Raises FileNotFoundError."""
         to.parent.mkdir(parents=True, exist_ok=True)
         self.fs.get_file(self.full(name), str(to))
 
     def remove(self, name: str) -> None:
-        """Remove a file or a whole folder; one that is not there is no error. Of a link only the link itself goes."""
+        """Remove a file or folder if it exists. Of a symbolic link only the link is removed."""
         if self.local is not None and _is_special(self.full(name)):
             os.unlink(self.full(name))
         elif self.fs.exists(self.full(name)):
             self.fs.rm(self.full(name), recursive=True)
 
     def names_below(self, name: str) -> list[str]:
-        """Return the names of all files below a folder, sorted; empty where there is none."""
+        """Return the names of all files below a folder, sorted; empty if it does not exist."""
         root = self.path.rstrip("/") + "/"
         found = self.fs.find(self.full(name)) if self.fs.exists(self.full(name)) else []
         return sorted(str(path).removeprefix(root) for path in found)
 
     def sizes_below(self, name: str) -> dict[str, int | None]:
-        """Return the sizes of all files below a folder by their names in it; None for links and what is no regular file."""
+        """Return the size of each file below a folder by its name relative to it; None for links and special files."""
         full = self.full(name).rstrip("/")
         if self.local is None:
             found = self.fs.find(full, detail=True) if self.fs.exists(full) else {}
@@ -165,9 +172,10 @@ class DatasetRoot:
         return sizes
 
     def put_folder(self, fresh: Path, name: str, record: str = RECORD) -> None:
-        """Move a finished local folder to its name; its ``record`` goes last, and what the older one had more goes then.
+        """Move a finished local folder to ``name``: its ``record`` is written last, then surplus files of the older folder are
+        removed.
 
-        On a local root ``fresh`` must be on the same file system, and is renamed.
+        On a local root the folder is renamed, so that ``fresh`` must be on the same file system.
         """
         if self.local is not None:
             replace_folder(fresh, Path(self.full(name)))
@@ -182,7 +190,7 @@ class DatasetRoot:
         shutil.rmtree(fresh)
 
     def fetch_folder(self, name: str, to: Path) -> Path:
-        """Return a local folder with a folder's files: itself where the root is local, else a copy at ``to``."""
+        """Return a local folder with the files of a folder: the folder itself if the root is local, else a copy at ``to``."""
         if self.local is not None:
             return Path(self.full(name))
         for each in self.names_below(name):
@@ -207,7 +215,7 @@ class DatasetRoot:
 
 
 def _is_special(path: str) -> bool:
-    """Tell whether a path is there and neither a file nor a folder: a link, whatever it leads to, a pipe, a device."""
+    """Return whether a path exists and is neither a regular file nor a folder (a link to anything, a pipe, a device)."""
     try:
         mode = os.lstat(path).st_mode
     except OSError:

@@ -1,4 +1,4 @@
-"""What a closed vessel weighs empty, half full and full, and where its centre of mass then is."""
+"""Fill states of a closed vessel: mass, centre of mass and inertia when empty, half full and full."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from manitwin.twin.record_values import LARGEST_KG, LARGEST_M, Finite, Matrix3, 
 
 
 class FillState(Record):
-    """A vessel filled to a share of its volume: mass, centre of mass (object frame) and inertia about it, as of ``Physical``.
+    """A vessel filled to a share of its volume: mass, centre of mass (object frame) and inertia about it, as in ``Physical``.
 
-    ``center_of_mass_uncertainty_m``: how far the centre of mass may be off in this state; None in twins made without it.
+    ``center_of_mass_uncertainty_m`` is the uncertainty of the centre of mass in this state; None in twins of earlier versions.
     """
 
     share: Unit
@@ -23,10 +23,10 @@ class FillState(Record):
 
 
 class Filling(Record):
-    """A vessel's states from empty to full, and the assumption that they rest on, in words.
+    """The states of a vessel from empty to full, and the assumption behind them in words.
 
-    ``center_of_mass_shift_m``: how far from that of the full one the centre of mass is at most, at any level; where nobody knows
-    how full a vessel is, its centre of mass is uncertain by so much. None in twins that were made without it.
+    ``center_of_mass_shift_m`` is the largest distance of the centre of mass from that of the full vessel, over all fill levels:
+    the uncertainty of the centre of mass if the fill level is unknown. None in twins of earlier versions.
     """
 
     assumption: str = Field(min_length=1)
@@ -35,7 +35,7 @@ class Filling(Record):
 
     @model_validator(mode="after")
     def _possible(self) -> Filling:
-        """Refuse states that are not in order, or that no vessel has."""
+        """Reject states that are out of order or physically impossible."""
         for less, more in zip(self.states, self.states[1:], strict=False):
             if not (less.share < more.share and less.mass_kg < more.mass_kg):
                 raise ValueError("filling.states are not ordered from empty to full")
@@ -47,5 +47,5 @@ class Filling(Record):
         return self
 
     def at(self, share: float) -> FillState | None:
-        """Return the state of a share, None where there is none."""
+        """Return the state for a fill share; None if there is none."""
         return next((state for state in self.states if abs(state.share - share) < 1e-9), None)

@@ -1,4 +1,4 @@
-"""The part of the schema about grasps: how many held, of what trial, and what a second engine says of them."""
+"""Schema of grasp results: success counts, the settings of the trial, and the confirmation by a second engine."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ Outcome = Literal["held", "collides", "unreachable", "misses", "penetrates", "dr
 
 
 class Trial(Record):
-    """The settings of the grasp trial: a success rate means nothing without them.
+    """The settings of the grasp trial, without which a success rate has no meaning.
 
-    ``timestep_s`` is the engine's own for what is not light. Where ``doubts_tried_again``, what fell or was just held was tried
-    again at 1/960 s and with 40 iterations. ``confirmed_by`` is the engine that has to hold, too, a grasp in
-    which the object moved; None where there is none.
+    ``timestep_s`` is the engine's setting for objects that are not light. If ``doubts_tried_again``, grasps that failed or just
+    held were tried again with steps of 1/960 s and 40 iterations. ``confirmed_by`` is the engine that must confirm grasps in
+    which the object moved; None if there is no such engine.
     """
 
     engine: str
@@ -35,9 +35,9 @@ class Trial(Record):
 
 
 class SecondOpinion(Record):
-    """The agreement of a second engine: over grasps that held, some that failed, and jittered controls of those that held.
+    """Agreement with a second engine: on successful grasps, some failed ones, and jittered copies of successful ones as controls.
 
-    Kappa is Cohen's over the jittered alone: among grasps that nearly all hold, agreement says little.
+    ``kappa`` is Cohen's kappa over the jittered grasps only: among grasps that nearly all hold, agreement means little.
     """
 
     engine: str
@@ -53,10 +53,10 @@ class SecondOpinion(Record):
 
 
 class RobustnessSummary(Record):
-    """The perturbed trials of the held grasps, and how many survive.
+    """The perturbed trials of successful grasps, and how many survive.
 
-    ``median`` is that of the grasps' shares; ``robust`` counts those that rather hold in ``robust_share`` of the cases than
-    in ``fragile_share`` (the sequential test's verdict).
+    ``median`` is the median of the grasps' success shares. ``robust`` counts the grasps for which the sequential test prefers a
+    success probability of ``robust_share`` to one of ``fragile_share``.
     """
 
     pose_m: Finite
@@ -74,14 +74,16 @@ class RobustnessSummary(Record):
 
 
 class FailureTable(Record):
-    """Outcomes by the type of the grasp point that is served (``no point``: none) and by the part that is held (``no part``)."""
+    """Outcome counts by type of the associated grasp point (``no point``: none) and by the part that is held (``no part``:
+    none).
+    """
 
     by_grasp_type: dict[str, dict[str, int]]
     by_region: dict[str, dict[str, int]]
 
 
 class GraspSummary(Record):
-    """The outcomes of the grasps of one gripper; ``link``: the one that both fingertips of each touch, where one was chosen."""
+    """The results for one gripper; ``link`` is the link that both fingertips of each grasp touch, if one was chosen."""
 
     gripper: str
     gripper_sha256: str
@@ -107,10 +109,10 @@ class GraspSummary(Record):
 
 
 class OtherGripper(Record):
-    """The outcomes of the grasps of another gripper: a summary, or the reason for none; and what it can hold of the first's.
+    """The results for another gripper: a summary, or the reason why there is none; and how many grasp points transfer to it.
 
-    ``transferred`` counts the grasp points by which the first gripper holds the object and this one does too, of
-    ``transferable``.
+    ``transferred`` counts the grasp points with successful grasps of both grippers, out of ``transferable`` points at which the
+    first gripper succeeds.
     """
 
     summary: GraspSummary | None

@@ -1,4 +1,4 @@
-"""``grasps.parquet``: one row a grasp that reached verification, held or failed (docs/twin.md)."""
+"""The grasp table ``grasps.parquet``: one row per grasp that was tried, successful or failed (docs/twin.md)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from manitwin.twin.store import REMEDY
 JITTERED = ":jittered"
 PART = "part_id"
 JOINTS = ("pregrasp_joints_rad", "grasp_joints_rad")
-"""The arrays of ``proposals.npz`` that hands with more joints have: ``(N, J)`` each."""
+"""Arrays of ``proposals.npz`` for hands with several joints, each ``(N, J)``."""
 SCHEMA = pa.schema(
     [
         ("grasp_id", pa.string()),
@@ -48,15 +48,15 @@ SCHEMA = pa.schema(
 _OF_VERSION_1 = [name for name in SCHEMA.names if name != PART]
 FROM_PROPOSALS = ("width_m", "depth_m", "score", "proposer", "distance_to_point_m")
 POINTED = ("grasp_point_id", "functional_point_id", PART)
-"""What a grasp holds, '' in arrays where it holds none: null in the table."""
+"""What a grasp is associated with; '' in the arrays means none, and is null in the table."""
 
 
 @dataclass(frozen=True)
 class GripperRows:
-    """All that was found of one gripper's proposals, row by row.
+    """All results for the proposals of one gripper, row by row.
 
-    ``proposals`` holds the arrays of ``proposals.npz``; ``outcome``, ``displacement_m`` and ``rotation_rad`` the trial's;
-    ``holds_in_second_engine`` and ``robustness`` are None where that was not tried.
+    ``proposals`` holds the arrays of ``proposals.npz``; ``outcome``, ``displacement_m`` and ``rotation_rad`` are those of the
+    trial. ``holds_in_second_engine`` and ``robustness`` are None for grasps without such trials.
     """
 
     gripper: str
@@ -70,7 +70,7 @@ class GripperRows:
     ids: list[str]
 
     def columns(self, order: np.ndarray) -> dict[str, list[Any]]:
-        """Return the table's columns, rows in the given order."""
+        """Return the table's columns, with the rows in the given order."""
         poses = self.proposals["gripper_to_object"][order]
         return {
             "grasp_id": [self.ids[i] for i in order],
@@ -91,14 +91,14 @@ class GripperRows:
         }
 
     def _joints(self, name: str, order: np.ndarray) -> list[Any]:
-        """Return the joints of hands with more than one, null for the others."""
+        """Return the joint values of hands with several joints; null for other grippers."""
         return self.proposals[name][order].tolist() if name in self.proposals else [None] * len(order)
 
 
 def read_grasp_table(path: Path) -> pa.Table:
-    """Return the rows of a twin's ``grasps.parquet`` with the columns of ``SCHEMA``; raises TwinError.
+    """Return a twin's ``grasps.parquet`` with the columns of ``SCHEMA``. Raises TwinError.
 
-    Tables of schema version 1 have no ``part_id``: it is null in all of their rows.
+    Tables of schema version 1 have no ``part_id``: it is then null in all rows.
     """
     if not os.path.lexists(path):
         raise TwinError(f"{path}: missing; {REMEDY}")
@@ -111,6 +111,6 @@ def read_grasp_table(path: Path) -> pa.Table:
 
 
 def write_grasp_table(path: Path, parts: list[dict[str, list[Any]]]) -> None:
-    """Write the columns of all parts, one after the other; equal arguments give equal bytes."""
+    """Write the concatenated columns of all parts; equal arguments give equal bytes."""
     columns = {name: [value for part in parts for value in part[name]] for name in SCHEMA.names}
     pq.write_table(pa.table(columns, schema=SCHEMA), path, compression="zstd", version="2.6")

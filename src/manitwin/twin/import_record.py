@@ -1,4 +1,4 @@
-"""import.json: what an asset of another tool gives, brought to the object frame of twins, and what it does not."""
+"""The record import.json: what an imported asset states, converted to the object frame of twins, and what it lacks."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from manitwin.twin.record_values import Finite, Matrix3, Matrix4, Record, Vector
 IMPORT_RECORD, IMPORTED_MESH = "import.json", "asset.glb"
 MAX_BYTES = 64 << 20
 TEMPLATE = "template"
-"""The format of what a template knows of the thing that it made."""
+"""The format of a record with the known properties of an object built from a template."""
 FITTED = "fitted"
-"""The format of what a template knows of the thing in a photo that it was fitted to."""
+"""The format of a record for a template that was fitted to a photo."""
 MISSING_FILE = "file "
-"""How an entry of ``missing`` begins that is a file which the asset names and has not."""
+"""Prefix of entries in ``missing`` that name a file which the asset references but lacks."""
 FILLED = "filled"
-"""The format of what a template knows of the thing whose measures somebody gave: ``attribution`` says who."""
+"""The format of a record for a template with given measures; ``attribution`` says who gave them."""
 Positive = Annotated[Finite, Field(gt=0)]
 
 
 class GivenPoint(Record):
-    """An annotated point: where, which way is out of the object (None: unsaid), what it is for.
+    """An annotated point: position, outward normal (None: not stated), and label.
 
-    For a place to hold, ``position_m`` is between the fingertips, and ``approach`` and ``closing`` are unit vectors.
-    ``frame`` is the functional frame where whoever made the thing knows it.
+    For a place to grasp, ``position_m`` is between the fingertips, and ``approach`` and ``closing`` are unit vectors. ``frame``
+    is the functional frame if the asset's creator states it.
     """
 
     position_m: Vector3
@@ -45,7 +45,7 @@ class GivenPoint(Record):
 
 
 class GivenGrasps(Record):
-    """Grasps of one gripper in the grasp frame of twins; ``held`` is what whoever made them says of each."""
+    """Grasps of one gripper in the grasp frame of twins; ``held`` states for each whether its creator considers it successful."""
 
     gripper: str
     gripper_to_object: list[Matrix4]
@@ -55,7 +55,7 @@ class GivenGrasps(Record):
 
 
 class GivenParts(Record):
-    """The part of each face of the mesh that it is given with, in the order of its file: an index into ``names``."""
+    """The part of each face of the mesh, in file order, as an index into ``names``."""
 
     names: list[str]
     of_face: list[int]
@@ -64,9 +64,10 @@ class GivenParts(Record):
 class ImportRecord(Record):
     """An imported asset in the object frame: Z up, origin at the bottom centre of its visual meshes, metres.
 
-    ``asset_to_object`` is what brought the asset's own axes there. ``missing`` says in words what it does not give,
-    ``dropped`` what it gives and was not taken over, and why. ``articulation``: what moves in it; the rest is of all of it as it
-    stands. ``friction_range`` is the least and the most static friction of its surfaces, where they differ.
+    ``asset_to_object`` transforms the asset's own axes to this frame. ``missing`` lists in words what the asset does not state,
+    ``dropped`` what it states but could not be imported, and why. ``articulation`` holds links and joints; all other values
+    describe the whole asset in its current joint state. ``friction_range`` is the lowest and highest static friction of its
+    surfaces, if they differ.
     """
 
     import_version: Literal[1] = 1
@@ -98,7 +99,7 @@ class ImportRecord(Record):
 
     @property
     def source(self) -> str:
-        """The source, as an Estimate names it."""
+        """The source to be stated in an Estimate."""
         if self.format == FITTED:
             return f"template:{self.name}, fitted to the photo"
         if self.format == FILLED:
@@ -107,22 +108,22 @@ class ImportRecord(Record):
 
     @property
     def made_of_parts(self) -> bool:
-        """Whether mass, centre and inertia are those of parts that were built, with a matter each."""
+        """Whether mass, centre of mass and inertia come from parts built with a material each."""
         return self.format in (TEMPLATE, FILLED)
 
     @property
     def has_places(self) -> bool:
-        """Whether somebody put points, grasps or resting poses on the object: how it stands is then meant."""
+        """Whether the asset has points, grasps or resting poses, so that its orientation is intentional."""
         return bool(self.functional_points or self.grasp_points or self.grasps or self.rests) or self.format == "twin"
 
     @property
     def missing_files(self) -> list[str]:
-        """The files that the asset names and that were not there, as it names them."""
+        """The files that the asset references but lacks, as named in it."""
         return [what.removeprefix(MISSING_FILE) for what in self.missing if what.startswith(MISSING_FILE)]
 
     @property
     def called(self) -> str:
-        """The object's name: the key to the priors."""
+        """The object's category or name: the key to the priors."""
         return self.category or self.name
 
     def moved(self, transform: np.ndarray) -> ImportRecord:
@@ -151,7 +152,9 @@ class ImportRecord(Record):
         )
 
     def scaled(self, factor: float) -> ImportRecord:
-        """Return the record of the thing at another size: its points move; masses and grasps are of true size only."""
+        """Return the record with its points scaled by ``factor``; masses and grasps are unchanged, as they hold at true size
+        only.
+        """
         return self.model_copy(
             update={
                 name: [
@@ -168,9 +171,10 @@ class ImportRecord(Record):
         )
 
     def resized(self, factor: float) -> ImportRecord:
-        """Return the record of an asset whose file has wrong lengths: all are ``factor`` times as long, its masses stay.
+        """Return the record of an asset whose file has a wrong length unit: all lengths are multiplied by ``factor``, masses are
+        kept.
 
-        Grasps are left out: their jaws do not grow with it.
+        Grasps are dropped, because their finger widths do not scale.
         """
         center, inertia = self.center_of_mass_m, self.inertia_kg_m2
         grown = np.diag([factor, factor, factor, 1.0])
@@ -196,12 +200,12 @@ def _moved(point: GivenPoint, transform: np.ndarray) -> GivenPoint:
 
 
 def is_imported(folder: Path) -> bool:
-    """Tell whether a folder is what ``manitwin import`` writes."""
+    """Return whether a folder was written by ``manitwin import``."""
     return (folder / IMPORT_RECORD).is_file() and (folder / IMPORTED_MESH).is_file()
 
 
 def read_import_record(path: Path) -> ImportRecord:
-    """Read an import.json; raises UsageError naming the first thing that is wrong with it."""
+    """Read an import.json. Raises UsageError with the first validation error."""
     said = read_json_object(path, UsageError, limit_bytes=MAX_BYTES, inside=path.parent, name=str(path))
     try:
         return ImportRecord.model_validate(said)

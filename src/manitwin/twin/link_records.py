@@ -1,4 +1,4 @@
-"""The links and joints of a twin that moves in itself, and the file that says of each face which link it is of."""
+"""Links and joints of an articulated twin, and the file that assigns each face to a link."""
 
 from __future__ import annotations
 
@@ -14,18 +14,19 @@ if TYPE_CHECKING:
     from manitwin.geometry.articulation import ArticulatedJoint
 
 FACE_LINKS = "face_links.npy"
-"""One ``uint8`` a face of visual.glb, in the order of ``formats.glb.read_glb``: the link's place in the table."""
+"""One ``uint8`` per face of visual.glb, in the order of ``formats.glb.read_glb``: the index of its link."""
 MAX_LINKS = 32
-"""As many as a twin has collision hulls: each link needs one."""
+"""The number of collision hulls of a twin, as each link needs at least one."""
 _UNIT_TOLERANCE = 1e-6
 
 
 class Joint(Record):
-    """A joint of one degree of freedom, in the object frame, as the twin stands when the joint is at ``locked_at``.
+    """A joint with one degree of freedom, in the object frame, for the pose of the twin with the joint at ``locked_at``.
 
-    ``origin_m`` lies on its axis; a positive motion turns the child link right-handed about ``axis`` (length one), or slides
-    it along. ``lower``, ``upper`` (null: no limit) and ``locked_at`` are radians, of a prismatic joint metres; ``damping`` is
-    N m s/rad or N s/m, ``friction`` and ``effort`` N m or N, ``velocity`` rad/s or m/s; the last two are limits, null: unsaid.
+    ``origin_m`` lies on the joint axis. A positive motion rotates the child link about the unit vector ``axis`` (right-hand
+    rule), or translates it along ``axis``. ``lower``, ``upper`` (null: no limit) and ``locked_at`` are in radians, for
+    prismatic joints in metres. ``damping`` is in N m s/rad or N s/m, ``friction`` and ``effort`` in N m or N, ``velocity`` in
+    rad/s or m/s; ``effort`` and ``velocity`` are limits (null: not stated).
     """
 
     name: str = Field(min_length=1)
@@ -57,8 +58,8 @@ class Joint(Record):
         return self
 
     def articulated(self, links: Sequence[str]) -> ArticulatedJoint:
-        """Return the joint for a simulation or a picture; ``links`` are the names of all in their order."""
-        # here, since it loads meshes, which a record's reader does not need
+        """Return the joint for simulation and rendering; ``links`` are the names of all links in order."""
+        # imported here, because it loads mesh libraries that reading a record does not need
         from manitwin.geometry.articulation import ArticulatedJoint
 
         return ArticulatedJoint(
@@ -79,7 +80,7 @@ class Joint(Record):
 
     @classmethod
     def of(cls, joint: ArticulatedJoint, links: Sequence[str]) -> Joint:
-        """Return the record of a joint between links of these names."""
+        """Return the record of a joint; ``links`` are the names of all links in order."""
         return cls(
             name=joint.name,
             type=joint.kind,
@@ -98,9 +99,9 @@ class Joint(Record):
 
 
 class Link(Record):
-    """A rigid link, as the twin stands, in the object frame: mass properties, hulls, and how much of visual.glb it is.
+    """A rigid link in the object frame: mass properties, collision hulls, and its number of faces in visual.glb.
 
-    ``source`` says whose mass, centre of mass and inertia these are; ``hulls`` are numbers of collision/hull_NN.obj.
+    ``source`` is the source of mass, centre of mass and inertia. ``hulls`` are the numbers NN of collision/hull_NN.obj.
     """
 
     name: str = Field(min_length=1)
@@ -113,9 +114,9 @@ class Link(Record):
 
 
 class GivenLink(Record):
-    """A link of an imported asset: mass, centre of mass and inertia where it gives all three, else none of them.
+    """A link of an imported asset: mass, centre of mass and inertia if it states all three, otherwise none of them.
 
-    The inertia alone is null where it cannot be that of the mass.
+    The inertia alone is null if it is impossible for the mass.
     """
 
     name: str = Field(min_length=1)
@@ -139,13 +140,13 @@ class Articulation(Record):
         return self
 
     def moved(self, transform: np.ndarray) -> Articulation:
-        """Return links and joints under a rigid transform ``(4, 4)`` of their frame."""
+        """Return the links and joints under a rigid transform ``(4, 4)`` of their frame."""
         names = [link.name for link in self.links]
         joints = [Joint.of(joint.articulated(names).moved(transform), names) for joint in self.joints]
         return self.model_copy(update={"joints": joints, "links": [_moved(link, transform) for link in self.links]})
 
     def scaled(self, factor: float) -> Articulation:
-        """Return links and joints of the thing at another size, with the same masses."""
+        """Return the links and joints with all lengths multiplied by ``factor`` and the same masses."""
         if factor == 1.0:
             return self
         joints = [_joint_scaled(joint, factor) for joint in self.joints]
@@ -163,7 +164,7 @@ def _moved(link: GivenLink, transform: np.ndarray) -> GivenLink:
 
 
 def require_tree(links: Sequence[str], joints: Sequence[Joint]) -> None:
-    """Raise ValueError unless joints hold links as a tree: the first is its root, each other hangs from one before it."""
+    """Raise ValueError unless the joints form a tree: the first link is its root, each other link has a parent before it."""
     if len(set(links)) < len(links) or len({joint.name for joint in joints}) < len(joints):
         raise ValueError("links and joints have names of their own")
     for link, joint in zip(links[1:], joints, strict=False):

@@ -1,4 +1,4 @@
-"""The links of a finished twin: the meshes of each, as rigid bodies with their joints, and drawn at positions of the joints."""
+"""The links of a finished twin: visual meshes per link, rigid bodies with joints, and visual meshes at given joint positions."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from manitwin.twin.store import REMEDY
 
 
 def read_face_links(folder: Path, record: TwinRecord, faces: int) -> np.ndarray:
-    """Return the place in ``record.links`` of the link of each of so many faces ``(F,) uint8``; 0 where the twin has none.
+    """Return the index in ``record.links`` of the link of each face ``(F,) uint8``; 0 for a twin without links.
 
-    Raises TwinError where the file has another number of faces or names links that the record has not.
+    Raises TwinError if the file has another number of faces or refers to links that the record does not have.
     """
     if not record.links:
         return np.zeros(faces, np.uint8)
@@ -37,15 +37,15 @@ def read_face_links(folder: Path, record: TwinRecord, faces: int) -> np.ndarray:
 
 
 def joints_of(record: TwinRecord) -> tuple[ArticulatedJoint, ...]:
-    """Return the joints of a twin in the order of its links; none of one that is rigid."""
+    """Return the joints of a twin in the order of its links; empty for a rigid twin."""
     names = [link.name for link in record.links]
     return tuple(joint.articulated(names) for joint in record.joints)
 
 
 def articulated_body(record: TwinRecord, whole: RigidBody) -> ArticulatedBody:
-    """Return the links as rigid bodies with their joints, ``whole`` being the locked twin.
+    """Return the links as rigid bodies with their joints; ``whole`` is the twin with locked joints.
 
-    A twin without links is one. Raises TwinError where the record names hulls that are not there.
+    A twin without links is a single body. Raises TwinError if the record refers to hulls that do not exist.
     """
     if not record.links:
         return ArticulatedBody((whole,), ())
@@ -82,9 +82,9 @@ def posed_parts(
     joints: tuple[ArticulatedJoint, ...],
     positions: Mapping[str, float],
 ) -> list[trimesh.Trimesh]:
-    """Return visual parts with joints at ``positions``, those that are not named as the twin stands; the root link stays.
+    """Return the visual parts with the named joints at ``positions``, other joints unchanged; the root link does not move.
 
-    Raises UsageError for a joint that is not there, and a position outside of its limits.
+    Raises UsageError for an unknown joint or a position outside its limits.
     """
     wanted = [joint.stands_at for joint in joints]
     names = [joint.name for joint in joints]

@@ -1,4 +1,4 @@
-"""A finished twin in memory: meshes, grasps as arrays, and the way into a SAPIEN scene."""
+"""A finished twin in memory: record, meshes, grasps as arrays, and insertion into a SAPIEN scene."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ from manitwin.twin.store import RECORD, REMEDY, read_record
 
 @dataclass(frozen=True)
 class Grasps:
-    """Grasps of one gripper as arrays; poses are ``gripper_to_object (N, 4, 4)`` in the grasp frame (+Z approach, X closing).
+    """Grasps of one gripper; poses are ``gripper_to_object (N, 4, 4)`` in the grasp frame (+Z approach, X closing).
 
-    ``verified (N,) bool``, ``width_m (N,)``, ``depth_m (N,)``, ``score (N,)``, ``outcome (N,) str``; the rest by name in
-    ``columns``.
+    ``verified (N,) bool``, ``width_m (N,)``, ``depth_m (N,)``, ``score (N,)``, ``outcome (N,) str``; further table columns by
+    name in ``columns``.
     """
 
     gripper_to_object: np.ndarray
@@ -49,10 +49,10 @@ class Grasps:
 
 
 class Twin:
-    """A twin folder, read when asked for. All geometry is in the object frame: metres, +Z up, standing on z = 0."""
+    """A twin folder whose files are read on demand. Geometry is in the object frame: metres, +Z up, standing on z = 0."""
 
     def __init__(self, folder: str | Path, verify: bool = False):
-        """Read the record; with ``verify``, check every file's digest. Raises TwinError."""
+        """Read the record; with ``verify``, check the digest of every file. Raises TwinError."""
         self.folder = Path(folder)
         self.record: TwinRecord = read_record(self.folder, verify=verify)
 
@@ -61,7 +61,7 @@ class Twin:
 
     @property
     def physical(self) -> Physical:
-        """The physical properties; raises TwinError for a rejected twin."""
+        """The physical properties. Raises TwinError for a rejected twin."""
         if self.record.physical is None:
             reason = self.record.rejection.detail if self.record.rejection else "no physical properties"
             raise TwinError(f"{self.folder}: this twin was rejected ({reason}); only its record and source can be read")
@@ -69,21 +69,21 @@ class Twin:
 
     @cached_property
     def visual(self) -> list[trimesh.Trimesh]:
-        """The textured meshes, in the object frame (Z-up)."""
+        """The textured meshes in the object frame (Z-up)."""
         self.physical  # noqa: B018  a rejected twin has no meshes: say so
         return read_visual(self.folder / "visual.glb")
 
     @cached_property
     def hulls(self) -> list[trimesh.Trimesh]:
-        """The convex collision hulls; raises TwinError where one that the record names is not there: a thing with a hole."""
+        """The convex collision hulls. Raises TwinError if a hull named in the record is missing."""
         self.physical  # noqa: B018
         return read_hulls(self.folder, self.record.files)
 
     def face_parts(self) -> np.ndarray:
-        """Return of each face of the visual meshes, one after the other, the place of its part in ``record.parts``.
+        """Return the part of each face of the visual meshes, concatenated, as an index into ``record.parts``.
 
-        ``(F,) uint8``, 255 where it is of none: all of a twin without parts. Raises TwinError where the file has another number
-        of faces or names parts that the record has not.
+        Shape ``(F,) uint8``; 255 for faces that belong to no part, and for all faces of a twin without parts. Raises TwinError
+        if the file has another number of faces or refers to parts that the record does not have.
         """
         faces = sum(len(mesh.faces) for mesh in self.visual)
         parts = len(self.record.parts)
@@ -102,16 +102,16 @@ class Twin:
         return labels
 
     def face_links(self) -> np.ndarray:
-        """Return of each face of the visual meshes, one after the other, the place ``(F,)`` of its link in ``record.links``.
+        """Return the link of each face of the visual meshes, concatenated, as an index ``(F,)`` into ``record.links``.
 
-        All are 0 in a twin that is one rigid body. Raises TwinError as ``face_parts``.
+        All are 0 for a twin that is one rigid body. Raises TwinError like ``face_parts``.
         """
         return read_face_links(self.folder, self.record, sum(len(mesh.faces) for mesh in self.visual))
 
     def posed_visual(self, positions: Mapping[str, float]) -> list[trimesh.Trimesh]:
-        """Return the textured meshes with joints at positions (radians, metres) by their names; the others as the twin stands.
+        """Return the textured meshes with the named joints at ``positions`` (radians or metres), and other joints unchanged.
 
-        Raises UsageError for a joint that is not there, or a position outside of its limits.
+        Raises UsageError for an unknown joint or a position outside its limits.
         """
         return posed_parts(self.visual, self.face_links(), joints_of(self.record), positions)
 
@@ -120,16 +120,16 @@ class Twin:
         return articulated_body(self.record, self.rigid_body())
 
     def read_bytes(self, file: str) -> bytes:
-        """Return the content of one of the twin's files; raises TwinError where it is no file of its folder."""
+        """Return the content of one of the twin's files. Raises TwinError if it is not a file in its folder."""
         return read_bytes(
             self.folder / file, MAX_FILE_BYTES, TwinError, inside=self.folder, name=f"{self.folder}/{file}"
         )
 
     def rigid_body(self, fill: float | None = None) -> RigidBody:
-        """Return the hulls with the twin's mass properties and friction, as simulations take them.
+        """Return the collision hulls with the twin's mass properties and friction, for simulation.
 
-        ``fill``: those of a vessel that is filled to this share of its volume, of ``physical.filling``. Raises UsageError where
-        the twin has no such state.
+        ``fill``: use the mass properties of a vessel filled to this share of its volume, from ``physical.filling``. Raises
+        UsageError if the twin has no such state.
         """
         physical = self.physical
         weighed = physical if fill is None else self._filled(fill)
@@ -153,14 +153,14 @@ class Twin:
         return state
 
     def grasp_table(self) -> pa.Table:
-        """Return all rows of ``grasps.parquet`` (docs/grasps.md); raises TwinError where it cannot be read."""
+        """Return all rows of ``grasps.parquet`` (docs/grasps.md). Raises TwinError if it cannot be read."""
         return read_grasp_table(self.folder / "grasps.parquet")
 
     def grasps(self, verified_only: bool = True, gripper: str | None = None, *, retired: bool = False) -> Grasps:
-        """Return the grasps of a gripper (by default the one that the twin was verified with).
+        """Return the grasps of a gripper (default: the first gripper, with which the twin was verified).
 
-        Leaves out the unfiltered sample, the jittered controls, and grasps that are retired: with ``retired`` those are there
-        too, and ``columns["retired"]`` says which. Raises UsageError for a gripper that the twin was not tried with.
+        The unfiltered sample, the jittered controls and retired grasps are left out. With ``retired``, retired grasps are
+        included and marked in ``columns["retired"]``. Raises UsageError for a gripper that the twin was not tried with.
         """
         self.physical  # noqa: B018
         table = self.grasp_table().to_pydict()
@@ -188,7 +188,9 @@ class Twin:
         )
 
     def _tried_gripper(self, name: str | None) -> str:
-        """Return the name of a gripper that the twin has grasps of, or says why it has none; "" where it has none at all."""
+        """Return the gripper to read, by default the first; "" if the twin has no grasps. Raises UsageError for a gripper not
+        tried.
+        """
         summary = self.record.grasps
         tried = [] if summary is None else [summary.gripper, *sorted(summary.other_grippers)]
         if name is None:
@@ -202,8 +204,8 @@ class Twin:
     def add_to_sapien(self, scene: Any, pose: Any = None, *, visual: bool = True) -> Any:
         """Add the twin to a SAPIEN 3 scene as a dynamic rigid body and return its entity.
 
-        ``pose`` is a sapien.Pose of the object frame in the world. Mass, centre of mass, inertia and friction are the
-        twin's own. With ``visual`` the textured mesh is added too, which needs a render system in the scene.
+        ``pose`` is the pose of the object frame in the world, a sapien.Pose. Mass, centre of mass, inertia and friction are
+        those of the twin. With ``visual`` the textured mesh is added as well, which requires a render system in the scene.
         """
         from manitwin.physics.sapien.body import add_body
 
@@ -218,14 +220,14 @@ class Twin:
 
 
 MOVED = "put it back, or give the data set where the twins are now (--twins)"
-"""What helps where scenes or episodes name a twin that is not there."""
+"""The remedy if scenes or episodes refer to a missing twin."""
 
 
 class TwinSource:
-    """Find twins by id below a data set's root; ``remedy`` is what helps where one is not there.
+    """Access to twins by id below a data set's root; ``remedy`` is appended to the message on a missing twin.
 
-    Those of a data set at a URL are copied to ``cache`` when they are asked for. Raises UsageError where there is no such
-    place, or for a URL without ``cache``.
+    Twins of a data set at a URL are copied to ``cache`` on demand. Raises UsageError if the place does not exist, or for a URL
+    without ``cache``.
     """
 
     def __init__(self, place: str | Path, cache: Path | None = None, remedy: str = MOVED):
@@ -247,20 +249,20 @@ class TwinSource:
         return list(self.root.twin_ids())
 
     def record_bytes(self, twin_id: str) -> bytes:
-        """Return the content of a twin's twin.json; raises UsageError where there is no such twin."""
+        """Return the content of a twin's twin.json. Raises UsageError if there is no such twin."""
         try:
             return self.root.read_bytes(f"{self.root.twin_name(twin_id)}/{RECORD}")
         except FileNotFoundError as error:
             raise UsageError(self._missing(twin_id)) from error
 
     def check(self, twin_ids: Collection[str]) -> None:
-        """Raise UsageError where twins are not there, with how many of them; only whether they are there is looked at."""
+        """Raise UsageError with the number of missing twins if any is missing; only the existence of their records is checked."""
         gone = sorted(each for each in twin_ids if not self.root.exists(f"{self.root.twin_name(each)}/{RECORD}"))
         if gone:
             raise UsageError(self._missing(gone[0], f" ({len(gone):,} of {len(twin_ids):,} are missing)"))
 
     def folder(self, twin_id: str) -> Path:
-        """Return a local folder with a twin's files; raises UsageError where there is no such twin."""
+        """Return a local folder with a twin's files. Raises UsageError if there is no such twin."""
         name = self.root.twin_name(twin_id)
         if self.cache is None:
             folder = Path(self.root.full(name))
@@ -273,7 +275,7 @@ class TwinSource:
         return folder
 
     def twin(self, twin_id: str) -> Twin:
-        """Return the twin; raises UsageError where there is none of this id, TwinError where it cannot be read."""
+        """Return a twin. Raises UsageError if there is no such twin, TwinError if it cannot be read."""
         return Twin(self.folder(twin_id))
 
     def _missing(self, twin_id: str, count: str = "") -> str:

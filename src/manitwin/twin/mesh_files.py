@@ -1,4 +1,4 @@
-"""The files of a twin's meshes: what is seen, and the convex hulls that collide."""
+"""Reading of a twin's mesh files: the visual mesh and the convex collision hulls."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from manitwin.twin.store import REMEDY
 
 MAX_HULL_BYTES = 16 << 20
 HULLS = "collision/hull_*.obj"
-"""The names of the files of hulls among those of a record."""
+"""Pattern of the hull files among a record's files."""
 
 
 def read_visual(path: Path) -> list[trimesh.Trimesh]:
-    """Return the parts of a twin's ``visual.glb`` in the object frame; raises TwinError."""
+    """Return the parts of a twin's ``visual.glb`` in the object frame. Raises TwinError."""
     if not os.path.lexists(path):
         raise TwinError(f"{path}: missing; {REMEDY}")
     open_regular(path, TwinError, inside=path.parent, name=str(path)).close()
@@ -44,7 +44,7 @@ def read_hulls(folder: Path, files: Iterable[str]) -> list[trimesh.Trimesh]:
 
 
 def _hull(path: Path, folder: Path) -> trimesh.Trimesh:
-    """Read the vertices and triangles of a hull's OBJ, of which nothing else is looked at; raises TwinError."""
+    """Read the vertices and triangles of a hull's OBJ file, ignoring all other lines. Raises TwinError."""
     content = read_bytes(path, MAX_HULL_BYTES, TwinError, inside=folder, name=str(path))
     rows = [line.split() for line in content.splitlines() if line.strip()]
     try:

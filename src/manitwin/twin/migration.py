@@ -1,4 +1,4 @@
-"""Records of earlier schema versions, brought to the present one when they are read; the files stay as they are."""
+"""Migration of records of earlier schema versions when they are read; the files stay unchanged."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ SCHEMA_VERSION = 4
 
 
 def migrated(record: dict[str, Any]) -> dict[str, Any]:
-    """Return the content of a twin.json in the present schema version; of an unknown version it is returned as it is.
+    """Return the content of a twin.json in the current schema version; content of an unknown version is returned unchanged.
 
-    What an earlier version did not say stays unsaid (null, empty): nothing is computed.
+    Values that an earlier version does not have are null or empty; nothing is computed.
     """
     while (step := _STEPS.get(_version(record))) is not None:
         record = step(record)
@@ -24,19 +24,19 @@ def _version(record: dict[str, Any]) -> int | None:
 
 
 def _to_2(record: dict[str, Any]) -> dict[str, Any]:
-    """Version 2: points have frames, candidates say which were refined, the surface has parts: each has a value for unsaid."""
+    """Version 2 adds functional frames, refined candidates and parts; their defaults mean "not stated"."""
     return {**record, "schema_version": 2}
 
 
 def _to_3(record: dict[str, Any]) -> dict[str, Any]:
-    """Version 3: closed vessels have fill states, which have a value for unsaid."""
+    """Version 3 adds the fill states of closed vessels; their default means "not stated"."""
     return {**record, "schema_version": 3}
 
 
 def _to_4(record: dict[str, Any]) -> dict[str, Any]:
-    """Version 4: what moves in itself has links and joints, and a thing without any has a value for unsaid."""
+    """Version 4 adds links and joints of articulated objects; their defaults mean a rigid object."""
     return {**record, "schema_version": 4}
 
 
 _STEPS: dict[int | None, Callable[[dict[str, Any]], dict[str, Any]]] = {1: _to_2, 2: _to_3, 3: _to_4}
-"""By the version that each step begins from."""
+"""The migration steps, by the version that each starts from."""

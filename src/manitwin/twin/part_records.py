@@ -1,4 +1,4 @@
-"""The twin's parts: named regions of its visual surface, and the file that says of each face which one it is of."""
+"""Parts of a twin: named regions of its visual surface, and the file that assigns each face to a part."""
 
 from __future__ import annotations
 
@@ -9,16 +9,17 @@ from pydantic import Field
 from manitwin.twin.record_values import Finite, Record, Unit, Vector3
 
 FACE_PARTS = "face_parts.npy"
-"""One ``uint8`` a face of visual.glb, in the order of ``formats.glb.read_glb``: the part's place in the table."""
+"""One ``uint8`` per face of visual.glb, in the order of ``formats.glb.read_glb``: the index of its part."""
 NO_PART = 255
-"""The face is of no part that geometry tells."""
+"""Label of faces that belong to no part."""
 
 
 class Part(Record):
-    """A region of the visual surface that has a name, such as handle or cap.
+    """A named region of the visual surface, such as handle or cap.
 
-    ``source``: ``template:<category>`` where the parts are known by construction, ``geometry:<rule>`` where they were told by
-    shape. ``faces`` of visual.glb are of it, ``area_share`` of the surface; ``centroid_m`` is theirs, by area, object frame.
+    ``source``: ``template:<category>`` for parts known by construction, ``geometry:<rule>`` for parts found by shape. ``faces``
+    is the number of faces in visual.glb, ``area_share`` the share of the surface area, ``centroid_m`` the area centroid in the
+    object frame.
     """
 
     id: str

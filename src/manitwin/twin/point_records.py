@@ -1,4 +1,4 @@
-"""The twin's points: candidates, functional points with their frames, grasp points. Object frame, metres, quaternions wxyz."""
+"""Points of a twin: candidates, functional points with frames, and grasp points. Object frame, metres, quaternions wxyz."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ from manitwin.twin.record_values import Finite, Quaternion, Record, Unit, Vector
 
 GraspType = Literal["parallel_jaw", "pinch", "power", "three_finger", "enveloping"]  # the paper's five
 FrameKind = Literal["opening", "face", "tip", "edge", "hole", "axis", "button", "surface"]
-"""What a functional frame is the frame of."""
-_UNIT_TOLERANCE = 1e-3  # of a quaternion's length: frames are written in full precision, other tools' with four digits
+"""The kind of feature that a functional frame describes."""
+_UNIT_TOLERANCE = (
+    1e-3  # of a quaternion's length: our frames have full precision, those of other tools often four digits
+)
 
 
 class RefinedCandidate(Record):
-    """A candidate that moved to the place that a second, closer look found: where it was when the views were marked."""
+    """A candidate that was moved by a second, closer look, with its position and normal in the marked views."""
 
     candidate: int
     marked_position_m: Vector3
@@ -24,9 +26,9 @@ class RefinedCandidate(Record):
 
 
 class Candidates(Record):
-    """The points among which functional and grasp points are chosen (the paper: 42).
+    """The points among which functional and grasp points are chosen (paper: 42).
 
-    ``refined`` names those that a closer look has moved since the views were marked, each at most once.
+    ``refined`` lists the candidates that were moved after the views were marked, each at most once.
     """
 
     positions_m: list[Vector3]
@@ -35,13 +37,13 @@ class Candidates(Record):
 
 
 class FunctionalFrame(Record):
-    """Where a function truly is, as a frame in the object frame: the point chooses the feature, the frame is the feature's.
+    """A functional frame in the object frame: the functional point selects a feature, and the frame is the feature's own.
 
-    Z is the functional direction: out of an opening, face, button or surface, along a tip, a hole's or an axis's line, away
-    from an edge. X is the second one: the pour direction of an opening, the line of an edge, from a hole to the centre of mass.
-    ``size_m`` is a radius, of the circle with the area of an opening's rim, a face, a button or a surface's flat part, of the
-    circle inscribed in a hole, of a tip's end; of an edge or an axis it is the length. ``free`` is ``roll`` where X is one
-    choice of many. ``source``: geometry | template:<category> and what else is said of it.
+    Z is the functional direction: out of an opening, face, button or surface; along a tip, or the line of a hole or axis; away
+    from an edge. X is the secondary direction: the pour direction of an opening, the line of an edge, from a hole to the centre
+    of mass. ``size_m`` is a radius: of the circle with the area of an opening's rim, of a face, of a button or of a surface's
+    flat part; of the inscribed circle of a hole; of a tip's end. For an edge or an axis it is the length. ``free`` is ``roll``
+    if X is arbitrary. ``source``: geometry | template:<category>, followed by remarks.
     """
 
     position_m: Vector3
@@ -59,15 +61,15 @@ class FunctionalFrame(Record):
         return self
 
     def scaled(self, factor: float) -> FunctionalFrame:
-        """Return the frame of the thing at another size."""
+        """Return the frame scaled by ``factor``."""
         position = (factor * np.array(self.position_m)).tolist()
         return self.model_copy(update={"position_m": position, "size_m": factor * self.size_m})
 
 
 class FunctionalPoint(Record):
-    """A point with a specific function; ``frame`` is None where geometry does not tell it reliably.
+    """A point with a specific function; ``frame`` is None if it cannot be determined reliably from geometry.
 
-    ``source``: human:<annotator> where a person has moved it, else None: it is the annotator's of the provenance.
+    ``source``: human:<annotator> if a person has moved the point; None if it is from the annotator in the provenance.
     """
 
     id: str
@@ -83,11 +85,11 @@ class FunctionalPoint(Record):
 
 
 class GraspPoint(Record):
-    """A point that is good to hold the object by; ``label`` is the part as whoever chose it says, None where nobody did.
+    """A point suited to grasping; ``label`` is the part as named by the annotator, None if not named.
 
-    ``verified`` counts the first gripper's grasps that held and touch this point's part within the radius of
-    association; None: not counted. ``shortfall`` says why they are fewer than were asked for; empty where they are not.
-    ``source`` as that of a functional point.
+    ``verified`` counts the first gripper's successful grasps that touch this point's part within the association radius; None:
+    not counted. ``shortfall`` states why there are fewer than requested, empty if there are not. ``source``: as of a functional
+    point.
     """
 
     id: str
@@ -107,7 +109,7 @@ class GraspPoint(Record):
 class Points(Record):
     """Candidate, functional and grasp points.
 
-    ``withdrawn`` are grasp points at which no grasp held, and in whose place another one is.
+    ``withdrawn`` are grasp points at which no grasp succeeded and which were replaced by others.
     """
 
     candidates: Candidates

@@ -1,6 +1,6 @@
-"""The twin's schema: the one copy in code of what a finished twin says about itself.
+"""The schema of twin.json, the record of a finished twin.
 
-SI units, object frame (right-handed, +Z up, origin at the bottom centre), quaternions wxyz.
+SI units; object frame (right-handed, +Z up, origin at the bottom centre); quaternions wxyz.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from manitwin.twin.record_values import (
 
 Status = Literal["accepted", "rejected"]
 
-_OF_EVERY_STAGE = frozenset({"too_large"})  # any stage's process has a limit of memory
+_OF_EVERY_STAGE = frozenset({"too_large"})  # every stage has a memory limit
 REJECTION_REASONS: dict[str, frozenset[str]] = {
     stage: reasons | _OF_EVERY_STAGE
     for stage, reasons in {
@@ -49,7 +49,7 @@ REJECTION_REASONS: dict[str, frozenset[str]] = {
 
 
 class Rejection(Record):
-    """The reason for which there is no twin of this input."""
+    """The reason why an input was rejected."""
 
     stage: str
     reason: str
@@ -63,10 +63,10 @@ class Rejection(Record):
 
 
 class StatedCameras(Record):
-    """The file that stated the cameras of several photos; they are in the archive, as ``transforms.json`` with z up.
+    """The file that stated the camera poses of several photos; it is archived as ``transforms.json`` with z up.
 
-    ``format``: transforms.json | colmap. ``up`` and ``unit`` say which way is up in the file and what its unit is, and who says
-    so; ``unit_m`` is that in metres, None where nobody knows, so that the size is no measured one.
+    ``format``: transforms.json | colmap. ``up`` and ``unit`` are the file's up axis and length unit, with the source of that
+    information. ``unit_m`` is the unit in metres; None if unknown, in which case the object's size is not measured.
     """
 
     file: str
@@ -78,11 +78,11 @@ class StatedCameras(Record):
 
 
 class Source(Record):
-    """The input that the twin was made of; ``variation`` counts the things made of one text.
+    """The input of the twin; ``variation`` numbers the objects made from one text.
 
-    ``photos``: several photos of one thing, in the archive ``file`` in their order; ``turns_deg`` is the camera's turn about the
-    vertical in each, counter-clockwise seen from above, where they were stated; ``poses`` who stated the cameras. ``mask`` is
-    the picture of the thing's outline that was given with one photo, ``box_px`` its stated box there: left, top, right, bottom.
+    ``photos``: several photos of one object, in order in the archive ``file``. ``turns_deg`` is the camera's rotation about the
+    vertical for each, counter-clockwise seen from above, if stated; ``poses`` the source of stated camera poses. ``mask`` is
+    the mask image given with a single photo, ``box_px`` the stated bounding box in it: left, top, right, bottom.
     """
 
     kind: Literal["image", "photos", "text", "mesh"]
@@ -99,7 +99,9 @@ class Source(Record):
 
 
 class StageProvenance(Record):
-    """The code and the backend that did a stage; ``rehearsal``: a rehearsal server (``manitwin fake``) answered in its place."""
+    """The code version and backend of a stage; ``rehearsal``: a rehearsal server (``manitwin fake``) answered instead of a
+    model.
+    """
 
     version: str
     backend: str
@@ -108,7 +110,7 @@ class StageProvenance(Record):
 
 
 class Provenance(Record):
-    """The version, configuration, seed and stages that made the twin, and the digest of what people have put right of it."""
+    """The version, configuration, seed and stages that made the twin, and the digest of its manual corrections."""
 
     manitwin_version: str
     config_sha256: str
@@ -123,16 +125,16 @@ class Provenance(Record):
 
 
 class Likely(Record):
-    """What a thing may be, and how likely that is."""
+    """A possible name of an object with its probability."""
 
     name: str
     probability: Unit
 
 
 class Naming(Record):
-    """What a classifier takes a thing for that nobody has named: ``name`` is None where no guess was likely enough.
+    """A classifier's name for an unnamed object; ``name`` is None if no guess is likely enough.
 
-    ``probability`` is that of ``name``, or of the likeliest guess; its interval is that of the single pictures.
+    ``probability`` is that of ``name``, or of the likeliest guess; its interval spans the single images.
     """
 
     name: str | None
@@ -141,7 +143,7 @@ class Naming(Record):
 
 
 class Hulls(Record):
-    """The convex collision hulls, measured against the surface they stand for."""
+    """The convex collision hulls and their measured error against the surface."""
 
     count: int
     max_vertices: int
@@ -153,7 +155,7 @@ class Hulls(Record):
 
 
 class MeshReport(Record):
-    """The geometry, and what repair did to it."""
+    """Mesh statistics, and the repairs made."""
 
     vertices: int
     faces: int
@@ -174,7 +176,7 @@ class OrientedBox(Record):
 
 
 class Physical(Record):
-    """Size, mass and contact properties; ``filling``: of a closed vessel, which weighs what it holds."""
+    """Size, mass and contact properties; ``filling``: fill states of a closed vessel."""
 
     extents_m: Vector3
     obb: OrientedBox
@@ -193,7 +195,7 @@ class Physical(Record):
 
     @model_validator(mode="after")
     def _possible(self) -> Physical:
-        """Refuse what no object has: no simulator is given a negative mass, or a metre count that overflows."""
+        """Reject impossible values, such as negative masses or lengths that overflow in a simulator."""
         for name, estimate, largest in (
             ("mass_kg", self.mass_kg, LARGEST_KG),
             ("friction_static", self.friction_static, LARGEST_M),
@@ -212,12 +214,14 @@ class Physical(Record):
 
     @property
     def longest_m(self) -> float:
-        """The longest side of the oriented box: a turn of the thing in its frame changes nothing, as it does of ``extents_m``."""
+        """The longest side of the oriented box, which unlike ``extents_m`` does not depend on the object's rotation in its
+        frame.
+        """
         return max(self.obb.extents_m)
 
 
 class Language(Record):
-    """Words: the paper's six attributes, a sentence, and more sentences."""
+    """Descriptions: the paper's six attributes, a caption, and further captions."""
 
     category: str = Field(min_length=1)
     color: str = Field(min_length=1)
@@ -230,7 +234,7 @@ class Language(Record):
 
 
 class Placement(Record):
-    """A stable pose: ``object_to_plane``, the plane being z = 0."""
+    """A stable pose ``object_to_plane``, with the plane at z = 0."""
 
     position_m: Vector3
     quaternion_wxyz: Quaternion
@@ -241,16 +245,16 @@ class Placement(Record):
 
 
 class Quality(Record):
-    """Findings: shown, counted, filterable, not rejecting."""
+    """Quality checks, which are reported and can be filtered by, but do not reject."""
 
     checks: list[Check]
 
 
 class TwinRecord(Record):
-    """twin.json: everything that a person wants to read about a twin.
+    """twin.json: the complete record of a twin.
 
-    ``parts`` is empty where geometry tells none, and of twins of schema version 1. ``links`` and ``joints`` are those of what
-    moves in itself, empty for all others and before schema version 4.
+    ``parts`` is empty if no parts were found, and for twins of schema version 1. ``links`` and ``joints`` are those of
+    articulated objects, empty for rigid ones and before schema version 4.
     """
 
     schema_version: int = SCHEMA_VERSION

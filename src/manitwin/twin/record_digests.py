@@ -1,4 +1,4 @@
-"""What of a twin's record decides whether things made with it still hold: how it stands, and which grippers it was tried with."""
+"""Digests of the parts of a twin's record on which scenes and episodes depend: its body and its grippers."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ _OF_BODY = ("mass_kg", "center_of_mass_m", "inertia_kg_m2", "friction_static", "
 
 @dataclass(frozen=True)
 class TwinState:
-    """What a twin is now: its revision, its ``body_sha256``, and the digests of its grippers' files by their names."""
+    """The state of a twin on which derived data depends: revision, ``body_sha256``, and digests of gripper files by gripper
+    name.
+    """
 
     revision: str
     body_sha256: str
@@ -23,9 +25,9 @@ class TwinState:
 
 
 def state_of(record: Mapping[str, Any], name: str) -> TwinState:
-    """Return the state of a twin by the content of its twin.json in the present schema version.
+    """Return the state of a twin from its twin.json in the current schema version.
 
-    Raises TwinError naming ``name`` for one that lacks what it needs.
+    Raises TwinError with ``name`` if a required value is missing.
     """
     try:
         return TwinState(record["revision"], body_sha256(record), gripper_digests(record))
@@ -34,10 +36,10 @@ def state_of(record: Mapping[str, Any], name: str) -> TwinState:
 
 
 def body_sha256(record: Mapping[str, Any]) -> str:
-    """Return the digest of what decides how a twin comes to rest: hulls, mass properties, contact properties and placements.
+    """Return the digest of everything that determines how a twin comes to rest: hulls, mass and contact properties, placements.
 
-    ``record`` is the content of a twin.json in the present schema version. Words, points, grasps and the look of a twin are no
-    part of it, nor is where a number is from: a twin that was amended in these has another revision, and this digest.
+    ``record`` is the content of a twin.json in the current schema version. Descriptions, points, grasps, appearance and the
+    sources of numbers are not included: amending them changes the revision but not this digest.
     """
     physical, files = record.get("physical") or {}, record.get("files") or {}
     return sha256_of_json(
@@ -53,9 +55,9 @@ def body_sha256(record: Mapping[str, Any]) -> str:
 
 
 def gripper_digests(record: Mapping[str, Any]) -> dict[str, str]:
-    """Return the digests of the files of all grippers that a twin has grasps of, by their names.
+    """Return the digests of the definitions of all grippers with grasps in a twin, by name.
 
-    ``record`` is the content of a twin.json in the present schema version.
+    ``record`` is the content of a twin.json in the current schema version.
     """
     first = record.get("grasps")
     if first is None:

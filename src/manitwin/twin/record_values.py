@@ -1,4 +1,4 @@
-"""The values that the schema's parts are made of: names of files, finite numbers, vectors, an estimate, a check."""
+"""Value types of the schema: file names, finite numbers, vectors, Estimate, Check."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ def _finite(value: float) -> float:
 
 
 CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff]")
-"""What no text of a record holds: XML, which many exports are, has no control characters, and UTF-8 no lone surrogates."""
+"""Characters not allowed in a record's texts: control characters, which XML exports cannot represent, and lone surrogates."""
 LARGEST_M, LARGEST_KG = 1e4, 1e6
-"""Far beyond what a gripper meets, and no trouble for the arithmetic of any simulator."""
+"""Limits far beyond graspable objects, and safe for the arithmetic of any simulator."""
 
 
 def _file_below(name: str) -> str:
@@ -55,16 +55,16 @@ Unit = Annotated[float, Field(ge=0, le=1)]
 
 
 class Record(BaseModel):
-    """A part of the schema: unknown keys are errors, values do not change."""
+    """Base class of the schema: unknown keys are errors, instances are immutable."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Estimate(Record):
-    """A number with its interval and who said so.
+    """A number with its interval and source.
 
     ``source``: measured | user | human:<annotator> | vlm:<model> | prior:<category> | density*volume | imported:<format> |
-    default. What was imported is another tool's word: it is held against the same plausibility as an estimate.
+    default. Imported values are subject to the same plausibility checks as estimates.
     """
 
     value: Finite
@@ -80,7 +80,7 @@ class Estimate(Record):
 
 
 class Check(Record):
-    """One quality check: ``passed`` is None where nothing could judge it."""
+    """One quality check; ``passed`` is None if it could not be judged."""
 
     name: str
     passed: bool | None

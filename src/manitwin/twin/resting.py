@@ -1,4 +1,4 @@
-"""The ways in which an object rests on a plane: upright, upside down, or lying on one of its sides."""
+"""Classification of placements by how the object rests: upright, upside down, or lying on one side."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.twin.record import Placement
 
 UPRIGHT_DEG = 10.0
-"""A pose whose +Z axis is within this of the vertical is upright, or upside down where +Z points down."""
+"""Largest angle of +Z from the vertical for a pose that counts as upright, or as upside down if +Z points down."""
 
 Rest = Literal["upright", "upside_down", "lying"]
 
 
 @dataclass(frozen=True)
 class RestingPose:
-    """A placement with its number in the record, and how an object rests in it; ``side_down`` is None unless it lies."""
+    """A placement with its index in the record and its class; ``side_down`` is None unless the object lies."""
 
     number: int
     placement: Placement
@@ -29,7 +29,7 @@ class RestingPose:
 
 
 def resting_poses(placements: Sequence[Placement]) -> list[RestingPose]:
-    """Say how an object rests in each placement: first those that stayed in simulation, likely ones before unlikely ones."""
+    """Classify all placements, sorted: those that were stable in simulation first, then by decreasing probability."""
     order = sorted(enumerate(placements), key=lambda each: (not each[1].settled, -each[1].probability))
     return [_resting_pose(number, placement) for number, placement in order]
 
@@ -41,7 +41,7 @@ def _resting_pose(number: int, placement: Placement) -> RestingPose:
 
 
 def rest_of(object_to_plane: np.ndarray) -> Rest:
-    """Return how an object rests, by where the rotation ``object_to_plane (3, 3)`` takes its +Z axis."""
+    """Return how an object rests, from the rotation ``object_to_plane (3, 3)``."""
     cosine, limit = float(object_to_plane[2, 2]), np.cos(np.radians(UPRIGHT_DEG))
     if cosine > limit:
         return "upright"
@@ -49,12 +49,12 @@ def rest_of(object_to_plane: np.ndarray) -> Rest:
 
 
 def side_down(object_to_plane: np.ndarray) -> str:
-    """Return the side that a lying object lies on: the one of ``+x``, ``-x``, ``+y``, ``-y`` that points down most."""
+    """Return the side a lying object rests on: the one of ``+x``, ``-x``, ``+y``, ``-y`` that points down most."""
     down = -object_to_plane[2, :2]
     axis = int(np.abs(down).argmax())
     return f"{'+' if down[axis] > 0 else '-'}{'xy'[axis]}"
 
 
 def tilt_deg(object_to_plane: np.ndarray) -> float:
-    """Return the angle (degrees) between the object's +Z axis and the vertical: 0 upright, 180 upside down."""
+    """Return the angle between the object's +Z axis and the vertical in degrees: 0 upright, 180 upside down."""
     return float(np.degrees(np.arccos(np.clip(object_to_plane[2, 2], -1.0, 1.0))))

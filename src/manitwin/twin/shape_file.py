@@ -1,6 +1,6 @@
-"""The shape descriptor that lies in a twin's folder, so that who compares many twins reads none of their meshes.
+"""The shape descriptor file of a twin, so that comparing many twins does not require reading their meshes.
 
-What reads meshes is imported for twins alone that have no such file.
+Mesh libraries are imported only for twins without this file.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 SHAPE = "shape.json"
 MAX_SHAPE_BYTES = 16_384
 _LENGTH = 2 * QUANTILES + 2
-_SEED = 0  # every data set describes shapes alike
+_SEED = 0  # fixed, so that all data sets describe shapes alike
 
 
 def surface(path: Path) -> trimesh.Trimesh:
-    """Return all parts of a twin's ``visual.glb`` as one mesh without texture, in the object frame; raises TwinError."""
+    """Return all parts of a twin's ``visual.glb`` as one untextured mesh in the object frame. Raises TwinError."""
     import trimesh
 
     from manitwin.twin.mesh_files import read_visual
@@ -40,7 +40,7 @@ def surface(path: Path) -> trimesh.Trimesh:
 
 
 def shape_of(visual: Path) -> ShapeDescriptor:
-    """Describe the shape of a twin's ``visual.glb``; raises TwinError."""
+    """Compute the shape descriptor of a twin's ``visual.glb``. Raises TwinError."""
     try:
         return shape_descriptor(surface(visual), seed=_SEED)
     except ValueError as error:
@@ -54,9 +54,9 @@ def shape_to_json(shape: ShapeDescriptor) -> bytes:
 
 
 def read_shape(folder: Path) -> ShapeDescriptor | None:
-    """Return what ``shape.json`` in a twin's folder says; None where there is none, as in twins of earlier versions.
+    """Read ``shape.json`` from a twin's folder; None if there is none, as in twins of earlier versions.
 
-    Raises TwinError where it is damaged.
+    Raises TwinError for a damaged file.
     """
     path = folder / SHAPE
     if not os.path.lexists(path):

@@ -1,4 +1,4 @@
-"""Shares of counted things, and how far they may be off."""
+"""Confidence intervals of proportions."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 
 def wilson_interval(right: int, of: int, z: float = 1.959963984540054) -> tuple[float, float]:
-    """Return the 95 % interval of a share (Wilson 1927, eq. 4): (0, 1) of nothing."""
+    """Return the Wilson score interval at 95 % of ``right`` out of ``of`` (Wilson 1927, eq. 4); (0, 1) if ``of`` is 0."""
     if of == 0:
         return 0.0, 1.0
     share, square = right / of, z * z / of

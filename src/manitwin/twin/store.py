@@ -1,4 +1,4 @@
-"""Twin folders: written whole or not at all, read with their digests checked."""
+"""Twin folders: written atomically, and read with their digests checked."""
 
 from __future__ import annotations
 
@@ -27,30 +27,32 @@ RECORD = "twin.json"
 RUN = "run.json"
 WORK = ".work"
 MAX_TWIN_FILE_BYTES = 5 << 30
-"""Its source is the largest: ``packed_source.MAX_KEPT_BYTES``, and what an archive adds."""
+"""The largest file is the source: ``packed_source.MAX_KEPT_BYTES`` plus the overhead of an archive."""
 REMEDY = "build the twin again"
 _SHOWN_CHARACTERS = 120
 _BLOCK_BYTES = 1 << 20
 
 
 def canonical_json(value: Any) -> str:
-    """Return JSON that is the same text for equal values: sorted keys, no NaN or infinity."""
+    """Return canonical JSON, the same text for equal values: sorted keys, no NaN or infinity."""
     return json.dumps(value, sort_keys=True, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def sha256_of_json(value: Any) -> str:
-    """Return the hex digest of a JSON value."""
+    """Return the hex SHA-256 of a JSON value."""
     return hashlib.sha256(canonical_json(value).encode()).hexdigest()
 
 
 def sha256_of_file(path: Path) -> str:
-    """Return the hex digest of a file's bytes."""
+    """Return the hex SHA-256 of a file."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def sha256_of_untrusted(path: Path, inside: Path) -> str:
-    """Return the hex digest of a regular file of a twin's size below a folder; raises TwinError for anything else."""
+    """Return the hex SHA-256 of a regular file below a folder. Raises TwinError for special files, outside links and excess
+    size.
+    """
     digest = hashlib.sha256()
     with open_regular(path, TwinError, inside=inside, name=str(path)) as stream:
         size = os.fstat(stream.fileno()).st_size
@@ -70,21 +72,21 @@ def digests_below(folder: Path) -> dict[str, str]:
 
 
 def sha256_of_artifact(path: Path) -> str:
-    """Return the digest of a file, or of a folder's names and contents."""
+    """Return the digest of a file, or of the names and contents of a folder."""
     return sha256_of_json(digests_below(path)) if path.is_dir() else sha256_of_file(path)
 
 
 def write_bytes_atomically(path: Path, content: bytes) -> None:
-    """Write a file beside its place and rename it there, so that nobody ever reads half of it."""
+    """Write a file atomically: to a temporary file in the same folder, which is then renamed."""
     with file_beside(path) as beside:
         beside.write_bytes(content)
 
 
 @contextmanager
 def file_beside(place: Path) -> Iterator[Path]:
-    """Give a path in the same folder; what is written there takes its place when the block ends well, else it is removed.
+    """Yield a temporary path in the same folder; on success it replaces ``place``, on an exception it is removed.
 
-    Raises UsageError where a folder is in its place.
+    Raises UsageError if ``place`` is a folder.
     """
     if place.is_dir():
         raise UsageError(f"{place}: is a folder, but a file must be written there; move the folder away")
@@ -101,7 +103,7 @@ def file_beside(place: Path) -> Iterator[Path]:
 
 @contextmanager
 def folder_beside(place: Path) -> Iterator[Path]:
-    """Give an empty folder beside a place; it takes that place when the block ends well, else it is removed."""
+    """Yield an empty temporary folder beside ``place``; on success it replaces ``place``, on an exception it is removed."""
     beside = place.with_name(f".{place.name}.{os.getpid()}")
     shutil.rmtree(beside, ignore_errors=True)
     beside.mkdir(parents=True)
@@ -113,10 +115,10 @@ def folder_beside(place: Path) -> Iterator[Path]:
 
 
 def replace_folder(new: Path, place: Path) -> None:
-    """Rename a finished folder into place; an older one there steps aside first and is then deleted.
+    """Rename a finished folder into place; an older folder there is first moved aside and then deleted.
 
-    Both must be on one file system. A crash in between leaves either the old or the new one whole, or neither in place
-    with the old one under ``<name>.replaced`` beside ``new``, from where the next run starts afresh.
+    Both must be on one file system. After a crash either the old or the new folder is in place, or neither, with the old one
+    kept as ``<name>.replaced`` beside ``new``; the next run then starts over.
     """
     aside = new.with_name(f"{place.name}.replaced")
     shutil.rmtree(aside, ignore_errors=True)
@@ -128,14 +130,14 @@ def replace_folder(new: Path, place: Path) -> None:
 
 
 def revision_of(record: dict[str, Any]) -> str:
-    """Return the hash of twin.json without its ``revision``."""
+    """Return the hash of a twin.json without its ``revision``."""
     return sha256_of_json({key: value for key, value in record.items() if key != "revision"})
 
 
 def seal(folder: Path, record: dict[str, Any]) -> TwinRecord:
-    """Add the digests of the folder's files and the revision to a record, validate it, and write twin.json.
+    """Add file digests and the revision to a record, validate it, and write twin.json.
 
-    Raises pydantic.ValidationError where the record breaks the schema: that is a defect, not an input.
+    Raises pydantic.ValidationError if the record violates the schema, which is a bug.
     """
     digests = digests_below(folder)
     record = {**record, "files": {n: d for n, d in digests.items() if n not in (RECORD, RUN)}}
@@ -146,7 +148,7 @@ def seal(folder: Path, record: dict[str, Any]) -> TwinRecord:
 
 
 def _plain(value: Any) -> Any:
-    """Return a JSON value whose texts hold no control characters: a model's answer or the name of a file may."""
+    """Return a JSON value with control characters in its texts escaped, as model answers and file names may contain them."""
     if isinstance(value, str):
         return CONTROLS.sub(lambda found: printable(found[0]), value)
     if isinstance(value, dict):
@@ -155,7 +157,7 @@ def _plain(value: Any) -> Any:
 
 
 def _with_controls(value: Any) -> str | None:
-    """Return the beginning of a text in a JSON value that contains control characters, None where none does."""
+    """Return an excerpt of a text in a JSON value that contains control characters; None if there is none."""
     left = [value]
     while left:
         each = left.pop()
@@ -171,11 +173,11 @@ def _with_controls(value: Any) -> str | None:
 def amend(
     folder: Path, files: dict[str, bytes], note: Callable[[dict[str, int]], None] = lambda sizes: None
 ) -> TwinRecord:
-    """Give a finished twin new content of some of its files: each is renamed over the old one, twin.json last.
+    """Replace the content of some files of a finished twin; each is written atomically, twin.json last.
 
-    The record gets their digests and a new revision; nothing else in it changes. ``note`` is told the new sizes before
-    twin.json is written. A crash in between leaves a twin whose digests do not match, which ``verify_record`` says. Raises
-    TwinError where the twin has no such file.
+    The record gets the new digests and a new revision; nothing else in it changes. ``note`` is called with the new sizes before
+    twin.json is written. After a crash in between, digests do not match, which ``verify_record`` reports. Raises TwinError if
+    the twin has no such file.
     """
     record = read_record(folder).model_dump(mode="json")
     unknown = files.keys() - record["files"].keys()
@@ -194,7 +196,7 @@ def amend(
 def read_record(folder: Path, verify: bool = False) -> TwinRecord:
     """Read twin.json; with ``verify``, also check its revision and the digest of every file it names.
 
-    Raises TwinError naming the file, the cause and the remedy.
+    Raises TwinError with file, cause and remedy.
     """
     path = folder / RECORD
     if not os.path.lexists(path):
@@ -213,9 +215,9 @@ def read_record(folder: Path, verify: bool = False) -> TwinRecord:
 
 
 def parse_record(content: bytes, path: str | Path = RECORD, *, sealed: bool = False) -> TwinRecord:
-    """Read the content of a twin.json, with ``sealed`` one that its revision is of; raises TwinError naming ``path``.
+    """Parse the content of a twin.json; with ``sealed``, check its revision. Raises TwinError with ``path``.
 
-    A record of an earlier schema version is brought to this one; its ``revision`` stays that of the file.
+    A record of an earlier schema version is migrated; its ``revision`` stays that of the file.
     """
     said = parse_json_object(content, str(path), TwinError, remedy=REMEDY)
     data = in_present_version(said, path)
@@ -232,9 +234,9 @@ def parse_record(content: bytes, path: str | Path = RECORD, *, sealed: bool = Fa
 
 
 def in_present_version(said: dict[str, Any], path: str | Path) -> dict[str, Any]:
-    """Return the content of a twin.json in the present schema version; raises TwinError naming ``path`` for one not known.
+    """Return the content of a twin.json in the current schema version. Raises TwinError with ``path`` for an unknown version.
 
-    One of a newer version of this package raises NewerVersion.
+    A version newer than this package raises NewerVersion.
     """
     data = migrated(said)
     if is_newer(data.get("schema_version"), SCHEMA_VERSION):
@@ -246,7 +248,7 @@ def in_present_version(said: dict[str, Any], path: str | Path) -> dict[str, Any]
 
 
 def verify_record(folder: Path, record: TwinRecord) -> None:
-    """Check the revision of a folder's record and the digest of every file that it names; raises TwinError."""
+    """Check the revision of a folder's record and the digest of every file it names. Raises TwinError."""
     said = read_json_object(folder / RECORD, TwinError, inside=folder, name=str(folder / RECORD), remedy=REMEDY)
     if revision_of(said) != record.revision:
         raise TwinError(f"{folder / RECORD}: altered since it was written (its revision does not match); {REMEDY}")

@@ -1,7 +1,7 @@
-"""What may lie in a twin's folder: regular files, folders, and links that stay inside.
+"""Check of a twin folder from an untrusted source: only regular files, folders, and links that stay inside are allowed.
 
-Twins come from others: a file may be a link to somewhere else, a device, or a pipe that nobody writes to. This is looked at
-before the record is read, so that nothing which reads the folder meets one, whatever the record names or leaves out.
+A file may be a link to another place, a device, or a pipe without a writer. The check is made before the record is read, so
+that no later reader encounters one, whatever the record states.
 """
 
 from __future__ import annotations
@@ -16,8 +16,7 @@ _MOST_ENTRIES = 100_000
 
 
 def require_plain(folder: Path) -> None:
-    """Raise TwinError where anything in a twin's folder is not a regular file, no folder, or a link that leads out"
-    " of it."""
+    """Raise TwinError if a twin's folder contains anything but regular files, folders, and links that stay inside."""
     left, entries = [folder], 0
     while left:
         place = left.pop()
@@ -40,7 +39,7 @@ def require_plain(folder: Path) -> None:
 def _require_inside(folder: Path, path: Path) -> None:
     try:
         target = path.resolve(strict=True)
-    except (OSError, RuntimeError, ValueError) as error:  # leads nowhere, or in a circle (RuntimeError until 3.12)
+    except (OSError, RuntimeError, ValueError) as error:  # broken or circular (RuntimeError until Python 3.12)
         raise TwinError(_refusal(path, "is a broken link")) from error
     if not target.is_relative_to(folder.resolve()):
         raise TwinError(_refusal(path, "leads outside the folder of the twin, and is not read"))

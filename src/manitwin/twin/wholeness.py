@@ -1,7 +1,7 @@
-"""Is a finished twin's folder as it was written? By the sizes of its files, which cost next to nothing, or by their digests.
+"""Integrity checks of a finished twin's folder: by file sizes, which is cheap, or by digests.
 
-The sizes stand in run.json (``bytes``), which no revision depends on. Of twins without them (written by earlier versions, or
-unpacked from a publication) the files whose own first or last bytes tell where they end are looked at.
+The sizes are in run.json (``bytes``), which is not part of the revision. For twins without them (of earlier versions, or
+unpacked from a publication), files whose first or last bytes reveal their length are checked.
 """
 
 from __future__ import annotations
@@ -27,7 +27,9 @@ _PNG_END = b"IEND\xaeB`\x82"
 
 
 def note_sizes(folder: Path, changed: Mapping[str, int] = MappingProxyType({})) -> None:
-    """Write the sizes of all files of a twin's folder into its run.json; ``changed`` has those that are about to be."""
+    """Write the sizes of all files of a twin's folder to its run.json; ``changed`` gives the sizes of files about to be
+    written.
+    """
     run = read_json_object(folder / RUN, TwinError, inside=folder, name=str(folder / RUN), remedy=REMEDY)
     found = {name: size for name, size in DatasetRoot(folder).sizes_below("").items() if size is not None}
     sizes = {name: size for name, size in {**found, **changed}.items() if name != RUN}
@@ -35,7 +37,7 @@ def note_sizes(folder: Path, changed: Mapping[str, int] = MappingProxyType({})) 
 
 
 def noted_sizes(root: DatasetRoot, folder: str) -> dict[str, int] | None:
-    """Return the sizes that a twin's run.json has, None where it has none; raises TwinError where it cannot be read."""
+    """Return the sizes in a twin's run.json, None if it has none. Raises TwinError if the file cannot be read."""
     try:
         said = root.read_json(f"{folder}/{RUN}", TwinError, remedy=REMEDY).get(BYTES)
     except FileNotFoundError as error:
@@ -48,7 +50,7 @@ def noted_sizes(root: DatasetRoot, folder: str) -> dict[str, int] | None:
 
 
 def size_damage(root: DatasetRoot, folder: str) -> str | None:
-    """Return what is wrong with a folder by the sizes in its run.json alone; None too where it has none."""
+    """Return what is wrong with a folder, from the sizes in its run.json alone; None if nothing is, or if it has no sizes."""
     try:
         sizes = noted_sizes(root, folder)
     except TwinError as error:
@@ -59,7 +61,7 @@ def size_damage(root: DatasetRoot, folder: str) -> str | None:
 
 
 def damage(root: DatasetRoot, folder: str, record: TwinRecord, *, digests: bool) -> str | None:
-    """Return what is wrong with the files of a twin by their sizes, with ``digests`` by every byte; None where nothing is."""
+    """Return what is wrong with a twin's files, from their sizes and, with ``digests``, their contents; None if nothing is."""
     found = root.sizes_below(folder)
     try:
         sizes = noted_sizes(root, folder)
@@ -77,7 +79,7 @@ def damage(root: DatasetRoot, folder: str, record: TwinRecord, *, digests: bool)
 
 
 def foreign_files(root: DatasetRoot, folder: str, record: TwinRecord) -> str | None:
-    """Return what lies in a twin's folder and is none of its files; None where nothing does."""
+    """Return the files in a twin's folder that its record does not name; None if there are none."""
     return _named(root.sizes_below(folder).keys() - record.files.keys() - {RECORD, RUN})
 
 
@@ -94,7 +96,7 @@ def _differences(found: Mapping[str, int | None], sizes: Mapping[str, int]) -> s
 
 
 def _cut(root: DatasetRoot, name: str, size: int | None) -> str | None:
-    """Tell of a file that its own first or last bytes show to be cut off; of a URL none is looked into."""
+    """Return a message if a file's first or last bytes show that it is truncated; files at a URL are not opened."""
     called = printable_line(name.rpartition("/")[2])
     if not size:
         return f"{called} is not a regular file" if size is None else f"{called} is empty"
@@ -127,7 +129,7 @@ def _altered(root: DatasetRoot, folder: str, record: TwinRecord) -> Iterator[str
 
 
 def _named(names: set[str]) -> str | None:
-    """Return the first of some names, and how many more there are."""
+    """Return the first few names, and how many more there are."""
     if not names:
         return None
     first = [printable_line(name, max_characters=80) for name in sorted(names)[:_MOST_NAMED]]
