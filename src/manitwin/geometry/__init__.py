@@ -1,1 +1,1 @@
-"""Poses, sampling, mass properties, repair, convex hulls, distances: pure functions over arrays."""
+"""Geometry on arrays and meshes: poses, sampling, mass properties, repair, convex hulls, distances. All functions are pure."""

@@ -1,7 +1,6 @@
-"""Antipodal contact pairs: two opposite points of a surface, each inside the friction cone of the other.
+"""Antipodal contact pairs: two surface points, each on the line of the other's friction cone, for parallel grippers.
 
-Source: Nguyen 1988, "Constructing force-closure grasps"; sampled by rays as in Dex-Net 2.0 (Mahler et al. 2017,
-appendix).
+Source: Nguyen 1988, "Constructing force-closure grasps"; sampled by rays as in Dex-Net 2.0 (Mahler et al. 2017, appendix).
 """
 
 from __future__ import annotations
@@ -12,13 +11,15 @@ import numpy as np
 
 from manitwin.geometry.ray_caster import RayCaster
 
-MAX_WALLS = 6  # surfaces a ray may leave before it is given up: a mug's ray leaves two
+MAX_WALLS = 6  # exits per ray before it is abandoned; a ray through a mug has two
 STEP_PAST_M = 1e-6
 
 
 @dataclass(frozen=True)
 class AntipodalPairs:
-    """Contact pairs: both points ``(N, 3)`` m and ``alignment (N,)``, the worse cosine of normal and closing axis."""
+    """Contact pairs: the two points ``(N, 3)`` m, and ``alignment (N,)``, the smaller cosine between a normal and the closing
+    axis.
+    """
 
     first_m: np.ndarray
     second_m: np.ndarray
@@ -29,7 +30,7 @@ class AntipodalPairs:
 
     @property
     def width_m(self) -> np.ndarray:
-        """The distance ``(N,)`` of the two contacts."""
+        """The distance ``(N,)`` m between the two contacts."""
         return np.linalg.norm(self.second_m - self.first_m, axis=1)
 
     def take(self, index: np.ndarray) -> AntipodalPairs:
@@ -38,7 +39,7 @@ class AntipodalPairs:
 
 
 def tangents(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return two unit vectors ``(N, 3)`` that make a right-handed frame with unit directions ``(N, 3)``."""
+    """Return two unit vectors ``(N, 3)`` that complete unit directions ``(N, 3)`` to right-handed frames."""
     other = np.where(np.abs(directions[:, :1]) < 0.9, [[1.0, 0, 0]], [[0, 1.0, 0]])
     first = np.cross(directions, other)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
@@ -54,11 +55,11 @@ def antipodal_pairs(
     max_width_m: float,
     rng: np.random.Generator,
 ) -> AntipodalPairs:
-    """Find contact pairs that start at surface points ``(N, 3)`` with outward normals ``(N, 3)``.
+    """Sample contact pairs that start at surface points ``(N, 3)`` with outward normals ``(N, 3)``.
 
-    From each point one ray goes inwards, at random inside the friction cone; where it leaves matter inside the cone of
-    that surface is a pair. The first and the last such exit within ``max_width_m`` are kept: a wall, and the body as a
-    whole.
+    One ray per point is cast inwards in a random direction within the friction cone. Wherever it leaves the solid within the
+    friction cone of that surface, the two points form a pair. The first and the last such exit within ``max_width_m`` are kept:
+    a grasp of a wall, and one of the whole body.
     """
     cosine = 1 / np.hypot(1, friction)
     angle = np.arctan(friction) * np.sqrt(rng.random(len(points_m)))
@@ -88,7 +89,7 @@ def antipodal_pairs(
 
 
 def _first_and_last(found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return column and row of the first and the last True of each column of ``found (rows, columns)``, each once."""
+    """Return column and row of the first and the last True in each column of ``found (rows, columns)``, without duplicates."""
     columns = np.flatnonzero(found.any(0))
     first = found[:, columns].argmax(0)
     last = len(found) - 1 - found[::-1, columns].argmax(0)
@@ -99,11 +100,11 @@ def _first_and_last(found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def grasp_frames(
     pairs: AntipodalPairs, *, rolls: int, tip_depth_m: float, max_depth_offset_m: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """Return grasps ``gripper_to_object (N * rolls, 4, 4)`` that close along each pair, from ``rolls`` directions.
+    """Return grasps ``gripper_to_object (N * rolls, 4, 4)`` that close along each pair, with ``rolls`` approach directions each.
 
-    X is the pair's axis; the approach directions are evenly spaced around it from a random first one. The fingertips'
-    centre (``tip_depth_m`` along the approach) lies within ``max_depth_offset_m`` before or behind the middle of the
-    pair.
+    X is the closing axis. The approach directions (Z) are evenly spaced around it, starting at a random angle. The point
+    between the fingertips, ``tip_depth_m`` along the approach, is placed within ``max_depth_offset_m`` before or behind the
+    midpoint of the pair.
     """
     closing = np.repeat((pairs.second_m - pairs.first_m) / pairs.width_m[:, None], rolls, axis=0)
     middle = np.repeat((pairs.first_m + pairs.second_m) / 2, rolls, axis=0)

@@ -1,4 +1,4 @@
-"""Rigid links that joints with one degree of freedom hold together: a tree whose first link is its root."""
+"""Kinematic trees of rigid links with one-degree-of-freedom joints; the first link is the root."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ JointKind = Literal["revolute", "continuous", "prismatic"]
 
 
 def axis_motion(origin_m: np.ndarray, axis: np.ndarray, way: float, *, slides: bool) -> np.ndarray:
-    """Return the motion ``(4, 4)`` by ``way`` m along a unit axis, or rad right-handed about it through ``origin_m``."""
+    """Return the motion ``(4, 4)`` by ``way``: metres along a unit axis, or radians about it through ``origin_m`` (right-hand
+    rule).
+    """
     if slides:
         return transform(None, way * axis)
     rotation = Rotation.from_rotvec(way * axis).as_matrix()
@@ -25,12 +27,12 @@ def axis_motion(origin_m: np.ndarray, axis: np.ndarray, way: float, *, slides: b
 
 @dataclass(frozen=True)
 class ArticulatedJoint:
-    """One joint between the links ``parent`` and ``child``, by their places in the tree's order, parents first.
+    """A joint between the links ``parent`` and ``child``, given by their indices; parents come first.
 
-    ``origin_m (3,)`` lies on its axis and ``axis (3,)`` is of length one, both in one frame for all links, which stand as they
-    stand when the joint is at ``stands_at``. Positions and the limits ``lower`` and ``upper`` (None: no limit) are radians, of a
-    prismatic joint metres; ``damping`` is N m s/rad or N s/m, ``friction`` and ``effort`` (the most that a motor gives) N m or N,
-    ``velocity`` (the most that it may have) rad/s or m/s.
+    ``origin_m (3,)`` lies on the joint axis and ``axis (3,)`` has length one, both in one frame common to all links, in the
+    configuration in which the joint is at ``stands_at``. Positions and the limits ``lower`` and ``upper`` (None: no limit) are
+    in radians, for a prismatic joint in metres. ``damping`` is in N m s/rad or N s/m, ``friction`` and ``effort`` (the actuator
+    limit) in N m or N, ``velocity`` (its limit) in rad/s or m/s.
     """
 
     name: str
@@ -48,11 +50,13 @@ class ArticulatedJoint:
     velocity: float | None = None
 
     def motion(self, position: float) -> np.ndarray:
-        """Return the motion ``(4, 4)`` of the child in the common frame, the parent held, from ``stands_at`` to ``position``."""
+        """Return the motion ``(4, 4)`` of the child in the common frame from ``stands_at`` to ``position``, with the parent
+        fixed.
+        """
         return axis_motion(self.origin_m, self.axis, position - self.stands_at, slides=self.kind == "prismatic")
 
     def within(self, position: float) -> float:
-        """Return the position within the limits that is nearest to ``position``."""
+        """Clip a position to the joint's limits."""
         low = -np.inf if self.lower is None else self.lower
         high = np.inf if self.upper is None else self.upper
         return float(np.clip(position, low, high))
@@ -65,16 +69,17 @@ class ArticulatedJoint:
 
 @dataclass(frozen=True)
 class ArticulatedBody:
-    """Links as rigid bodies in one frame, as they stand, and their joints."""
+    """Rigid links in one common frame, in their reference configuration, and their joints."""
 
     links: tuple[RigidBody, ...]
     joints: tuple[ArticulatedJoint, ...]
 
 
 def link_motions(joints: Sequence[ArticulatedJoint], positions: Sequence[float]) -> np.ndarray:
-    """Return how each link moves ``(L, 4, 4)`` in the common frame from where it stands, the joints at ``positions`` (J,).
+    """Return the motion of each link ``(L, 4, 4)`` in the common frame from its reference pose, with the joints at ``positions
+    (J,)``.
 
-    The root stays. ``joints`` are in an order in which the joint that holds a link comes before those that it holds.
+    The root does not move. ``joints`` must be ordered from the root outwards.
     """
     motions = np.tile(np.eye(4), (len(joints) + 1, 1, 1))
     for joint, position in zip(joints, positions, strict=True):

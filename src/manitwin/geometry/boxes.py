@@ -1,4 +1,4 @@
-"""Smallest boxes and circles around points, and convex footprints on a plane."""
+"""Bounding boxes, enclosing circles and mirror axes of points, and convex footprints on a plane."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from scipy.spatial import ConvexHull
 from manitwin.geometry.poses import transform
 
 ASKEW_SHARE = 0.9
-"""Of the area along the axes: what fits a rectangle that is smaller than that lies at an angle to them."""
-_MIRRORED = 0.02  # of the larger side: how far an outline may be from its mirror image
+"""A smallest rectangle with less than this share of the axis-aligned area means that the object is not aligned with the axes."""
+_MIRRORED = 0.02  # of the larger side: tolerated deviation of an outline from its mirror image
 _MIRRORED_DIRECTIONS = 72
 
 
@@ -23,21 +23,22 @@ def box_corners(half_extents_m: np.ndarray, box_to_frame: np.ndarray) -> np.ndar
 
 
 def oriented_bounding_box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the smallest box ``(extents_m (3,), obb_to_object (4, 4))`` that has a face in a plane of the convex hull.
+    """Return the smallest box ``(extents_m (3,), obb_to_object (4, 4))`` with a face flush with a facet of the convex hull.
 
-    The box frame has its origin at the box's centre; of its equal namings of axes it is the one closest to the
-    object's axes.
-    Source: O'Rourke 1985 shows that the smallest box touches the hull with edges; boxes flush with a hull face are
-    the usual approximation; in the plane, rotating calipers (Toussaint 1983).
+    The box frame has its origin at the box's centre; among equivalent axis orders and signs, the one closest to the object's
+    axes is chosen.
+
+    Source: O'Rourke 1985 shows that the smallest box has edges of the hull on its faces; restricting it to boxes flush with a
+    hull facet is the usual approximation. In the plane, rotating calipers are used (Toussaint 1983).
     """
     points = np.asarray(points, dtype=float)
     hull = ConvexHull(points)
     corners = points[hull.vertices]
     normals = np.vstack([np.eye(3), _distinct_directions(hull.equations[:, :3])])
     heights = np.ptp(corners @ normals.T, axis=0)
-    # No rectangle is smaller than the shadow it holds: most normals are out before their rectangle is sought.
+    # A rectangle is at least as large as the projection that it contains, which excludes most normals early.
     least = heights * _shadow_areas(points[hull.simplices], normals)
-    least[:3] = 0  # the object's own axes first: of equal boxes the first one is taken
+    least[:3] = 0  # the object's own axes come first: among equal boxes the first one is kept
     first, second = _plane_axes(normals)
     best_volume, best_axes = np.inf, np.eye(3)
     for index in np.argsort(least, kind="stable"):
@@ -55,10 +56,11 @@ def oriented_bounding_box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def upright_extents(points: np.ndarray) -> np.ndarray:
-    """Return length, width, and height ``(3,)`` of an object that stands on Z: the smallest rectangle seen from above, and Z.
+    """Return length, width and height ``(3,)`` of an object standing on Z: the smallest rectangle seen from above, and the Z
+    extent.
 
-    What people measure: a box of least volume may lean, so that its longest side is a diagonal that no ruler shows. A turn
-    about Z changes nothing.
+    This is what people measure. A minimum-volume box may lean, so that its longest side is a diagonal. The result does not
+    change under rotation about Z.
     """
     points = np.asarray(points, dtype=float)
     _, along = _smallest_rectangle(points[:, :2])
@@ -68,11 +70,12 @@ def upright_extents(points: np.ndarray) -> np.ndarray:
 
 
 def extents_along_sides(points: np.ndarray) -> np.ndarray:
-    """Return length, width and height ``(3,)`` as people measure them: along the axis about which a thing is mirrored from above.
+    """Return length, width and height ``(3,)`` as people measure them: along the mirror axis of the outline seen from above.
 
-    Of several such axes that of the smallest rectangle. Of what is not mirrored the extents are those along X, Y and Z, or, where
-    it lies askew, those of ``upright_extents``. A round thing with a handle is as long as from the handle to the far side, and an
-    aircraft from nose to tail, though a rectangle that is smaller stands askew around them.
+    Among several mirror axes, the one with the smallest rectangle is used. Without a mirror axis the result is the extents
+    along X, Y and Z, or ``upright_extents`` if the object is not aligned with the axes. A round object with a handle is thus
+    measured from the handle to the far side, and an aircraft from nose to tail, although a smaller rectangle encloses each
+    diagonally.
     """
     points = np.asarray(points, dtype=float)
     along_axes, upright = np.ptp(points, axis=0), upright_extents(points)
@@ -85,7 +88,7 @@ def extents_along_sides(points: np.ndarray) -> np.ndarray:
 
 
 def turn_to_sides(points: np.ndarray) -> tuple[float, float]:
-    """Return cosine and sine of the angle, within 45 degrees of none, at which the smallest rectangle around ``(N, 2)`` lies."""
+    """Return cosine and sine of the angle, at most 45 degrees, of the smallest rectangle around ``(N, 2)`` points to the axes."""
     _, along = _smallest_rectangle(np.asarray(points, dtype=float))
     across = np.array([-along[1], along[0]])
     cosine, sine = max((along, -along, across, -across), key=lambda side: float(side[0]))
@@ -93,7 +96,7 @@ def turn_to_sides(points: np.ndarray) -> tuple[float, float]:
 
 
 def longest_edges(points: np.ndarray) -> np.ndarray:
-    """Return the four parallel edges ``(4, 2, 3)`` of the box of ``upright_extents`` along its longest side."""
+    """Return the four parallel edges ``(4, 2, 3)`` along the longest side of the box of ``upright_extents``."""
     points = np.asarray(points, dtype=float)
     _, along = _smallest_rectangle(points[:, :2])
     axes = np.array([[*along, 0.0], [-along[1], along[0], 0.0], [0.0, 0.0, 1.0]])
@@ -110,10 +113,10 @@ def longest_edges(points: np.ndarray) -> np.ndarray:
 
 
 def smallest_enclosing_circle(points: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return the smallest circle ``(center (2,), radius)`` that holds points ``(N, 2)``.
+    """Return the smallest circle ``(center (2,), radius)`` that encloses points ``(N, 2)``.
 
-    Source: Welzl 1991, the incremental form; the points are taken in the order of their hull, so the answer is
-    repeatable.
+    Source: Welzl 1991, in incremental form. The points are processed in the order of their hull, which makes the result
+    deterministic.
     """
     points = np.unique(np.asarray(points, dtype=float), axis=0)
     if len(points) > 3 and np.linalg.matrix_rank(points - points.mean(0), tol=1e-12) == 2:
@@ -134,7 +137,7 @@ def smallest_enclosing_circle(points: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def _next_outside(points: np.ndarray, first: int, end: int, center: np.ndarray, reach: float) -> int:
-    """Return the first of the points from ``first`` on that is farther than ``reach`` from a centre; ``end`` where none is."""
+    """Return the index of the first point in ``first:end`` farther than ``reach`` from a centre; ``end`` if there is none."""
     away = points[first:end] - center
     outside = np.sqrt(away[:, 0] * away[:, 0] + away[:, 1] * away[:, 1]) > reach
     return first + int(outside.argmax()) if outside.any() else end
@@ -143,7 +146,7 @@ def _next_outside(points: np.ndarray, first: int, end: int, center: np.ndarray, 
 def _circumcircle(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, float]:
     ab, ac = b - a, c - a
     double_area = 2 * (ab[0] * ac[1] - ab[1] * ac[0])
-    if abs(double_area) < 1e-18:  # on one line: the two farthest apart
+    if abs(double_area) < 1e-18:  # collinear: use the two points farthest apart
         ends = max(((a, b), (a, c), (b, c)), key=lambda pair: float(np.linalg.norm(pair[0] - pair[1])))
         return (ends[0] + ends[1]) / 2, float(np.linalg.norm(ends[0] - ends[1])) / 2
     x = (ac[1] * (ab @ ab) - ab[1] * (ac @ ac)) / double_area
@@ -152,7 +155,7 @@ def _circumcircle(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarr
 
 
 def _distinct_directions(normals: np.ndarray) -> np.ndarray:
-    """Return the normals without those equal, up to sign and half a degree, to one kept; at most 256 of them."""
+    """Return at most 256 normals, merging those that are equal up to sign and half a degree."""
     signs = np.sign(normals[np.arange(len(normals)), np.abs(normals).argmax(1)])
     cells = np.round(normals * signs[:, None] / 0.01)
     kept = np.sort(np.unique(cells, axis=0, return_index=True)[1])
@@ -160,22 +163,22 @@ def _distinct_directions(normals: np.ndarray) -> np.ndarray:
 
 
 def _shadow_areas(triangles: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Return the areas ``(N,)`` of the shadows that a convex surface ``(F, 3, 3)`` throws along normals ``(N, 3)``."""
+    """Return the areas ``(N,)`` of a convex surface ``(F, 3, 3)`` projected along normals ``(N, 3)``."""
     areas = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]) / 2
-    return np.abs(areas @ normals.T).sum(0) / 2  # every ray through the body crosses its surface twice
+    return np.abs(areas @ normals.T).sum(0) / 2  # every line through the body crosses its surface twice
 
 
 def _plane_axes(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return two axes ``(N, 3)`` each that span the planes of the normals."""
+    """Return two unit vectors ``(N, 3)`` each that span the planes of the normals."""
     first = np.cross(normals, np.eye(3)[np.abs(normals).argmin(1)])
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     return first, np.cross(normals, first)
 
 
 def _smallest_rectangle(points: np.ndarray) -> tuple[float, np.ndarray]:
-    """Return the area of the smallest rectangle around points ``(N, 2)`` and the direction ``(2,)`` of a side."""
-    # OpenCV's hull is some ten times faster than Qhull. It takes float32: which of two corners a ten-millionth apart
-    # it keeps does not matter, their places are taken in full.
+    """Return the area of the smallest rectangle around points ``(N, 2)`` and the direction ``(2,)`` of one side."""
+    # OpenCV's hull is about ten times faster than Qhull. It uses float32, which may drop one of two corners that are 1e-7
+    # apart; the coordinates of the kept corners are used in full precision.
     outline = points[cv2.convexHull((points - points[0]).astype(np.float32), returnPoints=False)[:, 0]]
     edges = np.concatenate([outline[1:], outline[:1]]) - outline
     edges /= np.maximum(np.hypot(edges[:, 0], edges[:, 1]), 1e-300)[:, None]
@@ -186,10 +189,11 @@ def _smallest_rectangle(points: np.ndarray) -> tuple[float, np.ndarray]:
 
 
 def mirror_axis(points: np.ndarray) -> np.ndarray | None:
-    """Return the direction ``(2,)`` along or across which the outline of points ``(N, 2)`` is mirrored; None where none is.
+    """Return the direction ``(2,)`` of a mirror axis of the outline of points ``(N, 2)``, or of its normal; None if there is
+    none.
 
-    Of several that of the smallest rectangle. Tried are X, a side of the smallest rectangle, and the axis of the outline's
-    least second moment of area.
+    The candidates are X, a side of the smallest rectangle, and the axis of least second moment of area of the outline. Among
+    several mirror axes, the one with the smallest rectangle is returned.
     """
     outline = points[cv2.convexHull((points - points[0]).astype(np.float32), returnPoints=False)[:, 0]]
     tried = [np.array([1.0, 0.0]), _smallest_rectangle(points)[1], *_principal_axis(outline)]
@@ -203,7 +207,9 @@ def mirror_axis(points: np.ndarray) -> np.ndarray | None:
 
 
 def _principal_axis(outline: np.ndarray) -> list[np.ndarray]:
-    """Return the direction ``(2,)`` about which a convex polygon ``(K, 2)`` has its least second moment; none of a line."""
+    """Return the axis ``(2,)`` of least second moment of area of a convex polygon ``(K, 2)``; an empty list for a degenerate
+    one.
+    """
     arms = outline - outline.mean(0)
     ahead = np.roll(arms, -1, axis=0)
     doubled = np.abs(
@@ -219,7 +225,7 @@ def _principal_axis(outline: np.ndarray) -> list[np.ndarray]:
 
 
 def _is_mirrored(outline: np.ndarray, size: float) -> bool:
-    """Tell whether a convex outline ``(K, 2)`` around the origin is its own mirror image about X or about Y."""
+    """Return whether a convex outline ``(K, 2)`` centred on the origin is symmetric about X or Y."""
     angles = 2 * np.pi * np.arange(_MIRRORED_DIRECTIONS) / _MIRRORED_DIRECTIONS
     directions = np.stack([np.cos(angles), np.sin(angles)])
     reach = (outline @ directions).max(0)
@@ -228,7 +234,7 @@ def _is_mirrored(outline: np.ndarray, size: float) -> bool:
 
 
 def _nearest_to_identity(axes: np.ndarray) -> np.ndarray:
-    """Return the same axes, permuted and flipped to a right-handed frame as close to the object's as can be."""
+    """Return the same axes, permuted and flipped to the right-handed frame closest to the identity."""
     best = max(permutations(range(3)), key=lambda order: float(np.abs(np.diag(axes[list(order)])).sum()))
     named = axes[list(best)]
     diagonal = np.diag(named)
@@ -245,16 +251,16 @@ def footprint(points_m: np.ndarray) -> np.ndarray:
 
 
 def separation_m(first: np.ndarray, second: np.ndarray) -> float:
-    """Return a lower bound of the distance of two convex polygons ``(K, 2)``, negative where they overlap.
+    """Return a lower bound of the distance between two convex polygons ``(K, 2)``, negative if they overlap.
 
-    The largest gap along the normals of their edges (separating axes): the distance itself, but where the nearest points are
-    two corners; then it is less.
+    It is the largest gap along the edge normals (separating axes). It equals the distance unless the closest points are two
+    corners, in which case it is smaller.
     """
     return float(separations_m(first, second, np.zeros((1, 2)))[0])
 
 
 def separations_m(first: np.ndarray, second: np.ndarray, offsets_m: np.ndarray) -> np.ndarray:
-    """Return the ``separation_m`` ``(N,)`` of two convex polygons with the first one moved by each of the offsets ``(N, 2)``."""
+    """Return ``separation_m`` ``(N,)`` of two convex polygons, with the first translated by each of the offsets ``(N, 2)``."""
     gaps = []
     for one, other, sign in ((first, second, -1.0), (second, first, 1.0)):
         edges = np.roll(one, -1, axis=0) - one

@@ -1,4 +1,4 @@
-"""Which way is up in a world, as the cameras say that took photos there: people and rigs hold them level."""
+"""The up direction of a world from its camera poses: photos are usually taken with a level camera."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 MOST_ROLL_DEG = 10.0
-"""Root mean square of cameras' rolls up to which they are level ones, held by hand."""
-_AXIS_ROLL_DEG = 5.0  # up to which an axis of the world is the one that they are level about
-_LEAST_SPREAD = 0.2  # of the sines between the cameras' sideward axes: below it these say nothing of one direction
-_LEAST_UPRIGHT = 0.3  # the mean of the cameras' own up against the direction: portraits taken sideways have 0
-_SAME_UP = 0.8  # the cosine of 37 degrees: cameras that are level about what is so far away say something else
+"""Root mean square roll of cameras up to which they count as level, for handheld cameras."""
+_AXIS_ROLL_DEG = 5.0  # the roll up to which a world axis is accepted as up
+_LEAST_SPREAD = 0.2  # least singular value of the cameras' right axes: below it, the level direction is ambiguous
+_LEAST_UPRIGHT = 0.3  # least mean component of the cameras' own up; portraits taken sideways have 0
+_SAME_UP = 0.8  # cosine of 37 degrees: up directions farther apart contradict each other
 _ROUNDS = 10
-_LEAST_ON_EDGE = 8  # cameras: of fewer some direction is level about a side of each by chance
-_EDGE_ROLL_DEG = 6.0  # nor is it chance alone up to this
-_LEAST_DOWN = 0.15  # of the cameras' mean direction against up: people look down at things, and this tells up from down
-_LEAST_AHEAD = 0.2  # of a camera's direction that is level: of steeper ones it says little
+_LEAST_ON_EDGE = 8  # cameras: with fewer, some direction is level with a side of each image by chance
+_EDGE_ROLL_DEG = 6.0  # chance alone does not reach a roll this small
+_LEAST_DOWN = 0.15  # of the mean viewing direction against up: objects are seen from above, which gives the sign
+_LEAST_AHEAD = 0.2  # horizontal component below which a viewing direction has no reliable azimuth
 _AXES = {
     "z": (0, 0, 1.0),
     "y": (0, 1.0, 0),
@@ -29,7 +29,7 @@ _AXES = {
 
 @dataclass(frozen=True)
 class UpTold:
-    """The direction ``axis (3,)`` that is up, what is said of it, and by how much the cameras are rolled about it."""
+    """The up direction ``axis (3,)``, a description of how it was found, and the RMS roll of the cameras about it."""
 
     axis: np.ndarray
     said: str
@@ -37,11 +37,12 @@ class UpTold:
 
 
 def up_of_cameras(rotations: np.ndarray, usual: str | None = None) -> UpTold | None:
-    """Return which way is up; None where the cameras, ``rotations (N, 3, 3)`` from the world to x right, y down, do not say.
+    """Return the up direction from camera ``rotations (N, 3, 3)`` (world to camera, x right, y down); None if ambiguous.
 
-    An axis of the world that they are level about comes first, ``usual`` ('z', '-y', ...) before the others; then whatever
-    direction they are level about; then one about which each is level on a side of its picture, as telephones held upright and
-    across are, and which they look down along; where they are rolled, ``usual`` if most of them are the right way up about it.
+    Tried in order: a world axis about which the cameras are level, first ``usual`` ('z', '-y', ...); any direction about which
+    they are level; a direction about which each camera is level along one side of its image, as for phones held upright or
+    sideways, with the sign from the cameras looking down; finally, for rolled cameras, ``usual`` if most cameras are the right
+    way up about it.
     """
     aside, upward = rotations[:, 0], -rotations[:, 1]
     for name in sorted(_AXES, key=lambda name: name != usual):
@@ -64,7 +65,7 @@ def up_of_cameras(rotations: np.ndarray, usual: str | None = None) -> UpTold | N
 
 
 def _level_on_an_edge(rotations: np.ndarray) -> UpTold | None:
-    """Return the direction that of each camera the one or the other side of the picture is level about."""
+    """Return the direction that is level with one of the two sides of each camera's image."""
     down = rotations[:, 2].mean(axis=0)
     starts = [np.array(axis) for axis in _AXES.values()] + [-down / max(float(np.linalg.norm(down)), 1e-9)]
     found: list[UpTold] = []
@@ -84,9 +85,9 @@ def _level_on_an_edge(rotations: np.ndarray) -> UpTold | None:
 
 
 def up_as_stated(rotations: np.ndarray, name: str) -> UpTold | None:
-    """Return an axis of the world ('y', 'z') as the one that is up; None where most photos would stand on their heads.
+    """Return a stated world axis ('y', 'z') as the up direction; None if most photos would be upside down.
 
-    Where the cameras say that another direction is, that is told with it.
+    If the cameras indicate another direction, the description says so.
     """
     axis = np.array(_AXES[name])
     if float((-rotations[:, 1]).mean(axis=0) @ axis) < -_LEAST_UPRIGHT:
@@ -98,7 +99,7 @@ def up_as_stated(rotations: np.ndarray, name: str) -> UpTold | None:
 
 
 def _about(axis: np.ndarray, aside: np.ndarray, upward: np.ndarray) -> float | None:
-    """Return by how much cameras are rolled about an axis; None where they are not the right way up, or it is not told."""
+    """Return the RMS roll of cameras about an axis in degrees; None if they are not the right way up about it."""
     if float(upward.mean(axis=0) @ axis) < _LEAST_UPRIGHT:
         return None
     return _roll_deg(axis, aside)
@@ -109,9 +110,9 @@ def _roll_deg(axis: np.ndarray, aside: np.ndarray) -> float:
 
 
 def azimuth_deg(rotation: np.ndarray) -> float:
-    """Return from where a camera looks at what is before it, about the vertical z, counter-clockwise seen from above.
+    """Return the azimuth (degrees) from which a camera sees the scene, about the vertical z, counter-clockwise seen from above.
 
-    ``rotation (3, 3)`` is from the world. Of one that looks straight down or up, what it has below in its picture is nearer.
+    ``rotation (3, 3)`` is world to camera. For a camera that looks straight down or up, the bottom of its image counts as near.
     """
     ahead = rotation[2, :2]
     if np.linalg.norm(ahead) < _LEAST_AHEAD:

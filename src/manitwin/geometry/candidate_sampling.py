@@ -1,4 +1,4 @@
-"""Candidate points for functions and grasps: farthest points of a surface, denser where it bends, and middles and ends."""
+"""Candidate points for functional and grasp points: farthest point sampling, denser at edges, plus centres and extremities."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from scipy.spatial import cKDTree
 from manitwin.geometry.cavity import Opening
 
 _NEIGHBOURS = 16
-_OTHER_SIDE = -0.5  # cosine of normals: a neighbour through a thin wall says nothing of how the surface bends
-_BEND = 0.06  # of the mean normal's length: a right-angled edge has 0.29, a cylinder of 20 neighbour distances 0.003
-_WEIGHT = 1.0  # a sample on an edge counts as farther away by this share of its distance
-_MIDDLES, _BUMPS, _ENDS = 7, 4, 6  # of the candidates at most
-_FLAT = 0.985  # length of the mean normal: a quarter of a cylinder has 0.90, a dome 20 degrees to each side 0.97
-_SMALL_SHARE = 0.06  # of the longest side: the half width of what may be a button
-_APART_SHARE = 0.06  # of the longest side: middles and ends nearer to each other than this are one place
-_RESTING_SHARE, _RESTING_COSINE = 0.015, -0.8  # of the longest side above the lowest place; normal that looks down
+_OTHER_SIDE = -0.5  # cosine of normals: a neighbour across a thin wall carries no information on curvature
+_BEND = 0.06  # 1 minus the length of the mean normal; a right-angled edge has 0.29, a cylinder of 20 neighbour distances 0.003
+_WEIGHT = 1.0  # relative increase of the sampling distance at an edge
+_MIDDLES, _BUMPS, _ENDS = 7, 4, 6  # the largest number of each among the candidates
+_FLAT = 0.985  # length of the mean normal; a quarter of a cylinder has 0.90, a dome of 20 degrees to each side 0.97
+_SMALL_SHARE = 0.06  # of the longest side: largest half width of a button
+_APART_SHARE = 0.06  # of the longest side: centres and extremities closer together are merged
+_RESTING_SHARE, _RESTING_COSINE = 0.015, -0.8  # of the longest side above the lowest point; a downward normal
 _FLOOR_DEPTH, _FLOOR_COSINE = 0.5, 0.5  # of the depth below the rim; normal along the opening's axis
-_UPWARD = 0.9  # cosine: a lid's hollow has no floor on which things lie
-_FLOOR_SHARE = 0.5  # of the rim's radius: of a deep vessel no view shows the very middle
+_UPWARD = 0.9  # cosine; the hollow of a lid has no floor to place things on
+_FLOOR_SHARE = 0.5  # of the rim's radius; no view shows the very centre of a deep vessel
 MOST_RESTING = 0.2
-"""The share of candidates that may lie on the underside on which a thing rests."""
+"""The largest share of candidates on the resting underside."""
 
 
 @dataclass(frozen=True)
 class _Bends:
-    """How much the surface bends at samples ``(N,)`` in [0, 1], and how far the next edge is ``(N,)`` m (inf: none)."""
+    """Surface bending at samples ``(N,)`` in [0, 1], and distance to the nearest edge ``(N,)`` m (inf: no edge)."""
 
     weight: np.ndarray
     inner_m: np.ndarray
@@ -36,12 +36,12 @@ class _Bends:
 def sample_candidates(
     points_m: np.ndarray, normals: np.ndarray, count: int, opening: Opening | None = None
 ) -> np.ndarray:
-    """Return the indices of ``count`` of the samples ``(N, 3)`` m of a surface with outward normals ``(N, 3)``.
+    """Return the indices of ``count`` of the surface samples ``(N, 3)`` m with outward normals ``(N, 3)``.
 
-    First the middles of the floor and the underside of what has an ``opening``, the middles of flat parts, tops of bumps and
-    outermost ends, then by farthest point sampling (paper, eq. 1) of distances that count up to twice where the surface bends:
-    rims, edges, tips. At most a fifth lies on the underside that it rests on. Returns all indices where there are no more than
-    ``count``.
+    First come the centres of the floor and underside of a vessel (given its ``opening``), the centres of flat regions, the tops
+    of bumps and the extremities. The rest is farthest point sampling (paper, eq. 1) with distances weighted up to twofold where
+    the surface bends: rims, edges, tips. At most a fifth of the points lie on the resting underside. Returns all indices if
+    there are no more than ``count``.
     """
     if len(points_m) <= count:
         return np.arange(len(points_m))
@@ -69,7 +69,7 @@ def sample_candidates(
 
 
 def _floor(points_m: np.ndarray, normals: np.ndarray, opening: Opening) -> list[int]:
-    """Return the samples in the middle of a vessel's floor and of its underside; none for what has no floor, such as a funnel."""
+    """Return the samples at the centre of a vessel's floor and underside; empty if it has no floor, such as a funnel."""
     if opening.axis[2] < _UPWARD:
         return []
     offset, up = points_m - opening.center_m, normals @ opening.axis
@@ -101,7 +101,7 @@ def _resting(points_m: np.ndarray, normals: np.ndarray, size_m: float) -> np.nda
 def _places(
     tree: cKDTree, points_m: np.ndarray, normals: np.ndarray, bends: _Bends, size_m: float, floor: list[int]
 ) -> list[int]:
-    """Return ``floor``, and samples at the middles of flat parts, on bumps and at outermost ends, none of them near another."""
+    """Return ``floor`` and samples at extremities, centres of flat regions and on bumps, with a minimum mutual distance."""
     spacing = float(np.median(tree.query(points_m[:500], 2)[0][:, 1]))
     middles, bumps = _middles(tree, points_m, normals, bends, size_m, 2.5 * spacing)
     found: list[int] = []
@@ -118,7 +118,9 @@ def _places(
 def _middles(
     tree: cKDTree, points_m: np.ndarray, normals: np.ndarray, bends: _Bends, size_m: float, least_m: float
 ) -> tuple[list[int], list[int]]:
-    """Return the samples in the middle of what edges enclose, the widest first, and of these the small ones that stand out."""
+    """Return the samples at the centres of regions enclosed by edges, widest first, and separately those of small raised
+    regions.
+    """
     middles: list[int] = []
     bumps: list[int] = []
     left = np.isfinite(bends.inner_m) & (bends.inner_m > least_m)
@@ -129,11 +131,11 @@ def _middles(
         half = float(bends.inner_m[top])
         around = np.array(tree.query_ball_point(points_m[top], max(3.0 * half, least_m)))
         alike = around[normals[around] @ normals[top] > 0.8]
-        plateau = alike[bends.inner_m[alike] > 0.85 * half]  # of a long part the middle of its ridge
+        plateau = alike[bends.inner_m[alike] > 0.85 * half]  # for an elongated region, the middle of its medial ridge
         middle = points_m[plateau].mean(0)
         index = int(plateau[np.linalg.norm(points_m[plateau] - middle, axis=1).argmin()])
         if np.linalg.norm(normals[alike].mean(0)) < _FLAT:
-            pass  # the side of something round: it has no middle
+            pass  # the side of a round object has no centre
         elif half > _SMALL_SHARE * size_m:
             middles += [index] if len(middles) < _MIDDLES else []
         elif len(bumps) < _BUMPS and _stands_out(points_m[around], points_m[top], normals[top], half):
@@ -152,7 +154,7 @@ def _stands_out(around_m: np.ndarray, top_m: np.ndarray, normal: np.ndarray, hal
 
 
 def _ends(points_m: np.ndarray, size_m: float) -> list[int]:
-    """Return the samples that are the farthest from the middle for a fifth of the longest side around, the farthest first."""
+    """Return the samples farthest from the box centre within a radius of a fifth of the longest side, farthest first."""
     away = np.linalg.norm(points_m - (points_m.min(0) + points_m.max(0)) / 2, axis=1)
     left, found = away > 0.35 * size_m, list[int]()
     while left.any() and len(found) < _ENDS:

@@ -1,8 +1,8 @@
-"""The canonical frame of an object: its up axis, and the object frame.
+"""The canonical frame of an object: choice of its up axis, and the object frame.
 
-The up axis is the one that the user states, else that of the format, snapped onto a pose in which the object really rests. The
-object frame is right-handed, +Z up, its origin at the bottom centre, with the input's yaw kept; of what is laid
-down the axis that is up in its file lies along X or Y.
+The up axis is the one that the user states, else that of the file format, adjusted to a pose in which the object really rests.
+The object frame is right-handed with +Z up and its origin at the bottom centre. The yaw of the input is kept; if an object is
+laid down, the axis that is up in its file is aligned with X or Y.
 """
 
 from __future__ import annotations
@@ -24,10 +24,12 @@ _FORMAT_TO_Z_UP = {
     "y": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
     "x": np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]]),
 }
-_NEAR_DEG = 10.0  # scans stand up to 3 degrees off their base (pan, crock); a pose this near is the one meant
-_TILTED_DEG = 35.0  # generators keep some of the photo's view from above
+_NEAR_DEG = (
+    10.0  # scans stand up to 3 degrees off their base (pan, crock); a pose within this angle is the intended one
+)
+_TILTED_DEG = 35.0  # generators keep part of the photo's view from above
 _LEAST_PROBABILITY = 0.01  # an upright bottle has 0.04, a fork on its tines less than 0.001
-_SAME_SIDE_DEG = 20.0  # a round or facetted thing that rolls a little lies on the same side
+_SAME_SIDE_DEG = 20.0  # poses of a round or facetted object that rolls a little count as one side
 _NEARLY_AS_LIKELY = 0.6
 _ELONGATED = 1.5
 _LONGER = 1.2
@@ -35,21 +37,21 @@ _LEANING_DEG = 45.0
 _LAY = "it lies with {} up, but such a thing stands, and it is round"
 _ON_END = "it does not rest with {} up, and such a thing lies; this is its likeliest side"
 _OVER = "it stands upside down in its file: it rests with {0} down, and not up"
-_EXACTLY_DEG = 1.0  # a thing that a generator has tilted rests on no axis of its file so exactly, but by chance
-_ROUND = 0.1  # relative difference of the two moments across the axis
+_EXACTLY_DEG = 1.0  # an object tilted by a generator rests this exactly on an axis of its file only by chance
+_ROUND = 0.1  # relative difference of the two moments of inertia across the axis
 _TALL = 0.9  # of its width: a lower vessel that is round about its file's horizontal axis may be a flask that stands on edge
-_AS_WIDE = 0.05  # relative difference of a round thing's widths across its axis
-_ROUND_SHARE = 0.6  # of the directions across the axis: the tab of a can makes it wider in the others
+_AS_WIDE = 0.05  # relative difference of a round object's widths across its axis
+_ROUND_SHARE = 0.6  # of the directions across the axis; the tab of a can widens it in the others
 _WIDTHS = 36
 
 
 @dataclass(frozen=True)
 class UpChoice:
-    """The up axis of a mesh: ``rotation (3, 3)`` from its own axes to Z-up.
+    """The chosen up axis of a mesh: ``rotation (3, 3)`` from the file's axes to Z-up.
 
-    ``up`` names the axis of the file it started from ('x' | 'y' | 'z'), ``probability`` is that of the resting pose
-    (0.0: it does not rest so), ``turned_deg`` the angle between that axis and the chosen up, ``reason`` one sentence
-    for a person.
+    ``up`` is the axis of the file from which the choice started ('x' | 'y' | 'z'), ``probability`` that of the resting pose
+    (0.0: it does not rest so), ``turned_deg`` the angle between that axis and the chosen up, ``reason`` an explanation in one
+    sentence.
     """
 
     rotation: np.ndarray
@@ -71,20 +73,27 @@ def choose_up(
     said_by: str = "the user",
     by_convention: bool = False,
 ) -> UpChoice:
-    """Choose the canonical pose of a watertight solid; its yaw is kept.
+    """Choose the canonical pose of a watertight solid, keeping its yaw.
 
-    ``file_up`` is the up axis that the format declares (None: no rule; Z is tried before Y). ``stands``: whether such a
-    thing is put down upright (None: unknown), ``opens_up`` whether an opening is the top of such a thing (False: it may be
-    hollow from below, as hats and toy bricks are), ``opens_aside`` that its openings are in its sides and say nothing, ``level``
-    that what stands has its long axis level, as vehicles do, and is stood on no end. ``said_by`` names who said the axis
-    ``user``, for the reason; ``by_convention``: nobody meant this thing by it, it is the up axis of its world.
+    ``user``: the stated up axis. ``file_up``: the up axis of the file format (None: undefined; Z is tried before Y).
+    ``stands``: whether such an object is placed upright (None: unknown). ``opens_up``: whether an opening is the top of such an
+    object (False: it may be hollow from below, as hats and toy bricks are). ``opens_aside``: its openings are in its sides and
+    give no information. ``level``: it stands with its long axis horizontal, as vehicles do, and never on end. ``said_by``: who
+    stated ``user``, for the reason. ``by_convention``: ``user`` is the up axis of its world, not chosen for this object.
 
-    In order: that axis, but by convention after the long axis of a round, long vessel (unless such a thing has it level, or this
-    one opens along the file's axis), and the likeliest side of what lies and does not rest with that axis up; for things that
-    lie, their likeliest side, the file's if nearly as likely; an opening upward, but of one that the file has underneath; for
-    round, long things that stand and round vessels, their axis; the file's axis; for things that stand, another axis of the file
-    that is as likely as what is near the file's own, then the file's axis downward; the likeliest side. All but an unstable axis
-    that was said are snapped onto the support facet.
+    Order of decisions:
+
+    - The stated axis. If stated by convention only, a lying round, long vessel is stood up first (unless ``level``, or if it
+      opens along the stated axis), and an object that lies and does not rest with that axis up is laid on its likeliest side.
+    - For objects that lie, the likeliest side, or the file's if nearly as likely.
+    - The opening upward, unless the file has it underneath for an object that may be hollow from below.
+    - For round, long objects that stand and for round vessels, their symmetry axis.
+    - The file's up axis.
+    - For objects that stand, another axis of the file with a pose at least as likely as those near its up axis, then the up
+      axis reversed.
+    - The likeliest side.
+
+    Except for a stated axis on which the object is unstable, the result is aligned with the support facet.
     """
     poses = stable_poses(solid.vertices, _center_of_mass(solid))
     if user != "auto":
@@ -159,7 +168,7 @@ def _as_told(poses: list[StablePose], axis: str, said_by: str) -> UpChoice:
 
 
 def _open_below(poses: list[StablePose], axes: list[str], opening: np.ndarray) -> tuple[str, StablePose] | None:
-    """Return the first of a file's axes on which a thing rests with its opening underneath, and that pose."""
+    """Return the first of the file's axes on which the object rests with its opening underneath, and that pose."""
     for axis in axes:
         near = _nearest(poses, _axis(axis), _NEAR_DEG)
         if near is not None and float(opening @ near.rotation[2]) < -np.cos(np.radians(_TILTED_DEG)):
@@ -173,9 +182,10 @@ def _opens_along(solid: trimesh.Trimesh, up: np.ndarray) -> bool:
 
 
 def _stood_up(solid: trimesh.Trimesh, poses: list[StablePose], up: np.ndarray, *, vessel: bool) -> StablePose | None:
-    """Return the end on which a lying round, long thing or a short round vessel stands; None where it stands with ``up`` upward.
+    """Return the end on which a lying round, long object or short round vessel stands; None if it already stands along ``up``.
 
-    That is the likelier end; of two ends of a short vessel that are nearly as likely, the one with the file's axis upward.
+    The more likely end is chosen. For a short vessel with two nearly equally likely ends, it is the one with the file's axis
+    upward.
     """
     along = _round_long_axis(solid)
     short = along is None and vessel
@@ -191,7 +201,9 @@ def _stood_up(solid: trimesh.Trimesh, poses: list[StablePose], up: np.ndarray, *
 
 
 def _stood_over(solid: trimesh.Trimesh, poses: list[StablePose], up: np.ndarray) -> StablePose | None:
-    """Return the lower end of a round, long thing that stands on it alone: a pump bottle whose file has it upside down."""
+    """Return the pose upside down of a round, long object that rests on that end only, e.g. a pump bottle inverted in its
+    file.
+    """
     along = _round_long_axis(solid)
     if along is None or not _along(along, up) or _likeliest_within(poses, up, _TILTED_DEG) is not None:
         return None
@@ -203,10 +215,10 @@ def _along(axis: np.ndarray, up: np.ndarray) -> bool:
 
 
 def _round_long_axis(solid: trimesh.Trimesh) -> np.ndarray | None:
-    """Return the direction ``(3,)`` of the long axis of a round, long thing; None of any other.
+    """Return the long axis ``(3,)`` of a round, long object; None for other objects.
 
-    Its long axis is that of the least moment of inertia of its hull, round where the other two are nearly equal: a can, a
-    bottle, a carton of square section, and no pan with its handle.
+    The long axis is that of least moment of inertia of the hull; the object is round if the other two moments are nearly equal.
+    Cans, bottles and cartons with square section qualify, a pan with its handle does not.
     """
     hull = solid.convex_hull
     moments, directions = np.linalg.eigh(np.asarray(hull.moment_inertia))
@@ -217,9 +229,9 @@ def _round_long_axis(solid: trimesh.Trimesh) -> np.ndarray | None:
 
 
 def _round_axis(solid: trimesh.Trimesh) -> np.ndarray | None:
-    """Return the axis ``(3,)`` of the file about which a thing is round, no lower than wide; None of any other.
+    """Return the axis ``(3,)`` of the file about which an object is round and no lower than wide; None for other objects.
 
-    It is as wide in most directions across it. A ball is round about all: its axis is none of them.
+    Round means equally wide in most directions across the axis. A ball is round about all axes and returns None.
     """
     corners = solid.convex_hull.vertices
     found = [axis for axis in map(_axis, _FORMAT_TO_Z_UP) if _is_round_about(corners, axis)]
@@ -236,7 +248,7 @@ def _is_round_about(corners: np.ndarray, axis: np.ndarray) -> bool:
 
 
 def _undeclared_axes(solid: trimesh.Trimesh, on_end: bool) -> list[str]:
-    """Return Z and Y in the order to try: a round, long thing that stands on an end has its axis up."""
+    """Return Z and Y in the order to try: Y first for a round object that is long along Y and stands on end."""
     x, y, z = solid.extents
     moments = np.diag(np.asarray(solid.convex_hull.moment_inertia))
     round_about_y = abs(moments[0] - moments[2]) < _ROUND * max(moments[0], moments[2])
@@ -246,7 +258,7 @@ def _undeclared_axes(solid: trimesh.Trimesh, on_end: bool) -> list[str]:
 
 
 def _on_another_axis(poses: list[StablePose], axes: list[str]) -> StablePose | None:
-    """Return the likeliest pose that has exactly another of the file's axes upward, or one of ``axes`` downward."""
+    """Return the likeliest pose with exactly another of the file's axes upward, or one of ``axes`` downward."""
     others = [sign * _axis(axis) for axis in _FORMAT_TO_Z_UP for sign in (1, -1) if sign < 0 or axis not in axes]
     found = [_nearest(poses, up, _EXACTLY_DEG) for up in others]
     return max((pose for pose in found if pose is not None), key=lambda pose: pose.probability, default=None)
@@ -255,7 +267,7 @@ def _on_another_axis(poses: list[StablePose], axes: list[str]) -> StablePose | N
 def _nearest(
     poses: list[StablePose], up: np.ndarray, within_deg: float, least: float = _LEAST_PROBABILITY
 ) -> StablePose | None:
-    """Return the pose nearest to having ``up`` upward, of those at least so likely, if within an angle."""
+    """Return the pose closest to ``up`` upward within an angle, among poses with at least the probability ``least``."""
     likely = [pose for pose in poses if pose.probability >= least and _angle_deg(pose, up) <= within_deg]
     return min(likely, key=lambda pose: (round(_angle_deg(pose, up), 3), -pose.probability), default=None)
 
@@ -266,9 +278,9 @@ def _likeliest_within(poses: list[StablePose], up: np.ndarray, within_deg: float
 
 
 def _likeliest_side(poses: list[StablePose], up: np.ndarray) -> StablePose:
-    """Return the likeliest pose of the likeliest side; of sides nearly as likely the one nearest to ``up``.
+    """Return the likeliest pose of the likeliest side; among sides nearly as likely, of the one nearest to ``up``.
 
-    A side is a pose with all others within 20 degrees of it.
+    A side is a pose together with all others within 20 degrees of it.
     """
     sides: list[list[StablePose]] = []
     for pose in poses:
@@ -283,10 +295,10 @@ def _likeliest_side(poses: list[StablePose], up: np.ndarray) -> StablePose:
 
 
 def _turned(pose: StablePose, axis: str, reason: str) -> UpChoice:
-    """Return the smallest turn from the file's axis onto the pose's support facet.
+    """Return the smallest rotation that brings the file's axis onto the pose's support facet.
 
-    Of what is laid down the axis that was up is then turned about the vertical onto the nearest of X and Y: a round thing lies
-    on any of its sides, and which one that is says nothing of its yaw.
+    If the object is laid down, the axis that was up is then rotated about the vertical onto the nearest of X and Y: a round
+    object may lie on any side, so that its yaw is arbitrary.
     """
     basis = _FORMAT_TO_Z_UP[axis]
     rotation = rotation_between(basis @ pose.rotation[2], _Z) @ basis
@@ -305,10 +317,10 @@ def _angle_deg(pose: StablePose, up: np.ndarray) -> float:
 
 
 def object_frame(vertices: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-    """Return the transform ``(4, 4)`` of a mesh's frame into the object frame.
+    """Return the transform ``(4, 4)`` from a mesh's frame to the object frame.
 
-    ``rotation (3, 3)`` turns it upright; the translation puts the lowest of ``vertices (V, 3)`` on z = 0 and the middle
-    of the axis-aligned box on x = y = 0.
+    ``rotation (3, 3)`` turns it upright. The translation puts the lowest of ``vertices (V, 3)`` at z = 0, and the centre of the
+    axis-aligned box at x = y = 0.
     """
     turned = vertices @ rotation.T
     low, high = turned.min(0), turned.max(0)

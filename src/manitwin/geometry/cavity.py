@@ -1,4 +1,4 @@
-"""Open cavities: what a container can hold, measured by looking into it."""
+"""Open cavities of containers: opening, depth and capacity, measured on a height field of parallel rays."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from manitwin.geometry.hulls.reduction import hull_volume
 from manitwin.geometry.kept import kept
 from manitwin.geometry.poses import rotation_between
 
-# Measured on 25 real meshes: the shallowest vessel (a plate) has depth 4.4 % of the longest side and the smallest (a
-# shoe) holds 5.4 % of its convex hull; the largest hollow that is none (a can's lid) holds 3.9 %, and sideways (a
-# clamp's jaws) 5.2 %.
+# Measured on 25 real meshes: the shallowest vessel (a plate) has a depth of 4.4 % of the longest side, and the smallest (a
+# shoe) holds 5.4 % of its convex hull. The largest hollow of an object that is not a vessel holds 3.9 % (a can's lid), and
+# sideways 5.2 % (a clamp's jaws).
 _MIN_DEPTH_SHARE = 0.04
 _MIN_VOLUME_SHARE = 0.05
 _MIN_VOLUME_SHARE_SIDEWAYS = 0.10
-_LARGEST_DRAIN_SHARE = 0.02  # of the outline's rectangle: a pot's drain, not the hole of a ring or a nut
-_CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], dtype=np.uint8)  # a cell and the four beside it
+_LARGEST_DRAIN_SHARE = 0.02  # of the outline's rectangle: the drain of a pot, but not the hole of a ring or a nut
+_CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], dtype=np.uint8)  # a cell and its four neighbours
 
 
 @dataclass(frozen=True)
 class Opening:
-    """The largest hollow that would hold water, in the object frame.
+    """The largest cavity that would hold water, in the object frame.
 
-    ``axis (3,)`` points out of it, ``center_m (3,)`` is the middle of its rim, ``rim_radius_m`` the radius of a
-    circle with the rim's area, ``volume_m3`` what it holds to the brim, ``depth_m`` from the brim to its deepest point.
+    ``axis (3,)`` points out of it, ``center_m (3,)`` is the centre of its rim, ``rim_radius_m`` the radius of a circle with the
+    rim's area, ``volume_m3`` its capacity to the brim, ``depth_m`` the distance from the brim to its deepest point.
     """
 
     axis: np.ndarray
@@ -41,9 +41,9 @@ class Opening:
 def cavity_volume(
     mesh: trimesh.Trimesh, up: np.ndarray, hull: trimesh.Trimesh | None = None, cells: int = 120
 ) -> float:
-    """Return the volume (m3) between the convex hull and the first surface met from ``up (3,)``.
+    """Return the volume (m3) between the convex hull and the first surface met along ``-up (3,)``.
 
-    ``hull`` is the mesh's convex hull where it is known already. The grid has ``cells`` along the longer side.
+    ``hull`` is the mesh's convex hull if already known. The grid has ``cells`` along the longer side.
     """
     hull = mesh.convex_hull if hull is None else hull
     grid = _look_grid(hull, np.asarray(up, dtype=float), cells)
@@ -51,13 +51,14 @@ def cavity_volume(
 
 
 def find_opening(mesh: trimesh.Trimesh, cells: int = 64) -> Opening | None:
-    """Return the largest opening of a mesh, or None where nothing would hold water.
+    """Return the largest opening of a mesh; None if nothing would hold water.
 
-    It looks along the mesh's own axes and its principal ones. An opening is a basin of the height field seen from
-    outside: at least 4 % of the longest side deep and 5 % of the convex hull's volume large, 10 % where it does not
-    open upward. Walls thinner than a cell of the grid hold by their edges; a drain in the floor (2 % of the outline's rectangle
-    at most) counts as closed. Source: depressions filled as by priority flood (Barnes, Lehman and Mulla 2014).
-    Many ask about one mesh; it is looked at once.
+    The directions tried are the mesh's own axes and its principal axes. An opening is a basin of the height field seen from
+    outside, with a depth of at least 4 % of the longest side and a volume of at least 5 % of the convex hull's, or 10 % if it
+    does not open upward. Walls thinner than a grid cell are represented by their edges. A drain in the floor (at most 2 % of
+    the outline's rectangle) counts as closed. The result is cached with the mesh.
+
+    Source: filling of depressions as in priority flood (Barnes, Lehman and Mulla 2014).
     """
     return kept(mesh, f"opening {cells}", lambda: _found_opening(mesh, cells))
 
@@ -76,7 +77,8 @@ def _found_opening(mesh: trimesh.Trimesh, cells: int) -> Opening | None:
         heights = grid.heights(mesh_rays)
         if grid.volume_between(heights, grid.heights(hull_rays)) < least_m3:
             continue
-        # A wall thinner than a cell may fall between two rays; one raised to its edges holds, but takes whole cells.
+        # A wall thinner than a cell may fall between two rays. Raising cells to its edges closes it, but it then fills whole
+        # cells.
         basins = [_basin(grid, grid.with_drains_closed(each)) for each in (heights, grid.with_edges(heights, mesh))]
         opening = max((b for b in basins if b is not None), key=lambda basin: basin.volume_m3, default=None)
         if (
@@ -90,7 +92,7 @@ def _found_opening(mesh: trimesh.Trimesh, cells: int) -> Opening | None:
 
 @dataclass(frozen=True)
 class _LookGrid:
-    """Parallel rays down ``-up`` over a square grid: ``origins (R, 3)`` above the mesh, in rows of ``shape``."""
+    """Parallel rays along ``-up`` from a square grid: ``origins (R, 3)`` above the mesh, in rows of ``shape``."""
 
     origins: np.ndarray
     shape: tuple[int, int]
@@ -98,7 +100,7 @@ class _LookGrid:
     cell_m: float
 
     def heights(self, surface: RayMeshIntersector) -> np.ndarray:
-        """Return the height along ``up`` of the first surface met, in the grid's shape; NaN where there is none."""
+        """Return the height along ``up`` of the first surface hit, in the grid's shape; NaN for no hit."""
         directions = np.repeat(-self.up[None], len(self.origins), axis=0)
         _, rays, locations = surface.intersects_id(self.origins, directions, multiple_hits=False, return_locations=True)
         heights = np.full(len(self.origins), np.nan)
@@ -107,7 +109,7 @@ class _LookGrid:
         return heights.reshape(self.shape)
 
     def with_edges(self, heights: np.ndarray, mesh: trimesh.Trimesh) -> np.ndarray:
-        """Return heights raised to the mesh's edges in each cell: a rim is an edge, however thin its wall."""
+        """Return heights raised to the mesh's edges in each cell, so that a rim counts however thin its wall is."""
         rotation = rotation_between(self.up, np.array([0.0, 0, 1]))
         ends = (mesh.vertices @ rotation.T)[mesh.edges_unique]
         spans = np.linalg.norm(np.diff(ends[:, :, :2], axis=1)[:, 0], axis=1)
@@ -123,7 +125,7 @@ class _LookGrid:
         return np.where(np.isinf(raised), np.nan, raised)
 
     def with_drains_closed(self, heights: np.ndarray) -> np.ndarray:
-        """Return heights with small holes in the middle filled to the matter around them: a flower pot's drain."""
+        """Return heights with small inner holes filled to the level of their border, e.g. the drain of a flower pot."""
         count, labels, stats, _ = cv2.connectedComponentsWithStats(np.isnan(heights).astype(np.uint8), connectivity=4)
         closed = heights.copy()
         for number in range(1, count):
@@ -136,7 +138,7 @@ class _LookGrid:
         return closed
 
     def volume_between(self, lower: np.ndarray, upper: np.ndarray) -> float:
-        """Return the volume (m3) between two height fields, where both are."""
+        """Return the volume (m3) between two height fields over the cells where both are defined."""
         return float(np.nansum(np.maximum(upper - lower, 0))) * self.cell_m**2
 
 
@@ -153,7 +155,7 @@ def _look_grid(hull: trimesh.Trimesh, up: np.ndarray, cells: int) -> _LookGrid:
 
 
 def _candidate_axes(hull: trimesh.Trimesh) -> list[np.ndarray]:
-    """Return the object's axes, +Z first, and those principal axes that differ from them by more than 10 degrees."""
+    """Return the object's axes, +Z first, and the principal axes that differ from them by more than 10 degrees."""
     axes = [np.array(a, dtype=float) for a in ((0, 0, 1), (0, 0, -1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0))]
     for principal in hull.principal_inertia_vectors:
         for axis in (principal, -principal):
@@ -163,7 +165,7 @@ def _candidate_axes(hull: trimesh.Trimesh) -> list[np.ndarray]:
 
 
 def _basin(grid: _LookGrid, heights: np.ndarray) -> Opening | None:
-    """Return the deepest basin of a height field, or None where all runs off."""
+    """Return the deepest basin of a height field; None if all water runs off."""
     if not np.isfinite(heights).any():
         return None
     level = _flooded(heights)
@@ -182,10 +184,10 @@ def _basin(grid: _LookGrid, heights: np.ndarray) -> Opening | None:
 
 
 def _flooded(heights: np.ndarray) -> np.ndarray:
-    """Return the water level of every cell when all basins are full; the border and cells that are NaN drain.
+    """Return the water level of every cell with all basins full; border and NaN cells drain.
 
-    Water sinks until every cell holds the lowest level around it or its own ground, whichever is higher: the same fixed
-    point as the priority flood's, reached with a picture's erosions.
+    Levels sink until every cell has the lowest level of its neighbourhood or its own ground, whichever is higher. This is the
+    fixed point of priority flood, computed with image erosions.
     """
     beside = np.isnan(heights)
     drains = beside.copy()

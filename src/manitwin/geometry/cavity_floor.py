@@ -1,4 +1,4 @@
-"""The floor of a cavity: how deep things may reach into a vessel near its axis."""
+"""The floor of a vessel's cavity: how far an object may be lowered near its axis."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ AZIMUTHS = 8
 
 
 def floor_below_rim(hulls: Sequence[np.ndarray], opening: Opening, radius_m: float) -> float:
-    """Return the height (negative, m) from the rim's middle of the highest floor in a vessel within a radius of its axis."""
+    """Return the height (m, negative) relative to the rim's centre of the highest floor within a radius of the vessel's axis."""
     basis = rotation_of(opening.axis)
     angles = np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS
     ring = radius_m * np.column_stack([np.cos(angles), np.sin(angles)])

@@ -1,4 +1,4 @@
-"""Exact distance from points to a triangle mesh, unsigned and signed."""
+"""Exact unsigned and signed distances from points to a triangle mesh."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from scipy.spatial import cKDTree
 from manitwin.geometry.kept import kept
 
 _LEAF_TRIANGLES = 4
-_PAIRS_PER_CHUNK = 400_000  # (point, node) pairs tested at once: bounds the memory
-_FEATURE_TOLERANCE = 1e-9  # barycentric slack below which a closest point counts as on an edge or a vertex
+_PAIRS_PER_CHUNK = 400_000  # (point, node) pairs tested at once, to bound the memory
+_FEATURE_TOLERANCE = 1e-9  # barycentric tolerance within which a closest point lies on an edge or vertex
 
 
 def distance_to_surface(points: np.ndarray, mesh: trimesh.Trimesh) -> np.ndarray:
@@ -19,10 +19,10 @@ def distance_to_surface(points: np.ndarray, mesh: trimesh.Trimesh) -> np.ndarray
 
 
 def closest_faces(points: np.ndarray, mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
-    """Return the face index ``(N,)`` closest to each point ``(N, 3)`` and its exact distance ``(N,)`` m.
+    """Return the index ``(N,)`` of the face closest to each point ``(N, 3)``, and the exact distance ``(N,)`` m.
 
-    Source: branch and bound over a balanced tree of boxes, from the nearest corner on; point to triangle after Ericson,
-    Real-Time Collision Detection, 5.1.5.
+    Method: branch and bound over a balanced tree of boxes, with the nearest vertex as the initial bound; point to triangle
+    distance after Ericson, Real-Time Collision Detection, 5.1.5.
     """
     return ClosestFaces(mesh).of(points)
 
@@ -48,9 +48,9 @@ def signed_distance(points: np.ndarray, mesh: trimesh.Trimesh) -> np.ndarray:
 
 
 def closest_points_on_triangles(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the closest point ``(N, 3)`` of each triangle ``(N, 3, 3)`` to its point, and its barycentric weights.
+    """Return the closest point ``(N, 3)`` on each triangle ``(N, 3, 3)`` to its point, and the barycentric weights ``(N, 3)``.
 
-    Triangles without area count as their edges.
+    Degenerate triangles are treated as their edges.
     """
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
     weights = _interior_weights(points, a, b, c)
@@ -65,7 +65,7 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _interior_weights(points: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """Return barycentric weights of the projections onto the triangles' planes; -1 where a triangle has no area."""
+    """Return barycentric weights of the projections onto the triangles' planes; -1 for degenerate triangles."""
     ab, ac, ap = b - a, c - a, points - a
     d00, d01, d11, d20, d21 = _dot(ab, ab), _dot(ab, ac), _dot(ac, ac), _dot(ap, ab), _dot(ap, ac)
     determinant = d00 * d11 - d01 * d01
@@ -101,13 +101,13 @@ def _edge_normals(mesh: trimesh.Trimesh) -> np.ndarray:
 
 
 class ClosestFaces:
-    """A mesh prepared for ``closest_faces``, where it is asked more than once."""
+    """A mesh prepared for repeated ``closest_faces`` queries."""
 
     def __init__(self, mesh: trimesh.Trimesh):
         self._tree = kept(mesh, "box tree", lambda: _BoxTree(np.asarray(mesh.triangles, dtype=float)))
 
     def of(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the face index ``(N,)`` closest to each point ``(N, 3)`` and its exact distance ``(N,)`` m."""
+        """Return the index ``(N,)`` of the face closest to each point ``(N, 3)``, and the exact distance ``(N,)`` m."""
         return self._tree.closest(np.asarray(points, dtype=float).reshape(-1, 3))
 
 
@@ -120,7 +120,7 @@ class _BoxTree:
         leaves = 2**self.depth
         size = -(-count // leaves)
         centers = triangles.mean(1)
-        order: np.ndarray = np.resize(np.arange(count), leaves * size)  # the first ones again, to fill the last leaf
+        order: np.ndarray = np.resize(np.arange(count), leaves * size)  # triangles are repeated to fill the last leaf
         for level in range(self.depth):
             order = order.reshape(2**level, -1)
             grouped = centers[order]
@@ -139,7 +139,7 @@ class _BoxTree:
 
     def closest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the index of the closest triangle and its distance for every point."""
-        # The nearest corner gives the bound that prunes the search.
+        # The nearest vertex gives the initial bound for pruning.
         face = self.corners.query(points)[1] // 3
         offset = points - closest_points_on_triangles(points, self.triangles[face])[0]
         squared = _dot(offset, offset)

@@ -1,17 +1,19 @@
-"""Choose some of many directions so that they are spread as evenly as the others allow."""
+"""Selection of evenly spread directions from a given set."""
 
 from __future__ import annotations
 
 import numpy as np
 
-_DIGITS = 5  # of distances between unit vectors: what rounds otherwise on another processor decides nothing
+_DIGITS = (
+    5  # of distances between unit vectors, so that rounding differences between processors do not change the result
+)
 
 
 def evenly_spread(directions: np.ndarray, count: int) -> np.ndarray:
-    """Return which ``count`` of unit vectors ``(N, 3)`` are kept: their numbers, in order; the first is one of them.
+    """Return the sorted indices of ``count`` of the unit vectors ``(N, 3)``; the first vector is always kept.
 
-    Of the two that lie closest together the one with the closer next neighbour goes, until ``count`` are left. It takes
-    ``12 N N`` bytes.
+    Of the closest remaining pair, the vector with the closer next neighbour is removed, until ``count`` are left. Memory: ``12
+    N N`` bytes.
     """
     left = np.ones(len(directions), dtype=bool)
     apart = _distances(directions)

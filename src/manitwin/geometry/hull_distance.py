@@ -1,8 +1,8 @@
-"""Distances and overlaps of bodies that are made of convex hulls, and of many pairs of convex point sets at once.
+"""Distance and overlap of bodies composed of convex hulls, and batched distances of pairs of convex point sets.
 
-Source: Gilbert, Johnson and Keerthi 1988, "A fast procedure for computing the distance between complex objects"; the point of
-a simplex nearest to the origin is sought among all of its faces, which is as exact as their recursion and runs over all pairs
-at once.
+Source: Gilbert, Johnson and Keerthi 1988, "A fast procedure for computing the distance between complex objects". The point of a
+simplex nearest to the origin is found by testing all of its faces, which is as exact as their recursion and can be vectorized
+over all pairs.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ from scipy.spatial import ConvexHull
 from manitwin.geometry.poses import transform_points
 from manitwin.geometry.rigid_body import StaticBox
 
-_AT_ONCE = 4096  # pairs of parts in one call, which bounds the memory
-_FIRST_PAIRS = 16  # tried first: where two bodies meet, it is mostly in one of the pairs whose boxes are nearest
-SAME_NORMAL = 1e-4  # normals that differ by less in each coordinate are those of one flat face
+_AT_ONCE = 4096  # pairs of parts per call, to bound the memory
+_FIRST_PAIRS = 16  # tried first: bodies that touch mostly do so in one of the pairs with the nearest boxes
+SAME_NORMAL = 1e-4  # normals that differ by less in each coordinate belong to one flat face
 
 MAX_ITERATIONS = 60
-TOLERANCE_M = 1e-7  # of the distance: far below any gap or overlap that is asked for
+TOLERANCE_M = 1e-7  # of the distance, far below all gaps and overlaps of interest
 _EDGES = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
 _FACES = np.array([(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)])
-_OPPOSITE = np.array([3, 2, 1, 0])  # the corner that a face leaves out
-_FLAT = 1e-18  # a squared volume or area, over that of its edges, that is no more than rounding
+_OPPOSITE = np.array([3, 2, 1, 0])  # the corner opposite to each face
+_FLAT = 1e-18  # squared volume or area relative to that of the edges, below which it is rounding error
 
 
 @dataclass(frozen=True)
 class ConvexParts:
-    """A body's convex parts in its own frame.
+    """The convex parts of a body in its own frame.
 
-    ``whole (V, 3)`` are the corners of their common convex hull, ``parts (H, M, 3)`` those of each part, the first one
-    repeated to equal numbers, ``normals`` the directions ``(K, 3)`` of each part's faces.
+    ``whole (V, 3)`` are the vertices of their common convex hull; ``parts (H, M, 3)`` those of each part, padded to equal
+    length with its first vertex; ``normals`` the distinct face normals ``(K, 3)`` of each part.
     """
 
     whole: np.ndarray
@@ -44,7 +44,7 @@ class ConvexParts:
 
     @classmethod
     def of(cls, hulls: Sequence[np.ndarray]) -> ConvexParts:
-        """Take hulls, each ``(V, 3)`` m."""
+        """Build the parts from hulls, each ``(V, 3)`` m."""
         found = [ConvexHull(hull) for hull in hulls]
         corners = [hull.points[hull.vertices] for hull in found]
         most = max(len(each) for each in corners)
@@ -56,12 +56,12 @@ class ConvexParts:
 
     @classmethod
     def of_box(cls, box: StaticBox) -> ConvexParts:
-        """Take a piece of furniture."""
+        """Build a single part from a static box."""
         corners = np.array(trimesh.creation.box(extents=2 * box.half_extents_m).vertices)
         return cls(corners, corners[None], (np.vstack([np.eye(3), -np.eye(3)]),))
 
     def at(self, pose: np.ndarray) -> PlacedParts:
-        """Return the parts at a pose ``(4, 4)`` of their frame in the world."""
+        """Return the parts at a pose ``(4, 4)`` in the world."""
         return PlacedParts(self, pose)
 
 
@@ -74,27 +74,27 @@ class PlacedParts:
 
     @cached_property
     def whole(self) -> np.ndarray:
-        """The corners of the common convex hull ``(V, 3)``."""
+        """The vertices of the common convex hull ``(V, 3)``."""
         return transform_points(self.pose, self.body.whole)
 
     @cached_property
     def parts(self) -> np.ndarray:
-        """The corners of each part ``(H, M, 3)``."""
+        """The vertices of each part ``(H, M, 3)``."""
         return self.body.parts @ self.pose[:3, :3].T + self.pose[:3, 3]
 
     @cached_property
     def part_bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """The least and the largest coordinates of each part, ``(H, 3)`` each."""
+        """The lower and upper bounds of each part, ``(H, 3)`` each."""
         return self.parts.min(1), self.parts.max(1)
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """The least and the largest coordinates of all, ``(3,)`` each."""
+        """The lower and upper bounds of the body, ``(3,)`` each."""
         return self.whole.min(0), self.whole.max(0)
 
 
 def distance(first: PlacedParts, second: PlacedParts, *, beyond_m: float = np.inf) -> float:
-    """Return the distance (m) of two bodies, 0 where they overlap; above ``beyond_m`` it is only a lower bound."""
+    """Return the distance (m) between two bodies, 0 if they overlap; a result above ``beyond_m`` is only a lower bound."""
     apart = _box_gap(*first.bounds, *second.bounds)
     if apart > beyond_m:
         return float(apart)
@@ -116,7 +116,7 @@ def distance(first: PlacedParts, second: PlacedParts, *, beyond_m: float = np.in
 
 
 def is_clear_of(body: PlacedParts, others: Sequence[PlacedParts], gap_m: float) -> bool:
-    """Tell whether no other body is nearer than a gap: by boxes, then by common convex hulls at once, then by parts."""
+    """Return whether no other body is closer than ``gap_m``; tested by boxes, then common convex hulls (batched), then parts."""
     near = [other for other in others if _box_gap(*body.bounds, *other.bounds) <= gap_m]
     if not near:
         return True
@@ -128,7 +128,7 @@ def is_clear_of(body: PlacedParts, others: Sequence[PlacedParts], gap_m: float) 
 
 
 def _parts_within(first: PlacedParts, second: PlacedParts, gap_m: float) -> bool:
-    """Tell whether a part of one is no farther than ``gap_m`` from a part of the other; pairs of near boxes are tried first."""
+    """Return whether any two parts are within ``gap_m``; pairs with the nearest boxes are tested first."""
     gaps = _part_gaps(first, second).ravel()
     order = np.argsort(gaps, kind="stable")
     order = order[gaps[order] <= gap_m]
@@ -142,7 +142,7 @@ def _parts_within(first: PlacedParts, second: PlacedParts, gap_m: float) -> bool
 
 
 def least_distance(pairs: Sequence[tuple[PlacedParts, PlacedParts]]) -> float:
-    """Return the distance (m) of the pair that is nearest to each other; infinite without pairs."""
+    """Return the distance (m) of the closest pair; infinite without pairs."""
     gaps = [float(_box_gap(*first.bounds, *second.bounds)) for first, second in pairs]
     least = np.inf
     for index in np.argsort(gaps, kind="stable"):
@@ -153,10 +153,10 @@ def least_distance(pairs: Sequence[tuple[PlacedParts, PlacedParts]]) -> float:
 
 
 def overlap_depth(first: PlacedParts, second: PlacedParts) -> float:
-    """Return how deep (m) two bodies overlap, 0 where they do not: the deepest pair of their parts.
+    """Return the overlap depth (m) of two bodies, 0 if they are disjoint: that of their deepest pair of parts.
 
-    The depth of a pair is the shortest way out along a face normal of either. Where two edges cross, a shorter way can be
-    along the normal of both; so the answer is never too small.
+    The depth of a pair is the shortest separating translation along a face normal of either part. For crossing edges, a shorter
+    one may exist along their common normal, so the depth is never underestimated.
     """
     if (_box_gap(*first.bounds, *second.bounds) > 0).any():
         return 0.0
@@ -176,26 +176,26 @@ def _pair_depth(first: PlacedParts, row: int, second: PlacedParts, column: int) 
 
 
 def _part_gaps(first: PlacedParts, second: PlacedParts) -> np.ndarray:
-    """Return the distances ``(H1, H2)`` (m) of the parts' boxes, lower bounds of those of the parts."""
+    """Return the distances ``(H1, H2)`` m between the parts' bounding boxes, which are lower bounds for the parts."""
     return _box_gap(*(bound[:, None] for bound in first.part_bounds), *(bound[None] for bound in second.part_bounds))
 
 
 def _box_gap(low_a: np.ndarray, high_a: np.ndarray, low_b: np.ndarray, high_b: np.ndarray) -> np.ndarray:
-    """Return the distance of axis-aligned boxes; 0 where they overlap."""
+    """Return the distance between axis-aligned boxes; 0 if they overlap."""
     apart = np.maximum(np.maximum(low_a - high_b, low_b - high_a), 0.0)
     return np.sqrt(np.square(apart).sum(-1))
 
 
 def _distinct(normals: np.ndarray) -> np.ndarray:
-    """Return the normals ``(K, 3)``, one for each flat face however many triangles it has."""
+    """Return one normal for each flat face, however many triangles it has: ``(K, 3)``."""
     cells = np.round(normals / SAME_NORMAL)
     return normals[np.sort(np.unique(cells, axis=0, return_index=True)[1])]
 
 
 def convex_distances(first: np.ndarray, second: np.ndarray, *, beyond_m: float = np.inf) -> np.ndarray:
-    """Return the distances ``(P,)`` between the convex hulls of points ``(P, A, 3)`` and ``(P, B, 3)``; 0 where they overlap.
+    """Return the distances ``(P,)`` between the convex hulls of points ``(P, A, 3)`` and ``(P, B, 3)``; 0 if they overlap.
 
-    Where the distance is above ``beyond_m``, what is returned may be a lower bound of it that is above ``beyond_m`` too.
+    For a distance above ``beyond_m``, the result may be a lower bound that is itself above ``beyond_m``.
     """
     pairs = len(first)
     result = np.zeros(pairs)
@@ -219,7 +219,7 @@ def convex_distances(first: np.ndarray, second: np.ndarray, *, beyond_m: float =
 
 
 def support(first: np.ndarray, second: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Return the point of ``first - second`` farthest along a direction, ``(P, 3)``."""
+    """Return the support point of the Minkowski difference ``first - second`` along each direction, ``(P, 3)``."""
     rows = np.arange(len(first))
     ahead = first[rows, np.matmul(first, direction[..., None])[..., 0].argmax(1)]
     behind = second[rows, np.matmul(second, direction[..., None])[..., 0].argmin(1)]
@@ -228,9 +228,11 @@ def support(first: np.ndarray, second: np.ndarray, direction: np.ndarray) -> np.
 
 
 def nearest_on_simplex(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the point nearest to the origin ``(P, 3)``, the corners that it lies between ``(P, 4)``, and whether it is inside.
+    """Return the point of each simplex nearest to the origin ``(P, 3)``, a mask of the corners spanning it ``(P, 4)``, and
+    containment.
 
-    ``corners (P, 4, 3)`` may coincide: a simplex of fewer corners has some twice.
+    ``corners (P, 4, 3)`` may contain duplicates: a simplex of lower dimension repeats some. Containment ``(P,) bool`` states
+    whether the tetrahedron contains the origin.
     """
     rows = np.arange(len(corners))
     on_edges, along = _nearest_on_edges(corners)
@@ -259,7 +261,7 @@ def _nearest_on_edges(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _nearest_on_faces(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the feet of the origin on the planes of the four faces, and whether each lies inside its face."""
+    """Return the projections of the origin onto the planes of the four faces, and whether each lies inside its face."""
     a, b, c = (corners[:, _FACES[:, k]] for k in range(3))
     normal = _cross(b - a, c - a)
     area2 = np.einsum("pki,pki->pk", normal, normal)
@@ -284,7 +286,7 @@ def _holds_origin(corners: np.ndarray) -> np.ndarray:
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    # four times as fast as numpy's own for small arrays
+    # four times as fast as numpy.cross for small arrays
     result = np.empty(a.shape)
     ax, ay, az, bx, by, bz = a[..., 0], a[..., 1], a[..., 2], b[..., 0], b[..., 1], b[..., 2]
     result[..., 0] = ay * bz - az * by

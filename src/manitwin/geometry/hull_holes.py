@@ -1,4 +1,4 @@
-"""Holes between convex hulls: does a rod fit through, and is a point enclosed by them."""
+"""Holes between convex hulls: tests whether a rod passes through, and whether a point is enclosed."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ _TURNS = 24
 def rod_passes(
     hulls: Sequence[np.ndarray], center_m: np.ndarray, axis: np.ndarray, radius_m: float, half_length_m: float
 ) -> bool:
-    """Tell whether a rod along an axis ``(3,)`` through a point stays outside of all hulls, each ``(V, 3)`` m.
+    """Return whether a rod along ``axis (3,)`` through a point does not intersect any of the hulls, each ``(V, 3)`` m.
 
-    Exact: of each hull, what is at the rod's length is looked at along the axis. One that touches it stays outside.
+    Exact: the section of each hull within the rod's length is projected along the axis. A rod that touches a hull passes.
     """
     return not any(_meets(seen, radius_m) for seen in _along(hulls, center_m, axis, half_length_m))
 
@@ -25,7 +25,7 @@ def rod_passes(
 def _along(
     hulls: Sequence[np.ndarray], center_m: np.ndarray, axis: np.ndarray, half_length_m: float
 ) -> Iterator[np.ndarray]:
-    """Yield, of each hull within a slab across an axis, the points ``(N, 2)`` whose hull it covers, seen along the axis."""
+    """Yield, for each hull cut to a slab across the axis, the projected points ``(N, 2)`` whose convex hull it covers."""
     z = axis / np.linalg.norm(axis)
     x = np.cross(z, np.eye(3)[np.abs(z).argmin()])
     frame = np.stack([x / np.linalg.norm(x), np.cross(z, x) / np.linalg.norm(x), z], axis=1)
@@ -44,10 +44,10 @@ def _along(
 
 
 def _meets(points: np.ndarray, radius_m: float) -> bool:
-    """Tell whether the convex hull of points ``(N, 2)`` meets a disc about the origin.
+    """Return whether the convex hull of points ``(N, 2)`` meets a disc about the origin.
 
-    It does not where some direction has all points beyond the disc: each point allows an arc of directions, none of which is
-    longer than half a turn.
+    They are disjoint if some direction has all points beyond the disc. Each point allows an arc of such directions, none longer
+    than half a turn; the hull meets the disc if the arcs have no common direction.
     """
     away = np.linalg.norm(points, axis=1)
     if (away <= radius_m).any():
@@ -58,18 +58,18 @@ def _meets(points: np.ndarray, radius_m: float) -> bool:
 
 
 def enclosed_share(hulls: Sequence[np.ndarray], point_m: np.ndarray, axis: np.ndarray, reach_m: float) -> float:
-    """Return the share of 24 rays from a point across an axis ``(3,)`` that meet a hull within ``reach_m``."""
+    """Return the share of 24 rays from a point, perpendicular to ``axis (3,)``, that meet a hull within ``reach_m``."""
     ways = _ways_m(hulls, point_m, _around(axis))
     return float((ways <= reach_m).mean())
 
 
 def free_way_m(hulls: Sequence[np.ndarray], point_m: np.ndarray, direction: np.ndarray) -> float:
-    """Return how far from a point one meets a hull in a direction ``(3,)`` (m); infinity where there is none."""
+    """Return the distance (m) from a point to the first hull along ``direction (3,)``; infinity if there is none."""
     return float(_ways_m(hulls, point_m, direction[None] / np.linalg.norm(direction))[0])
 
 
 def _ways_m(hulls: Sequence[np.ndarray], point_m: np.ndarray, rays: np.ndarray) -> np.ndarray:
-    """Return how far unit rays ``(N, 3)`` from a point come until they enter a hull: Cyrus and Beck's clipping by its planes."""
+    """Return the distances at which unit rays ``(N, 3)`` from a point enter a hull, by Cyrus-Beck clipping against its planes."""
     ways = np.full(len(rays), np.inf)
     for hull in hulls:
         planes = ConvexHull(hull).equations
@@ -84,7 +84,7 @@ def _ways_m(hulls: Sequence[np.ndarray], point_m: np.ndarray, rays: np.ndarray) 
 
 
 def _around(axis: np.ndarray) -> np.ndarray:
-    """Return unit vectors ``(24, 3)`` across an axis."""
+    """Return 24 unit vectors ``(24, 3)`` perpendicular to an axis."""
     z = axis / np.linalg.norm(axis)
     x = np.cross(z, np.eye(3)[np.abs(z).argmin()])
     frame = transform(np.stack([x / np.linalg.norm(x), np.cross(z, x) / np.linalg.norm(x), z], axis=1))

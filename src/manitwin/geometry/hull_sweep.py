@@ -1,7 +1,7 @@
-"""When convex hulls that move without turning meet others: many pairs at once.
+"""Times of impact of translating convex hulls, for many pairs at once.
 
-Source: van den Bergen 2004, "Ray casting against general convex objects with application to continuous collision detection":
-a ray from the origin against the Minkowski difference, clipped at each supporting plane that separates it.
+Source: van den Bergen 2004, "Ray casting against general convex objects with application to continuous collision detection": a
+ray from the origin against the Minkowski difference, clipped at each supporting plane that separates it.
 """
 
 from __future__ import annotations
@@ -18,17 +18,18 @@ _PARALLEL = 1e-12
 def first_contacts(
     moving: np.ndarray, others: np.ndarray, directions: np.ndarray, length_m: float, within_m: float = 0.0
 ) -> np.ndarray:
-    """Return how far (m) each of some hulls moves until it is within ``within_m`` of its other; infinite beyond ``length_m``.
+    """Return the distance (m) each hull translates until it is within ``within_m`` of its counterpart; infinite beyond
+    ``length_m``.
 
-    ``moving (P, A, 3)`` and ``others (P, B, 3)`` are the corners of each pair, ``directions (P, 3)`` unit vectors. Pairs that
-    are so near at the start give 0. Right to about ``TOLERANCE_M``, the ways never too long.
+    ``moving (P, A, 3)`` and ``others (P, B, 3)`` are the vertices of each pair, ``directions (P, 3)`` unit vectors. Pairs
+    within ``within_m`` at the start return 0. The error is about ``TOLERANCE_M``, and distances are never overestimated.
     """
     pairs = len(moving)
     result = np.full(pairs, np.inf)
     along = np.zeros(pairs)
-    # one corner, not the mean: others of the batch may have theirs filled up with copies
+    # a vertex, not the mean, as hulls in a batch may be padded with copies
     corners = np.repeat((others[:, 0] - moving[:, 0])[:, None], 4, axis=1)
-    apart = -corners[:, 0]  # from the nearest known point of the difference to the point that the ray has come to
+    apart = -corners[:, 0]  # from the nearest known point of the Minkowski difference to the current point of the ray
     active = np.arange(pairs)
     for _ in range(MAX_ITERATIONS):
         if not len(active):
@@ -62,10 +63,10 @@ def least_contacts(
     length_m: float,
     within_m: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the least of ``first_contacts`` of each group ``(G,)``, and the pairs' lower bounds ``(P,)``, raised where known.
+    """Return the minimum of ``first_contacts`` per group ``(G,)``, and lower bounds per pair ``(P,)``, raised where computed.
 
-    ``groups (P,)`` numbers from 0 to G - 1, ``at_least_m (P,)`` a lower bound of each pair's way. The most promising pair of each
-    group is asked first; one whose bound is not below what its group has found is not asked.
+    ``groups (P,)`` are group indices from 0 to G - 1, ``at_least_m (P,)`` lower bounds of each pair's distance. The most
+    promising pair of each group is computed first; pairs whose bound is not below the group's current minimum are skipped.
     """
     least = np.full(int(groups.max()) + 1, np.inf)
     bounds = at_least_m.copy()
@@ -82,7 +83,7 @@ def least_contacts(
 
 
 def _with(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Put a point into each simplex ``(P, 4, 3)`` in the place of a corner that is there twice."""
+    """Insert a point into each simplex ``(P, 4, 3)`` in place of a duplicate corner."""
     same = (corners[:, :, None] == corners[:, None]).all(-1) & ~np.eye(4, dtype=bool)
     place = np.where(same.any((1, 2)), same.any(2).argmax(1), 3)
     result = corners.copy()

@@ -1,4 +1,4 @@
-"""Integrals over the inside of a solid: small columns of matter along parallel rays."""
+"""Volume integrals over a solid, discretized into cells along parallel rays."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from manitwin.geometry.mass_properties import MassProperties
 from manitwin.geometry.ray_caster import RayCaster
 
 COLUMNS = 96
-"""Columns along the shorter sides of the box; a hammer's centre of mass is right to 1.5 mm (tested by closed form)."""
+"""Columns along each of the shorter sides of the box; a hammer's centre of mass is exact to 1.5 mm (tested in closed form)."""
 _MOST_WALLS = 40
 _PAST_HIT = 1e-7  # of the solid's size
 
 
 def columns_of(solid: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
-    """Return cells that fill a watertight solid: their centres ``(N, 3)`` m and volumes ``(N,)`` m3.
+    """Return cells that fill a watertight solid: centres ``(N, 3)`` m and volumes ``(N,)`` m3.
 
-    Rays along the longest side of the box enter and leave the solid; what lies between is cut to cells.
+    Rays along the longest side of the bounding box are cut where they enter and leave the solid, and divided into cells.
     """
     low, high = (np.asarray(bound, dtype=float) for bound in solid.bounds)
     order = np.argsort(high - low)
@@ -41,7 +41,7 @@ def columns_of(solid: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _inside(caster: RayCaster, origins: np.ndarray, along: int, past: float) -> list[tuple[int, float, float]]:
-    """Return the stretches inside as (ray, from, to), distances from the rays' origins."""
+    """Return the segments inside the solid as (ray, from, to), with distances from the rays' origins."""
     direction = np.zeros(3)
     direction[along] = 1.0
     reached = np.zeros(len(origins))
@@ -69,7 +69,7 @@ def _inside(caster: RayCaster, origins: np.ndarray, along: int, past: float) -> 
 
 
 def mass_properties_of(centers_m: np.ndarray, masses_kg: np.ndarray, volume_m3: float) -> MassProperties:
-    """Return the mass properties of small cells of matter at ``(N, 3)`` m of masses ``(N,)`` kg, taken as points."""
+    """Return the mass properties of point masses ``(N,)`` kg at ``(N, 3)`` m; ``volume_m3`` is passed through."""
     center = np.average(centers_m, axis=0, weights=masses_kg)
     arms = centers_m - center
     second = np.einsum("n,ni,nj->ij", masses_kg, arms, arms)

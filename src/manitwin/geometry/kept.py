@@ -1,4 +1,4 @@
-"""What is costly to make of a mesh, made once while the mesh stays as it is."""
+"""Cache of derived data in a mesh, valid while the mesh is unchanged."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ Made = TypeVar("Made")
 
 
 def kept(mesh: trimesh.Trimesh, name: str, make: Callable[[], Made]) -> Made:
-    """Return what ``make`` makes of a mesh, the same object each time it is asked for by ``name``.
+    """Return ``make()`` for a mesh, computed once per ``name``.
 
-    It lies in the mesh's own cache (trimesh), which is emptied when vertices or faces change.
+    It is stored in the mesh's own cache (trimesh), which is cleared when vertices or faces change.
     """
     cache = mesh._cache
     cache.verify()
     key = f"manitwin {name}"
     if key not in cache.cache:
-        made = make()  # it may ask the mesh for more, so the cache is looked at only now
+        made = make()  # ``make`` may use the mesh's cache itself
         cache.cache[key] = made
     return cast(Made, cache.cache[key])

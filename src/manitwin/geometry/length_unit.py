@@ -1,4 +1,4 @@
-"""The unit of a mesh: what the user states, else what the format declares, else what makes its size that of such a thing."""
+"""The length unit of a mesh: stated by the user, else declared by the format, else inferred from the plausible size."""
 
 from __future__ import annotations
 
@@ -7,39 +7,38 @@ from dataclasses import dataclass
 from typing import Literal
 
 PLAUSIBLE_M = (0.005, 1.0)
-"""Longest axes that an object held in one hand or on a table can have (the paper's objects: 3 to 50 cm)."""
+"""Plausible longest axes of an object held in one hand or placed on a table (the paper's objects: 3 to 50 cm)."""
 
 StatedUnit = Literal["m", "cm", "mm", "none", "auto"]
-"""What a person says of a mesh's unit; ``none``: its numbers are no lengths, as those of many game assets."""
+"""A stated unit; ``none``: the numbers are not lengths, as in many game assets."""
 
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-"""Metres of the units that a person can state."""
+"""Metres per stated unit."""
 
-_GUESSES_M = {"millimetres": 0.001, "centimetres": 0.01, "inches": 0.0254}  # in the order in which they are common
+_GUESSES_M = {"millimetres": 0.001, "centimetres": 0.01, "inches": 0.0254}  # in order of how common they are
 _SHARES = {"millimetres": 0.5, "centimetres": 0.35, "inches": 0.1}
-# STL holds no unit: CAD programs write millimetres, every slicer reads them so, and 3MF, its successor, has them as its default
+# STL has no unit: CAD programs write millimetres, slicers read it so, and 3MF, its successor, has them as default
 _STL_SHARES = {"millimetres": 0.85, "centimetres": 0.05, "inches": 0.05}
-_NO_UNIT_SHARE = 0.05  # furniture in metres, and meshes of no scale at all
+_NO_UNIT_SHARE = 0.05  # furniture in metres, and meshes without scale
 _SURE = 0.9
-_ANYTHING_M = (0.02, 0.6)  # the usual longest axis of a thing that nobody has named
-_OTHER_SIZE_SHARE = 0.1  # toys, samples and giants of a kind
-_DEVIATIONS_ACROSS = 3.29  # a usual interval holds nine of ten
-_NORMALISED = (1.0, 2.0)  # the longest axis of meshes that a generator or a viewer scaled to a unit cube
+_ANYTHING_M = (0.02, 0.6)  # the usual longest axis of an unnamed object
+_OTHER_SIZE_SHARE = 0.1  # toys, samples and oversized specimens
+_DEVIATIONS_ACROSS = 3.29  # standard deviations across an interval that contains nine of ten
+_NORMALISED = (1.0, 2.0)  # longest axis of meshes normalized to a unit cube by a generator or viewer
 _MADE_TO_SIZE = frozenset({"step", "3mf"})
-"""Formats of what is designed to be made: their unit is part of the design, and no viewer scales it."""
+"""Design formats, whose unit is part of the design and which viewers do not rescale."""
 _CHOICE_OF_UNIT = frozenset({"dae", "fbx", "usdz"})
-"""Formats that let their writer say any unit, and whose viewers do not care; glTF has metres alone, which many ignore."""
-_SLACK = 2.0  # a size outside the usual interval by more than this speaks against the unit
+"""Formats that may declare any unit, which viewers ignore; glTF always means metres, which many writers ignore."""
+_SLACK = 2.0  # factor beyond the usual interval at which a size speaks against the unit
 
 
 @dataclass(frozen=True)
 class LengthUnit:
-    """The unit of a mesh and who said so.
+    """The unit of a mesh and its source.
 
-    ``factor`` turns the file's numbers into metres. ``metric`` tells whether the size can be believed; if not, only
-    proportions can. ``source``: 'user' | 'declared' by the format | 'assumed' (nothing said, plausible as metres) |
-    'guessed' (from the size) | 'unknown'. ``finding`` is one sentence for a person where the size spoke against the
-    file.
+    ``factor`` converts the file's numbers to metres. ``metric``: whether the size is reliable; if not, only proportions are.
+    ``source``: 'user' | 'declared' by the format | 'assumed' (not stated, plausible as metres) | 'guessed' (from the size) |
+    'unknown'. ``finding``: a sentence for the report if the size contradicts the file.
     """
 
     factor: float
@@ -56,11 +55,11 @@ def decide_unit(
     expected_m: tuple[float, float] | None = None,
     file_format: str | None = None,
 ) -> LengthUnit:
-    """Decide the unit of a mesh whose longest side has the length ``longest_axis`` in the file's numbers.
+    """Decide the unit of a mesh whose longest side is ``longest_axis`` in the file's numbers.
 
-    ``file_unit_m`` is the unit that the format declares (None: it does not). ``expected_m`` is the usual interval of
-    the longest axis of such a thing (None: unknown); it decides between guesses, and against sizes nobody declared.
-    ``file_format`` ('stl', 'obj', ...) tells which units are common in such files.
+    ``file_unit_m``: the unit that the format declares, in metres (None: none). ``expected_m``: the usual interval of such an
+    object's longest axis (None: unknown); it selects among guesses, and rejects implausible undeclared sizes. ``file_format``
+    ('stl', 'obj', ...) determines which units are common.
     """
     declared = file_unit_m is not None
     factor = 1.0 if file_unit_m is None else file_unit_m
@@ -93,13 +92,13 @@ def _guessed(
     said = f"{longest_axis:.4g} units are {size_m:.4g} m as {'declared' if declared else 'metres'}"
     fitting = {n: u for n, u in _GUESSES_M.items() if PLAUSIBLE_M[0] <= longest_axis * u <= PLAUSIBLE_M[1]}
     if not fitting:
-        # kept as it is, so that the gate refuses it for its size
+        # kept unchanged, so that the gate rejects the size
         source: Literal["declared", "assumed"] = "declared" if declared else "assumed"
         return LengthUnit(factor, True, source, f"{said}, and no usual unit makes that plausible; give --units")
     shares = _STL_SHARES if file_format == "stl" else _SHARES
     weights = {n: shares[n] * _density(longest_axis * u, expected_m or _ANYTHING_M) for n, u in fitting.items()}
     best = max(weights, key=lambda name: weights[name])
-    # a unit that somebody chose is no other one because it is wrong: the file may as well mean none, or a large thing
+    # A declared unit that is implausible is not evidence for another unit: the file may have no scale, or be large.
     contradicts = declared and file_format in _CHOICE_OF_UNIT and expected_m is None
     if not contradicts and weights[best] >= _SURE * (sum(weights.values()) + _NO_UNIT_SHARE * _any_density()):
         finding = f"{said}, which is implausible; read as {best}: {longest_axis * fitting[best]:.3g} m"
@@ -117,7 +116,7 @@ def _not_believed(factor: float, cause: str) -> LengthUnit:
 
 
 def _density(size_m: float, usual_m: tuple[float, float]) -> float:
-    """Return the density of the logarithm of a longest axis: nine of ten are within the usual interval, one in ten has any."""
+    """Return the density of the logarithm of a longest axis: nine of ten within the usual interval, one in ten uniform."""
     middle, deviation = math.log(usual_m[0] * usual_m[1]) / 2, math.log(usual_m[1] / usual_m[0]) / _DEVIATIONS_ACROSS
     deviation = max(deviation, 0.05)
     own = math.exp(-0.5 * ((math.log(size_m) - middle) / deviation) ** 2) / (deviation * math.sqrt(2 * math.pi))

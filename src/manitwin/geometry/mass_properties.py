@@ -1,4 +1,4 @@
-"""Volume, centre of mass and inertia of solids and of thin shells, exact for the triangles given."""
+"""Volume, centre of mass and inertia of solids and thin shells, exact for the given triangles."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import trimesh
 
 @dataclass(frozen=True)
 class MassProperties:
-    """Centre of mass ``(3,)`` m, inertia ``(3, 3)`` about it in object axes, and volume of matter."""
+    """Centre of mass ``(3,)`` m, inertia ``(3, 3)`` about it in object axes, and volume of material."""
 
     center_of_mass_m: np.ndarray
     inertia_kg_m2: np.ndarray
@@ -18,11 +18,11 @@ class MassProperties:
 
 
 TRIANGLE_SLACK = 1e-9
-"""Of the largest moment: how far the other two have to exceed it together, so that rounding makes no engine refuse them."""
+"""Margin of the triangle inequality of principal moments, relative to the largest, so that rounding does not violate it."""
 
 
 def with_triangle_slack(inertia_kg_m2: np.ndarray) -> np.ndarray:
-    """Return an inertia ``(3, 3)`` whose moments, but for rounding, are those of a body, as MuJoCo takes it: A + B > C."""
+    """Return an inertia ``(3, 3)`` that satisfies the triangle inequality A + B > C despite rounding, as MuJoCo requires."""
     tensor = (inertia_kg_m2 + inertia_kg_m2.T) / 2
     least, middle, most = np.linalg.eigvalsh(tensor)
     lacks = TRIANGLE_SLACK * most - (least + middle - most)
@@ -30,12 +30,11 @@ def with_triangle_slack(inertia_kg_m2: np.ndarray) -> np.ndarray:
 
 
 def solid_mass_properties(mesh: trimesh.Trimesh, mass_kg: float) -> MassProperties:
-    """Return the mass properties of a watertight mesh filled evenly.
+    """Return the mass properties of a watertight mesh of uniform density.
 
-    Source: divergence theorem over signed tetrahedra from the origin (Mirtich 1996; Eberly, Polyhedral mass
-    properties).
+    Source: divergence theorem over signed tetrahedra from the origin (Mirtich 1996; Eberly, Polyhedral mass properties).
     """
-    center = mesh.bounds.mean(0)  # near the mesh: the tetrahedra then cancel less
+    center = mesh.bounds.mean(0)  # an origin near the mesh reduces cancellation
     corners = mesh.triangles - center
     volumes = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
     volume = float(volumes.sum())
@@ -48,12 +47,12 @@ def solid_mass_properties(mesh: trimesh.Trimesh, mass_kg: float) -> MassProperti
 
 
 def shell_mass_properties(mesh: trimesh.Trimesh, mass_kg: float, wall_thickness_m: float) -> MassProperties:
-    """Return the mass properties of an evenly thick wall whose outer surface is the mesh.
+    """Return the mass properties of a wall of uniform thickness whose outer surface is the mesh.
 
-    The wall is taken as its middle surface: every vertex moved half the thickness inward. The volume is area times
+    The wall is represented by its middle surface: every vertex is moved inward by half the thickness. The volume is area times
     thickness.
-    Source: triangle moments integrated exactly, as for a lamina (per triangle A/12 (sum of t t^T + s s^T), s the
-    corners' sum).
+
+    Source: exact triangle moments, as for a lamina (per triangle A/12 (sum of t t^T + s s^T), with s the sum of the corners).
     """
     corners = _moved_inward(mesh, wall_thickness_m / 2)[mesh.faces]
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
@@ -74,10 +73,10 @@ def _inertia_from_second_moment(second: np.ndarray) -> np.ndarray:
 
 
 def _moved_inward(mesh: trimesh.Trimesh, offset_m: float) -> np.ndarray:
-    """Return the vertices ``(V, 3)`` moved so that every face moves ``offset_m`` along its normal, as well as can be.
+    """Return the vertices ``(V, 3)`` moved so that every face moves by about ``offset_m`` against its normal.
 
-    Each vertex solves least squares over its faces' planes, so that box corners stay corners; the step is at most 3
-    offsets.
+    Each vertex solves a least-squares problem over the planes of its faces, so that box corners are preserved; steps are
+    limited to 3 offsets.
     """
     normals, angles = mesh.face_normals, mesh.face_angles
     outer = np.zeros((len(mesh.vertices), 3, 3))

@@ -1,4 +1,4 @@
-"""How much of what is around a body each place of its surface sees."""
+"""Ambient accessibility: how much of the surroundings each surface point sees."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.repair.thickening import fibonacci_sphere
 
 DIRECTIONS = 24
-_OFF_SURFACE = 1e-4  # of the body's size: where the rays start
+_OFF_SURFACE = 1e-4  # of the body's size: offset of the ray origins
 
 
 def open_share(mesh: trimesh.Trimesh, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Return the share ``(N,)`` of the surroundings before each surface point ``(N, 3)`` that the body does not hide.
+    """Return the unoccluded share ``(N,)`` of the surroundings before each surface point ``(N, 3)``.
 
-    1 on a convex body, 0 in a closed cavity: the accessibility of ambient light, weighted by the cosine to the outward
-    normals ``(N, 3)`` (Zhukov, Iones, Kronin 1998, "An ambient light illumination model", eq. 3), over evenly spread directions.
+    It is 1 on a convex body and 0 in a closed cavity: the accessibility of ambient light, weighted by the cosine to the outward
+    normals ``(N, 3)`` (Zhukov, Iones, Kronin 1998, "An ambient light illumination model", eq. 3), over evenly spread
+    directions.
     """
     caster = RayCaster(mesh)
     start = points_m + _OFF_SURFACE * float(mesh.scale) * normals

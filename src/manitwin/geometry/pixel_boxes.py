@@ -1,4 +1,4 @@
-"""Boxes of things in pictures: left, top, right and bottom edge in pixels, x to the right, y down, from the picture's corner."""
+"""Bounding boxes in images, in pixels: left, top, right, bottom; x to the right and y down from the top left corner."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ PixelBox = tuple[float, float, float, float]
 
 
 def box_of_pixels(mask: np.ndarray) -> PixelBox:
-    """Return the box of what is true of a mask ``(H, W) bool`` that has something."""
+    """Return the bounding box of a non-empty mask ``(H, W) bool``."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     return float(columns[0]), float(rows[0]), float(columns[-1] + 1), float(rows[-1] + 1)
 
 
 def share_in_common(one: PixelBox, other: PixelBox) -> float:
-    """Return the intersection of two boxes over their union, 0..1."""
+    """Return the intersection over union of two boxes, 0..1."""
     width = min(one[2], other[2]) - max(one[0], other[0])
     height = min(one[3], other[3]) - max(one[1], other[1])
     both = max(width, 0.0) * max(height, 0.0)
@@ -24,12 +24,12 @@ def share_in_common(one: PixelBox, other: PixelBox) -> float:
 
 
 def to_picture(box: PixelBox, window: PixelBox, scale: tuple[float, float]) -> PixelBox:
-    """Return a box in a picture of a ``window``, drawn ``scale`` (x, y) times as large, in pixels of the whole picture."""
+    """Convert a box from a crop (``window``, enlarged by ``scale`` (x, y)) to pixels of the whole image."""
     left, top = window[:2]
     return left + box[0] / scale[0], top + box[1] / scale[1], left + box[2] / scale[0], top + box[3] / scale[1]
 
 
 def to_window(box: PixelBox, window: PixelBox, scale: float) -> PixelBox:
-    """Return a box of the whole picture in pixels of one of a ``window``, drawn ``scale`` times as large."""
+    """Convert a box from pixels of the whole image to those of a crop (``window``, enlarged by ``scale``)."""
     left, top = window[:2]
     return scale * (box[0] - left), scale * (box[1] - top), scale * (box[2] - left), scale * (box[3] - top)

@@ -1,6 +1,6 @@
-"""Rigid transforms as 4x4 matrices and quaternions in wxyz order.
+"""Rigid transforms as 4x4 matrices, and quaternions in wxyz order.
 
-SciPy's rotations are imported when they are asked for: a third of the start of a program that turns nothing.
+SciPy's rotations are imported on first use, as they take a third of the start-up time of a program that does not need them.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ OBJECT_TO_GLTF = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0
 
 GLTF_TO_OBJECT = OBJECT_TO_GLTF.T
 
-_ALONG_RAD = 1e-9  # nearer to an axis is along it
-LEAST_LEADING = 1e-3  # of a quaternion's number that says its sign: 0.1 degrees from none
+_ALONG_RAD = 1e-9  # smaller angles count as aligned with the axis
+LEAST_LEADING = 1e-3  # least magnitude of the quaternion component that fixes its sign; 0.1 degrees from zero
 
 
 def quaternion_wxyz(rotation: np.ndarray) -> np.ndarray:
@@ -31,7 +31,7 @@ def rotation_from_quaternion_wxyz(quaternion: np.ndarray) -> np.ndarray:
 
 
 def transform(rotation: np.ndarray | None = None, translation: np.ndarray | None = None) -> np.ndarray:
-    """Build a 4x4 transform from a rotation ``(3, 3)`` and a translation ``(3,)``; what is not given is the identity."""
+    """Build a 4x4 transform from a rotation ``(3, 3)`` and a translation ``(3,)``; omitted parts are the identity."""
     pose = np.eye(4)
     if rotation is not None:
         pose[:3, :3] = rotation
@@ -56,7 +56,9 @@ def transform_points(pose: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def yaw_onto_axis(direction: np.ndarray) -> np.ndarray:
-    """Return the turn ``(3, 3)`` about Z, of 45 degrees at most, that brings a direction ``(3,)`` over X or Y."""
+    """Return the rotation ``(3, 3)`` about Z, by at most 45 degrees, that aligns a direction ``(3,)`` with X or Y seen from
+    above.
+    """
     angle = float(np.arctan2(direction[1], direction[0]))
     turn = np.round(angle / (np.pi / 2)) * np.pi / 2 - angle
     if abs(turn) < _ALONG_RAD:
@@ -66,7 +68,7 @@ def yaw_onto_axis(direction: np.ndarray) -> np.ndarray:
 
 
 def rotation_between(source: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Return the smallest rotation ``(3, 3)`` that turns direction ``source`` into ``target`` (Rodrigues)."""
+    """Return the smallest rotation ``(3, 3)`` that takes direction ``source`` to ``target`` (Rodrigues)."""
     from scipy.spatial.transform import Rotation
 
     a, b = source / np.linalg.norm(source), target / np.linalg.norm(target)
@@ -82,16 +84,16 @@ def rotation_between(source: np.ndarray, target: np.ndarray) -> np.ndarray:
 
 
 def rotation_angle_rad(rotation: np.ndarray) -> float:
-    """Return the angle of a rotation ``(3, 3)``; as exact near zero as elsewhere: |R - I| = 2 sqrt(2) sin(angle / 2)."""
+    """Return the angle of a rotation ``(3, 3)``, accurate near zero as well: |R - I| = 2 sqrt(2) sin(angle / 2)."""
     half_sine = float(np.linalg.norm(rotation - np.eye(3))) / np.sqrt(8)
     return float(2 * np.arcsin(min(1.0, half_sine)))
 
 
 def without_sign_changes(quaternions: np.ndarray, before: np.ndarray | None = None) -> np.ndarray:
-    """Choose the signs of quaternions ``(T, ..., 4)`` wxyz so that each is nearest to the one of the row before.
+    """Choose the signs of quaternions ``(T, ..., 4)`` wxyz so that each is closest to its predecessor.
 
-    The first row follows ``before (..., 4)``, or has w >= 0; where that is next to nothing, as of hands that look straight down,
-    x >= 0, and so on: the noise of w would draw the sign.
+    The first row follows ``before (..., 4)``; without it, w >= 0. If w is nearly zero, as for hands pointing straight down, its
+    sign would be noise: then x >= 0, and so on.
     """
     if before is None:
         leading = np.argmax(np.abs(quaternions[:1]) > LEAST_LEADING, axis=-1, keepdims=True)

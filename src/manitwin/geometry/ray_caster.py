@@ -1,4 +1,4 @@
-"""First hits of many rays on a triangle mesh (Embree), and the thickness of a body by them."""
+"""Ray casting against triangle meshes (Embree), and the local thickness of a solid."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from embreex.rtcore_scene import EmbreeScene
 from manitwin.geometry.hulls.reduction import hull_mesh
 from manitwin.geometry.kept import kept
 
-MILLIMETRES = 1000.0  # Embree works in float32 with absolute tolerances: objects of a hand's size want larger units
+MILLIMETRES = 1000.0  # Embree uses float32 with absolute tolerances, so hand-sized objects need larger units
 
-_START_BELOW_SURFACE_M = 1e-5  # the ray must not meet the face that it starts on
+_START_BELOW_SURFACE_M = 1e-5  # so that the ray does not hit the face it starts on
 
 
 class RayCaster:
-    """A mesh prepared for rays, at the first of them."""
+    """A mesh for ray casting; its acceleration structure is built with the first ray."""
 
     def __init__(self, mesh: trimesh.Trimesh):
         self._mesh = mesh
 
     @classmethod
     def of_hulls(cls, hulls: Sequence[np.ndarray]) -> RayCaster:
-        """Return that of the faces of convex hulls, each ``(V, 3)`` m; those inside other hulls are among them."""
+        """Build a caster for the faces of convex hulls, each ``(V, 3)`` m, including faces inside other hulls."""
         surfaces = [hull_mesh(vertices) for vertices in hulls]
         vertices, faces = trimesh.util.append_faces([s.vertices for s in surfaces], [s.faces for s in surfaces])
         return cls(trimesh.Trimesh(vertices, faces, process=False))
 
     def scaled(self, factor: float) -> RayCaster:
-        """Return that of the mesh multiplied by a factor about its origin."""
+        """Return a caster for the mesh scaled by a factor about its origin."""
         return RayCaster(trimesh.Trimesh(self._mesh.vertices * factor, self._mesh.faces, process=False))
 
     @cached_property
@@ -45,9 +45,9 @@ class RayCaster:
         return kept(self._mesh, "rays", lambda: _rays(self._mesh))
 
     def first_hits(self, origins_m: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the distance (m; inf: nothing) and the face (-1: nothing) of each ray's first hit.
+        """Return distance (m; inf: no hit) and face index (-1: no hit) of each ray's first hit.
 
-        ``origins_m`` and ``directions`` are ``(N, 3)``, the directions of unit length.
+        ``origins_m`` and ``directions`` are ``(N, 3)``, with directions of unit length.
         """
         if not len(origins_m):
             return np.zeros(0), np.zeros(0, dtype=np.int64)
@@ -61,14 +61,14 @@ class RayCaster:
 
 
 def _rays(mesh: trimesh.Trimesh) -> tuple[EmbreeScene, TriangleMesh]:
-    scene = EmbreeScene()  # knows of its mesh, but does not keep it
+    scene = EmbreeScene()  # the scene does not keep a reference to its mesh
     return scene, TriangleMesh(scene, (mesh.triangles * MILLIMETRES).astype(np.float32))
 
 
 def local_thickness(mesh: trimesh.Trimesh, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Return the length (m) of matter behind surface points ``(N, 3)``, straight against outward normals ``(N, 3)``.
+    """Return the thickness (m) of the solid at surface points ``(N, 3)``, along the inverted outward normals ``(N, 3)``.
 
-    A ray goes inward to the first surface. Where it meets none (a grazing point of an imperfect mesh), the answer is 0.
+    It is the length of an inward ray to the first surface; 0 if the ray hits nothing (a grazing point of an imperfect mesh).
     """
     inward = -normals / np.linalg.norm(normals, axis=1, keepdims=True)
     distance, _ = RayCaster(mesh).first_hits(points_m + inward * _START_BELOW_SURFACE_M, inward)

@@ -1,4 +1,4 @@
-"""Rigid bodies of simulations: convex hulls with mass properties and friction, at a pose; and boxes that do not move."""
+"""Rigid bodies for simulation: convex hulls with mass properties and friction, placed objects, and static boxes."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.geometry.ray_caster import RayCaster
 
 FURNITURE_FRICTION = 0.5
-"""Static and dynamic, of every piece of furniture."""
+"""Static and dynamic friction of all furniture."""
 LEAST_TABLE_M = 0.3
-"""The least half extent of a table's top: a level box at the height z = 0 that is smaller is no table."""
+"""The least half extent of a table top: a smaller level box at z = 0 is not a table."""
 
 
 @dataclass(frozen=True)
 class RigidBody:
-    """Convex hulls (each ``(V, 3)`` m) and the real mass properties, in the object frame.
+    """Convex hulls (each ``(V, 3)`` m) and the true mass properties, in the object frame.
 
-    ``inertia_kg_m2 (3, 3)`` is about the centre of mass, along the axes of the object frame; it is not derived from the
-    hulls. ``surface`` is the true surface where it is known: a suction cup feels what hulls smooth over.
+    ``inertia_kg_m2 (3, 3)`` is about the centre of mass, in the axes of the object frame; it is not derived from the hulls.
+    ``surface`` is the true surface if known, for suction cups, which depend on details that hulls smooth out.
     """
 
     hulls: tuple[np.ndarray, ...]
@@ -34,13 +34,15 @@ class RigidBody:
 
     @cached_property
     def principal_inertia(self) -> tuple[np.ndarray, np.ndarray]:
-        """The principal moments ``(3,)`` ascending and the quaternion wxyz that turns their axes into the object's."""
+        """The principal moments ``(3,)``, ascending, and the quaternion wxyz from their axes to the object's."""
         moments, axes = principal_frame(self.inertia_kg_m2)
         return moments, quaternion_wxyz(axes)
 
 
 def principal_frame(inertia_kg_m2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the principal moments ``(3,)`` ascending and the right-handed rotation ``(3, 3)`` of their axes to the object's."""
+    """Return the principal moments ``(3,)``, ascending, and the right-handed rotation ``(3, 3)`` from their axes to the
+    object's.
+    """
     moments, axes = np.linalg.eigh(inertia_kg_m2)
     if np.linalg.det(axes) < 0:
         axes[:, 0] *= -1
@@ -49,7 +51,7 @@ def principal_frame(inertia_kg_m2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True)
 class PlacedObject:
-    """A twin's body at a pose ``object_to_world (4, 4)``; ``name`` is its own in the scene (``object_00``)."""
+    """A twin's body at a pose ``object_to_world (4, 4)``; ``name`` is unique in the scene (``object_00``)."""
 
     name: str
     twin_id: str
@@ -59,7 +61,7 @@ class PlacedObject:
 
 @dataclass(frozen=True)
 class StaticBox:
-    """A box that does not move: a table's top, a shelf's board, a tray's rim. ``half_extents_m (3,)``, metres, world frame."""
+    """A static box, such as a table top, shelf board or tray rim; ``half_extents_m (3,)`` in metres, world frame."""
 
     name: str
     half_extents_m: np.ndarray
@@ -67,11 +69,11 @@ class StaticBox:
 
 
 def stands_for_a_plane(box: StaticBox) -> bool:
-    """Tell whether a box is a table: its top lies in z = 0, where the robot stands, and nothing gets past its edge.
+    """Return whether a box is a table top at z = 0, the robot's base height, that may be treated as an infinite plane.
 
-    Physics and planners take it for an endless plane: on a box of PhysX contacts of hulls persist from step to step, and a tall
-    box that is set down rocks by a degree or two for ever. Of six cereal boxes let go with up to 3 degrees of tilt, one had come
-    to rest after 3 s on a box, and all on a plane.
+    Physics and planners use a plane instead of such a box. In PhysX, contacts of hulls on a box persist from step to step, and
+    a tall box that is set down keeps rocking by a degree or two. Of six cereal boxes released with up to 3 degrees of tilt, one
+    had come to rest after 3 s on a box, and all on a plane.
     """
     top = box.box_to_world[:3, 2] * box.half_extents_m[2] + box.box_to_world[:3, 3]
     upright = box.box_to_world[2, 2] > 1 - 1e-9

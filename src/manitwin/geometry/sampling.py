@@ -1,4 +1,4 @@
-"""Points on surfaces, and far-apart subsets of them."""
+"""Sampling of points on surfaces, and farthest point sampling."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ if TYPE_CHECKING:
 def sample_surface(
     mesh: trimesh.Trimesh, count: int, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Sample points uniformly by area.
+    """Sample surface points uniformly by area.
 
-    Returns points ``(count, 3)`` m, the outward unit normals of their faces ``(count, 3)`` and face indices ``(count,)``.
+    Returns points ``(count, 3)`` m, the outward unit normals of their faces ``(count, 3)``, and face indices ``(count,)``.
+
     Source: paper, "Candidate Point Sampling"; barycentric sampling of Osada et al. 2002, eq. 1.
     """
     cumulative = np.cumsum(mesh.area_faces)
     drawn = rng.random(count) * cumulative[-1]
     order, faces = np.argsort(drawn), np.empty(count, np.int64)
-    faces[order] = np.searchsorted(cumulative, drawn[order])  # in order, twice as fast
+    faces[order] = np.searchsorted(cumulative, drawn[order])  # sorted queries are twice as fast
     faces = np.minimum(faces, len(mesh.faces) - 1)
     root, along = np.sqrt(rng.random(count))[:, None], rng.random(count)[:, None]
     corners = np.asarray(mesh.triangles).reshape(-1, 9).take(faces, axis=0)
@@ -30,9 +31,9 @@ def sample_surface(
 
 
 def farthest_point_sampling(points: np.ndarray, count: int, start: int = 0) -> np.ndarray:
-    """Return indices of ``count`` of the points ``(N, D)``, each the farthest from those before it (paper, eq. 1).
+    """Return the indices of ``count`` of the points ``(N, D)``, each the farthest from those chosen before (paper, eq. 1).
 
-    Starts at index ``start``; returns all indices where there are no more than ``count`` points.
+    Starts at index ``start``; returns all indices if there are no more than ``count`` points.
     """
     if len(points) <= count:
         return np.arange(len(points))

@@ -1,8 +1,8 @@
-"""Seams of a textured mesh, where one place has several vertices, and triangles without area that close them.
+"""Closing of texture seams, where one position has several vertices, with degenerate triangles.
 
-A glTF vertex has one normal and one texture coordinate, so a closed solid with a texture or a crease has borders where its
-charts meet, and every tool that looks at indices takes it for an open sheet: no volume, no inertia, "not watertight". Along
-each seam the two rims are joined by triangles whose corners coincide: nothing is drawn, and the solid is closed again.
+A glTF vertex has one normal and one texture coordinate, so that a closed textured or creased solid has borders where its charts
+meet. Tools that only compare indices take it for an open sheet without volume and inertia, and report "not watertight". The two
+sides of each seam are joined by triangles with coincident corners: nothing more is drawn, and the solid is closed.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from scipy.sparse.csgraph import connected_components
 def close_seams(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Close the seams of a mesh; true borders stay open.
 
-    ``vertices (V, 3)``, ``faces (F, 3)``. Returns the vertices as indices ``(W,)`` into the given ones, and faces ``(G, 3)``:
-    the given faces first, then triangles with at least two corners at one place, which join every border edge to the one
-    that runs the other way at the same place. Without a seam, both are as given.
+    ``vertices (V, 3)``, ``faces (F, 3)``. Returns the new vertices as indices ``(W,)`` into the given ones, and faces ``(G,
+    3)``: the given faces first, then triangles with at least two corners at one position, which join every border edge to the
+    opposite edge at the same position. Without seams, both are returned unchanged.
     """
     borders = _border_edges(faces)
     if not len(borders):
@@ -31,9 +31,9 @@ def close_seams(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np
 
 
 def _one_vertex_a_wedge(faces: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Give every fan of faces around a vertex a vertex of its own: then two fans meet along one seam at most.
+    """Split vertices so that every fan of faces has its own vertex; two fans then meet along at most one seam.
 
-    Returns for each new vertex the old one ``(W,)``, and the faces in new vertices. Unused vertices are dropped.
+    Returns for each new vertex the old index ``(W,)``, and the faces in new indices. Unused vertices are dropped.
     """
     corner = np.arange(3 * len(faces)).reshape(-1, 3)
     a, b = (np.concatenate([faces[:, i], faces[:, (i + 1) % 3], faces[:, (i + 2) % 3]]) for i in (0, 1))
@@ -51,14 +51,14 @@ def _one_vertex_a_wedge(faces: np.ndarray, vertex_count: int) -> tuple[np.ndarra
 
 
 def has_three_places(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Return a mask ``(F,)`` of the faces whose three corners are at three places."""
+    """Return a mask ``(F,)`` of the faces with three distinct corner positions."""
     corners = vertices[faces]
     same = [(corners[:, i] == corners[:, (i + 1) % 3]).all(1) for i in range(3)]
     return ~np.logical_or.reduce(same)
 
 
 def _border_edges(faces: np.ndarray) -> np.ndarray:
-    """Return the directed edges ``(B, 2)`` whose opposite no face has, in the order of the faces."""
+    """Return the directed edges ``(B, 2)`` without an opposite edge in any face, in the order of the faces."""
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     count = int(faces.max()) + 1
     forward, backward = edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0]
@@ -66,7 +66,7 @@ def _border_edges(faces: np.ndarray) -> np.ndarray:
 
 
 def _join(borders: np.ndarray, place: np.ndarray) -> list[tuple[int, int, int]]:
-    """Bridge each border edge to its counterpart; what is then open around one place is a polygon, and is filled."""
+    """Bridge each border edge to its counterpart, and fill the polygons that remain open around one position."""
     waiting: dict[tuple[int, int], list[tuple[int, int]]] = defaultdict(list)
     triangles: list[tuple[int, int, int]] = []
     rungs: dict[tuple[int, int], int] = defaultdict(int)
@@ -76,7 +76,7 @@ def _join(borders: np.ndarray, place: np.ndarray) -> list[tuple[int, int, int]]:
         if not partners:
             waiting[ends].append((a, b))
             continue
-        c, d = partners.pop(0)  # c is where b is, d where a is
+        c, d = partners.pop(0)  # c coincides with b, d with a
         if b != c:
             triangles.append((b, a, c))
             rungs[(c, b)] += 1
@@ -89,7 +89,7 @@ def _join(borders: np.ndarray, place: np.ndarray) -> list[tuple[int, int, int]]:
 
 
 def _polygons(rungs: dict[tuple[int, int], int]) -> list[list[int]]:
-    """Return the closed loops of the directed edges that no opposite edge takes up."""
+    """Return the closed loops of the directed edges that have no opposite edge."""
     following: dict[int, list[int]] = defaultdict(list)
     for (a, b), count in rungs.items():
         for _ in range(count - min(count, rungs.get((b, a), 0))):

@@ -1,4 +1,4 @@
-"""A shape as a few numbers that neither size, place nor orientation changes: to find shapes that are alike."""
+"""Shape descriptors invariant to scale, position and orientation, for similarity search."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import trimesh
 
 QUANTILES = 32
-_PAIRS = 1 << 15  # two draws are 0.005 apart, at most 0.011, over 25 real objects; different ones 0.047 or more
+_PAIRS = 1 << 15  # two draws differ by 0.005, at most 0.011, over 25 real objects; different objects by 0.047 or more
 _LEVELS = (np.arange(QUANTILES) + 0.5) / QUANTILES
 
 
@@ -21,10 +21,10 @@ _LEVELS = (np.arange(QUANTILES) + 0.5) / QUANTILES
 class ShapeDescriptor:
     """``values (66,) float32``, to be compared by Euclidean distance, and the size ``radius_of_gyration_m``.
 
-    ``values`` are 32 quantiles of the distance between two points of the surface over its root mean square, 32 of the distance
-    of a point from the surface's centroid over its own, both divided by the root of 32, so that their Euclidean distance is
-    the Wasserstein distance of the distributions; then the middle and the smallest principal radius of gyration of the
-    surface over the largest.
+    ``values`` consist of 32 quantiles of the distance between two surface points over its root mean square; 32 quantiles of the
+    distance of a point from the surface's centroid over its root mean square (both divided by the root of 32, so that the
+    Euclidean distance is the Wasserstein distance of the distributions); and the middle and smallest principal radii of
+    gyration of the surface over the largest.
     """
 
     values: np.ndarray
@@ -32,13 +32,14 @@ class ShapeDescriptor:
 
 
 def shape_descriptor(mesh: trimesh.Trimesh, *, seed: int) -> ShapeDescriptor:
-    """Describe a surface, without regard to scale, position, orientation, mirroring or tessellation.
+    """Compute the descriptor of a surface, invariant to scale, position, orientation, mirroring and tessellation.
 
-    Deterministic for a seed; another seed changes ``values`` by sampling noise alone. Raises ValueError for a surface
-    whose area is zero or not finite.
-    Source: Osada, Funkhouser, Chazelle, Dobkin 2002, "Shape distributions": D2, by 32,768 pairs of points uniform by area,
-    and D1 about the centroid, by the same points. Both are scaled by the trace of the surface's covariance, which is exactly
-    D1's mean square and half of D2's, and compared by quantiles, which need no bin width.
+    Deterministic for a seed; another seed changes ``values`` by sampling noise only. Raises ValueError for a surface whose area
+    is zero or not finite.
+
+    Source: Osada, Funkhouser, Chazelle, Dobkin 2002, "Shape distributions": D2 from 32,768 pairs of points uniform by area, and
+    D1 about the centroid from the same points. Both are scaled by the trace of the surface's covariance, which is exactly the
+    mean square of D1 and half that of D2, and compared by quantiles, which need no bin width.
     """
     with np.errstate(all="ignore"):
         area = float(mesh.area)
@@ -57,12 +58,13 @@ def shape_descriptor(mesh: trimesh.Trimesh, *, seed: int) -> ShapeDescriptor:
 
 
 def surface_moments(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
-    """Return mean ``(3,)`` m and covariance ``(3, 3)`` m² of a point uniform on a surface, exactly.
+    """Return the exact mean ``(3,)`` m and covariance ``(3, 3)`` m² of a point uniform on a surface.
 
-    Second moment of a triangle a, b, c with centroid g: (9 g gᵀ + a aᵀ + b bᵀ + c cᵀ) / 12 of its area (exact for degree two).
+    The second moment of a triangle a, b, c with centroid g is (9 g gᵀ + a aᵀ + b bᵀ + c cᵀ) / 12 of its area (exact for degree
+    two).
     """
     middle = mesh.triangles.mean((0, 1))
-    corners = mesh.triangles - middle  # near the origin: nothing cancels
+    corners = mesh.triangles - middle  # an origin near the mesh avoids cancellation
     shares = mesh.area_faces / mesh.area_faces.sum()
     centroids = corners.mean(1)
     mean = shares @ centroids

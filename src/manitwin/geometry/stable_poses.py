@@ -9,14 +9,14 @@ from scipy.spatial import ConvexHull
 
 from manitwin.geometry.poses import rotation_between
 
-_MERGE_COSINE = np.cos(np.radians(1.0))  # facets of one flat side, as scans and hulls render it
+_MERGE_COSINE = np.cos(np.radians(1.0))  # merges the facets of one flat side of a scan or hull
 _TILT_DIRECTIONS = 36
 _ON_EDGE_M = 1e-12
 
 
 @dataclass(frozen=True)
 class StablePose:
-    """``rotation (3, 3)`` object to plane (z up), and the ``probability`` that a tumbling object comes to rest so."""
+    """``rotation (3, 3)`` from object to plane (z up), and the ``probability`` that a tumbling object comes to rest in it."""
 
     rotation: np.ndarray
     probability: float
@@ -25,8 +25,10 @@ class StablePose:
 def stable_poses(points: np.ndarray, center_of_mass: np.ndarray) -> list[StablePose]:
     """Return the stable poses of the convex hull of ``points (N, 3)`` about ``center_of_mass (3,)``, most likely first.
 
-    Every hull facet is landed on with the solid angle it spans from the centre of mass; where that does not lie above
-    the facet, the body rolls over the edge farthest beyond and gives its probability to the neighbour.
+    The body lands on a hull facet with a probability proportional to the solid angle of the facet seen from the centre of mass.
+    If the centre of mass does not project into the facet, the body rolls over the edge that it exceeds most, and the
+    probability moves to the neighbouring facet.
+
     Source: Goldberg, Mirtich, Zhuang, Craig, Carlisle and Canny 1999, Part pose statistics, the quasi-static estimator.
     """
     center = np.asarray(center_of_mass, dtype=float)
@@ -36,7 +38,7 @@ def stable_poses(points: np.ndarray, center_of_mass: np.ndarray) -> list[StableP
     share = _solid_angles(corners) / (4 * np.pi)
     rolls_to = _rolls_to(hull, normals, center + normals * heights[:, None])
     rest = np.arange(len(share))
-    for _ in range(len(share)):  # a roll lowers the centre of mass, so this ends; coplanar facets could still circle
+    for _ in range(len(share)):  # each roll lowers the centre of mass, so this ends; only coplanar facets could cycle
         rolled, rest = rest, rolls_to[rest]
         if (rolled == rest).all():
             break
@@ -58,14 +60,16 @@ def stable_poses(points: np.ndarray, center_of_mass: np.ndarray) -> list[StableP
 def easiest_tilt(
     points: np.ndarray, center_of_mass: np.ndarray, rotations: np.ndarray, tilt_rad: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return how far (m) the centre of mass must rise for a tilt at its easiest, and those tilted rotations.
+    """Return the least rise (m) of the centre of mass for a tilt, over all tilt directions, and the tilted rotations.
 
-    ``rotations (N, 3, 3)`` turn the object onto the plane, ``points`` are its hull's, ``tilt_rad`` is the tilt.
-    Returns ``(N,)`` and ``(N, 3, 3)``. Where the rise is small or negative, the body rocks or rolls on. The height of
-    the centre of mass over the plane is the hull's support function.
+    ``rotations (N, 3, 3)`` turn the object onto the plane, ``points`` are the vertices of its hull, ``tilt_rad`` is the tilt
+    angle. Returns ``(N,)`` and ``(N, 3, 3)``. If the rise is small or negative, the body rocks or rolls on. The height of the
+    centre of mass above the plane is the hull's support function.
     """
     coarse = np.linspace(0, 2 * np.pi, _TILT_DIRECTIONS, endpoint=False)
-    fine = np.linspace(-1, 1, _TILT_DIRECTIONS + 1) * (coarse[1] - coarse[0])  # a long thing rolls one way only
+    fine = np.linspace(-1, 1, _TILT_DIRECTIONS + 1) * (
+        coarse[1] - coarse[0]
+    )  # an elongated object rolls in one direction only
     offsets = points - center_of_mass
     rises, tilted = np.empty(len(rotations)), np.empty_like(rotations)
     for index, rotation in enumerate(rotations):
@@ -81,7 +85,7 @@ def easiest_tilt(
 
 
 def _tilted_down(azimuths: np.ndarray, tilt_rad: float) -> np.ndarray:
-    """Return the directions ``(N, 3)`` at ``tilt_rad`` from straight down, towards the azimuths."""
+    """Return the directions ``(N, 3)`` at the angle ``tilt_rad`` from straight down, towards the azimuths."""
     across = np.sin(tilt_rad)
     return np.stack(
         [across * np.cos(azimuths), across * np.sin(azimuths), np.full(len(azimuths), -np.cos(tilt_rad))], 1
@@ -89,7 +93,7 @@ def _tilted_down(azimuths: np.ndarray, tilt_rad: float) -> np.ndarray:
 
 
 def _solid_angles(corners: np.ndarray) -> np.ndarray:
-    """Return the solid angle of triangles ``(N, 3, 3)`` seen from the origin (Van Oosterom and Strackee 1983)."""
+    """Return the solid angles of triangles ``(N, 3, 3)`` seen from the origin (Van Oosterom and Strackee 1983)."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     na, nb, nc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
     volume = np.abs(np.einsum("ij,ij->i", a, np.cross(b, c)))
@@ -98,7 +102,7 @@ def _solid_angles(corners: np.ndarray) -> np.ndarray:
 
 
 def _rolls_to(hull: ConvexHull, normals: np.ndarray, feet: np.ndarray) -> np.ndarray:
-    """Return for every facet the neighbour that the body rolls onto, or the facet itself where it rests.
+    """Return for every facet the neighbour that the body rolls onto, or the facet itself if it rests.
 
     ``feet (N, 3)`` are the projections of the centre of mass onto the facets' planes.
     """

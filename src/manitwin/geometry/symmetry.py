@@ -1,4 +1,4 @@
-"""The symmetries of a solid by its surface: mirror planes, turns by a half to a 36th, bodies of revolution, and balls."""
+"""Symmetries of a solid from its surface: mirror planes, rotations up to 36-fold, bodies of revolution, and balls."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from scipy.spatial import cKDTree
 from manitwin.geometry.boxes import oriented_bounding_box
 from manitwin.geometry.sampling import sample_surface
 
-_TESTED, _SURFACE = 1500, 30_000  # samples that are moved, and those that they are to fall on
-_OFF_SHARE = 0.015  # of the box's diagonal: how far nearly all of a moved surface may be from the surface
+_TESTED, _SURFACE = 1500, 30_000  # number of samples that are transformed, and of samples they are compared with
+_OFF_SHARE = 0.015  # of the box's diagonal: tolerated distance of the transformed surface
 _KEPT_SHARE = 0.99
-_MOST_SIDES, _MOST_TEETH = 8, 36  # a prism of more sides is round, by ``_OFF_SHARE``; a gear is not
-_EVEN = 0.05  # of the spread across an axis: how far it may differ by direction where many turns are symmetries
-_ODD_TURNS = (0.61, 1.87, 0.137, 2.71)  # radians: of up to 50 teeth one of them is off by a sixth of a tooth or more
-_MOST_MOTIONS, _ONE_MOTION = 4 * _MOST_TEETH, 1e-3  # a cube has 48; of two matrices that differ by less one is kept
+_MOST_SIDES, _MOST_TEETH = 8, 36  # a prism with more sides is round within ``_OFF_SHARE``; a gear is not
+_EVEN = 0.05  # relative anisotropy of the spread across an axis that high-order rotational symmetry still allows
+_ODD_TURNS = (0.61, 1.87, 0.137, 2.71)  # radians; for up to 50 teeth one of them is off by a sixth of a tooth or more
+_MOST_MOTIONS, _ONE_MOTION = 4 * _MOST_TEETH, 1e-3  # a cube has 48; matrices that differ by less are duplicates
 
 
 @dataclass(frozen=True)
 class Symmetries:
-    """Motions ``(K, 3, 3)`` about ``center_m (3,)`` that move a solid onto itself; ``axis (3,)`` of a body of revolution.
+    """Orthogonal maps ``(K, 3, 3)`` about ``center_m (3,)`` that map a solid to itself; ``axis (3,)`` of a body of revolution.
 
-    The first motion is the identity; two of them after each other are one of them too. ``ball``: so is any turn.
+    The maps form a group with the identity first. ``ball``: every rotation is a symmetry.
     """
 
     center_m: np.ndarray
@@ -34,7 +34,7 @@ class Symmetries:
     ball: bool = False
 
     def apart_m(self, first_m: np.ndarray, second_m: np.ndarray) -> float:
-        """Return the least distance (m) of two places ``(3,)``, where symmetric places are one."""
+        """Return the least distance (m) between two positions ``(3,)`` under all symmetries."""
         if self.ball:
             return float(abs(np.linalg.norm(first_m - self.center_m) - np.linalg.norm(second_m - self.center_m)))
         first, moved = first_m - self.center_m, self.motions @ (second_m - self.center_m)
@@ -48,10 +48,10 @@ class Symmetries:
 
 
 def find_symmetries(mesh: trimesh.Trimesh, rng: np.random.Generator) -> Symmetries:
-    """Find the mirrors and turns about the axes of the oriented box, of inertia and of the frame that keep a solid as it is.
+    """Find the mirror and rotational symmetries of a solid about the axes of its frame, oriented box and inertia.
 
-    A motion counts that leaves 99 % of the surface within 1.5 % of the box's diagonal: dents and seams of scans do not count, a
-    small handle does. All symmetries of a solid leave the centroid of its surface where it is.
+    A map is a symmetry if it leaves 99 % of the surface within 1.5 % of the box's diagonal: dents and scan seams are tolerated,
+    a small handle breaks it. All symmetries fix the centroid of the surface.
     """
     surface, _, _ = sample_surface(mesh, _SURFACE, rng)
     extents, box_to_object = oriented_bounding_box(mesh.vertices)
@@ -79,7 +79,7 @@ def _is_round(axis: np.ndarray, kept: Callable[[np.ndarray], bool]) -> bool:
 
 
 def _turns_about(axis: np.ndarray, points: np.ndarray, kept: Callable[[np.ndarray], bool]) -> list[np.ndarray]:
-    """Return the turns about an axis that are kept, the least first; of what is round a quarter turn."""
+    """Return the rotations about an axis that are symmetries, smallest angle first; a quarter turn for a round object."""
     if _is_round(axis, kept):
         return [_turned(axis, np.pi / 2)]
     most = _MOST_TEETH if _is_even(axis, points) else _MOST_SIDES
@@ -88,16 +88,16 @@ def _turns_about(axis: np.ndarray, points: np.ndarray, kept: Callable[[np.ndarra
 
 
 def _is_even(axis: np.ndarray, points: np.ndarray) -> bool:
-    """Whether points spread alike in all directions across an axis, as those do that a third of a turn or less leaves as is."""
+    """Return whether points spread equally in all directions across an axis, as under 3-fold or higher symmetry."""
     spread = np.linalg.eigvalsh(np.cov((points - np.outer(points @ axis, axis)).T))
     return bool(spread[1] >= (1 - _EVEN) * spread[2])
 
 
 def _group(generators: list[np.ndarray], kept: Callable[[np.ndarray], bool]) -> np.ndarray:
-    """Return the motions ``(K, 3, 3)`` that generators make after each other, the identity first.
+    """Return the group ``(K, 3, 3)`` generated by the maps, with the identity first.
 
-    A generator counts only if all that it makes with those before it are kept: a leaning stem may fall on itself within the
-    tolerance after one small turn, and not after two.
+    A generator is used only if all products with the previous ones are symmetries too: a leaning stem may be within tolerance
+    after one small rotation but not after two.
     """
     group = [np.eye(3)]
     for generator in generators:
@@ -110,9 +110,9 @@ def _group(generators: list[np.ndarray], kept: Callable[[np.ndarray], bool]) -> 
 
 
 def _closed(generators: list[np.ndarray]) -> list[np.ndarray] | None:
-    """Return the identity and all motions that generators make after each other; None of more than ``_MOST_MOTIONS``."""
+    """Return all products of generators, including the identity; None if there are more than ``_MOST_MOTIONS``."""
     motions = [np.eye(3)]
-    for motion in motions:  # which grows meanwhile
+    for motion in motions:  # the list grows during the iteration
         for product in (each @ motion for each in generators):
             if not _is_among(product, motions):
                 motions.append(product)

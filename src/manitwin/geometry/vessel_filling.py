@@ -1,4 +1,4 @@
-"""Mass properties of a closed vessel that is filled to a share: a thin wall, and contents with a level top."""
+"""Mass properties of a partly filled closed vessel: a thin wall, and contents with a level surface."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from manitwin.geometry.mass_properties import MassProperties, shell_mass_propert
 
 
 class Vessel:
-    """A closed vessel whose outer surface is the mesh, +Z up; its wall is even and takes none of the volume: it is thin."""
+    """A closed vessel whose outer surface is the mesh, +Z up. Its wall has uniform thickness and negligible volume."""
 
     def __init__(self, outer: trimesh.Trimesh, wall_thickness_m: float):
         self._outer = outer
         self._wall_of_1_kg = shell_mass_properties(outer, 1.0, wall_thickness_m)
 
     def filled(self, wall_kg: float, contents_kg: float, share: float) -> MassProperties:
-        """Return the mass properties with contents that fill the lower ``share`` in (0, 1] of the volume, up to a level.
+        """Return the mass properties with contents that fill the lower ``share`` in (0, 1] of the volume.
 
-        Without contents it is the wall alone. The centre of mass is that of both, the inertia by the parallel-axis theorem.
+        Without contents, those of the wall alone. Wall and contents are combined by the parallel-axis theorem.
         """
         one = self._wall_of_1_kg
         wall = MassProperties(one.center_of_mass_m, wall_kg * one.inertia_kg_m2, one.volume_m3)
@@ -37,7 +37,7 @@ class Vessel:
         return MassProperties(center_m, np.asarray(inertia), wall.volume_m3)
 
     def center_m(self, wall_kg: float, contents_kg: float, share: float) -> np.ndarray:
-        """Return the centre of mass ``(3,)`` alone, as ``filled``."""
+        """Return only the centre of mass ``(3,)`` of ``filled``."""
         wall = self._wall_of_1_kg.center_of_mass_m
         if contents_kg <= 0:
             return np.asarray(wall)
@@ -46,13 +46,13 @@ class Vessel:
 
     @cached_property
     def _cells(self) -> tuple[np.ndarray, np.ndarray]:
-        """Centres ``(N, 3)`` m and volumes ``(N,)`` m3 of cells of the volume, the lowest first."""
+        """Centres ``(N, 3)`` m and volumes ``(N,)`` m3 of cells of the interior, lowest first."""
         centers_m, volumes_m3 = columns_of(self._outer)
         order = np.argsort(centers_m[:, 2], kind="stable")
         return centers_m[order], volumes_m3[order]
 
     def _held(self, share: float) -> np.ndarray:
-        """Return of the cells ``(N,)`` how much of the contents each has: the lowest are full, up to ``share`` of the volume."""
+        """Return the share of the contents in each cell ``(N,)``: the lowest cells are full, up to ``share`` of the volume."""
         volumes_m3 = self._cells[1]
         before = np.cumsum(volumes_m3) - volumes_m3
         kept = np.clip(share * volumes_m3.sum() - before, 0, volumes_m3)
