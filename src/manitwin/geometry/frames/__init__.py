@@ -1,1 +1,1 @@
-"""Functional frames from geometry: where the feature that a point means truly is. What is not clear is no frame but a reason."""
+"""Functional frames from geometry: the frame of the feature at a functional point, or the reason why it is ambiguous."""

@@ -1,4 +1,4 @@
-"""The axis of a handle, shaft or stem: a straight line through the middle of what is long around a point."""
+"""Frames of handle, shaft and stem axes: a straight line fitted through the slices of an elongated part."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ import numpy as np
 
 from manitwin.geometry.frames.feature import UP, FeatureFrame, Found, FramedMesh, Unclear, rotation_of
 
-_STEP_SHARE = 0.025  # of the longest side: the distance between slices
-_WIDER, _THINNER = 1.7, 0.45  # times the median radius of the slices so far: there another part begins
-_SLENDER = 2.2  # length by width from which a part has an axis
-_BENT_SHARE = 0.1  # of the length: how far a straight part's middle may be off its line
+_STEP_SHARE = 0.025  # of the longest side: distance between slices
+_WIDER, _THINNER = 1.7, 0.45  # times the median radius of the slices so far; beyond these another part begins
+_SLENDER = 2.2  # least ratio of length to width of a part that has an axis
+_BENT_SHARE = 0.1  # of the length: tolerated deviation of slice centres from the line
 _LEAST_SAMPLES = 5
 
 
 def axis_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> Found:
-    """Return the axis of the long part that a surface point is on: its middle, Z along it to the bulk of the object, length.
+    """Return the axis frame of the elongated part at a surface point: its midpoint, Z along it towards the bulk of the object.
 
-    Slices are followed from the point to both sides as long as they are about as wide; their middles must lie on a line.
+    ``size_m`` is the length. Slices are followed from the point in both directions as long as their radius is similar; their
+    centres must lie on a line.
     """
     positions, _ = surface.samples
     deep, _ = surface.caster.first_hits((point_m - 1e-5 * normal)[None], -normal[None])
@@ -39,7 +40,7 @@ def axis_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> 
 
 
 def _followed(surface: FramedMesh, center: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Return the middles and radii of slices ``(S, 4)`` along a part, from one end to the other."""
+    """Return the centres and radii of slices ``(S, 4)`` along a part, from one end to the other."""
     first = _slice(surface, center, direction, 0.3 * surface.size_m)
     if first is None:
         return np.zeros((0, 4))
@@ -66,7 +67,7 @@ def _march(surface: FramedMesh, first: np.ndarray, direction: np.ndarray) -> lis
 
 
 def _slice(surface: FramedMesh, center: np.ndarray, direction: np.ndarray, reach_m: float) -> np.ndarray | None:
-    """Return the middle of a slice across a direction and its radius ``(4,)``; None where hardly anything is there."""
+    """Return the centre and radius of a slice perpendicular to a direction ``(4,)``; None if it has too few samples."""
     positions, _ = surface.samples
     half = max(_STEP_SHARE * surface.size_m, 1.2 * surface.spacing_m) / 2
     around = surface.near(center, float(np.hypot(reach_m, half)))

@@ -1,4 +1,4 @@
-"""Edges: the line in which thin matter ends, a blade's or a spatula's."""
+"""Frames of edges: the straight line at which a thin plate ends, such as that of a blade or spatula."""
 
 from __future__ import annotations
 
@@ -11,20 +11,21 @@ from scipy.spatial import cKDTree
 from manitwin.geometry.frames.feature import FeatureFrame, Found, FramedMesh, Unclear, rotation_of
 
 _ANGLE_COSINE = np.cos(np.radians(40))  # outline whose outward normal is nearer to a side's is of that side
-_CELLS = 96  # across the longer side of the plate's outline
-_FLAT = 0.28  # thickness by second spread (standard deviations) of a plate
-_THIN_FACTOR = 1.6  # times the thickness at the point's own plate: more is another part
-_STRAIGHT_SHARE = 0.12  # of the length: how far an edge may be off its chord
-_CLEAR = 1.08  # the score of the best side by that of the next
+_CELLS = 96  # along the longer side of the plate's outline
+_FLAT = 0.28  # largest ratio of thickness to second spread (standard deviations) of a plate
+_THIN_FACTOR = 1.6  # times the thickness of the plate at the point; thicker material is another part
+_STRAIGHT_SHARE = 0.12  # of the length: tolerated deviation of an edge from its chord
+_CLEAR = 1.08  # least ratio of the best side's score to the next
 _REACH_SHARES = (0.6, 0.3, 0.18, 0.1)
-"""Of the longest side: how far from the point a plate is followed; a wedge is flat nearby."""
+"""Of the longest side: radii within which a plate is sought around the point; a wedge is flat only nearby."""
 
 
 def edge_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> Found:
-    """Return the edge of the thin plate that a surface point is on: its middle, Z out of the matter, X along it, length.
+    """Return the edge frame of the thin plate at a surface point: its midpoint, Z outward, X along the edge; ``size_m`` is its
+    length.
 
-    The plate is the thin matter around the point; of the sides of its outline the edge is the one that is thin, long and
-    near to the point.
+    The plate is the connected thin material around the point. Of the sides of its outline, the edge is the one that is thin,
+    long and near the point.
     """
     plate: tuple[np.ndarray, np.ndarray] | None = None
     for share in _REACH_SHARES:
@@ -62,7 +63,7 @@ def edge_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> 
 
 
 def _plate(surface: FramedMesh, point_m: np.ndarray, share: float) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the samples of the thin matter that hangs together around a point and the thickness there; None: it is no plate."""
+    """Return the samples of the connected thin material around a point and its thickness there; None if it is not a plate."""
     positions, normals = surface.samples
     around = surface.near(point_m, share * surface.size_m)
     distance, _ = surface.caster.first_hits(positions[around] - 1e-5 * normals[around], -normals[around])
@@ -79,7 +80,7 @@ def _plate(surface: FramedMesh, point_m: np.ndarray, share: float) -> tuple[np.n
 
 
 def _linked(points: np.ndarray, start_m: np.ndarray, step_m: float) -> np.ndarray:
-    """Tell which points hang together with the one nearest to a place by steps of at most ``step_m``."""
+    """Return which points are connected to the one nearest to a position by steps of at most ``step_m``."""
     tree = cKDTree(points)
     pairs = tree.query_pairs(step_m, output_type="ndarray")
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
@@ -88,7 +89,7 @@ def _linked(points: np.ndarray, start_m: np.ndarray, step_m: float) -> np.ndarra
 
 
 def _outline(flat: np.ndarray, spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the outline of points in a plane ``(N, 2)`` as places and outward normals, evenly spaced."""
+    """Return the outline of points in a plane ``(N, 2)`` as evenly spaced positions and outward normals."""
     low, span = flat.min(0), float(np.ptp(flat, axis=0).max())
     cell = max(span / _CELLS, 0.35 * spacing_m)
     size = np.ceil(np.ptp(flat, axis=0) / cell).astype(int) + 13
@@ -123,7 +124,7 @@ def _sides(
     at: np.ndarray,
     spacing_m: float,
 ) -> list[tuple[float, np.ndarray, np.ndarray]]:
-    """Return a score, both ends ``(2, 2)`` and the outward direction of each straight side of an outline."""
+    """Return score, both ends ``(2, 2)`` and outward direction of each straight side of an outline."""
     (_, (wide, high), turn) = cv2.minAreaRect(flat.astype(np.float32))
     angle = np.radians(turn)
     first = np.array([np.cos(angle), np.sin(angle)])

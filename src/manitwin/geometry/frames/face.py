@@ -1,4 +1,4 @@
-"""Faces, buttons and places of the surface as frames."""
+"""Frames of flat faces, buttons and general surface points."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from manitwin.geometry.frames.feature import UP, FeatureFrame, Found, FramedMesh
 from manitwin.geometry.frames.on_feature import ON_FEATURE_M
 from manitwin.geometry.frames.patch import Patch, flat_patch
 
-_ANGLE_RAD = np.radians(20.0)  # of the patch's normal: a scanned mallet's face, flat to 0.9 mm, is within that
-_SLAB_SHARE, _LEAST_SLAB_M = 0.012, 0.0008  # of the longest side: half of a patch's thickness
-_SEARCH_SHARE = 0.12  # of the longest side: a candidate for a face may lie on the side next to it, at its border
-_WIDE_SHARE = 0.35  # of the longest side, where the word says which side the face is on
-_RECESS = 0.12  # of the extent in the direction of the word: what lies deeper is an inside, no base or top
-_ROUGH_SHARE = 0.12  # RMS distance from the plane by the patch's radius: a ball's cap is rounder
-_LEAST_RADIUS_SHARE = 0.012  # of the longest side: a smaller flat is a facet of something round
-_OBLONG = 1.15  # longer by shorter side from which a face's roll is not free
-_RAISED_M = 0.0002  # a button stands out, or lies deeper, by more
-_END_ON = 1.1  # matter behind an end by the end's width
+_ANGLE_RAD = np.radians(20.0)  # of the patch's normal; the face of a scanned mallet, flat to 0.9 mm, stays within it
+_SLAB_SHARE, _LEAST_SLAB_M = 0.012, 0.0008  # of the longest side: half the thickness of the slab that contains a patch
+_SEARCH_SHARE = 0.12  # of the longest side: a candidate may lie next to the face, at its border
+_WIDE_SHARE = 0.35  # of the longest side, for labels that state the side of the face
+_RECESS = 0.12  # of the extent in the label's direction: deeper patches are interior, not a base or top
+_ROUGH_SHARE = 0.12  # RMS distance from the plane over the patch's radius; the cap of a ball is rounder
+_LEAST_RADIUS_SHARE = 0.012  # of the longest side: a smaller flat patch is a facet of a round object
+_OBLONG = 1.15  # aspect ratio from which a face's roll is determined
+_RAISED_M = 0.0002  # least height or depth of a button relative to its surroundings
+_END_ON = 1.1  # least ratio of material depth behind an end face to its width
 _BUTTON_SEARCH = 0.05  # of the longest side
-_FACING_COSINE = 0.85  # of a button's top and the point: a bevel beside it is not pressed
-_ON_BUTTON = 0.012  # of the longest side: how far the point may be from the patch
+_FACING_COSINE = 0.85  # cosine between a button's top and the normal at the point; excludes the bevel beside it
+_ON_BUTTON = 0.012  # of the longest side: largest distance from the point to the patch
 _BUTTON_SHARE = 0.1
-"""Of the longest side: a larger radius is a face (0.057 at most among the templates of the tuning half)."""
+"""Of the longest side: patches with a larger radius are faces (at most 0.057 among the templates of the tuning half)."""
 _BUTTON_ROUGH = 0.05
-"""RMS distance from the plane by the radius: what is rounder is a bump whose middle is not known (0.005)."""
+"""RMS distance from the plane over the radius: rounder patches are bumps without a defined centre (0.005)."""
 
 
 def face_frame(
@@ -35,10 +35,11 @@ def face_frame(
     towards: np.ndarray | None = None,
     end_on: bool = False,
 ) -> Found:
-    """Return the flat face that a surface point with a normal ``(3,)`` is on or beside: centre, Z out, radius.
+    """Return the frame of the flat face at or next to a surface point with normal ``(3,)``: centre, Z outward; ``size_m`` is its
+    radius.
 
-    ``towards (3,)`` is the direction that the face must look in (within 45 degrees) where the word for it says so. ``end_on``:
-    it is the end of something, with more matter behind it than it is wide, as a hammer's face is and its cheeks are not.
+    ``towards (3,)``: the direction that the face must look in (within 45 degrees), if the label states one. ``end_on``: the
+    face must be an end, with more material behind it than it is wide; this holds for a hammer's face but not for its cheeks.
     """
     share = _SEARCH_SHARE if towards is None else _WIDE_SHARE
     found = [p for p in _patches(surface, point_m, normal, towards, share) if _is_face(surface, p)]
@@ -50,7 +51,7 @@ def face_frame(
         return Unclear("no flat end is where the point is" if end_on else "nothing flat is where the point is")
     if end_on:
         best = max(found, key=lambda patch: _depth(surface, patch) - _away(patch, surface, point_m) / _radius(patch))
-    elif towards is not None:  # the word says which side: there it is the largest, not the ring around a recess
+    elif towards is not None:  # the label states the side: take its largest face, not the ring around a recess
         best = max(found, key=lambda patch: patch.area_m2 * max(float(patch.normal @ towards), 0.0) ** 4)
     else:
         best = max(found, key=lambda patch: _fit(surface, patch, point_m, normal))
@@ -60,7 +61,7 @@ def face_frame(
 
 
 def button_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> Found:
-    """Return the top of the button that a surface point is on: a small patch that stands out of what is around it."""
+    """Return the frame of the button at a surface point: a small flat patch that is raised from its surroundings."""
     found = [
         patch
         for patch in _patches(surface, point_m, normal, None, _BUTTON_SEARCH)
@@ -75,8 +76,11 @@ def button_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -
     return FeatureFrame("button", best.center_m, rotation_of(best.normal, x), _radius(best), best.elongation <= _OBLONG)
 
 
-_NEARER = (1.0, 0.5, 0.25)  # of the reach: within which one normal is looked for
-_STEADY, _STEADY_COSINE = 0.85, 0.7  # length of the mean of unit normals, and its cosine with the point's own
+_NEARER = (1.0, 0.5, 0.25)  # of the search radius: neighbourhoods in which a uniform normal is sought
+_STEADY, _STEADY_COSINE = (
+    0.85,
+    0.7,
+)  # least length of the mean unit normal, and least cosine with the point's own normal
 
 
 def _is_steady(mean: np.ndarray, normal: np.ndarray) -> bool:
@@ -89,13 +93,15 @@ def _steady_normal(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray,
     return next((mean for mean in means if _is_steady(mean, normal)), None)
 
 
-_MOST_BESIDE = 8  # places beside an edge that are looked at
+_MOST_BESIDE = 8  # number of samples beside an edge that are tried
 
 
 def _beside(
     surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, reach_m: float
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """Return the nearest place beside a point on an edge with one normal, not far from its own, and that."""
+    """Return the nearest sample beside a point on an edge with a uniform normal close to the point's own, and that mean
+    normal.
+    """
     positions, normals = surface.samples
     near = surface.near(point_m, min(reach_m, ON_FEATURE_M))
     near = near[normals[near] @ normal > 0]
@@ -108,10 +114,11 @@ def _beside(
 
 
 def surface_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> Found:
-    """Return a place of the surface: the point itself, Z the mean normal around it, the radius of what is flat there.
+    """Return the frame of a surface point: the point itself, Z the mean normal around it; ``size_m`` is the radius of its flat
+    region.
 
-    On a thin or bent part what is near enough to have one normal is less: it is looked for twice nearer. Of a point on an edge
-    the place is on a side beside it.
+    On a thin or curved part, the neighbourhood for the mean normal is halved up to twice. For a point on an edge, the frame is
+    moved to a sample beside the edge.
     """
     positions, normals = surface.samples
     reach = max(0.02 * surface.size_m, 2.5 * surface.spacing_m)
@@ -135,7 +142,7 @@ def surface_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) 
 def _patches(
     surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, towards: np.ndarray | None, share: float
 ) -> list[Patch]:
-    """Return the flat patches that begin at samples around a point, one a direction."""
+    """Return the flat patches grown from samples around a point, one seed per direction."""
     positions, normals = surface.samples
     thick = max(_LEAST_SLAB_M, _SLAB_SHARE * surface.size_m)
     seeds: list[tuple[np.ndarray, np.ndarray]] = [(point_m, normal)]
@@ -151,7 +158,7 @@ def _patches(
 
 
 def _at_heights(surface: FramedMesh, around: np.ndarray, towards: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return a place and normal at each height, along a direction, at which much of the surface looks that way."""
+    """Return a seed position and normal at each height, along a direction, at which much of the surface faces that way."""
     positions, normals = surface.samples
     around = around[normals[around] @ towards > np.cos(np.pi / 4)]
     height = positions[around] @ towards
@@ -186,13 +193,13 @@ def _is_button(surface: FramedMesh, patch: Patch) -> bool:
 
 
 def _recess_share(surface: FramedMesh, patch: Patch, towards: np.ndarray) -> float:
-    """Return how far a patch lies behind the outermost place in a direction, as a share of the extent in it."""
+    """Return how far a patch lies behind the outermost vertex in a direction, as a share of the extent."""
     along = surface.mesh.vertices @ towards
     return float((along.max() - patch.center_m @ towards) / max(np.ptp(along), 1e-9))
 
 
 def _depth(surface: FramedMesh, patch: Patch) -> float:
-    """Return how much matter is behind a patch by its width."""
+    """Return the depth of material behind a patch relative to its width."""
     deep, _ = surface.caster.first_hits((patch.center_m - 1e-5 * patch.normal)[None], -patch.normal[None])
     return float(deep[0]) / (2 * _radius(patch)) if np.isfinite(deep[0]) else 0.0
 
@@ -204,13 +211,13 @@ def _away(patch: Patch, surface: FramedMesh, point_m: np.ndarray) -> float:
 
 
 def _fit(surface: FramedMesh, patch: Patch, point_m: np.ndarray, wanted: np.ndarray) -> float:
-    """Score a patch: it looks where it should, is flat, and is near."""
+    """Score a patch by alignment with the wanted normal, flatness and proximity."""
     away = _away(patch, surface, point_m) / (0.5 * _SEARCH_SHARE * surface.size_m)
     return float(patch.normal @ wanted) - away - 2 * _rough(patch)
 
 
 def _stands_out(surface: FramedMesh, patch: Patch) -> bool:
-    """Tell whether the surface just around a patch lies below its plane, on most sides."""
+    """Return whether most of the surface just around a patch lies below its plane."""
     positions, _ = surface.samples
     radius = _radius(patch)
     around = surface.near(patch.center_m, 2.2 * radius + 2 * surface.spacing_m)

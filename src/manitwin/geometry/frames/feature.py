@@ -1,4 +1,4 @@
-"""A functional frame, or the reason for which there is none; and the mesh that frames are looked for on."""
+"""Types of functional frames, and the mesh with cached measurements on which frames are computed."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ _LOCAL_SAMPLES, _MOST_LOCAL_SAMPLES = 500, 200_000  # within a circle of that ra
 
 @dataclass(frozen=True)
 class FeatureFrame:
-    """A feature's frame in the object frame: ``position_m (3,)``, ``rotation (3, 3)`` with the columns X, Y, Z.
+    """The frame of a feature in the object frame: ``position_m (3,)``, and ``rotation (3, 3)`` with the columns X, Y, Z.
 
-    Z is the functional direction, X the second one; ``size_m`` a radius, of an edge and an axis the length. ``roll_free``:
-    any turn about Z serves as well.
+    Z is the functional direction and X the secondary direction. ``size_m`` is a radius, for edges and axes the length.
+    ``roll_free``: any rotation about Z is equivalent.
     """
 
     kind: Kind
@@ -37,18 +37,18 @@ class FeatureFrame:
 
     @property
     def z(self) -> np.ndarray:
-        """The functional direction, ``(3,)``."""
+        """The functional direction Z, ``(3,)``."""
         return self.rotation[:, 2]
 
     @property
     def x(self) -> np.ndarray:
-        """The second direction, ``(3,)``."""
+        """The secondary direction X, ``(3,)``."""
         return self.rotation[:, 0]
 
 
 @dataclass(frozen=True)
 class Unclear:
-    """Why there is no frame, in words that complete 'no frame: ...'."""
+    """The reason why there is no frame, as a completion of 'no frame: ...'."""
 
     reason: str
 
@@ -57,9 +57,9 @@ Found = FeatureFrame | Unclear
 
 
 def rotation_of(z: np.ndarray, x: np.ndarray = UP) -> np.ndarray:
-    """Return the rotation ``(3, 3)`` with the third column along ``z (3,)`` and the first as near to ``x (3,)`` as can be.
+    """Return the rotation ``(3, 3)`` with its third column along ``z (3,)`` and its first as close to ``x (3,)`` as possible.
 
-    Where both are parallel, the first is as near to the object's X as can be.
+    If both are parallel, the first column is as close to the object's X (or Y) as possible.
     """
     z = z / np.linalg.norm(z)
     for wanted in (x, np.array([1.0, 0, 0]), np.array([0.0, 1, 0])):
@@ -73,9 +73,9 @@ def rotation_of(z: np.ndarray, x: np.ndarray = UP) -> np.ndarray:
 
 @dataclass(frozen=True)
 class FramedMesh:
-    """A watertight mesh in the object frame with what all frames share, measured when first asked for.
+    """A watertight mesh in the object frame, with measurements that are shared by all frames and computed on first use.
 
-    ``seed`` is that of its samples; ``known_opening`` saves looking for one that is known already.
+    ``seed`` is that of the surface samples; ``known_opening`` avoids searching for a known opening.
     """
 
     mesh: trimesh.Trimesh
@@ -85,44 +85,44 @@ class FramedMesh:
 
     @cached_property
     def size_m(self) -> float:
-        """The longest side of the box along the axes, m."""
+        """The longest side of the axis-aligned box, m."""
         return float(self.mesh.extents.max())
 
     @cached_property
     def caster(self) -> RayCaster:
-        """The mesh prepared for rays."""
+        """A ray caster for the mesh."""
         return RayCaster(self.mesh)
 
     @cached_property
     def opening(self) -> Opening | None:
-        """The largest hollow that would hold water."""
+        """The largest cavity that would hold water."""
         return self.known_opening or find_opening(self.mesh)
 
     @cached_property
     def samples(self) -> tuple[np.ndarray, np.ndarray]:
-        """Samples of the surface: positions ``(6000, 3)`` m and the normals of their faces."""
+        """Surface samples: positions ``(6000, 3)`` m and face normals ``(6000, 3)``."""
         positions, normals, _ = sample_surface(self.mesh, _SAMPLES, np.random.default_rng(self.seed))
         return positions, normals
 
     @cached_property
     def tree(self) -> cKDTree:
-        """A tree over the positions of ``samples``."""
+        """A k-d tree of the positions in ``samples``."""
         return cKDTree(self.samples[0])
 
     @cached_property
     def corners(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """The faces with equal corners joined ``(F, 3)``, their centres and normals ``(F, 3)`` and areas ``(F,)`` m2."""
+        """The faces with coincident vertices merged ``(F, 3)``, their centres and normals ``(F, 3)`` and areas ``(F,)`` m2."""
         _, joined = np.unique(np.round(self.mesh.vertices, 7), axis=0, return_inverse=True)
         faces = joined.reshape(-1)[self.mesh.faces]
         return faces, self.mesh.triangles_center, np.asarray(self.mesh.face_normals), self.mesh.area_faces
 
     @cached_property
     def spacing_m(self) -> float:
-        """How far apart neighbouring samples are in the mean."""
+        """The mean distance between neighbouring samples."""
         return float(np.sqrt(self.mesh.area / _SAMPLES))
 
     def body(self, axis_xy_m: np.ndarray | None) -> RoundBody:
-        """Return the upright body about a vertical axis, with what sticks out of it."""
+        """Return the upright body about a vertical axis, with its protrusions."""
         return round_body(self.samples[0], axis_xy_m)
 
     def near(self, point_m: np.ndarray, radius_m: float) -> np.ndarray:
@@ -130,9 +130,10 @@ class FramedMesh:
         return np.array(sorted(self.tree.query_ball_point(point_m, radius_m)), dtype=int)
 
     def mean_normal(self, point_m: np.ndarray, normal: np.ndarray, radius_m: float) -> np.ndarray:
-        """Return the mean ``(3,)`` of unit normals by area within a radius of a point, on its side: shorter as they differ.
+        """Return the area-weighted mean ``(3,)`` of the unit normals within a radius of a point, on its side; its length shows
+        uniformity.
 
-        Samples are drawn anew of the faces there: those of the whole are too far apart for a thin part.
+        New samples are drawn from the faces near the point, as the global samples are too sparse for thin parts.
         """
         triangles, centers = self.mesh.triangles, self.mesh.triangles_center
         reach_m = radius_m + np.linalg.norm(triangles - centers[:, None], axis=2).max(1)

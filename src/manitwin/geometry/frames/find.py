@@ -1,4 +1,4 @@
-"""The frame of the feature that a point and its label mean."""
+"""Selection of the functional frame for a point and its label."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from manitwin.geometry.frames.words import ahead_or_aside, direction_for, is_end
 
 
 def find_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, label: str) -> Found:
-    """Return the frame of the feature at a surface point with an outward normal ``(3,)``, of a kind that fits its label.
+    """Return the frame of the feature at a surface point with outward normal ``(3,)``, of a kind that fits its label.
 
-    The kinds that fit are tried in their order. Where none is clear, the reason of the first is returned: the frame of a
-    feature is never replaced by that of another one.
+    The fitting kinds are tried in order. If none is clear, the reasons of the first two are returned: a feature's frame is
+    never replaced by that of another feature.
     """
     reasons = []
     for kind in kinds_for(label):

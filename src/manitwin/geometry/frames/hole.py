@@ -1,4 +1,4 @@
-"""Holes: a bore, a ring, a handle's loop, by the walls that look at its axis."""
+"""Frames of holes (bores, rings, handle loops), fitted to the walls that face the hole's axis."""
 
 from __future__ import annotations
 
@@ -8,28 +8,30 @@ import numpy as np
 from manitwin.geometry.frames.feature import FeatureFrame, Found, FramedMesh, Unclear, rotation_of
 
 _TURNS = 48  # rays around the axis
-_CLOSED_SHARE = 0.9  # of them must meet a wall: else it is a notch or a jaw
+_CLOSED_SHARE = 0.9  # of the rays that must hit a wall; otherwise it is a notch or a jaw
 _ROUNDS = 6
-_EVEN = 4.5  # the wall's far parts by its near ones: a loop or a slot may be oblong
-_SLOT = 0.9  # of the largest circle's radius: as much room as the middle of a slot must have
+_EVEN = 4.5  # largest ratio of the wall's far to near distances; loops and slots may be oblong
+_SLOT = 0.9  # of the largest circle's radius: the clearance that the centre of a slot must have
 _LEAST_RADIUS_M = 0.0008
-_SEARCH_SHARE, _SEEDS = 0.2, 60  # of the longest side around the point, and how many samples there are asked
-_LEVEL = 0.01  # by which a place must be narrower for each metre along the axis: a bore is equally narrow everywhere
+_SEARCH_SHARE, _SEEDS = 0.2, 60  # of the longest side around the point, and number of samples tried there
+_LEVEL = (
+    0.01  # penalty per metre along the axis when seeking the narrowest place, as a bore is equally narrow everywhere
+)
 _BESIDE_RADII = 1.5
-"""Of the radius: a point farther from the wall is not of this hole; a handle's is not the mouth beside it."""
-_FEW = 2  # starts found around the point: where there are more, the middle of the thing is no better
-_ON_WALL = 0.3  # of the radius: a point that near to a hole's wall means that hole
+"""Of the radius: points farther from the wall belong to another feature, such as the mouth beside a handle's loop."""
+_FEW = 2  # number of starts near the point above which the object's centre is not tried
+_ON_WALL = 0.3  # of the radius: a point this close to a hole's wall refers to that hole
 _FAN_RAD = np.radians(12)
-_FAR = 0.6  # of the longest side: walls beyond are not a hole's
+_FAR = 0.6  # of the longest side: farther walls do not belong to a hole
 
 
 def hole_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, through: bool = False) -> Found:
-    """Return the hole whose wall or rim a surface point is on: its axis by the walls' normals, the inscribed circle's radius.
+    """Return the frame of the hole whose wall or rim a surface point is on; ``size_m`` is the radius of the inscribed circle.
 
-    A through hole's frame is in its middle, Z towards the side that looks up or along +X; a blind one's at its mouth, Z out.
-    X leads to the centre of mass. The axis is the direction across the normals of the walls that are seen from inside: exact
-    for a cylinder and for a torus. ``through``: only a hole that is open at both ends, as a handle's loop is and the mouth beside
-    it is not.
+    The frame of a through hole is at its middle with Z towards the end that faces up or +X; that of a blind hole is at its
+    mouth with Z outward. X points to the centre of mass. The axis is the direction perpendicular to the normals of the walls
+    seen from inside, which is exact for a cylinder and a torus. ``through``: accept only holes that are open at both ends, such
+    as a handle's loop but not the mouth beside it.
     """
     best: tuple[float, np.ndarray, np.ndarray, float] | None = None
     for center, axis in _starts(surface, point_m, normal):
@@ -51,13 +53,15 @@ def hole_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, thr
 
 
 def _starts(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return centres and axes to begin with: midway to walls opposite, from the point and from samples around it."""
+    """Return initial centres and axes: midpoints to opposite walls, from the point and from samples around it."""
     positions, normals = surface.samples
     starts: list[tuple[np.ndarray, np.ndarray]] = []
     around = surface.near(point_m, _SEARCH_SHARE * surface.size_m)
     around = around[np.argsort(np.linalg.norm(positions[around] - point_m, axis=1), kind="stable")]
     alike = around[: len(around) // 3]
-    alike = alike[normals[alike] @ normal > 0.5]  # a ring's wall is round across too: its mean looks at the axis
+    alike = alike[
+        normals[alike] @ normal > 0.5
+    ]  # the wall of a ring is curved in section too; its mean normal faces the axis
     mean = normals[alike].mean(0) if len(alike) else normal
     spread = around[:: max(1, len(around) // _SEEDS)]
     seeds = np.concatenate([point_m[None], point_m[None], positions[spread]])
@@ -74,20 +78,20 @@ def _starts(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> lis
         axis = _open_axis(surface, center, out)
         if axis is not None:
             starts.append((center, axis))
-    middle = surface.mesh.bounds.mean(0)  # of a ring nothing else may look across: its walls are narrow and round
+    middle = surface.mesh.bounds.mean(0)  # the narrow round walls of a ring may not face any opposite wall
     _, axes = np.linalg.eigh(np.cov((positions - positions.mean(0)).T))
     return starts if len(starts) > _FEW else starts + [(middle, axis) for axis in axes.T]
 
 
 def _fan(direction: np.ndarray) -> np.ndarray:
-    """Return a direction and four that are 12 degrees off it: a facet of a ring's wall looks past the wall opposite."""
+    """Return a direction and four others tilted by 12 degrees: the normal of a ring's facet may miss the opposite wall."""
     basis = rotation_of(direction)
     tilts = np.stack([basis[:, 0], -basis[:, 0], basis[:, 1], -basis[:, 1]])
     return np.concatenate([basis[:, 2][None], np.cos(_FAN_RAD) * basis[:, 2] + np.sin(_FAN_RAD) * tilts])
 
 
 def _open_axis(surface: FramedMesh, center: np.ndarray, across: np.ndarray) -> np.ndarray | None:
-    """Return the direction across ``across`` in which one looks farthest to both sides, None where nothing is open."""
+    """Return the direction perpendicular to ``across`` with the longest free view to both sides; None if no side is open."""
     basis = rotation_of(across)
     angle = np.arange(12) * np.pi / 12
     around = np.cos(angle)[:, None] * basis[:, 0] + np.sin(angle)[:, None] * basis[:, 1]
@@ -105,7 +109,7 @@ def _open_axis(surface: FramedMesh, center: np.ndarray, across: np.ndarray) -> n
 
 
 def _fitted(surface: FramedMesh, center: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray, float] | None:
-    """Return centre, axis and inscribed radius of the hole around a start, None where its walls do not close."""
+    """Return centre, axis and inscribed radius of the hole around a start; None if its walls are not closed."""
     for _ in range(_ROUNDS):
         walls, normals, closed = _throat(surface, center, axis)
         if closed < _CLOSED_SHARE:
@@ -133,9 +137,9 @@ def _fitted(surface: FramedMesh, center: np.ndarray, axis: np.ndarray) -> tuple[
 
 
 def _throat(surface: FramedMesh, center: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return the narrowest place of the walls at each turn, looked for a third of the radius up and down the axis.
+    """Return the narrowest wall positions around the axis, sought up to a third of the radius along it.
 
-    There the wall of a ring, which is round across, looks at the axis as that of a bore does.
+    At the narrowest position, the wall of a ring, which is round in section, faces the axis like that of a bore.
     """
     first, _, closed = _walls(surface, center, axis)
     if closed < _CLOSED_SHARE:
@@ -154,7 +158,7 @@ def _throat(surface: FramedMesh, center: np.ndarray, axis: np.ndarray) -> tuple[
 def _rays(
     surface: FramedMesh, center: np.ndarray, axis: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return of rays around an axis the distance, the face, whether that is a wall nearby, and the place."""
+    """Return distance, face, whether the face is a wall nearby, and hit position, for each ray around an axis."""
     basis = rotation_of(axis)
     angle = np.arange(_TURNS) * 2 * np.pi / _TURNS
     out = np.cos(angle)[:, None] * basis[:, 0] + np.sin(angle)[:, None] * basis[:, 1]
@@ -165,15 +169,15 @@ def _rays(
 
 
 def _walls(surface: FramedMesh, center: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return what rays around an axis meet: places, the walls' normals, and the share of rays that meet a wall nearby."""
+    """Return wall positions, wall normals, and the share of rays around an axis that hit a nearby wall."""
     _, face, met, place = _rays(surface, center, axis)
     return place[met], surface.caster.face_normals[face[met]], float(met.mean())
 
 
 def _widest(flat: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """Return the step ``(3,)`` from the origin to the centre of the largest circle within walls ``(N, 3)``.
+    """Return the step ``(3,)`` from the origin to the centre of the largest circle inside walls ``(N, 3)``.
 
-    Of a slot, in which that circle may slide, to the middle of its box.
+    For a slot, in which the circle may slide, the step leads to the centre of its minimum-area rectangle.
     """
     basis = rotation_of(axis)
     points = flat @ basis[:, :2]
@@ -191,7 +195,7 @@ def _widest(flat: np.ndarray, axis: np.ndarray) -> np.ndarray:
 
 
 def _closed(surface: FramedMesh, center: np.ndarray, axis: np.ndarray, radius: float) -> list[bool]:
-    """Tell whether a hole is closed ahead and behind: most of nine rays along its axis meet something."""
+    """Return whether a hole is closed ahead and behind: most of nine rays along its axis hit something."""
     ring = rotation_of(axis)
     angle = np.arange(8) * np.pi / 4
     spokes = np.cos(angle)[:, None] * ring[:, 0] + np.sin(angle)[:, None] * ring[:, 1]
@@ -201,7 +205,7 @@ def _closed(surface: FramedMesh, center: np.ndarray, axis: np.ndarray, radius: f
 
 
 def _framed(surface: FramedMesh, center: np.ndarray, axis: np.ndarray, radius: float) -> Found:
-    """Place a hole's frame in its middle, or at its mouth where one end is closed."""
+    """Place a hole's frame at its middle, or at its mouth if one end is closed."""
     both = np.stack([axis, -axis])
     closed = _closed(surface, center, axis, radius)
     if all(closed):
@@ -217,7 +221,7 @@ def _framed(surface: FramedMesh, center: np.ndarray, axis: np.ndarray, radius: f
 
 
 def _mouth_m(surface: FramedMesh, center: np.ndarray, direction: np.ndarray, radius: float) -> float:
-    """Return how far along a direction the walls still close, by halving."""
+    """Return how far along a direction the walls still enclose the axis, by bisection."""
     low, high = 0.0, surface.size_m
     for _ in range(12):
         middle = (low + high) / 2

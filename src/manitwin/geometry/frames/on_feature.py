@@ -1,4 +1,4 @@
-"""How far a frame is from the feature that it says it is of."""
+"""Deviation of a functional frame from its feature, for validation."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from manitwin.geometry.distance import distance_to_surface
 from manitwin.geometry.frames.feature import Kind
 
 ON_FEATURE_M = 0.005
-"""The origin of a frame lies this near to the surface, that of an opening or hole to the plane of its walls."""
-_SECTORS, _LEAST_SECTORS = 8, 5  # around an opening or hole, and in how many of them there must be walls
-_NEAR, _FAR = 0.5, 3.0  # times the radius: where the walls of an opening or hole are, oblong ones too
-_INSIDE_SHARE = 0.25  # of an axis' length: what is thicker is not slender enough to have one
+"""Tolerance: the origin of a frame is this close to the surface; for an opening or hole, its plane to the walls."""
+_SECTORS, _LEAST_SECTORS = 8, 5  # around an opening or hole, and the number of them that must contain walls
+_NEAR, _FAR = 0.5, 3.0  # times the radius: range of distances of the walls of an opening or hole, including oblong ones
+_INSIDE_SHARE = 0.25  # of an axis' length: a part that is thicker is not slender enough to have one
 
 
 def off_feature_m(
@@ -23,11 +23,12 @@ def off_feature_m(
     surface_m: np.ndarray,
     mesh: trimesh.Trimesh | None = None,
 ) -> float:
-    """Return how far (m) a frame is from its feature, by samples of the surface ``(N, 3)``; inf: nothing of it is there.
+    """Return the distance (m) of a frame from its feature, from surface samples ``(N, 3)``; inf if no part of it is found.
 
-    Of an opening and a hole this is the distance of its plane from the walls around it in five of eight sectors at least; of
-    an axis, which runs inside, what is more than a quarter of its length; of the others that of the origin. Samples are some
-    millimetres apart on a large thing: with its ``mesh`` what they call too far is measured exactly.
+    For an opening or hole, it is the distance of its plane from the walls in at least five of eight sectors. For an axis, which
+    lies inside, it is the excess over a quarter of its length. For other kinds, it is the distance of the origin from the
+    surface. Samples on a large object are some millimetres apart; with ``mesh``, distances above the tolerance are computed
+    exactly.
     """
     offset = surface_m - position_m
     if kind not in ("opening", "hole"):

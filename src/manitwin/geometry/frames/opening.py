@@ -1,4 +1,4 @@
-"""Openings: the plane of the rim, its middle, and the side to pour over."""
+"""Frames of openings: rim plane, rim centre and pour direction."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from manitwin.geometry.frames.feature import FeatureFrame, Found, FramedMesh, Un
 
 _TURNS = 72
 _LAYERS = 16
-_SPOUT_BULGE = 0.08  # of the rim's radius, one-sided: a jug's lip has more, the rim of a scanned mug less
-_HANDLE_SECTOR_RAD = np.radians(50)  # around a handle the rim is not asked: a pan's handle looks like a spout
-_OBLONG = 1.15  # longer by shorter width of a rim from which the roll is not free
-_MOST_TILT_RAD = np.radians(20)  # of the rim's plane from the direction in which the hollow was found
-_NEAR_RADII = 1.6  # a point this many rim radii from the middle belongs to another feature
+_SPOUT_BULGE = 0.08  # of the rim's radius, one-sided; the lip of a jug exceeds it, the rim of a scanned mug does not
+_HANDLE_SECTOR_RAD = np.radians(50)  # rim sector excluded around a handle, as a pan's handle resembles a spout
+_OBLONG = 1.15  # aspect ratio of a rim from which its roll is determined
+_MOST_TILT_RAD = np.radians(20)  # of the rim's plane from the direction in which the cavity was found
+_NEAR_RADII = 1.6  # a point beyond this many rim radii from the centre belongs to another feature
 _BESIDE, _JUMP = 4, 1.3
-"""Of 72 azimuths to each side: a wall this many times farther than these is a handle behind a low rim."""
+"""Neighbours among 72 azimuths: a wall this many times farther away than theirs is a handle behind a low rim."""
 
 
 def opening_frame(surface: FramedMesh, point_m: np.ndarray) -> Found:
-    """Return the opening that a point is at: the rim's plane and middle, X the pour direction.
+    """Return the frame of the opening at a point: rim plane and centre, with X in the pour direction.
 
-    X leads to a spout (a one-sided bulge of the rim of more than 8 %, or what sticks out opposite the handle), else away from
-    the handle, else along an oblong rim; a round rim with none of these is free to roll.
+    X points to a spout (a one-sided bulge of the rim of more than 8 %, or a protrusion opposite the handle), else away from the
+    handle, else along an oblong rim. The roll of a round rim with none of these is free.
     """
     opening = surface.opening
     if opening is None:
@@ -42,9 +42,10 @@ def opening_frame(surface: FramedMesh, point_m: np.ndarray) -> Found:
 
 
 def rim_points(surface: FramedMesh, opening: Opening) -> np.ndarray:
-    """Return the top of the inner wall at 72 azimuths about the opening's axis, ``(72, 3)`` m; NaN where there is none.
+    """Return the top of the inner wall at 72 azimuths about the opening's axis, ``(72, 3)`` m; NaN where none is found.
 
-    Rays go outward from the axis at rising heights around the brim; the last that meets a wall is below its top.
+    Horizontal rays from the axis are cast at increasing heights around the brim; the last one that hits a wall is just below
+    its top.
     """
     basis = rotation_of(opening.axis)
     angle = np.arange(_TURNS) * 2 * np.pi / _TURNS
@@ -54,7 +55,7 @@ def rim_points(surface: FramedMesh, opening: Opening) -> np.ndarray:
     met = np.zeros((_LAYERS, _TURNS), dtype=bool)
     for layer, height in enumerate(heights):
         met[layer], _ = _meets(surface, opening, out, np.full(_TURNS, height))
-    run = np.cumprod(met, axis=0).sum(0)  # the wall is the unbroken run from below: a bail above it is not
+    run = np.cumprod(met, axis=0).sum(0)  # the wall is the unbroken run from below, which excludes a bail above it
     found = (run > 0) & (run < _LAYERS)
     below = heights[np.clip(run - 1, 0, _LAYERS - 1)]
     over = heights[np.clip(run, 0, _LAYERS - 1)]
@@ -81,7 +82,7 @@ def _meets(
 
 
 def _plane(rim: np.ndarray, opening: Opening) -> tuple[np.ndarray, np.ndarray]:
-    """Fit the rim's plane: normal and middle; a spout or a notch is left out by two rounds of trimming."""
+    """Fit the rim's plane, returned as normal and centre; spouts and notches are excluded by two rounds of trimming."""
     kept = rim
     for _ in range(3):
         middle = kept.mean(0)
@@ -96,7 +97,7 @@ def _plane(rim: np.ndarray, opening: Opening) -> tuple[np.ndarray, np.ndarray]:
     flat = (rim - opening.center_m) @ basis[:, :2]
     turns = np.linspace(0, np.pi, 36, endpoint=False)
     spans = flat @ np.stack([np.cos(turns), np.sin(turns)])
-    halves = (spans.max(0) + spans.min(0)) / 2  # the middle between both ends, in every direction, by least squares
+    halves = (spans.max(0) + spans.min(0)) / 2  # centre between both ends in every direction, by least squares
     middle = 2 / 36 * np.array([halves @ np.cos(turns), halves @ np.sin(turns)])
     return normal, opening.center_m + basis[:, :2] @ middle + height * normal
 
@@ -131,7 +132,7 @@ def _pour_direction(
 
 
 def _odd_part(profile: np.ndarray) -> np.ndarray:
-    """Return the one-sided part of a profile around a circle: its odd harmonics, which neither ellipse nor square have."""
+    """Return the one-sided part of a circular profile: its odd harmonics, which are zero for an ellipse or square."""
     smooth = (np.roll(profile, 1) + profile + np.roll(profile, -1)) / 3
     spectrum = np.fft.rfft(smooth)
     spectrum[0] = 0
@@ -146,10 +147,10 @@ def _turn(a: np.ndarray, b: float) -> np.ndarray:
 def _outside(
     surface: FramedMesh, basis: np.ndarray, center: np.ndarray, opening: Opening
 ) -> tuple[float | None, float | None]:
-    """Return the azimuths (rad) of a single handle and of a spout beside the body; None where there is no such thing.
+    """Return the azimuths (rad) of a single handle and of a spout beside the body; None if absent.
 
-    Of two things opposite each other that are alike, neither is the handle. A handle comes back to the body lower down, a
-    spout ends in a tip: the taller of two is the handle.
+    Two similar protrusions opposite each other are both handles. A handle returns to the body lower down while a spout ends in
+    a tip, so the taller of the two is the handle.
     """
     body = surface.body(center[:2]) if basis[2, 2] > 0.9 else None
     if body is None:
@@ -170,6 +171,6 @@ def _outside(
 
 
 def _in_plane(azimuth_rad: float, basis: np.ndarray) -> float:
-    """Return the angle in the rim's plane of a direction about the vertical."""
+    """Return the angle within the rim's plane of a horizontal azimuth."""
     direction = np.array([np.cos(azimuth_rad), np.sin(azimuth_rad), 0.0])
     return float(np.arctan2(direction @ basis[:, 1], direction @ basis[:, 0]))

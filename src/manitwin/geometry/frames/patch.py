@@ -1,4 +1,4 @@
-"""Flat patches of a surface: the faces around a place that lie in one plane."""
+"""Flat surface patches: connected faces around a point that lie in one plane."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from scipy.sparse.csgraph import connected_components
 from manitwin.geometry.frames.feature import FramedMesh
 
 _WIDTHS = (2.0, 1.5, 1.5, 1.0, 1.0, 1.0)
-"""Of slab and angle, by rounds of fitting the plane and growing the patch again."""
+"""Multiples of slab thickness and angle, per round of fitting the plane and growing the patch."""
 
 
 @dataclass(frozen=True)
 class Patch:
-    """A flat patch: its faces' indices, centre and outward normal ``(3,)``, area (m2), RMS distance from its plane (m).
+    """A flat patch: face indices, centre, outward normal ``(3,)``, area (m2), and RMS distance from its plane (m).
 
-    ``long_axis (3,)`` lies in the plane along the longer side, ``elongation`` is how much longer that is.
+    ``long_axis (3,)`` is the in-plane direction of the longer side, ``elongation`` the aspect ratio.
     """
 
     faces: np.ndarray
@@ -33,10 +33,10 @@ class Patch:
 def flat_patch(
     surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, *, angle_rad: float, thick_m: float
 ) -> Patch | None:
-    """Return the connected faces nearest to a point whose normals are within an angle and centres within a slab of a plane.
+    """Return the connected faces near a point with normals within an angle and centres within a slab of a fitted plane.
 
-    The plane begins at the point with the given outward normal and follows the patch. None where no face near the point
-    (5 % of the longest side) belongs to it.
+    The plane starts at the point with the given outward normal and is refitted to the patch. None if no such face is near the
+    point (5 % of the longest side).
     """
     corners, centers, normals, areas = surface.corners
     origin, chosen = point_m, np.zeros(0, dtype=int)
@@ -60,7 +60,7 @@ def flat_patch(
 
 
 def _components(corners: np.ndarray) -> np.ndarray:
-    """Return a number for each face ``(N, 3)``: equal for those that hang together by their corners."""
+    """Return a component label for each face ``(N, 3)``, connected through shared vertices."""
     face = np.repeat(np.arange(len(corners)), 3)
     _, corner = np.unique(corners, return_inverse=True)
     count = len(corners) + int(corner.max()) + 1
@@ -69,7 +69,7 @@ def _components(corners: np.ndarray) -> np.ndarray:
 
 
 def _above(surface: FramedMesh, faces: np.ndarray, point_m: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Tell which faces a point lies above or below, seen along a normal: a large face's corners may all be far."""
+    """Return which faces contain a point in projection along a normal; all corners of a large face may be far away."""
     triangles = surface.mesh.triangles[faces] - point_m
     turns = np.stack([np.cross(triangles[:, i], triangles[:, (i + 1) % 3]) @ normal for i in range(3)], axis=1)
     return np.asarray((turns >= 0).all(1) | (turns <= 0).all(1))

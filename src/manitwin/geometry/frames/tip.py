@@ -1,4 +1,4 @@
-"""Tips: the outermost end of what is long or pointed around a point."""
+"""Frames of tips: the outermost end of an elongated or pointed part."""
 
 from __future__ import annotations
 
@@ -7,21 +7,25 @@ import numpy as np
 from manitwin.geometry.frames.feature import UP, FeatureFrame, Found, FramedMesh, Unclear, rotation_of
 from manitwin.geometry.frames.opening import opening_frame, rim_points
 
-_REACH_SHARES = (0.12, 0.2, 0.35)  # of the longest side: how much of the thing around the point is looked at
-_LONG = 1.5  # longest by second spread (variances) of what has a direction
-_END_SHARE = 0.012  # of the longest side: what is that near to the outermost place is the end
-_FAR_SHARE = 0.25  # of the longest side: an end farther away is not what the point means
+_REACH_SHARES = (
+    0.12,
+    0.2,
+    0.35,
+)  # of the longest side: neighbourhoods of the point in which an elongated direction is sought
+_LONG = 1.5  # least ratio of the largest to the second variance of an elongated neighbourhood
+_END_SHARE = 0.012  # of the longest side: points this close to the outermost one form the end
+_FAR_SHARE = 0.25  # of the longest side: farther ends are not the one at the point
 _RIVAL = (1.5, 0.02)
-"""Times the best score, plus of the longest side: an end that looks elsewhere and is as near as that is a rival."""
-_SAME_WAY = np.cos(np.radians(25.0))  # of the directions of two ends that are one
-_BLUNT = 0.75  # radius of the end by that of what is behind it within a tenth of the longest side, for short stubs
+"""An end in another direction with a score below this multiple of the best, plus a share of the longest side, is a rival."""
+_SAME_WAY = np.cos(np.radians(25.0))  # directions of two ends that count as one
+_BLUNT = 0.75  # least share of nearby samples in the cone behind the end
 
 
 def tip_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, pours: bool = False) -> Found:
-    """Return the end that a surface point is at or near: the outermost place, Z along the tip and out.
+    """Return the frame of the tip at or near a surface point: the outermost point, Z along the tip and outward.
 
-    The direction is that of the long part around the point, towards its end; of what ``pours``, a lip that the rim
-    is drawn out to (a jug's) is found by its opening. Nothing of the object may lie straight ahead of a tip.
+    The direction is that of the elongated part around the point, towards its end. With ``pours``, the lip of a rim (as of a
+    jug) is found from the opening. No part of the object may lie straight ahead of a tip.
     """
     lip = _lip(surface, point_m) if pours else None
     if lip is not None:
@@ -43,7 +47,9 @@ def tip_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, pour
 
 
 def _directions(surface: FramedMesh, point_m: np.ndarray) -> list[tuple[np.ndarray, float]]:
-    """Return the directions in which what is around a point is long, both ways, with the share looked at (0: the whole)."""
+    """Return the directions, with both signs, in which neighbourhoods of a point are elongated, with their share (0: whole
+    object).
+    """
     positions, _ = surface.samples
     found = []
     for share in (*_REACH_SHARES, 0.0):
@@ -85,9 +91,9 @@ def _end(surface: FramedMesh, point_m: np.ndarray, direction: np.ndarray, share:
 
 
 def _is_end(surface: FramedMesh, tip: np.ndarray, direction: np.ndarray, blunt: bool) -> bool:
-    """Tell whether nothing lies ahead of a tip, and what is behind it is slender.
+    """Return whether nothing lies ahead of a tip, and the part behind it is slender.
 
-    ``blunt``: the end of the whole thing's length, which may be as wide as it likes; else what is wide is a side, no tip.
+    ``blunt``: the end of the whole object, which may have any width; otherwise a wide end is a side, not a tip.
     """
     positions, _ = surface.samples
     offset = positions[surface.near(tip, 0.15 * surface.size_m)] - tip
@@ -100,7 +106,7 @@ def _is_end(surface: FramedMesh, tip: np.ndarray, direction: np.ndarray, blunt: 
 
 
 def _lip(surface: FramedMesh, point_m: np.ndarray) -> FeatureFrame | None:
-    """Return the lip that a rim is drawn out to, where the point is on that side."""
+    """Return the frame of the lip of a rim if the point is on its side; otherwise None."""
     opening = opening_frame(surface, point_m)
     if isinstance(opening, Unclear) or opening.roll_free or surface.opening is None or opening.z[2] < 0.9:
         return None

@@ -1,4 +1,4 @@
-"""Which kinds of frame the word for a place may have: 'rim' an opening, 'blade' an edge."""
+"""Keyword rules from labels of points to kinds of functional frames, e.g. 'rim' to opening, 'blade' to edge."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _ALSO: tuple[tuple[str, tuple[Kind, ...]], ...] = (
     (r"\barm\b|\bneck\b", ("button",)),
     (r"spout|nozzle", ("opening", "hole")),
 )
-"""What a word may mean of some things besides: not looked for by it, but no contradiction."""
+"""Further meanings of a keyword: they are not searched for, but a frame of such a kind is not a contradiction."""
 _UNSAID: tuple[Kind, ...] = ("surface",)
 _DOWN = re.compile(r"base\b|bottom|underside|\bfoot\b|\bfeet\b|\bpaws?\b|sole", re.IGNORECASE)
 _POURS = re.compile(r"spout|pour", re.IGNORECASE)
@@ -54,7 +54,7 @@ _UPWARD = re.compile(r"\btop\b|upper", re.IGNORECASE)
 
 
 def kinds_for(label: str) -> tuple[Kind, ...]:
-    """Return the kinds of frame that fit a label, the likeliest first; a place of the surface for words that say none."""
+    """Return the kinds of frame that fit a label, likeliest first; ``("surface",)`` if no keyword matches."""
     text = label.lower()
     for pattern, kinds in _KINDS:
         if re.search(pattern, text):
@@ -63,56 +63,60 @@ def kinds_for(label: str) -> tuple[Kind, ...]:
 
 
 def direction_for(label: str) -> np.ndarray | None:
-    """Return the direction ``(3,)`` in which a face of that name looks in the upright pose, None where the word says none."""
+    """Return the direction ``(3,)`` that a face with this label has in the upright pose; None if the label does not state one."""
     if _DOWN.search(label):
         return np.array([0.0, 0.0, -1.0])
     return np.array([0.0, 0.0, 1.0]) if _UPWARD.search(label) else None
 
 
 def is_end(label: str) -> bool:
-    """Tell whether a face of that name is the end of something, as a striking face is that of a head."""
+    """Return whether a face with this label is the end of a part, as the striking face of a hammer's head."""
     return _END_ON.search(label) is not None
 
 
 def fits(label: str, kind: Kind) -> bool:
-    """Tell whether a kind of frame fits a label; to words that say no kind, any does."""
+    """Return whether a kind of frame fits a label; any kind fits a label without keywords."""
     kinds = kinds_for(label)
     also = {each for pattern, others in _ALSO if re.search(pattern, label.lower()) for each in others}
     return kinds is _UNSAID or kind in kinds or kind in also
 
 
 def means_place(label: str, kind: Kind) -> bool:
-    """Tell whether a label means the feature that its frame is of, and not something larger that the feature belongs to."""
+    """Return whether a label denotes the feature of its frame itself, not a larger part that contains it."""
     if kind in ("surface", "axis") or _INSIDE.search(label):
         return False
     return kinds_for(label)[0] == kind and _WHOLE.search(label) is None
 
 
 def ahead_or_aside(label: str) -> bool:
-    """Tell whether a part of that name is the end of a thing or stands out of its side, as bristles do."""
+    """Return whether a part with this label may be the end of an object or project from its side, such as bristles."""
     return _AHEAD_OR_ASIDE.search(label) is not None
 
 
 def pours(label: str) -> bool:
-    """Tell whether the word for a tip means what is poured over."""
+    """Return whether the label of a tip means an outlet for pouring."""
     return _POURS.search(label) is not None
 
 
 def aims(label: str) -> bool:
-    """Tell whether something comes out of a place of that name in one direction, or looks out of it."""
+    """Return whether a part with this label emits or looks in one direction (nozzle, muzzle, lens)."""
     return _AIMS.search(label) is not None
 
 
 def grip_rank(label: str) -> int | None:
-    """Return how near a place of that name is to where a thing that is aimed is held: 0 a trigger; None: not at all."""
+    """Return how likely an aimed tool is held at a part with this label: 0 for a trigger, larger is less likely; None: not held
+    there.
+    """
     return next((rank for rank, words in enumerate(_GRIPS) if re.search(words, label, re.IGNORECASE)), None)
 
 
 def cuts(category: str, label: str) -> bool:
-    """Tell whether the edge of that name of such a thing is one that cuts: a knife's, not a ruler's or a spatula's."""
+    """Return whether an edge with this label on an object of this category cuts, as a knife's does but not a ruler's or
+    spatula's.
+    """
     return _CUTS.search(f"{category} {label}") is not None
 
 
 def wipes(category: str, label: str) -> bool:
-    """Tell whether the face of that name of such a thing wipes: a sponge's any, of other things that which is called so."""
+    """Return whether a face with this label wipes: any face of a sponge, or a face of another object labelled so."""
     return _WIPERS.search(category) is not None or _WIPES.search(label) is not None

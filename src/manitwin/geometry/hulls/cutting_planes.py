@@ -1,4 +1,4 @@
-"""Planes that a part of a solid may be cut by, compared by how much hull volume the cut leaves."""
+"""Candidate cutting planes for a part of a solid, ranked by the hull volume that remains after the cut."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ import numpy as np
 
 from manitwin.geometry.cavity import Opening
 
-_COARSE_SHARE = 7e-3  # of a part's longest side: detail that does not decide where it is cut
+_COARSE_SHARE = 7e-3  # of a part's longest side: finer detail does not affect the choice of plane
 _POSITIONS = (0.2, 0.5, 0.8)  # of a part's width along a cutting normal
-_MORE_POSITIONS = (0.1, 0.35, 0.65, 0.9)  # along the two normals whose first positions were the best
+_MORE_POSITIONS = (0.1, 0.35, 0.65, 0.9)  # along the two normals with the best first positions
 
 
 class CoarsePart:
-    """A part's vertices and edges without its finest detail, on which planes are compared."""
+    """The vertices and edges of a simplified part, on which cutting planes are compared."""
 
     def __init__(self, solid: manifold3d.Manifold, extents_m: np.ndarray):
-        """Take a part's solid and its sides ``(3,)`` along the axes."""
+        """Simplify a part's solid with axis-aligned extents ``(3,)``."""
         coarse = solid.simplify(_COARSE_SHARE * float(extents_m.max()))
         kept = coarse.status() == manifold3d.Error.NoError and not coarse.is_empty()
         self.vertices, triangles = surface_of(coarse if kept else solid)
         edges = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-        once = edges[:, 0] < edges[:, 1]  # every edge of a closed surface is there in both directions
+        once = edges[:, 0] < edges[:, 1]  # a closed surface has every edge in both directions
         self.starts, self.ends = edges[once, 0], edges[once, 1]
 
     def hull_volume_after(self, normal: np.ndarray, offset: float) -> float:
-        """Return the summed hull volumes of both sides of a plane, infinity where it misses the part."""
+        """Return the summed hull volumes of both sides of a plane; infinity if the plane misses the part."""
         return self._hull_volume_after(self.vertices @ normal - offset)
 
     def _hull_volume_after(self, height: np.ndarray) -> float:
@@ -40,7 +40,7 @@ class CoarsePart:
         along = (high / (high - height.take(end)))[:, None]
         section = first + along * (self.vertices.take(end, axis=0) - first)
         sides = (np.concatenate([self.vertices.compress(side, axis=0), section]) for side in (below, ~below))
-        # manifold3d's hull is the faster one; it can be some per cent off on nearly flat clouds: it only ranks planes
+        # manifold3d's hull is faster; its error of up to some per cent on nearly flat clouds is acceptable for ranking
         return sum(float(manifold3d.Manifold.hull_points(side).volume()) for side in sides)
 
     def cuts_across(self, normal: np.ndarray, positions: Sequence[float]) -> list[tuple[float, float]]:
@@ -54,7 +54,7 @@ class CoarsePart:
 def best_plane(part: CoarsePart, opening: Opening | None) -> tuple[float, np.ndarray, float]:
     """Return the summed hull volumes (m^3) after the best cut, and its plane as normal ``(3,)`` and offset (m).
 
-    Tried are planes across the object's and the part's axes, and planes through the vessel's axis.
+    The candidates are planes perpendicular to the object's and the part's axes, and planes through the vessel's axis.
     """
     normals = own_and_principal_axes(part.vertices)
     first = [part.cuts_across(normal, _POSITIONS) for normal in normals]
@@ -71,17 +71,17 @@ def best_plane(part: CoarsePart, opening: Opening | None) -> tuple[float, np.nda
 
 
 def own_and_principal_axes(vertices: np.ndarray) -> list[np.ndarray]:
-    """Return the object's axes and those principal axes of vertices ``(V, 3)`` that are no such axis, each ``(3,)``."""
+    """Return the object's axes and the principal axes of vertices ``(V, 3)`` that do not coincide with them, each ``(3,)``."""
     centered = vertices - vertices.mean(0)
     principal = np.linalg.eigh(np.einsum("ni,nj->ij", centered, centered))[1].T
     return [*np.eye(3), *(axis for axis in principal if np.abs(axis).max() < 0.995)]
 
 
 def _sector_normals(offsets: np.ndarray, axis: np.ndarray) -> list[np.ndarray]:
-    """Return normals of planes through the axis that divide the angle which a part spans around it into quarters.
+    """Return normals of planes through the axis that divide the angular span of a part about it into quarters.
 
-    ``offsets (V, 3)`` are the part's vertices from a point of the axis. A plane cuts a whole ring twice, so of that half a turn
-    is divided.
+    ``offsets (V, 3)`` are the part's vertices relative to a point on the axis. A plane cuts a full ring twice, so that for it
+    half a turn is divided.
     """
     first, second = normal_across(axis, np.pi / 2), -normal_across(axis, 0.0)
     angles = np.sort(np.arctan2(offsets @ second, offsets @ first))
@@ -93,7 +93,7 @@ def _sector_normals(offsets: np.ndarray, axis: np.ndarray) -> list[np.ndarray]:
 
 
 def normal_across(axis: np.ndarray, angle: float) -> np.ndarray:
-    """Return the unit normal of the plane that holds ``axis`` and is turned by ``angle`` about it."""
+    """Return the unit normal of the plane that contains ``axis`` and is rotated by ``angle`` about it."""
     first = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
     first /= np.linalg.norm(first)
     return -np.sin(angle) * first + np.cos(angle) * np.cross(axis, first)

@@ -1,9 +1,11 @@
 """Approximate convex decomposition by best-first plane cuts and greedy merging.
 
-The part whose convex hull exceeds it most is cut by the plane that lowers the excess most, or crosswise through its
-hole, until there are more parts than hulls; then the pairs whose common hull costs least are merged. Work is counted in
-parts, never in time, so that equal meshes give equal hulls. Source: hull excess volume as the concavity (V-HACD, Mamou
-and Ghorbel 2009); cutting first and merging after (CoACD, Wei, Liu, Ling and Su 2022).
+The part with the largest excess of convex hull volume over its own is cut by the plane that reduces the excess most, or
+crosswise through its hole, until there are more parts than hulls. Then the pairs whose common hull costs least are merged. The
+effort is limited by the number of parts, never by time, so that equal meshes give equal hulls.
+
+Source: hull excess volume as the concavity (V-HACD, Mamou and Ghorbel 2009); cutting first and merging after (CoACD, Wei, Liu,
+Ling and Su 2022).
 """
 
 from __future__ import annotations
@@ -25,22 +27,24 @@ from manitwin.geometry.hulls.cutting_planes import (
 )
 from manitwin.geometry.hulls.reduction import DECIMALS, convex_corners, hull_volume, reduced_hull
 
-_SIMPLIFY_SHARE = 1e-3  # of the longest side: detail that no collision needs; 2e-3 already opened a mug's 4 mm wall
+_SIMPLIFY_SHARE = (
+    1e-3  # of the longest side: detail irrelevant to collision; 2e-3 already opened the 4 mm wall of a mug
+)
 _REDUCTION_TOLERANCE_M = 2e-4
 _CRUMB_SHARE = 1e-6  # of the mesh's volume: smaller pieces of a cut are dropped
-_CONVEX_SHARE = 1e-3  # of the mesh's volume: a part whose hull exceeds it by less is left whole
-_FREE_MERGE_SHARE = 2.5e-4  # of the mesh's volume: a merge that adds less is made even where there are few enough hulls
-_SECTORS = 8  # first cuts of a vessel, through its axis; without them the search leaves it filled, 12 and 16 were worse
-# Times that of the best plane: what three cuts, crosswise through a hole, must gain to be made instead.
+_CONVEX_SHARE = 1e-3  # of the mesh's volume: a part whose hull exceeds it by less is not cut further
+_FREE_MERGE_SHARE = 2.5e-4  # of the mesh's volume: merges that add less are made even if there are few enough hulls
+_SECTORS = 8  # first cuts of a vessel through its axis; without them the search leaves it filled, 12 and 16 were worse
+# Required gain of the three cuts crosswise through a hole, as a multiple of the best plane's gain.
 _CROSS_GAIN = 4.5
 _INNER_SHARE = 1 - 1e-9
-"""Of the volume of manifold3d's hull, which may leave out corners and adds none: what a hull has at least, but for rounding."""
-_TOUCH_SHARE = 1e-3  # of the longest side: parts farther apart than this are not merged
+"""Lower bound of a hull's volume as a share of manifold3d's hull, which may omit corners but adds none, up to rounding."""
+_TOUCH_SHARE = 1e-3  # of the longest side: parts farther apart are not merged
 
 
 @dataclass(frozen=True)
 class Decomposition:
-    """Convex hulls as vertices ``(V, 3)`` m, largest first, how they came about, and what to know of it."""
+    """Convex hulls as vertices ``(V, 3)`` m, largest first, with the method and remarks."""
 
     hulls: tuple[np.ndarray, ...]
     method: str
@@ -57,9 +61,9 @@ def convex_decomposition(
 ) -> Decomposition:
     """Cover a watertight mesh with at most ``max_hulls`` convex hulls of at most ``max_vertices`` vertices.
 
-    ``opening`` is the cavity to keep, whose axis the first cuts go through. ``oversplit`` times ``max_hulls`` parts
-    are cut before merging. A mesh that is no manifold gets one hull a connected component (method ``component_hulls``).
-    Raises scipy's QhullError where the mesh is flat.
+    ``opening`` is a cavity to preserve: the first cuts go through its axis. ``oversplit`` times ``max_hulls`` parts are cut
+    before merging. A mesh that is not manifold gets one hull per connected component (method ``component_hulls``). Raises
+    scipy's QhullError for a flat mesh.
     """
     longest = float(mesh.extents.max())
     solid, refusal = _solid(mesh, longest)
@@ -80,8 +84,8 @@ def convex_decomposition(
 
 
 def _solid(mesh: trimesh.Trimesh, longest: float) -> tuple[manifold3d.Manifold | None, str]:
-    """Return the mesh as a simplified manifold, or None and the reason why it is none."""
-    vertices = np.array(mesh.vertices, dtype=np.float64, order="C")  # a copy: manifold3d refuses read-only arrays
+    """Return the mesh as a simplified manifold, or None and the reason why it is not one."""
+    vertices = np.array(mesh.vertices, dtype=np.float64, order="C")  # a copy, as manifold3d rejects read-only arrays
     solid = manifold3d.Manifold(manifold3d.Mesh64(vertices, np.array(mesh.faces, dtype=np.uint64, order="C")))
     if solid.status() != manifold3d.Error.NoError:
         return None, solid.status().name
@@ -93,7 +97,7 @@ def _solid(mesh: trimesh.Trimesh, longest: float) -> tuple[manifold3d.Manifold |
 
 
 def _component_points(mesh: trimesh.Trimesh) -> list[np.ndarray]:
-    """Return the vertices of every connected component that has volume, or of the whole mesh where none has."""
+    """Return the vertices of every connected component with volume, or of the whole mesh if none has."""
     groups = trimesh.graph.connected_components(mesh.face_adjacency, nodes=np.arange(len(mesh.faces)))
     clouds = [np.asarray(mesh.vertices[np.unique(mesh.faces[group])]) for group in groups]
     clouds = [cloud for cloud in clouds if hull_volume(cloud) > 0]
@@ -101,7 +105,7 @@ def _component_points(mesh: trimesh.Trimesh) -> list[np.ndarray]:
 
 
 class _Part:
-    """A piece of the mesh: its solid, its hull, and how much the hull exceeds it."""
+    """A piece of the mesh: its solid, its hull vertices, and the excess of the hull's volume over its own."""
 
     def __init__(self, solid: manifold3d.Manifold):
         self.solid = solid
@@ -144,14 +148,14 @@ def _split(part: _Part, normal: np.ndarray, offset: float, volume: float) -> lis
 
 
 def _pieces(solids: Sequence[manifold3d.Manifold], volume: float) -> list[manifold3d.Manifold]:
-    """Return the connected pieces: one hull over two would bridge the gap between them."""
+    """Return the connected pieces: one hull over two of them would bridge the gap."""
     return [piece for solid in solids for piece in solid.decompose() if piece.volume() > _CRUMB_SHARE * volume]
 
 
 def _through_hole(part: _Part, least_gain: float) -> list[manifold3d.Manifold] | None:
-    """Return a part cut crosswise through its hole where that lowers the summed hull volume by more than ``least_gain``.
+    """Return a part cut crosswise through its hole if this reduces the summed hull volume by more than ``least_gain``; else None.
 
-    One plane alone lowers nothing there: two halves of a disc are the disc.
+    A single plane gains nothing there: two half discs have the same hull volume as the disc.
     """
     solid, best = part.solid, part.hull_volume - least_gain
     found = None
@@ -172,21 +176,21 @@ def _through_hole(part: _Part, least_gain: float) -> list[manifold3d.Manifold] |
 
 
 def _hole_middle(solid: manifold3d.Manifold, axis: np.ndarray) -> np.ndarray | None:
-    """Return the middle of the largest hole in the section half-way along an axis, None where there is none."""
+    """Return the centre of the largest hole in the section half-way along an axis; None if there is none."""
     frame = np.stack([normal_across(axis, np.pi / 2), -normal_across(axis, 0.0), axis])
     turned = solid.transform(np.hstack([frame, np.zeros((3, 1))]))
     low, high = np.reshape(turned.bounding_box(), (2, 3))
     height = (low[2] + high[2]) / 2
     rings = [np.asarray(ring) for ring in turned.slice(height).to_polygons()]
     areas = [float(ring[:, 0] @ (np.roll(ring[:, 1], -1) - np.roll(ring[:, 1], 1))) for ring in rings]
-    if not areas or min(areas) >= 0:  # the outline of a hole runs clockwise
+    if not areas or min(areas) >= 0:  # the outline of a hole is clockwise
         return None
     hole = rings[int(np.argmin(areas))]
     return frame.T @ np.array([*((hole.min(0) + hole.max(0)) / 2), height])
 
 
 def _merged(clouds: list[np.ndarray], max_hulls: int, free_m3: float, touch_m: float) -> list[np.ndarray]:
-    """Merge pairs, cheapest in added hull volume first, down to ``max_hulls`` and while it is nearly free."""
+    """Merge pairs in order of added hull volume, down to ``max_hulls`` and further while a merge is nearly free."""
     clouds, volumes = list(clouds), [hull_volume(cloud) for cloud in clouds]
     alive = list(range(len(clouds)))
 
@@ -194,7 +198,7 @@ def _merged(clouds: list[np.ndarray], max_hulls: int, free_m3: float, touch_m: f
         return hull_volume(np.vstack([clouds[i], clouds[j]])) - volumes[i] - volumes[j]
 
     def added_at_least(i: int, j: int) -> float:
-        """Return a bound of ``added`` in a fifth of its time."""
+        """Return a lower bound of ``added`` in a fifth of its time."""
         inner = float(manifold3d.Manifold.hull_points(np.vstack([clouds[i], clouds[j]])).volume())
         return inner * _INNER_SHARE - volumes[i] - volumes[j]
 
@@ -203,7 +207,7 @@ def _merged(clouds: list[np.ndarray], max_hulls: int, free_m3: float, touch_m: f
         return bool((gap > touch_m).any())
 
     def cheapest() -> tuple[int, int]:
-        """Return the pair whose common hull costs least: of the others no more is known than that they cost as much."""
+        """Return the pair with the least added volume; for the other pairs only lower bounds are known."""
         while (pair := min(costs, key=lambda pair: (costs[pair], pair))) not in known:
             costs[pair] = added(*pair)
             known.add(pair)
@@ -212,7 +216,7 @@ def _merged(clouds: list[np.ndarray], max_hulls: int, free_m3: float, touch_m: f
     known: set[tuple[int, int]] = set()
     costs = {(i, j): added_at_least(i, j) for i in alive for j in alive if i < j and not apart(i, j)}
     while len(alive) > 1:
-        if not costs and len(alive) > max_hulls:  # nothing touches: the nearest in added volume all the same
+        if not costs and len(alive) > max_hulls:  # no parts touch: merge the cheapest pair nevertheless
             costs = {(i, j): added_at_least(i, j) for i in alive for j in alive if i < j}
         if not costs:
             break

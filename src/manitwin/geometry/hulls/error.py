@@ -1,4 +1,4 @@
-"""The error of a set of convex hulls as a model of a mesh."""
+"""Approximation error of a set of convex hulls with respect to a mesh."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ _INSIDE_M = 1e-6
 class HullError:
     """Differences between the union of hulls and the mesh.
 
-    ``surface_error_p95_m`` and ``surface_error_max_m`` are over mesh surface outside the hulls and hull surface
-    outside the mesh together; ``surface_uncovered_max_m`` is over mesh surface only. ``volume_ratio`` is union over
-    mesh. ``cavity_kept`` is the open cavity of the union over that of the mesh, None where there is no opening.
+    ``surface_error_p95_m`` and ``surface_error_max_m`` are over mesh surface outside the hulls and hull surface outside the
+    mesh together; ``surface_uncovered_max_m`` is over mesh surface only. ``volume_ratio`` is union over mesh. ``cavity_kept``
+    is the open cavity volume of the union over that of the mesh; None without an opening.
     """
 
     surface_error_p95_m: float
@@ -43,8 +43,8 @@ def hull_error(
 ) -> HullError:
     """Measure hulls (each ``(V, 3)`` m) against a watertight mesh.
 
-    Cut planes inside the mesh do not count: hull surface is measured only where it lies outside. ``samples`` points
-    are taken on either surface; the uncovered maximum also looks at every vertex.
+    Cutting planes inside the mesh are ignored: hull surface counts only where it lies outside. ``samples`` points are taken on
+    either surface; the uncovered maximum also includes every vertex.
     """
     union = hull_union(hulls)
     on_mesh = sample_surface(mesh, samples, rng)[0]
@@ -68,7 +68,7 @@ def hull_error(
 def hull_union(hulls: Sequence[np.ndarray]) -> trimesh.Trimesh:
     """Return the surface of the union of convex hulls as a watertight mesh."""
     solids = []
-    for hull in hulls:  # not Manifold.hull_points: it loses corners of nearly flat clouds
+    for hull in hulls:  # Manifold.hull_points would lose corners of nearly flat clouds
         surface = hull_mesh(hull)
         faces = np.ascontiguousarray(surface.faces, dtype=np.uint64)
         solids.append(
@@ -79,7 +79,7 @@ def hull_union(hulls: Sequence[np.ndarray]) -> trimesh.Trimesh:
 
 
 def inside_any_hull(points: np.ndarray, hulls: Sequence[np.ndarray], tolerance_m: float = _INSIDE_M) -> np.ndarray:
-    """Tell which points ``(N, 3)`` lie inside or within ``tolerance_m`` of a hull's planes, ``(N,) bool``."""
+    """Return which points ``(N, 3)`` lie inside a hull or within ``tolerance_m`` of its planes, ``(N,) bool``."""
     inside = np.zeros(len(points), dtype=bool)
     for hull in hulls:
         near = np.flatnonzero(
@@ -91,7 +91,7 @@ def inside_any_hull(points: np.ndarray, hulls: Sequence[np.ndarray], tolerance_m
 
 
 def uncovered_distance(points: np.ndarray, hulls: Sequence[np.ndarray], union: trimesh.Trimesh) -> np.ndarray:
-    """Return how far points ``(N, 3)`` lie outside the union of hulls, 0 inside, ``(N,)`` m."""
+    """Return the distance ``(N,)`` m of points ``(N, 3)`` from the union of hulls, 0 inside."""
     distance = np.zeros(len(points))
     outside = ~inside_any_hull(points, hulls)
     if outside.any():

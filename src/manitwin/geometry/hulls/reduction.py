@@ -1,4 +1,4 @@
-"""Convex hulls of few vertices, and their text form."""
+"""Reduction of convex hulls to few vertices, and their OBJ representation."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import numpy as np
 import trimesh
 from scipy.spatial import ConvexHull, QhullError
 
-DECIMALS = 6  # micrometres: an OBJ file then holds exactly the numbers that were checked
-_FOLD_SHARE = 2e-6  # of the hull's size; trimesh.convex.is_convex forgives 1e-5
-_LEAST_AREA_M2 = 1e-14  # trimesh.convex.is_convex looks past facets below 1e-13
+DECIMALS = 6  # micrometres, so that an OBJ file contains exactly the numbers that were checked
+_FOLD_SHARE = 2e-6  # of the hull's size; trimesh.convex.is_convex tolerates 1e-5
+_LEAST_AREA_M2 = 1e-14  # trimesh.convex.is_convex ignores facets below 1e-13
 
 
 def reduced_hull(points: np.ndarray, max_vertices: int, tolerance_m: float) -> np.ndarray:
-    """Return at most ``max_vertices`` of ``points (N, 3)`` whose hull covers the others to ``tolerance_m`` if it can.
+    """Return at most ``max_vertices`` of ``points (N, 3)`` whose hull covers the others to within ``tolerance_m`` if possible.
 
-    Starts from the six axis extremes, so that the bounding box stays, and adds the points farthest outside the hull
-    so far. Returns ``(V, 3)`` m rounded to micrometres, in lexicographic order, every one a corner of their hull.
-    Raises QhullError where the points have no volume.
+    Starts from the six axis extremes, which preserves the bounding box, and adds the points farthest outside the current hull.
+    Returns ``(V, 3)`` m rounded to micrometres, in lexicographic order, each a vertex of their hull. Raises QhullError if the
+    points have no volume.
     """
     points = np.unique(np.round(points, DECIMALS), axis=0)
     points = points[np.sort(_hull(points).vertices)]
@@ -26,7 +26,7 @@ def reduced_hull(points: np.ndarray, max_vertices: int, tolerance_m: float) -> n
 
 
 def convex_corners(points: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return the corners ``(V, 3)`` and volume (m3) of the hull of ``points (N, 3)``; all points and 0 where flat."""
+    """Return the vertices ``(V, 3)`` and volume (m3) of the hull of ``points (N, 3)``; all points and 0 if flat."""
     try:
         hull = _hull(points)
     except QhullError:
@@ -35,12 +35,12 @@ def convex_corners(points: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def hull_volume(points: np.ndarray) -> float:
-    """Return the volume (m3) of the convex hull of ``points (N, 3)``, 0 where they are flat."""
+    """Return the volume (m3) of the convex hull of ``points (N, 3)``; 0 if flat."""
     return convex_corners(points)[1]
 
 
 def hull_mesh(vertices: np.ndarray) -> trimesh.Trimesh:
-    """Return the convex hull of ``vertices (V, 3)`` as a mesh with outward faces, its vertices in the order given."""
+    """Return the convex hull of ``vertices (V, 3)`` as a mesh with outward faces, keeping the order of vertices."""
     hull = _hull(vertices)
     faces = hull.simplices.copy()
     a, b, c = np.swapaxes(vertices[faces], 0, 1)
@@ -50,7 +50,7 @@ def hull_mesh(vertices: np.ndarray) -> trimesh.Trimesh:
 
 
 def hull_to_obj(vertices: np.ndarray) -> bytes:
-    """Return a convex hull of ``vertices (V, 3)`` m as a Wavefront OBJ file; the same vertices give the same bytes."""
+    """Return the convex hull of ``vertices (V, 3)`` m as a Wavefront OBJ file; equal vertices give equal bytes."""
     mesh = hull_mesh(np.round(vertices, DECIMALS))
     faces = np.take_along_axis(mesh.faces, (mesh.faces.argmin(1)[:, None] + np.arange(3)) % 3, axis=1)
     faces = faces[np.lexsort(faces.T[::-1])]
@@ -64,10 +64,11 @@ def _hull(points: np.ndarray) -> ConvexHull:
 
 
 def _farthest_outside(points: np.ndarray, count: int, tolerance_m: float) -> np.ndarray:
-    """Return indices of up to ``count`` of the hull corners, greedily those farthest outside the hull so far.
+    """Return indices of up to ``count`` hull vertices, greedily those farthest outside the current hull.
 
-    The hull is rebuilt each round: Qhull's incremental mode aborts on nearly coplanar points (QH6347). So a round takes
-    more than one point: over each facet the farthest one, if it is at least half as far outside as the farthest of all.
+    The hull is rebuilt in each round, because Qhull's incremental mode aborts on nearly coplanar points (QH6347). A round
+    therefore adds several points: the farthest one over each facet, if it is at least half as far outside as the farthest of
+    all.
     """
     chosen = list(dict.fromkeys(np.r_[points.argmin(0), points.argmax(0)].tolist()))
     while len(chosen) < 4 or np.linalg.matrix_rank(points[chosen[1:]] - points[chosen[0]], tol=1e-7) < 3:
@@ -88,7 +89,7 @@ def _farthest_outside(points: np.ndarray, count: int, tolerance_m: float) -> np.
 
 
 def _distance_to_span(points: np.ndarray, chosen: list[int]) -> np.ndarray:
-    """Return how far each point lies from the point, line or plane through the chosen ones."""
+    """Return the distance of each point from the point, line or plane through the chosen ones."""
     offsets = points - points[chosen[0]]
     _, strength, axes = np.linalg.svd(offsets[chosen])
     rank = int((strength > 1e-7).sum())
@@ -96,9 +97,9 @@ def _distance_to_span(points: np.ndarray, chosen: list[int]) -> np.ndarray:
 
 
 def _strictly_convex(points: np.ndarray) -> np.ndarray:
-    """Drop those vertices whose slivers of facets fold inward, as their triangles' own normals have it.
+    """Remove vertices with sliver facets that fold inward according to their triangles' own normals.
 
-    Qhull's facets are convex by their planes; a triangle between nearly collinear vertices has a normal of its own.
+    Qhull's facets are convex by their planes, but a triangle between nearly collinear vertices has a different normal.
     """
     while True:
         hull = _hull(points)
@@ -113,7 +114,7 @@ def _strictly_convex(points: np.ndarray) -> np.ndarray:
 
 
 def _folded_vertices(hull: ConvexHull) -> np.ndarray:
-    """Return the vertices of facets across whose edges the hull folds inward by more than a rounding."""
+    """Return the vertices of facets across whose edges the hull folds inward by more than rounding."""
     triangles = hull.points[hull.simplices]
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     area = np.linalg.norm(normals, axis=1)
@@ -126,6 +127,6 @@ def _folded_vertices(hull: ConvexHull) -> np.ndarray:
 
 
 def _distance_outside(points: np.ndarray, vertex: int) -> float:
-    """Return how far a vertex stands out of the hull of the others."""
+    """Return the distance of a vertex from the hull of the others."""
     equations = _hull(np.delete(points, vertex, axis=0)).equations
     return float((equations[:, :3] @ points[vertex] + equations[:, 3]).max())

@@ -1,4 +1,4 @@
-"""How much of the holes through a solid its convex hulls keep, seen along its axes."""
+"""Through holes of a solid that its convex hulls keep open, in projection along its axes."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ import trimesh
 
 from manitwin.geometry.hulls.cutting_planes import own_and_principal_axes
 
-_LEAST_SHARE = 0.01  # of the outline's area: smaller holes are of scans, or of no use
+_LEAST_SHARE = 0.01  # of the outline's area; smaller holes are scan defects or irrelevant
 
 
 def holes_kept(mesh: trimesh.Trimesh, hulls: Sequence[np.ndarray]) -> float | None:
-    """Return the share that hulls, each ``(V, 3)`` m, keep of a watertight mesh's hole that they close most; None without holes.
+    """Return the open share of the most closed through hole under hulls, each ``(V, 3)`` m; None if the watertight mesh has no
+    holes.
 
-    Seen are holes straight through, along the object's or its principal axes, of at least 1 % of the outline's area.
+    Only straight holes along the object's or its principal axes with at least 1 % of the outline's area are considered.
     """
-    if mesh.euler_number >= 2 * mesh.body_count:  # no surface goes around a hole
+    if mesh.euler_number >= 2 * mesh.body_count:  # genus 0: no holes
         return None
-    vertices = np.array(mesh.vertices, dtype=np.float64, order="C")  # a copy: manifold3d refuses read-only arrays
+    vertices = np.array(mesh.vertices, dtype=np.float64, order="C")  # a copy, as manifold3d rejects read-only arrays
     solid = manifold3d.Manifold(manifold3d.Mesh64(vertices, np.array(mesh.faces, dtype=np.uint64, order="C")))
     if solid.status() != manifold3d.Error.NoError:
         return None
@@ -36,7 +37,9 @@ def _kept_along(solid: manifold3d.Manifold, hulls: Sequence[np.ndarray], axis: n
     flat = [manifold3d.CrossSection.hull_points(np.ascontiguousarray((hull @ frame.T)[:, :2])) for hull in hulls]
     filled = manifold3d.CrossSection.batch_boolean(flat, manifold3d.OpType.Add)
     outlines = [np.asarray(ring) for ring in seen.to_polygons()]
-    holes = [manifold3d.CrossSection([ring[::-1]]) for ring in outlines if _area(ring) < 0]  # a hole's runs clockwise
+    holes = [
+        manifold3d.CrossSection([ring[::-1]]) for ring in outlines if _area(ring) < 0
+    ]  # outlines of holes are clockwise
     return [1 - (hole ^ filled).area() / hole.area() for hole in holes if hole.area() >= least]
 
 

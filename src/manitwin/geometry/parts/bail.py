@@ -1,4 +1,4 @@
-"""Find a bail: a handle that goes over an upright body from side to side, as a kettle's, a basket's and a bucket's does."""
+"""Detection of a bail: a handle over an upright body from side to side, as of a kettle, basket or bucket."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_LEAST_RISE = 0.3  # of the body's largest radius, above its top
-_BEYOND = 1.1  # times that radius: what is farther out is a spout
-_LEGS = 0.45  # of it: legs stand farther apart than those of a lid's loop
-_OVER_AXIS = 0.35  # of it: the middle of its highest stretch is as near to the axis
-_WIDEST = 0.25  # of it: half the width of its bar; flowers and brushes spread
-_BETWEEN = 0.3  # of it: between its legs is air
-_FEET = 0.5  # of its rise: its legs reach as far down beside a lid
+_LEAST_RISE = 0.3  # of the body's largest radius: least rise above its top
+_BEYOND = 1.1  # times that radius: farther out is a spout
+_LEGS = 0.45  # of it: least distance of the legs from the axis, which excludes the loop of a lid
+_OVER_AXIS = 0.35  # of it: largest distance of the highest stretch's centre from the axis
+_WIDEST = 0.25  # of it: largest half width of the bar; flowers and brushes spread wider
+_BETWEEN = 0.3  # of it: region between the legs that must be empty
+_FEET = 0.5  # of its rise: depth to which its legs reach down beside a lid
 _STRAY = 0.1  # of the samples at the height of its legs
-_KNOB = 0.3  # of its rise: a lid's knob below it is no higher
+_KNOB = 0.3  # of its rise: height up to which a lid's knob is excluded
 
 
 @dataclass(frozen=True)
 class Bail:
-    """A handle that goes over a body.
+    """A handle over a body.
 
-    It rises ``rise_m`` above ``low_m``, where the body ends, along ``along (2,)`` of the horizontal, ``half_width_m`` to both
-    sides of ``across_m`` from the axis, and is no farther out than ``radius_m``; its legs reach somewhat below ``low_m``.
+    It rises ``rise_m`` above the body's top ``low_m``, extends horizontally along ``along (2,)``, lies within ``half_width_m``
+    of ``across_m`` from the axis, and within the distance ``radius_m``; its legs reach somewhat below ``low_m``.
     """
 
     low_m: float
@@ -33,7 +33,9 @@ class Bail:
     radius_m: float
 
     def contains(self, points_m: np.ndarray, offset_m: np.ndarray, outside_m: np.ndarray) -> np.ndarray:
-        """Tell which points ``(N, 3)`` are of it: ``offset_m (N, 2)`` from the axis, ``outside_m (N,)`` of the outline."""
+        """Return which points ``(N, 3)`` belong to it; ``offset_m (N, 2)`` from the axis, ``outside_m (N,)`` beyond the
+        outline.
+        """
         across = offset_m @ np.array([-self.along[1], self.along[0]]) - self.across_m
         within = (np.abs(across) <= self.half_width_m) & (np.hypot(*offset_m.T) <= self.radius_m)
         rise = (points_m[:, 2] - self.low_m) / self.rise_m
@@ -43,7 +45,7 @@ class Bail:
 
 
 def find_bail(surface_m: np.ndarray, axis_xy_m: np.ndarray, top_m: float, radius_m: float) -> Bail | None:
-    """Return the handle over a body that ends at ``top_m`` and is ``radius_m`` wide; None where nothing goes over it so."""
+    """Return the handle over a body with top ``top_m`` and radius ``radius_m``; None if there is none."""
     offset = surface_m[:, :2] - axis_xy_m
     above = (surface_m[:, 2] > top_m) & (np.hypot(*offset.T) < _BEYOND * radius_m)
     if above.sum() < 20:

@@ -1,17 +1,17 @@
-"""Cut up a mesh's long edges, both of whose faces are cut at one place: what was closed stays closed."""
+"""Subdivision of long mesh edges; both faces at an edge are split at the same point, so closed meshes stay closed."""
 
 from __future__ import annotations
 
 import numpy as np
 
-_MOST_ROUNDS = 12  # of halving: 1/4096 of the longest edge
+_MOST_ROUNDS = 12  # of halving: down to 1/4096 of the longest edge
 _MOST_PIECES = 30_000
 
 
 def cut_up(vertices: np.ndarray, faces: np.ndarray, longest_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return vertices ``(V, 3)`` and faces ``(P, 3)`` without edges over ``longest_m``, and the old face of each ``(P,)``.
+    """Return vertices ``(V, 3)``, faces ``(P, 3)`` without edges over ``longest_m``, and the original face of each ``(P,)``.
 
-    Only long edges are halved. A mesh of many slivers is cut no further once it has tens of thousands of pieces.
+    Only long edges are halved. Subdivision stops at tens of thousands of pieces, for meshes with many slivers.
     """
     vertices, faces, of_face = np.asarray(vertices, float), np.asarray(faces, np.int64), np.arange(len(faces))
     for _ in range(_MOST_ROUNDS):
@@ -29,9 +29,9 @@ def cut_up(vertices: np.ndarray, faces: np.ndarray, longest_m: float) -> tuple[n
 
 
 def _halved(faces: np.ndarray, middle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Cut faces ``(F, 3)`` at the middles ``(F, 3)`` of their edges from each corner to the next, -1 where that is not cut.
+    """Split faces ``(F, 3)`` at the midpoints ``(F, 3)`` of their edges (from each corner to the next; -1: not split).
 
-    Returns the new faces and the old one of each.
+    Returns the new faces and the original face of each.
     """
     count = (middle >= 0).sum(1)
     number = np.arange(len(faces))

@@ -1,4 +1,4 @@
-"""Names of places on an object, and of what tells its working end: priors say them, and none of them needs a mesh."""
+"""Names of features (places on an object) and of rules for its working end, used by the priors; independent of meshes."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ Feature = Literal[
     "apex", "arch_end", "end_wall", "toe", "stem", "nozzle", "crest", "teeth", "spine", "case", "strap", "lens",
     "bow", "beam",
 ]  # fmt: skip
-"""A place on an object that geometry can point out."""
+"""A place on an object that can be located from geometry."""
 
 HeadEnd = Literal["wide", "narrow", "thin", "thick", "short", "straight", "heavy", "up"]
-"""What tells the working end: its width, its thickness, being the shorter section (a cap; the wider end where no border shows),
-being away from an end that is bent to a hook (an umbrella; the wider end where none is), the side of the centre of mass, or
-being the upper one."""
+"""The rule that identifies the working end: by width; by thickness; "short": the shorter section (a cap), or the wider end if no
+border is found; "straight": the end opposite a hook (an umbrella), or the wider end if none is bent; "heavy": the side of the
+centre of mass; "up": the upper end.
+"""

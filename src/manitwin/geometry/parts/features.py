@@ -1,6 +1,6 @@
-"""Find the parts of an object by its shape: scores of surface points for places such as rim, handle or tip.
+"""Scores of surface points for named features such as rim, handle or tip, from the object's shape.
 
-Every score is in [0, 1]; a place that the shape does not have has no score (None). Object frame: +Z up, metres.
+Scores are in [0, 1]; a feature that the shape does not have gives None. Object frame: +Z up, metres.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from manitwin.geometry.parts.uneven import case, lens, spine, strap, teeth
 
 
 def feature_scores(feature: Feature, shape: Shape, points: SurfacePoints) -> np.ndarray | None:
-    """Return how well each point stands for a feature, ``(N,)`` in [0, 1]; None where the shape has no such place."""
+    """Return the score of each point for a feature, ``(N,)`` in [0, 1]; None if the shape does not have the feature."""
     scores = _SCORERS[feature](shape, points)
     return None if scores is None else np.clip(scores, 0.0, 1.0)
 
@@ -41,13 +41,13 @@ def _rim(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
 
 
 def _opening(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
-    """The rim where one pours: away from the handle."""
+    """The rim on the pouring side, away from the handle."""
     rim = _rim(shape, points)
     return None if rim is None else rim * _away_from_handle(shape, points)
 
 
 def _mouth(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    """The opening where it is open, else the top, where a lid closes it."""
+    """The opening if there is one that faces up, else the top, where a lid closes it."""
     rim = _rim(shape, points) if shape.opening is not None and shape.opening.axis[2] > 0.9 else None
     return _top(shape, points) if rim is None else rim
 
@@ -58,7 +58,7 @@ def _away_from_handle(shape: Shape, points: SurfacePoints) -> np.ndarray:
     return 0.75 - 0.25 * np.cos(shape.body.azimuth(points.positions_m) - shape.side_handle.azimuth_rad)
 
 
-_FLAT = 0.5  # of its width: what is higher and has no opening is no plate or tray that things are put on
+_FLAT = 0.5  # of its width: a higher object without an opening is not a plate or tray
 
 
 def _inside(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
@@ -82,10 +82,10 @@ def _inside(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
 def _handle(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
     if shape.side_handle is not None:
         mine = shape.body.belongs(points.positions_m, shape.side_handle)
-        if shape.side_handle.bail is not None:  # held where it is highest
+        if shape.side_handle.bail is not None:  # held at its highest stretch
             return mine * _near(1 - _share_of_height(shape, points), 0.15)
         outside = shape.body.outside_m(points.positions_m) / shape.side_handle.reach_m
-        # A ring handle is held in its outer half, a long one (a pan's) well before its end.
+        # A ring handle is held in its outer half, a long one (as of a pan) well before its end.
         best = 0.7 if shape.side_handle.reach_m < shape.body.radius_m.max() else 0.35
         return mine * (0.3 + 0.7 * _near(outside - best, 0.35))
     if not shape.has_ends:
@@ -114,11 +114,11 @@ def _head(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
     return _near(along - 0.55 * share, 0.35 * share) * (0.5 + 0.5 * broad) * centered
 
 
-_LOPSIDED = 1.25  # how much farther a brush's head reaches from the handle's line where its bristles stand out sideways
+_LOPSIDED = 1.25  # how much farther a brush's head extends on the side of the bristles, if they stand out sideways
 
 
 def _bristles(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
-    """The side of the head that stands out farthest from the handle's line, else the front of the head."""
+    """The side of the head that extends farthest from the handle's line, else the front of the head."""
     share = max(shape.axis.head_share, 0.1)
     along = shape.axis.along(points.positions_m)
     head = shape.surface_m[shape.axis.along(shape.surface_m) < share]
@@ -127,7 +127,7 @@ def _bristles(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
     line, handle = handle_line(shape), handle_direction(shape)
     across = shape.axis.across - np.outer(
         shape.axis.across @ handle, handle
-    )  # a bent head turns the box away from the handle
+    )  # a bent head tilts the box away from the handle
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     directions = np.concatenate([across, -across])
     reach = ((head - line) @ directions.T).max(0)
@@ -145,7 +145,7 @@ def _tip(shape: Shape, points: SurfacePoints) -> np.ndarray:
 
 
 def _edge(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    """Thin matter; on a long thing, in its working half."""
+    """Thin material; on an elongated object, in its working half."""
     thin = _near(np.maximum(points.thickness_m - 0.002, 0), 0.25 * float(np.median(points.thickness_m)) + 0.002)
     if not shape.has_ends:
         return thin
@@ -176,7 +176,7 @@ def _spout(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
     rim = _rim(shape, points)
     if rim is None:
         rim = _top(shape, points)
-    return np.sqrt(np.maximum(rim, 0)) * _away_from_handle(shape, points) ** 3  # the side counts more than the height
+    return np.sqrt(np.maximum(rim, 0)) * _away_from_handle(shape, points) ** 3  # the side matters more than the height
 
 
 def _top(shape: Shape, points: SurfacePoints) -> np.ndarray:
@@ -184,20 +184,20 @@ def _top(shape: Shape, points: SurfacePoints) -> np.ndarray:
     handle = shape.side_handle
     if handle is None or handle.bail is None:
         return _near(1 - _share_of_height(shape, points), 0.12) * facing
-    low = shape.bounds_m[0, 2]  # the top of the body, below the handle that goes over it
+    low = shape.bounds_m[0, 2]  # the top of the body, below the bail
     below = 1 - (points.positions_m[:, 2] - low) / max(handle.low_m - low, 1e-9)
     beside = ~shape.body.belongs(points.positions_m, handle) & (shape.body.outside_m(points.positions_m) <= 0)
     return _near(below, 0.12) * facing * beside
 
 
 def _nozzle(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    """The outlet of a pump or trigger, that reaches out to one side; of a round head all of its top."""
+    """The outlet of a pump or trigger that extends to one side; for a round head its whole top."""
     found = outlet(shape, points)
     return _top(shape, points) if found is None else found
 
 
 def _stem(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    """The end of what sticks out of a round thing, else its top, where a stem's mark is if anything shows it."""
+    """The end of the protrusion of a round object, else its top."""
     stem = shape.stem
     if stem is None:
         return _top(shape, points)
@@ -227,7 +227,7 @@ def _center(shape: Shape, points: SurfacePoints) -> np.ndarray:
 
 
 def _large_face(shape: Shape, points: SurfacePoints, side: int) -> np.ndarray:
-    """The face across the box's shortest axis: the upper one first, or the one towards -y of a thing that stands."""
+    """The face across the box's shortest axis: first the upper one, or for a standing object the one towards -y."""
     axis = side * shape.front
     offset = points.positions_m - shape.obb_to_object[:3, 3]
     in_plane = np.linalg.norm(offset - (offset @ axis)[:, None] * axis, axis=1)
@@ -235,7 +235,7 @@ def _large_face(shape: Shape, points: SurfacePoints, side: int) -> np.ndarray:
 
 
 def _end(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    """Either end of the long axis, in its middle; of a thing that stands, the upper one first."""
+    """The centre of either end of the long axis; for a standing object the upper one scores higher."""
     along = shape.axis.along(points.positions_m)
     middle = _near(shape.axis.off_axis_m(points.positions_m), 0.3 * float(np.sort(shape.obb_extents_m)[1]))
     height = _share_of_height(shape, points)
@@ -243,7 +243,7 @@ def _end(shape: Shape, points: SurfacePoints) -> np.ndarray:
 
 
 def _toe(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    """The end of the long axis away from where the foot goes in; without an opening the lower end, as a heel's back stands up."""
+    """The end of the long axis away from the foot opening; without an opening the lower end, as the back of a heel stands up."""
     along = shape.axis.along(points.positions_m)
     if shape.opening is not None:
         heel = float(shape.axis.along(shape.opening.center_m[None])[0])
@@ -254,12 +254,12 @@ def _toe(shape: Shape, points: SurfacePoints) -> np.ndarray:
 
 
 def _end_wall(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    """What looks sideways near an end of the long axis: where fingers hold that come to the end of a box or can."""
+    """Sideways surface near an end of the long axis, where fingers hold the end of a box or can."""
     return _end(shape, points) * (1 - np.abs(points.normals[:, 2]))
 
 
 def _ring(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
-    """The inner side of a ring: surface that looks at the centre of the box from nearby."""
+    """The inner side of a ring: surface that faces the centre of the box."""
     toward = shape.obb_to_object[:3, 3] - points.positions_m
     distance = np.linalg.norm(toward, axis=1)
     facing = np.einsum("ij,ij->i", points.normals, toward) / np.maximum(distance, 1e-9)
@@ -267,7 +267,7 @@ def _ring(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
 
 
 def _muzzle(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
-    """The working end of a pistol's barrel, away from its grip; of what has none, that of the long axis."""
+    """The working end of a pistol's barrel, away from its grip; for other shapes that of the long axis."""
     if shape.pistol is None:
         return _tip(shape, points)
     along, down = shape.pistol.places(points.positions_m)

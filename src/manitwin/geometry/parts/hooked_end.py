@@ -1,19 +1,19 @@
-"""Tell the end of a long thing that is bent to a hook, as the crook of an umbrella is, from the straight one."""
+"""Distinguish the hooked end of an elongated object, such as the crook of an umbrella, from the straight one."""
 
 from __future__ import annotations
 
 import numpy as np
 
 _SLICES = 32
-_HOOK_SHARE = 0.15  # of the length: an end that may be a hook
-_MIDDLE_SHARE = 0.2  # of the length: the shaft to either side of its middle
-_BENT = 0.25  # of its width: how far a hook's middle is from the line of the shaft that goes into one side of it
+_HOOK_SHARE = 0.15  # of the length: region of an end that may be a hook
+_MIDDLE_SHARE = 0.2  # of the length: the shaft to either side of the middle
+_BENT = 0.25  # of its width: offset of a hook's centre from the line of the shaft, which enters one side of it
 
 
 def straight_is_last(share: np.ndarray, across_m: np.ndarray) -> bool | None:
-    """Tell whether the end comes last that goes on in the line of the middle; None where neither is bent, or both are.
+    """Return whether the straight end, in line with the middle, comes last; None if neither end is bent, or both are.
 
-    The line is that of the middle's slices: the box leans where one end reaches out to a side.
+    The line is fitted to the slices of the middle, because the box leans if one end extends to a side.
     """
     slices = [part for part in np.array_split(np.argsort(share, kind="stable"), _SLICES) if len(part)]
     at = np.array([share[part].mean() for part in slices])

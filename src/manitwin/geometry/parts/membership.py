@@ -1,4 +1,4 @@
-"""What a rule of parts says: which part each place of a surface is of, and the parts that each rule knows."""
+"""Types of part rules: the rule names, the roles of each rule, and the resulting part of each point."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ ROLES: dict[PartRule, tuple[PartRole, ...]] = {
     "closed": ("body", "top", "base"),
     "faced": ("side", "front", "back"),
 }
-"""The parts that each rule may tell; those of ``open``, ``closed`` and ``faced`` are of the surface alone (``skin_rules``)."""
+"""The roles that each rule can assign; those of ``open``, ``closed`` and ``faced`` are surface zones (``skin_rules``)."""
 
 
 @dataclass(frozen=True)
 class Membership:
-    """The part of each point ``(N,)``, an index into ``roles``, and how sure the border is.
+    """The part of each point ``(N,)`` as an index into ``roles``, and the confidence in the border.
 
-    Nearer to a border than ``band_share`` of the longest side hollows tell the parts, and not the rule.
+    Within ``band_share`` of the longest side from a border, parts are separated at concavities instead of by the rule.
     """
 
     roles: tuple[str, ...]

@@ -1,4 +1,6 @@
-"""Find what reaches out farthest to one side: the outlet of a pump or trigger, the hook of a coat hanger, wings and a nose."""
+"""Features that extend farthest to one side: the outlet of a pump or trigger, a coat hanger's hook, wings and nose of an
+aircraft.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +9,15 @@ import numpy as np
 from manitwin.geometry.parts.scores import near, share_of_height
 from manitwin.geometry.parts.shape import Shape, SurfacePoints
 
-_OUTLETS_FROM = 0.85  # of the height: above it are the outlets of pumps and triggers, and no trigger
+_OUTLETS_FROM = 0.85  # of the height: outlets of pumps and triggers are above, triggers below
 _SLICES = 16
 _MIRRORED, _UNLIKE = 0.5, 0.1
-"""The share of the surface that is elsewhere in the mirror: relative to the other axis, and least."""
-_LOPSIDED = 1.25  # how much farther a head reaches out to the side of its outlet than to the other: round caps do not
+"""Asymmetry under mirroring: largest ratio to the other axis, and least value."""
+_LOPSIDED = 1.25  # how much farther a head extends on the side of its outlet; excludes round caps
 
 
 def outlet(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
-    """Score the side of the top that reaches out farthest from the body's axis, as a pump's outlet does; None of a round top."""
+    """Score the side of the top that extends farthest from the body's axis, such as a pump's outlet; None for a round top."""
     share = (shape.surface_m[:, 2] - shape.bounds_m[0, 2]) / max(float(np.ptp(shape.bounds_m[:, 2])), 1e-9)
     head = shape.surface_m[share > _OUTLETS_FROM, :2] - shape.body.axis_xy_m
     if not len(head):
@@ -30,7 +32,7 @@ def outlet(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
 
 
 def crest(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    """Score what reaches out farthest across the long axis, on the side where less matter is: a coat hanger's hook."""
+    """Score the farthest extent across the long axis, on the side with less material: the hook of a coat hanger."""
     order = np.argsort(-shape.obb_extents_m, kind="stable")
     across = shape.obb_to_object[:3, order[1]]
     reach = (shape.surface_m - shape.center_of_mass_m) @ across
@@ -40,14 +42,14 @@ def crest(shape: Shape, points: SurfacePoints) -> np.ndarray:
 
 
 def bow(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    """Score either end of the way in which a thing travels, in its middle: the nose and the tail of an aircraft."""
+    """Score the centres of both ends along the direction of travel: the nose and tail of an aircraft."""
     along, across, length_m, width_m = _travel(shape)
     ahead, aside = _from_middle(shape, points.positions_m, along, across)
     return near(1 - np.abs(ahead) / (length_m / 2), 0.12) * (0.3 + 0.7 * near(aside / (width_m / 2), 0.15))
 
 
 def beam(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    """Score what reaches out farthest to either side of the way in which a thing travels: the tips of wings."""
+    """Score the farthest extents on both sides of the direction of travel: the tips of wings."""
     along, across, _, width_m = _travel(shape)
     _, aside = _from_middle(shape, points.positions_m, along, across)
     return near(1 - np.abs(aside) / (width_m / 2), 0.12)
@@ -61,10 +63,10 @@ def _from_middle(
 
 
 def _travel(shape: Shape) -> tuple[np.ndarray, np.ndarray, float, float]:
-    """Return the level directions ``(3,)`` along and across the way in which a thing travels, and its extents (m) in both.
+    """Return the horizontal directions ``(3,)`` along and across the direction of travel, and the extents (m) in both.
 
-    That is along its longer side; but what is mirrored about its middle along that side, and along the other is not, travels
-    along the other: an aircraft whose wings are wider than it is long.
+    The object travels along its longer side, unless it is mirror-symmetric along that side but not along the other, as an
+    aircraft with wings wider than its length: then along the other.
     """
     level = np.argsort(np.abs(shape.obb_to_object[2, :3]), kind="stable")[:2]
     long, short = sorted(level, key=lambda axis: -float(shape.obb_extents_m[axis]))
@@ -76,7 +78,7 @@ def _travel(shape: Shape) -> tuple[np.ndarray, np.ndarray, float, float]:
 
 
 def _unlike_its_mirror_image(shape: Shape, axis: int) -> float:
-    """Return how far the surface is from its mirror image along a box's axis, in halves of the box (earth mover)."""
+    """Return the distance of the surface from its mirror image along a box axis, in half extents (earth mover's distance)."""
     along = np.sort((shape.surface_m - shape.obb_to_object[:3, 3]) @ shape.obb_to_object[:3, axis])
     half = max(float(shape.obb_extents_m[axis]) / 2, 1e-9)
     return float(np.abs(along + along[::-1]).mean() / half)

@@ -1,24 +1,26 @@
-"""The outline of a thing along an axis: width and thickness of its slices, and the stretches that explain them best."""
+"""The outline of an object along an axis: widths of its slices, and the piecewise constant fit that explains them best."""
 
 from __future__ import annotations
 
 import numpy as np
 
 SLICES = 48
-LEAST_EXPLAINED = 0.35  # of the outline's variance by stretches of one width and thickness each
-THIRD_GAIN = 0.2  # what a third stretch must explain besides
+LEAST_EXPLAINED = 0.35  # of the outline's variance, by sections of constant width and thickness
+THIRD_GAIN = 0.2  # additional share that a third section must explain
 LEAST_STRETCH = 3  # slices
-_ENDS = (0.05, 0.85)  # of the length: where a head may end
+_ENDS = (0.05, 0.85)  # of the length: range in which a head may end
 
 
 def slices_along(share: np.ndarray, across_m: np.ndarray) -> list[np.ndarray]:
-    """Return the places across ``(N, 2)`` m of the samples of each of 48 slices; ``share (N,)`` is where they are along."""
+    """Return the cross coordinates ``(N, 2)`` m of the samples in each of 48 slices; ``share (N,)`` is their position along the
+    axis.
+    """
     level = np.clip((share * SLICES).astype(int), 0, SLICES - 1)
     return [across_m[level == k] for k in range(SLICES)]
 
 
 def filled_outline(slices: list[np.ndarray], least_m: float) -> np.ndarray:
-    """Return the logs of both extents of each slice's samples ``(N, 2)``; a slice of few is between its neighbours."""
+    """Return the logarithms of both extents of each slice's samples ``(N, 2)``; slices with few samples are interpolated."""
     rows = [
         np.log(np.maximum(np.ptp(np.quantile(each, (0.03, 0.97), axis=0), axis=0), least_m))
         if len(each) > 3
@@ -34,15 +36,15 @@ def filled_outline(slices: list[np.ndarray], least_m: float) -> np.ndarray:
 
 
 def best_splits(outline: np.ndarray, count: int, ends: tuple[float, float] = _ENDS) -> tuple[float, tuple[int, ...]]:
-    """Return how much of the outline's variance stretches of one width each explain, and where the best ones begin.
+    """Return the explained share of the outline's variance by piecewise constant sections, and where the best sections begin.
 
-    The outline ``(K, D)`` is cut at ``count`` places (one or two) between the shares ``ends`` of the length; a stretch between
-    two is at least three slices long.
+    The outline ``(K, D)`` is divided at ``count`` (one or two) positions between the shares ``ends`` of the length; a section
+    between two positions has at least three slices.
     """
     sums = np.vstack([np.zeros(outline.shape[1]), np.cumsum(outline, axis=0)])
 
     def between(a: np.ndarray | int, b: np.ndarray | int) -> np.ndarray:
-        """Return what the mean of the stretch from ``a`` to ``b`` keeps of its sum of squares."""
+        """Return the sum of squares of the section from ``a`` to ``b`` explained by its mean."""
         return np.asarray(((sums[b] - sums[a]) ** 2).sum(-1) / np.maximum(np.asarray(b) - a, 1))
 
     whole = float((outline**2).sum()) - float(between(0, SLICES))

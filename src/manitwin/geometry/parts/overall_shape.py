@@ -1,4 +1,4 @@
-"""Name the overall shape of an object in one word, from its proportions and how round or box-like it is."""
+"""One word for the overall shape of an object, from its proportions, box fill and roundness."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from manitwin.geometry.parts.protrusions import round_body
 from manitwin.geometry.sampling import sample_surface
 
 _SAMPLES = 4000
-_LONG, _FLAT = 2.2, 3.0  # longest by second, and second by shortest side of the box
-_BOX_FILL = 0.85  # of the box: a box is 1, a cylinder along it 0.785, a ball 0.524
+_LONG, _FLAT = 2.2, 3.0  # ratio of longest to second, and of second to shortest side of the box
+_BOX_FILL = 0.85  # of the box: a box fills 1, an aligned cylinder 0.785, a ball 0.524
 _ROUND_RESIDUAL = 0.05  # of the radius, from a body of revolution
 
 
 @dataclass(frozen=True)
 class OverallShape:
-    """Proportions of a tight box (longest / second, second / shortest), share of it that is filled, and roundness.
+    """Proportions of a tight box (longest / second, second / shortest), its filled share, and roundness.
 
-    ``revolution_residual`` is the median distance of the surface from the best body of revolution about an axis of
-    the box, as a share of its radius: 0 for a perfect one.
+    ``revolution_residual`` is the median distance of the surface from the best body of revolution about an axis of the box,
+    relative to its radius: 0 for a perfect one.
     """
 
     elongation: float
@@ -38,12 +38,12 @@ class OverallShape:
 
     @property
     def is_box(self) -> bool:
-        """Whether it fills its box as nothing round does."""
+        """Whether it fills its box more than any round object."""
         return self.box_fill > _BOX_FILL
 
     @property
     def word(self) -> str:
-        """A word for a thing that nobody has named."""
+        """An adjective for an unnamed object of this shape."""
         if self.is_box:
             return {"long": "bar-shaped", "flat": "slab-shaped", "compact": "box-shaped"}[self.proportion]
         if self.revolution_residual < _ROUND_RESIDUAL:
@@ -55,7 +55,9 @@ class OverallShape:
 
 
 def overall_shape(mesh: trimesh.Trimesh, rng: np.random.Generator) -> OverallShape:
-    """Measure proportions, fill and roundness of a watertight mesh in a box along its own or its principal axes."""
+    """Measure proportions, fill and roundness of a watertight mesh in the smaller of the boxes along its own and principal
+    axes.
+    """
     surface, _, _ = sample_surface(mesh, _SAMPLES, rng)
     boxes = [surface @ axes.T for axes in (np.eye(3), np.asarray(mesh.principal_inertia_vectors))]
     local = min(boxes, key=lambda points: float(np.prod(np.ptp(points, axis=0))))
@@ -69,7 +71,7 @@ def overall_shape(mesh: trimesh.Trimesh, rng: np.random.Generator) -> OverallSha
 
 
 def _residual(local_m: np.ndarray) -> float:
-    """Return the median distance from the outline about the third axis; samples near the end faces do not count."""
+    """Return the median relative distance from the outline about the third axis, ignoring samples near the end faces."""
     width, depth, height = np.ptp(local_m, axis=0)
     if min(width, depth) < 0.85 * max(width, depth):
         return 1.0

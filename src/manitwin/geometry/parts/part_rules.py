@@ -1,7 +1,7 @@
-"""Rules of membership: which of an object's surface is handle, head, cap, stem or grip, by its form.
+"""Part rules by shape: assign surface points to handle, head, cap, stem or grip.
 
-Each rule takes the measured shape and points of the surface ``(N, 3)`` and gives the index of each point's part in ``PARTS`` of
-its own, with how surely the border was found in [0, 1]; None where the form shows no such border: nothing is guessed.
+Each rule takes the measured shape and surface points ``(N, 3)``, and returns the role of each point with a confidence in [0,
+1]; None if the shape shows no such border.
 """
 
 from __future__ import annotations
@@ -19,19 +19,21 @@ from manitwin.geometry.parts.shape import LEAST_HANDLE_REACH, Shape
 
 
 def membership(rule: PartRule, shape: Shape, points_m: np.ndarray) -> Membership | None:
-    """Return the parts of points ``(N, 3)`` by a rule; None where it does not show them, or they are of the surface alone."""
+    """Return the parts of points ``(N, 3)`` by a rule; None if the shape does not show them, or for surface rules
+    (``skin_rules``).
+    """
     told = _RULES.get(rule)
     return None if told is None else told(shape, points_m)
 
 
-_SURE_REACH = 3.0  # times the least reach of a handle: sticks out beyond doubt
+_SURE_REACH = 3.0  # times the least reach of a handle: certain protrusion
 
 
 def _handles(shape: Shape) -> list[Protrusion]:
     first = shape.side_handle
     if first is None:
         return []
-    if first.bail is not None:  # what sticks out beside it are its ears, or a spout
+    if first.bail is not None:  # protrusions beside a bail are its ears, or a spout
         return [first]
     least_m = LEAST_HANDLE_REACH * float(shape.body.radius_m.max())
     beside = [p for p in shape.body.protrusions if p.reach_m > least_m and p.low_m < shape.body.top_m]
@@ -39,7 +41,7 @@ def _handles(shape: Shape) -> list[Protrusion]:
 
 
 def _handled(shape: Shape, points_m: np.ndarray) -> Membership | None:
-    """Body and handle: all that sticks out far enough is handle."""
+    """Body and handle: all protrusions with sufficient reach are handle."""
     found = _handles(shape)
     if not found:
         return None
@@ -48,7 +50,7 @@ def _handled(shape: Shape, points_m: np.ndarray) -> Membership | None:
 
 
 def _spouted(shape: Shape, points_m: np.ndarray) -> Membership | None:
-    """Body, handle and spout: of what sticks out, the one opposite the handle is the spout."""
+    """Body, handle and spout: the protrusion opposite the handle is the spout."""
     found = _handles(shape)
     if not found:
         return None
@@ -68,20 +70,20 @@ def _reach_confidence(shape: Shape, handle: Protrusion) -> float:
 
 _LEVELS = 72
 _SECTORS = 12
-_STEP_LEVELS = 2  # a step is as sharp as that
-_LEAST_STEP = 0.045  # of the largest radius, beyond what the slopes on both sides would give
-_CAP_ABOVE, _CAP_BELOW = 0.35, 0.95  # of the height: where a cap may begin
-_STEP_BAND = 0.03  # of the longest side: a step is known more exactly than other borders
-_CAP_RADIUS = 0.3  # of the largest radius: what is thinner is a wick or a pole, no cap
+_STEP_LEVELS = 2  # levels within which a step occurs
+_LEAST_STEP = 0.045  # of the largest radius, beyond what the slopes on both sides explain
+_CAP_ABOVE, _CAP_BELOW = 0.35, 0.95  # of the height: range in which a cap may begin
+_STEP_BAND = 0.03  # of the longest side: the position of a step is known more precisely than other borders
+_CAP_RADIUS = 0.3  # of the largest radius: anything thinner is a wick or pole, not a cap
 _PUT_ON = 0.8
-"""Of the largest radius: what widens over a neck to no more than that is a cap, and the neck below it is not."""
+"""Of the largest radius: a part that widens above a neck to at most this is a cap, and the neck is not part of it."""
 _NECK = 0.35  # of the largest radius: a neck is wider, the stem of a pump is not
 _NEXT_STEP, _SURE_STEP = 0.5, 0.12
-"""Of the sharpest step, or of the radius: the lowest such step is where the cap begins."""
+"""Of the sharpest step, and of the radius: the lowest such step is where the cap begins."""
 
 
 def _outline(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
-    """Return heights ``(K,)`` as shares and radii ``(K,)`` m of the outline about the body's axis, the mean over directions."""
+    """Return relative heights ``(K,)`` and radii ``(K,)`` m of the outline about the body's axis, averaged over directions."""
     low, high = shape.bounds_m[:, 2]
     share = (shape.surface_m[:, 2] - low) / max(high - low, 1e-9)
     radius = np.hypot(*(shape.surface_m[:, :2] - shape.body.axis_xy_m).T)
@@ -98,7 +100,7 @@ def _outline(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _steps(radius: np.ndarray) -> np.ndarray:
-    """Return the step of the outline at each level (upwards, m), less what the slopes below and above would give."""
+    """Return the upward step of the outline at each level (m), minus what the adjacent slopes explain."""
     steps = np.zeros(len(radius))
     d = _STEP_LEVELS
     for k in range(2 * d, len(radius) - 2 * d):
@@ -107,17 +109,17 @@ def _steps(radius: np.ndarray) -> np.ndarray:
         below, above = np.sign(rise) * below, np.sign(rise) * above
         slope = max(
             above, below if above > 0 else 0.0, 0.0
-        )  # a slope that goes on above is a shoulder: a cap's side is upright
+        )  # a slope that continues above is a shoulder; a cap's side is vertical
         steps[k] = np.sign(rise) * max(abs(rise) - slope * (2 * d - 1) / d, 0.0)
     return steps
 
 
 def _capped(shape: Shape, points_m: np.ndarray) -> Membership | None:
-    """Body and cap: the outline steps where the cap begins, outward over a neck, or inward from a shoulder."""
+    """Body and cap: the outline has a step where the cap begins, outward above a neck or inward from a shoulder."""
     heights, radius = _outline(shape)
     steps = _steps(radius) / max(float(radius.max()), 1e-9)
     steps[(heights < _CAP_ABOVE) | (heights > _CAP_BELOW)] = 0.0
-    weight = np.where(steps > 0, 1.5 * steps, -steps)  # what widens upward is put on
+    weight = np.where(steps > 0, 1.5 * steps, -steps)  # an outward step marks a cap put on
     above = np.array([float(radius[k : k + 2 * _STEP_LEVELS].max()) for k in range(_LEVELS)])
     weight[above < _CAP_RADIUS * radius.max()] = 0.0
     enough = np.flatnonzero(weight >= np.clip(_NEXT_STEP * weight.max(), _LEAST_STEP, _SURE_STEP))
@@ -134,11 +136,11 @@ def _capped(shape: Shape, points_m: np.ndarray) -> Membership | None:
     return Membership(("body", "cap"), (share > border).astype(int), confidence, _STEP_BAND)
 
 
-_STEM_SHARE = 0.45  # of the radius of foot and bowl: a stem is at most as wide
+_STEM_SHARE = 0.45  # of the radii of foot and bowl: largest radius of a stem
 
 
 def _stemmed(shape: Shape, points_m: np.ndarray) -> Membership | None:
-    """Bowl, stem and foot: the stem is the narrow stretch between two wide ones."""
+    """Bowl, stem and foot: the stem is the narrow section between two wide ones."""
     heights, radius = _outline(shape)
     middle = (heights > 0.08) & (heights < 0.85)
     narrow = int(np.where(middle, radius, np.inf).argmin())
@@ -155,18 +157,18 @@ def _stemmed(shape: Shape, points_m: np.ndarray) -> Membership | None:
 
 
 def _pistol(shape: Shape, points_m: np.ndarray) -> Membership | None:
-    """Housing and grip: what lies below the barrel is grip."""
+    """Housing and grip: everything below the barrel is grip."""
     if shape.pistol is None:
         return None
     _, down = shape.pistol.places(points_m)
     return Membership(("housing", "grip"), (down > 1.0).astype(int), 0.75)
 
 
-_ARCH_TOP = 0.5  # of the way from the middle to the apex: above it the legs of an arch come together
+_ARCH_TOP = 0.5  # of the way from the centre to the apex: above it the legs of an arch meet
 
 
 def _arched(shape: Shape, points_m: np.ndarray) -> Membership | None:
-    """Band and ear cups: the legs of an arch widen at its ends; one change point of width and thickness, as of a handle."""
+    """Band and ear cups: the legs of an arch widen at their ends, found as a single change point of width and thickness."""
     if shape.arch is None:
         return None
     outline = _leg_outline(shape.arch, shape.surface_m, shape.size_m)
@@ -180,7 +182,7 @@ def _arched(shape: Shape, points_m: np.ndarray) -> Membership | None:
 
 
 def _leg_outline(arch: Arch, surface_m: np.ndarray, size_m: float) -> np.ndarray:
-    """Return log width and log thickness ``(48, 2)`` of an arch's legs, from their ends up."""
+    """Return the logarithms of width and thickness ``(48, 2)`` of an arch's legs, from their ends upward."""
     towards, across = arch.places(surface_m)
     width = (surface_m - arch.origin_m) @ np.cross(arch.apex, arch.apart)
     level = np.floor((towards + 1) / (1 + _ARCH_TOP) * SLICES).astype(int)

@@ -1,4 +1,4 @@
-"""Tell the barrel, the grip and the working end of a pistol-shaped thing, such as a drill or a hair dryer, by its outline."""
+"""Barrel, grip and working end of a pistol-shaped object, such as a drill or hair dryer, from its outline."""
 
 from __future__ import annotations
 
@@ -7,32 +7,32 @@ from dataclasses import dataclass
 import numpy as np
 
 _CELLS = 40  # along the outline's longer side
-_NEAR_PLANE = 0.8  # of the surface: so much is taken for near the plane of barrel and grip
-_FITS = 10  # of that plane
-_LIKE_BOX = 0.97  # cosine between the plane's normal and an axis of the box: so near, the box is taken
-_STEPS = 72  # directions in a turn, in which the grip is looked for
-_ALONG_BOX = 1.1  # how much better the box's own directions are thought
-_BARREL_ROW = 0.7  # of the longest row: a row that long crosses the barrel
-_GRIP_ROW = 0.55  # of the longest row: rows beyond the barrel are that short in the median, else it is no pistol
-_LEAST_GRIP = 0.25  # of the outline across the barrel
-# Of the grip's upper rows: so many are one bar; a caulking gun's lever is a second one beside its handle.
+_NEAR_PLANE = 0.8  # share of the surface used for fitting the plane of barrel and grip
+_FITS = 10  # iterations of that fit
+_LIKE_BOX = 0.97  # cosine between the plane's normal and a box axis above which the box axis is used
+_STEPS = 72  # directions per turn in which the grip is sought
+_ALONG_BOX = 1.1  # preference for the box's own directions
+_BARREL_ROW = 0.7  # of the longest row: rows this long cross the barrel
+_GRIP_ROW = 0.55  # of the longest row: largest median length of the rows beyond the barrel
+_LEAST_GRIP = 0.25  # least share of the outline's rows beyond the barrel
+# Share of the grip's upper rows that must be a single bar; the lever of a caulking gun is a second one beside its handle.
 _ONE_RUN = 0.4
-_GAP = 3  # cells that may be missing in a bar
-_BACK = 2  # cells that a straight back may be uneven by
-_LEAST_STRAIGHT = 0.55  # of a barrel: how straight it is at least
-_OVERHANG = 0.1  # of the barrel, beyond the grip at its back
-_PLACED, _BLUNT = 0.2, 0.3  # how much a grip at the very end counts against it, and one that tapers to nothing
-_END = 0.2  # of the barrel: what is compared to tell how its ends taper
+_GAP = 3  # cells that may be missing within a bar
+_BACK = 2  # cells by which a straight back may be uneven
+_LEAST_STRAIGHT = 0.55  # least straightness of a barrel
+_OVERHANG = 0.1  # of the barrel's length: overhang beyond the grip at its back
+_PLACED, _BLUNT = 0.2, 0.3  # penalties for a grip at the very end, and for one that tapers to nothing
+_END = 0.2  # of the barrel's length: end regions compared for taper
 _PLACE_WEIGHT, _TAPER_WEIGHT = 2.0, 1.0
 
 
 @dataclass(frozen=True)
 class Pistol:
-    """A barrel with a grip across it, in the plane of the outline.
+    """A barrel with a transverse grip, in the plane of the outline.
 
-    ``origin_m (3,)`` is the corner of the barrel's box at its working end on the side away from the grip; ``along (3,)`` leads
-    from there to its back, ``down (3,)`` towards the grip. ``length_m`` is the barrel's, ``barrel_m`` its height, ``height_m``
-    that of barrel and grip; ``grip_share`` is where along the barrel the grip is.
+    ``origin_m (3,)`` is the corner of the barrel's box at its working end, on the side away from the grip. ``along (3,)``
+    points from there to its back, ``down (3,)`` towards the grip. ``length_m`` and ``barrel_m`` are the barrel's length and
+    height, ``height_m`` is that of barrel and grip together; ``grip_share`` is the grip's position along the barrel.
     """
 
     origin_m: np.ndarray
@@ -44,14 +44,16 @@ class Pistol:
     grip_share: float
 
     def places(self, points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return where points ``(N, 3)`` are: along the barrel (0 at the working end), and down, in heights of the barrel."""
+        """Return coordinates of points ``(N, 3)``: along the barrel (0 at the working end), and down, in heights of the
+        barrel.
+        """
         offset = points_m - self.origin_m
         return offset @ self.along / self.length_m, offset @ self.down / self.barrel_m
 
 
 @dataclass(frozen=True)
 class _Outline:
-    """Rows of an outline's cells, from the barrel's back down: how well they ``fit`` a pistol, where its barrel and grip are."""
+    """Measures of an outline's rows of cells, from the barrel's back downward: goodness of fit, and extent of barrel and grip."""
 
     fit: float
     barrel_rows: int
@@ -62,11 +64,12 @@ class _Outline:
 
 
 def find_pistol(surface_m: np.ndarray, obb_to_object: np.ndarray) -> Pistol | None:
-    """Return the barrel and grip of surface samples ``(N, 3)``, None for what is not a thick bar with a thinner one across.
+    """Return barrel and grip from surface samples ``(N, 3)``; None if the object is not a thick bar with a thinner transverse
+    one.
 
-    The outline is that in the plane near which most of the surface is. Of all directions there the barrel lies along the one in
-    which it is straightest: its back is even from end to end and it fills its box, while a grip with a battery at its end is
-    hollow on both sides, and leans. The working end is the one away from the grip, and the one that tapers.
+    The outline is taken in the plane near which most of the surface lies. Among all in-plane directions, the barrel lies along
+    the one in which it is straightest: its back is even from end to end and it fills its box, whereas a grip with a battery at
+    its end is hollow on both sides and leans. The working end is the one away from the grip, and the one that tapers.
     """
     center = surface_m.mean(0)
     axes, of_box = _plane(surface_m, obb_to_object[:3, :3].T)
@@ -99,11 +102,11 @@ def find_pistol(surface_m: np.ndarray, obb_to_object: np.ndarray) -> Pistol | No
 
 
 def _plane(surface_m: np.ndarray, box_axes: np.ndarray) -> tuple[np.ndarray, bool]:
-    """Return two axes ``(2, 3)`` of the plane near which most points ``(N, 3)`` are, and whether they are the box's.
+    """Return two axes ``(2, 3)`` of the plane near which most points ``(N, 3)`` lie, and whether they are box axes.
 
-    A drill's side handle sticks out of it, so the shortest side of its box, or its least spread, need not be its thickness. From
-    each principal axis the farthest points are left out and the plane fitted anew; the thinnest counts. A box that lies nearly
-    so is exact where the fit is not.
+    A drill's side handle sticks out of the plane, so that neither the shortest box side nor the direction of least variance
+    need be its normal. Starting from each principal axis, the farthest points are left out and the plane is refitted; the
+    thinnest result counts. A nearly parallel box is used instead, as it is exact where the fit is not.
     """
     found: list[tuple[float, np.ndarray]] = []
     for normal in np.linalg.eigh(np.cov(surface_m.T))[1].T:
@@ -120,15 +123,17 @@ def _plane(surface_m: np.ndarray, box_axes: np.ndarray) -> tuple[np.ndarray, boo
 
 
 def _rows(flat_m: np.ndarray, cell_m: float) -> np.ndarray:
-    """Return which cells points ``(N, 2)`` take, a row for each step of the second coordinate."""
-    index = ((flat_m - flat_m.min(0)) / (cell_m * (1 + 1e-9))).astype(int)  # the farthest point is in the last cell
+    """Return an occupancy grid of points ``(N, 2)``, with one row per step of the second coordinate."""
+    index = ((flat_m - flat_m.min(0)) / (cell_m * (1 + 1e-9))).astype(
+        int
+    )  # so that the farthest point falls into the last cell
     taken = np.zeros(index.max(0)[::-1] + 1, dtype=bool)
     taken[index[:, 1], index[:, 0]] = True
     return taken
 
 
 def _measured(rows: np.ndarray) -> _Outline | None:
-    """Measure an outline ``(R, C)`` whose barrel may lie along its first rows."""
+    """Measure an outline ``(R, C)`` under the assumption that its barrel lies along the first rows."""
     lengths = rows.sum(1)
     longest = int(lengths.argmax())
     if longest > len(rows) / 2:
@@ -147,7 +152,7 @@ def _measured(rows: np.ndarray) -> _Outline | None:
     first, last = int(columns[0]), int(columns[-1]) + 1
     barrel = rows[:barrel_rows, first:last]
     straight = float(barrel[: _BACK + 1].any(0).mean() * barrel.mean())
-    upper = grip[: max(len(grip) // 2, 1)]  # below it a drill's battery reaches forward
+    upper = grip[: max(len(grip) // 2, 1)]  # below, a drill's battery extends forward
     if straight < _LEAST_STRAIGHT or np.mean([_is_one_run(row) for row in upper]) < _ONE_RUN:
         return None
     grip_at = float(np.nonzero(upper)[1].mean()) + 0.5
@@ -161,7 +166,7 @@ def _measured(rows: np.ndarray) -> _Outline | None:
 
 
 def _like_a_grip(grip: np.ndarray, upper: np.ndarray, first: int, last: int) -> float:
-    """Return how like a grip the rows beyond a barrel are, up to 1: it tapers less than a chuck, and is not at the very end."""
+    """Score how grip-like the rows beyond a barrel are, up to 1: less tapered than a chuck, and not at the very end."""
     taken = [np.flatnonzero(row) for row in upper if row.any()]
     before = float(np.median([row[0] for row in taken])) - first
     behind = last - 1 - float(np.median([row[-1] for row in taken]))

@@ -1,4 +1,4 @@
-"""Find what sticks out sideways from an upright round body, handles and spouts, and the handle that goes over it."""
+"""Protrusions of an upright round body (handles and spouts), and a bail over it."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from manitwin.geometry.parts.bail import Bail, find_bail
 _HEIGHTS = 24
 _DIRECTIONS = 36
 _OUT_BY = 1.12  # times the body's radius at that height
-_OUT_BY_SHARE = 0.03  # plus this share of the body's largest radius, so that relief and seams do not count
-_BODY_DIRECTIONS = 0.6  # a slice with fewer directions occupied is not a slice of the body
-_WIDEST_PROTRUSION = 0.4  # of all directions: what is wider than that is the body's own shape
+_OUT_BY_SHARE = 0.03  # plus this share of the body's largest radius, to ignore relief and seams
+_BODY_DIRECTIONS = 0.6  # a slice with fewer occupied directions does not belong to the body
+_WIDEST_PROTRUSION = 0.4  # of all directions: anything wider is the body's own shape
 
 
 @dataclass(frozen=True)
 class Protrusion:
     """A part that sticks out of the body in one direction.
 
-    ``azimuth_rad`` is where, about the vertical through ``axis_xy_m``; ``reach_m`` how far out it goes beyond the body;
-    ``share`` its share of the surface samples; ``height_m`` how tall its outer half is; ``low_m`` is its lowest height.
-    ``bail`` is given where it goes over the body instead, and ``reach_m`` is how far above it then.
+    ``azimuth_rad`` is its direction about the vertical through ``axis_xy_m``; ``reach_m`` its extent beyond the body; ``share``
+    its share of the surface samples; ``height_m`` the height of its outer half; ``low_m`` its lowest point. ``bail`` is set for
+    a handle over the body; ``reach_m`` is then its rise above the body.
     """
 
     azimuth_rad: float
@@ -36,10 +36,10 @@ class Protrusion:
 
 @dataclass(frozen=True)
 class RoundBody:
-    """A body about a vertical axis and what sticks out of it, the largest first.
+    """A body about a vertical axis and its protrusions, largest first.
 
-    ``heights_m (24,)`` and ``radius_m (24,)`` are the body's outline, ``top_m`` is the last of the most heights in a row at
-    which it goes round: what stands in a vase is above. ``over`` is the handle that goes over it, none of ``protrusions``.
+    ``heights_m (24,)`` and ``radius_m (24,)`` are the body's outline. ``top_m`` is the end of the longest run of heights with a
+    closed outline; the contents of a vase are above it. ``over`` is the bail over the body, which is not among ``protrusions``.
     """
 
     axis_xy_m: np.ndarray
@@ -54,16 +54,16 @@ class RoundBody:
         return np.interp(points_m[:, 2], self.heights_m, self.radius_m)
 
     def outside_m(self, points_m: np.ndarray) -> np.ndarray:
-        """Return how far (m) points ``(N, 3)`` are outside the body's outline; negative inside."""
+        """Return the distance (m) of points ``(N, 3)`` beyond the body's outline; negative inside."""
         return np.hypot(*(points_m[:, :2] - self.axis_xy_m).T) - self._limit(points_m)
 
     def azimuth(self, points_m: np.ndarray) -> np.ndarray:
-        """Return the direction (rad) of points ``(N, 3)`` about the axis."""
+        """Return the azimuth (rad) of points ``(N, 3)`` about the axis."""
         offset = points_m[:, :2] - self.axis_xy_m
         return np.arctan2(offset[:, 1], offset[:, 0])
 
     def belongs(self, points_m: np.ndarray, protrusion: Protrusion) -> np.ndarray:
-        """Tell which points ``(N, 3)`` are part of a protrusion."""
+        """Return which points ``(N, 3)`` belong to a protrusion."""
         if protrusion.bail is not None:
             return protrusion.bail.contains(points_m, points_m[:, :2] - self.axis_xy_m, self.outside_m(points_m))
         turn = np.abs((self.azimuth(points_m) - protrusion.azimuth_rad + np.pi) % (2 * np.pi) - np.pi)
@@ -75,10 +75,10 @@ class RoundBody:
 
 
 def round_body(surface_m: np.ndarray, axis_xy_m: np.ndarray | None = None) -> RoundBody:
-    """Measure the outline of a body about the vertical on surface samples ``(N, 3)``, and what sticks out of it.
+    """Measure the outline of a body about the vertical from surface samples ``(N, 3)``, and its protrusions.
 
-    At each height the radius is the median, over directions, of the outermost sample: a handle takes few directions.
-    The axis is fitted where it is not given (Kasa's circle fit, trimmed).
+    At each height the radius is the median, over directions, of the outermost sample: a handle occupies few directions. If not
+    given, the axis is fitted (Kasa's circle fit, trimmed).
     """
     axis_xy_m = _fitted_axis(surface_m[:, :2]) if axis_xy_m is None else np.asarray(axis_xy_m, dtype=float)
     offset = surface_m[:, :2] - axis_xy_m
@@ -101,7 +101,7 @@ def round_body(surface_m: np.ndarray, axis_xy_m: np.ndarray | None = None) -> Ro
 
 
 def _over(body: RoundBody, surface_m: np.ndarray) -> Protrusion | None:
-    """Return the handle that goes over a body from side to side, if any."""
+    """Return the bail over a body, if any."""
     top_m = body.top_m + 0.5 * float(body.heights_m[1] - body.heights_m[0])
     bail = find_bail(surface_m, body.axis_xy_m, top_m, float(body.radius_m.max()))
     if bail is None:
@@ -111,7 +111,7 @@ def _over(body: RoundBody, surface_m: np.ndarray) -> Protrusion | None:
 
 
 def _longest_run(flags: np.ndarray) -> np.ndarray:
-    """Return the indices of the longest run of true flags, the first of several; there is one."""
+    """Return the indices of the longest run of true flags, the first of equal ones; there is at least one."""
     places = np.flatnonzero(flags)
     return max(np.split(places, np.flatnonzero(np.diff(places) > 1) + 1), key=len)
 
@@ -159,7 +159,7 @@ def _protrusions(body: RoundBody, surface_m: np.ndarray) -> tuple[Protrusion, ..
 
 
 def _circular_runs(flags: np.ndarray) -> list[np.ndarray]:
-    """Return the runs of true flags around a circle, as rising indices that may pass the end."""
+    """Return the runs of true flags around a circle, as increasing indices that may exceed its length."""
     count = len(flags)
     if flags.all():
         return [np.arange(count)]

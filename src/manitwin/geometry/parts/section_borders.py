@@ -1,4 +1,4 @@
-"""Where sections of a long thing begin: at sharp changes of width, at the joint of two levers, at a groove.
+"""Borders between sections of an elongated object: sharp changes of width, the joint of two levers, or a groove.
 
 A taper has no border. Grooves follow the minima rule (D. Hoffman and W. Richards, Parts of recognition, Cognition 18, 1984).
 """
@@ -21,28 +21,31 @@ from manitwin.geometry.parts.outline import (
 )
 
 Borders = tuple[tuple[int, ...], float]
-"""The slices at which sections begin, one or two of 48, and how sure they are."""
+"""The slices, out of 48, at which one or two further sections begin, and the confidence."""
 _SECTION_ENDS = (0.04, 0.96)
-"""Of the length: where a section may begin; one that wants to begin there is too short to be told."""
-_SHARP_CONTRAST = 1.06  # of width and thickness (together) on both sides of a sharp border
-_SHARP, _SHARP_SLICES = 0.5, 2  # of the difference between two sections, so near to their border: less is a taper
-_LEAST_SECTION = 0.05  # of the area: a pole or a plug that is smaller yields to a groove
-_GROOVE = np.log(1.05)  # below the chord over a groove: the mean of width and thickness
+"""Of the length: range in which a section may begin; shorter end sections cannot be told apart."""
+_SHARP_CONTRAST = 1.06  # ratio of width and thickness (together) across a sharp border
+_SHARP, _SHARP_SLICES = (
+    0.5,
+    2,
+)  # of the difference between two sections, within so many slices of their border; less is a taper
+_LEAST_SECTION = 0.05  # of the area: a smaller section (a pole or plug) yields to a groove
+_GROOVE = np.log(1.05)  # below the chord over a groove: mean of log width and log thickness
 _GROOVE_SLICES = 5  # on either side of a groove
 _NEXT_GROOVE = 0.6  # of the deepest
-_GAP_SHARE = 0.25  # of a slice's width: what is as far apart is two pieces, the legs of a lever
+_GAP_SHARE = 0.25  # of a slice's width: a larger gap separates two pieces, such as the legs of a lever
 _JOINT_CONFIDENCE = 0.8
-_LEAST_SAMPLES = 24  # of a slice, to tell a gap from chance
+_LEAST_SAMPLES = 24  # per slice, to distinguish a gap from chance
 
 
 def section_borders(share: np.ndarray, across_m: np.ndarray, size_m: float) -> Borders | None:
-    """Return where sections begin along an axis; None where nothing shows it.
+    """Return where sections begin along an axis; None if there is no evidence.
 
-    Samples of the surface, even by area, are at ``share (N,)`` of the length and at ``across_m (N, 2)``, the wider axis first.
+    Area-uniform surface samples are at ``share (N,)`` of the length and ``across_m (N, 2)``, the wider axis first.
     """
     slices = slices_along(share, across_m)
     outline = filled_outline(slices, 1e-3 * size_m)
-    outline[[0, -1]] = outline[[1, -2]]  # rounded ends are no sections
+    outline[[0, -1]] = outline[[1, -2]]  # rounded ends are not sections
     sharp = _sharp_borders(outline)
     if sharp is not None and all(
         _LEAST_SECTION <= (share < border / SLICES).mean() <= 1 - _LEAST_SECTION for border in sharp[0]
@@ -52,7 +55,7 @@ def section_borders(share: np.ndarray, across_m: np.ndarray, size_m: float) -> B
 
 
 def _sharp_borders(outline: np.ndarray) -> Borders | None:
-    """Return the one or two borders that explain the outline, where each is sharp."""
+    """Return the one or two borders that explain the outline, provided that each is sharp."""
     one, first = best_splits(outline, 1, _SECTION_ENDS)
     two, both = best_splits(outline, 2, _SECTION_ENDS)
     for explained, borders in ((two, both), (one, first)) if two - one >= THIRD_GAIN else ((one, first),):
@@ -66,7 +69,7 @@ def _sharp_borders(outline: np.ndarray) -> Borders | None:
 
 
 def _is_groove(outline: np.ndarray, borders: tuple[int, ...]) -> bool:
-    """Tell whether what lies between two borders is so short and thin that it is no section but parts the others."""
+    """Return whether the section between two borders is so short and thin that it is a groove."""
     if len(borders) < 2 or borders[1] - borders[0] > _GROOVE_SLICES:
         return False
     before, middle, after = (each.mean() for each in np.split(outline, borders))
@@ -74,7 +77,7 @@ def _is_groove(outline: np.ndarray, borders: tuple[int, ...]) -> bool:
 
 
 def _is_sharp(outline: np.ndarray, borders: tuple[int, ...], place: int) -> bool:
-    """Tell whether the sections on both sides of a border differ, and most of it within a few slices."""
+    """Return whether the sections on both sides of a border differ, mostly within a few slices."""
     edges = (0, *borders, len(outline))
     border = edges[place + 1]
     if not LEAST_STRETCH <= border <= len(outline) - LEAST_STRETCH:
@@ -88,7 +91,7 @@ def _is_sharp(outline: np.ndarray, borders: tuple[int, ...], place: int) -> bool
 
 
 def _joint(slices: list[np.ndarray]) -> Borders | None:
-    """Return where the joint of two levers begins and ends: the one piece between two stretches of two."""
+    """Return the borders of the joint of two levers: the single piece between two stretches with two pieces."""
     parted = np.array([_is_parted(each[:, 0]) for each in slices])
     changes = np.flatnonzero(np.diff(parted)) + 1
     edges = np.concatenate([[0], changes, [len(parted)]])
@@ -100,7 +103,7 @@ def _joint(slices: list[np.ndarray]) -> Borders | None:
 
 
 def _is_parted(across_m: np.ndarray) -> bool:
-    """Tell whether the samples of a slice leave a gap across its width."""
+    """Return whether the samples of a slice have a gap across its width."""
     if len(across_m) < _LEAST_SAMPLES:
         return False
     ordered = np.sort(across_m)
@@ -108,7 +111,7 @@ def _is_parted(across_m: np.ndarray) -> bool:
 
 
 def _groove(outline: np.ndarray) -> Borders | None:
-    """Return the slice of the one deep groove; None where there is none, or another about as deep."""
+    """Return the slice of the only deep groove; None if there is none, or another about as deep."""
     size, window = outline.mean(1), _GROOVE_SLICES
     depth = np.zeros(len(size))
     for k in range(window, len(size) - window):

@@ -1,4 +1,4 @@
-"""Sections of a long thing: head, neck and handle, or a shaft and what is told from it at its ends."""
+"""Part rules for elongated objects: head, neck and handle, or a shaft with distinct ends."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from manitwin.geometry.parts.outline import (
 from manitwin.geometry.parts.section_borders import section_borders
 from manitwin.geometry.parts.shape import Shape
 
-_NECK_NARROW = 0.8  # of the handle's width and thickness (geometric mean): a neck is at most that
-LEAST_CONTRAST = 1.2  # of width and thickness on both sides of a border
+_NECK_NARROW = 0.8  # of the handle's width and thickness (geometric mean): largest value for a neck
+LEAST_CONTRAST = 1.2  # ratio of width and thickness across a border
 
 
 def ended(shape: Shape, points_m: np.ndarray) -> Membership | None:
-    """Head and handle, with a narrower neck between them where there is one: stretches of the long axis.
+    """Head and handle, with a narrower neck between them if there is one, as sections of the long axis.
 
-    The borders are where width and thickness change most: one or two change points by least squares over the outline.
+    The borders are the one or two least-squares change points of width and thickness of the outline.
     """
     if not shape.has_ends:
         return None
@@ -43,15 +43,15 @@ def ended(shape: Shape, points_m: np.ndarray) -> Membership | None:
 
 
 def _samples(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
-    """Return where the samples of the surface are along the long axis ``(N,)``, and across it ``(N, 2)`` m."""
+    """Return the positions of the surface samples along the long axis ``(N,)``, and across it ``(N, 2)`` m."""
     return shape.axis.along(shape.surface_m), (shape.surface_m - shape.axis.origin_m) @ shape.axis.across.T
 
 
-_SECTION_BAND = 0.05  # of the longest side: these borders are known more exactly than that of a handle
+_SECTION_BAND = 0.05  # of the longest side: these borders are known more precisely than that of a handle
 
 
 def sectioned(shape: Shape, points_m: np.ndarray) -> Membership | None:
-    """Shaft, and what is told from it at the tip, at the end or at both; of two sections the larger is the shaft."""
+    """Shaft, and distinct sections at the tip, the end or both; the larger of two sections is the shaft."""
     if not shape.has_ends:
         return None
     share, across_m = _samples(shape)

@@ -1,4 +1,4 @@
-"""The parts of a surface by its form: rules of membership, believed away from their borders, and growth that stops at hollows."""
+"""Segmentation of a surface into parts: rules assign points away from borders, and regions grow to meet at concavities."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from manitwin.geometry.parts.shape import Shape
 from manitwin.geometry.parts.skin_rules import skin_membership
 from manitwin.geometry.parts.surface_graph import EDGE_SHARE, SurfaceGraph
 
-_LEAST_AREA_SHARE = 0.005  # a part that is smaller is a slip of the rules
+_LEAST_AREA_SHARE = 0.005  # smaller parts are errors of the rules
 _NEIGHBOURS = 8
-_SAME_M = 1e-6  # between the middles of faces that are the same one, read from a file in single precision
+_SAME_M = 1e-6  # distance between centres of the same face, read from a file in single precision
 
 
 @dataclass(frozen=True)
 class Segmentation:
-    """The parts of a mesh: ``role (F,)`` of each face, an index into ``roles``, and how sure the border is."""
+    """The parts of a mesh: ``role (F,)`` of each face as an index into ``roles``, and the confidence in the border."""
 
     roles: tuple[str, ...]
     role: np.ndarray
@@ -30,7 +30,7 @@ class Segmentation:
 
 
 def segmented(mesh: trimesh.Trimesh, shape: Shape, rule: PartRule) -> Segmentation | None:
-    """Return the parts of a closed mesh by the rule of its form; None where it does not show at least two of them."""
+    """Return the parts of a closed mesh by the rule for its form; None if it does not show at least two of them."""
     graph = SurfaceGraph(mesh)
     found = membership(rule, shape, graph.centers_m) or skin_membership(rule, shape, graph, mesh)
     if found is None:
@@ -45,9 +45,9 @@ def segmented(mesh: trimesh.Trimesh, shape: Shape, rule: PartRule) -> Segmentati
 
 
 def carried_over(labels: np.ndarray, mesh: trimesh.Trimesh, to: trimesh.Trimesh) -> np.ndarray:
-    """Return labels ``(F,)`` of a mesh's faces for the faces ``(G,)`` of another mesh of the same surface.
+    """Transfer face labels ``(F,)`` of a mesh to the faces ``(G,)`` of another mesh of the same surface.
 
-    Each face takes that of the nearest place that faces the same way: both sides of a thin wall are near.
+    Each face takes the label of the nearest piece with a similar normal, as both sides of a thin wall are near.
     """
     centers, normals = np.asarray(to.triangles_center), np.asarray(to.face_normals)
     apart, same = cKDTree(mesh.triangles_center).query(centers)

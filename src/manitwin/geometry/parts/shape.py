@@ -1,4 +1,4 @@
-"""Measure an object once for all of its parts: box, long axis and its ends, upright body, opening, handle."""
+"""Shape measurements shared by all feature and part rules: box, long axis and its ends, upright body, opening, handle."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from manitwin.geometry.sampling import sample_surface
 
 _SLICES = 32
 _DIRECTIONS = 12
-_END_SHARE = 0.3  # of the length: what is compared to tell the two ends apart
-_DEFAULT_HEAD_SHARE = 0.25  # where the outline shows no step between head and handle
-_STEP_CONTRAST = 1.25  # wider over narrower end: a step that can be located
+_END_SHARE = 0.3  # of the length: end regions that are compared
+_DEFAULT_HEAD_SHARE = 0.25  # used if the outline has no step between head and handle
+_STEP_CONTRAST = 1.25  # ratio of the wider to the narrower end for a step that can be located
 
 
 @dataclass(frozen=True)
 class LongAxis:
-    """The oriented box's longest axis, from the head (0) to the far end (1).
+    """The longest axis of the oriented box, from the head (0) to the far end (1).
 
-    ``origin_m (3,)`` is its point at the head, ``direction (3,)`` leads away from it, ``across (2, 3)`` are the box's
-    other axes, the wider first. ``width_m`` and ``thickness_m`` ``(32,)`` are the outline along it. ``ratio`` is length
-    by width of the box, ``head_share`` where the head ends, ``center_of_mass_share`` where the centre of mass is.
+    ``origin_m (3,)`` is its point at the head, ``direction (3,)`` points away from it, ``across (2, 3)`` are the box's other
+    axes, the wider first. ``width_m`` and ``thickness_m`` ``(32,)`` are the outline along it. ``ratio`` is length over width of
+    the box, ``head_share`` the position where the head ends, ``center_of_mass_share`` that of the centre of mass.
     """
 
     origin_m: np.ndarray
@@ -49,7 +49,7 @@ class LongAxis:
     center_of_mass_share: float
 
     def along(self, points_m: np.ndarray) -> np.ndarray:
-        """Return where points ``(N, 3)`` are on the axis: 0 at the head, 1 at the far end."""
+        """Return the positions of points ``(N, 3)`` along the axis: 0 at the head, 1 at the far end."""
         return (points_m - self.origin_m) @ self.direction / self.length_m
 
     def off_axis_m(self, points_m: np.ndarray) -> np.ndarray:
@@ -64,7 +64,7 @@ def long_axis(
     center_of_mass_m: np.ndarray,
     head_end: HeadEnd,
 ) -> LongAxis:
-    """Measure the long axis on surface samples ``(N, 3)``; the head, told by ``head_end``, comes first."""
+    """Measure the long axis from surface samples ``(N, 3)``; the head, identified by ``head_end``, comes first."""
     order = np.argsort(-obb_extents_m, kind="stable")
     axes = obb_to_object[:3, :3].T[order]
     length = float(obb_extents_m[order[0]])
@@ -90,9 +90,9 @@ def long_axis(
 
 
 def _outline(share: np.ndarray, across_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the width along the wider cross axis and the thickness in slices of the long axis, ``(32,)`` each.
+    """Return width along the wider cross axis, and thickness, in slices of the long axis, ``(32,)`` each.
 
-    The thickness of a slice is its least extent in any direction: a tube's flat end may lie across the corners of the box. Empty
+    The thickness of a slice is its least extent in any direction, as a tube's flat end may lie diagonally in the box. Empty
     slices repeat the nearest.
     """
     angles = np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS
@@ -122,13 +122,13 @@ def _head_is_last(
 
 
 def _shorter_is_last(share: np.ndarray, across_m: np.ndarray, length_m: float) -> bool | None:
-    """Tell whether the shorter of two sections comes last; None where there are not two."""
+    """Return whether the shorter of two sections comes last; None if there are not exactly two."""
     borders = section_borders(share, across_m, length_m)
     return borders[0][0] > SLICES / 2 if borders is not None and len(borders[0]) == 1 else None
 
 
 def _head_share(width: np.ndarray) -> float:
-    """Return where the width crosses the middle between its values at the two ends, coming from the head."""
+    """Return where the width, coming from the head, crosses the mean of its values at the two ends."""
     count = round(_END_SHARE * _SLICES)
     head, handle = float(width[:count].max()), float(np.median(width[-count:]))
     if max(head, handle) < _STEP_CONTRAST * min(head, handle):
@@ -142,21 +142,25 @@ def _head_share(width: np.ndarray) -> float:
 
 
 _SAMPLES = 6000
-_IN_LINE_DEG = 15.0  # within which the smallest box fits a thing that leans or has a handle a little askew
-_MIRRORED_BOX = 1.5  # times the volume of the smallest box: of what leans, that along its mirror axis is no box of it
+_IN_LINE_DEG = (
+    15.0  # tolerance within which the smallest box is used, for objects that lean or have a slightly oblique handle
+)
+_MIRRORED_BOX = (
+    1.5  # times the smallest box's volume: above it, the box along the mirror axis is not used (leaning objects)
+)
 _AT_THE_FOOT = 0.05  # of the body's height
-_LOW_BULGE = 0.25  # of the body's radius: fingers go behind no handle as low as that
-_SIXTH_RAD = np.pi / 6  # on each side of its middle
+_LOW_BULGE = 0.25  # of the body's radius: least reach for fingers behind a handle
+_SIXTH_RAD = np.pi / 6  # to each side of its centre
 _OPPOSITE_RAD = np.pi / 6
-_AS_FAR = 0.6  # of the reach of the one opposite: the axis of a body with two bulges lies between them
-LEAST_HANDLE_REACH = 0.08  # of the body's radius, beyond the outline's own margin: less is relief, no handle
+_AS_FAR = 0.6  # of the opposite one's reach: the axis of a body with two bulges lies between them
+LEAST_HANDLE_REACH = 0.08  # of the body's radius, beyond the outline's own margin; less is relief
 _TALLER, _STEEPER = 1.1, 2.0  # a handle beside a long spout: its outer half, and that by its reach
-_ELONGATED, _ELONGATED_LYING = 1.6, 1.15  # length by width from which a thing has ends rather than sides
+_ELONGATED, _ELONGATED_LYING = 1.6, 1.15  # ratio of length to width from which an object has ends rather than sides
 
 
 @dataclass(frozen=True)
 class Shape:
-    """The measurements of a mesh, made once for all features."""
+    """The measurements of a mesh, shared by all features."""
 
     surface_m: np.ndarray
     bounds_m: np.ndarray
@@ -170,16 +174,15 @@ class Shape:
 
     @property
     def size_m(self) -> float:
-        """The longest axis of the oriented box."""
+        """The longest side of the oriented box."""
         return float(self.obb_extents_m.max())
 
     @property
     def side_handle(self) -> Protrusion | None:
-        """What goes over an upright body, else what sticks out and can be held: the largest, or a taller and steeper one.
+        """The bail over an upright body, else the protrusion that can be held: the largest, or a taller and steeper one.
 
-        It is beside the body: flowers and brushes that stand in it are above.
-
-        A spout may reach farther than the handle opposite, but ends in a tip; a handle comes back to the body lower down.
+        It is beside the body, which excludes flowers and brushes standing in it. A spout may reach farther than the opposite
+        handle but ends in a tip, whereas a handle returns to the body lower down.
         """
         if self.upright and self.body.over is not None:
             return self.body.over
@@ -193,9 +196,10 @@ class Shape:
 
     @property
     def added_handle(self) -> Protrusion | None:
-        """The side handle, but None where it is only the outline of a body that is not round: a square glass, a flat bottle.
+        """The side handle; None if it is only the outline of a body that is not round, such as a square glass or a flat bottle.
 
-        Such a bulge starts where the body does, and it is low, goes a sixth round, or has another one opposite.
+        Such a bulge starts at the foot of the body, and has a low reach, covers a sixth of the circumference to each side, or
+        has a similar one opposite.
         """
         handle = self.side_handle
         if handle is None or handle.bail is not None or handle.low_m > _AT_THE_FOOT * self.body.top_m:
@@ -211,35 +215,37 @@ class Shape:
 
     @property
     def front(self) -> np.ndarray:
-        """The direction ``(3,)`` of its large face: across the box's shortest axis, up, or towards -y of a thing that stands."""
+        """The direction ``(3,)`` of its large face: along the box's shortest axis, up, or towards -y for a standing object."""
         axis = self.obb_to_object[:3, int(self.obb_extents_m.argmin())]
         leading = axis[2] if abs(axis[2]) > 0.3 else -axis[1] - 0.1 * axis[0]
         return np.asarray(axis if leading > 0 else -axis)
 
     @cached_property
     def pistol(self) -> Pistol | None:
-        """The barrel and grip, where it has the outline of a pistol."""
+        """Barrel and grip, if the outline is that of a pistol."""
         return find_pistol(self.surface_m, self.obb_to_object)
 
     @cached_property
     def arch(self) -> Arch | None:
-        """The arch with heavy ends that it may be."""
+        """The arch with heavy ends, if any."""
         return find_arch(self.surface_m, self.obb_extents_m, self.obb_to_object, self.center_of_mass_m)
 
     @cached_property
     def stem(self) -> Stem | None:
-        """What sticks out of a round thing on one side."""
+        """The one-sided protrusion of a round object, if any."""
         return find_stem(self.surface_m, self.obb_extents_m)
 
     @property
     def has_ends(self) -> bool:
-        """True where it is long, or lies and so is held along its axis."""
+        """True if the object is elongated, or lies and so is held along its axis."""
         return self.axis.ratio >= (_ELONGATED if self.upright else _ELONGATED_LYING)
 
 
 @dataclass(frozen=True)
 class SurfacePoints:
-    """Surface points to be scored: positions ``(N, 3)``, outward normals ``(N, 3)``, matter behind them ``(N,)`` m."""
+    """Surface points to be scored: positions ``(N, 3)``, outward normals ``(N, 3)``, material thickness behind them ``(N,)``
+    m.
+    """
 
     positions_m: np.ndarray
     normals: np.ndarray
@@ -253,10 +259,10 @@ def measure_shape(
     stands: bool | None,
     rng: np.random.Generator,
 ) -> Shape:
-    """Measure what the features need: oriented box, long axis, upright body and opening.
+    """Measure the oriented box, long axis, upright body and opening of a mesh.
 
-    ``head_end`` tells the working end of a long thing; ``stands`` whether such a thing stands (its handle is at its
-    side) or lies (its handle is an end of its long axis); None: what opens upward or is tall stands.
+    ``head_end`` identifies the working end of an elongated object. ``stands``: whether such an object stands (its handle is at
+    its side) or lies (its handle is an end of its long axis); None: an object that opens upward or is tall stands.
     """
     surface, _, _ = sample_surface(mesh, _SAMPLES, rng)
     extents, obb_to_object = _box(mesh.vertices)
@@ -277,11 +283,10 @@ def measure_shape(
 
 
 def _box(vertices_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the box ``(extents_m (3,), obb_to_object (4, 4))`` whose axes are the thing's own.
+    """Return the box ``(extents_m (3,), obb_to_object (4, 4))`` along the object's natural axes.
 
-    That is the smallest box, which may lean with the thing, but of what is mirrored as seen from above the one along that axis,
-    where it is little larger: the smallest box of an aircraft stands askew around the cross of hull and wings, and its axes are
-    neither's.
+    This is the smallest box, which may lean with the object. If the outline seen from above is mirror-symmetric and the box
+    along that axis is little larger, the latter is used: the smallest box of an aircraft is diagonal to hull and wings.
     """
     extents, obb_to_object = oriented_bounding_box(vertices_m)
     along = mirror_axis(vertices_m[:, :2])
@@ -296,7 +301,7 @@ def _box(vertices_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _is_in_line(obb_to_object: np.ndarray, along: np.ndarray) -> bool:
-    """Tell whether an axis of a box runs along a direction ``(2,)`` as seen from above, or across it."""
+    """Return whether a box axis, seen from above, is parallel or perpendicular to a direction ``(2,)``."""
     flat = obb_to_object[:2, :3]
     length = np.linalg.norm(flat, axis=0)
     sines = np.abs(along[0] * flat[1] - along[1] * flat[0]) / np.maximum(length, 1e-9)
@@ -304,5 +309,5 @@ def _is_in_line(obb_to_object: np.ndarray, along: np.ndarray) -> bool:
 
 
 def surface_points(mesh: trimesh.Trimesh, positions_m: np.ndarray, normals: np.ndarray) -> SurfacePoints:
-    """Measure the thickness behind points of the surface."""
+    """Measure the material thickness behind surface points."""
     return SurfacePoints(positions_m, normals, local_thickness(mesh, positions_m, normals))

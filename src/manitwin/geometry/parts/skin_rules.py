@@ -1,7 +1,7 @@
-"""Rules of what is on a surface alone: inside and rim of an open vessel, lid and base of a closed one, faces of a flat thing.
+"""Part rules for surface zones: inside and rim of an open vessel, top and base of a closed one, faces of a flat object.
 
-Unlike handle or head these are zones of a skin, told by where they look and not by where they are: both sides of a wall are at
-one place. What a form does not show is not told.
+Unlike handle or head, these are zones of the surface, distinguished by normal and visibility rather than position, as both
+sides of a wall are at the same place. Zones that the shape does not show are omitted.
 """
 
 from __future__ import annotations
@@ -18,34 +18,36 @@ from manitwin.geometry.parts.shape import Shape
 from manitwin.geometry.parts.surface_graph import SurfaceGraph
 from manitwin.geometry.ray_caster import RayCaster
 
-_BAND = 0.01  # of the longest side: these borders are known to about a piece of the surface
+_BAND = 0.01  # of the longest side: precision of these borders, about one piece of the surface
 
 
 def skin_membership(rule: PartRule, shape: Shape, graph: SurfaceGraph, mesh: trimesh.Trimesh) -> Membership | None:
-    """Return the zone of each piece of a closed mesh's surface; None where the rule is of parts with matter, or not shown."""
+    """Return the zone of each piece of a closed mesh's surface; None for volumetric rules, or if the zones are not shown."""
     told = _RULES.get(rule)
     return None if told is None else told(shape, graph, mesh)
 
 
-_RIM_M = 0.018  # a finger pad of a common gripper
-_RIM_SHARE = 0.4  # of the larger of depth and radius: a rim is at most so wide
-_UP = 0.9  # cosine: an opening that looks up
+_RIM_M = 0.018  # the width of a finger pad of a common gripper
+_RIM_SHARE = 0.4  # of the larger of depth and radius: largest width of a rim
+_UP = 0.9  # cosine, for an opening that faces up
 _SECTORS = 72
-_LEAST_SECTORS = 0.6  # of the sectors: a rim that goes less far around is none
-_CREST_M = 0.0015  # what is as near to the highest of its sector is its crest too
-_LOOKOUTS = 6  # places on the opening's axis from which the inside is looked at
+_LEAST_SECTORS = 0.6  # of the sectors that a rim must cover
+_CREST_M = 0.0015  # points this close to the highest in their sector belong to the crest
+_LOOKOUTS = 6  # viewpoints on the opening's axis for the visibility of the inside
 _LEAST_INSIDE = 0.05  # of the area
-_DOWN, _LOW, _LOW_M = -0.6, 0.1, 0.003  # z of the normal, share of the height, m: what a vessel stands on
-_FOOT_SHARE, _FOOT_M = 0.02, 0.001  # of the height, m: as near to the ground as that touches it
-_FOOT_MARGIN = 1.05  # the fillet of a bottom's edge is of it
-_VAULT = -0.1  # z of the normal: a vault between the feet is of the base, however steep, where it looks at itself
-_OFF_M = 1e-5  # above the surface: where a ray begins
+_DOWN, _LOW, _LOW_M = -0.6, 0.1, 0.003  # z of the normal, share of the height, m: criteria of the supporting base
+_FOOT_SHARE, _FOOT_M = 0.02, 0.001  # of the height, m: points this close to the ground touch it
+_FOOT_MARGIN = 1.05  # margin for the fillet at the bottom's edge
+_VAULT = (
+    -0.1
+)  # z of the normal: a vault between the feet belongs to the base, however steep, where it faces the object itself
+_OFF_M = 1e-5  # offset of ray origins from the surface
 
 
 def _open(shape: Shape, graph: SurfaceGraph, mesh: trimesh.Trimesh) -> Membership | None:
-    """Outer wall, inside, rim and base of what opens upward.
+    """Outer wall, inside, rim and base of an object that opens upward.
 
-    The inside is what can be seen from places in the hollow, the rim what is within a finger pad of the crest on either side.
+    The inside is visible from points in the cavity; the rim is within a finger pad's width of the crest on either side.
     """
     opening = shape.opening
     if opening is None or opening.axis[2] < _UP:
@@ -71,7 +73,7 @@ def _open(shape: Shape, graph: SurfaceGraph, mesh: trimesh.Trimesh) -> Membershi
 
 
 def _over_footprint(centers_m: np.ndarray, corners_m: np.ndarray, margin: float) -> np.ndarray:
-    """Tell which pieces ``(P,)`` are over the feet of a thing: in the hull of its lowest corners, ``margin`` times as wide."""
+    """Return which pieces ``(P,)`` are above the footprint: the hull of the lowest vertices, scaled by ``margin``."""
     low, high = corners_m[:, 2].min(), corners_m[:, 2].max()
     feet = corners_m[corners_m[:, 2] < low + max(_FOOT_SHARE * (high - low), _FOOT_M), :2]
     if len(feet) < 3 or np.linalg.matrix_rank(feet - feet.mean(0), tol=1e-6) < 2:
@@ -84,7 +86,7 @@ def _over_footprint(centers_m: np.ndarray, corners_m: np.ndarray, margin: float)
 
 
 def _seen_from_below(caster: RayCaster, centers_m: np.ndarray, normals: np.ndarray, asked: np.ndarray) -> np.ndarray:
-    """Tell of the pieces ``asked`` ``(P,)`` whether nothing is between them and the ground; False of all others."""
+    """Return, for the pieces ``asked (P,)``, whether nothing lies between them and the ground; False for all others."""
     seen, which = np.zeros(len(centers_m), bool), np.flatnonzero(asked)
     if len(which):
         start = centers_m[which] + _OFF_M * normals[which]
@@ -93,7 +95,9 @@ def _seen_from_below(caster: RayCaster, centers_m: np.ndarray, normals: np.ndarr
 
 
 def _looks_at_itself(caster: RayCaster, centers_m: np.ndarray, normals: np.ndarray, asked: np.ndarray) -> np.ndarray:
-    """Tell of the pieces ``asked`` ``(P,)`` whether the thing is sideways of them too; False of all others."""
+    """Return, for the pieces ``asked (P,)``, whether a horizontal ray along their normal hits the object; False for all
+    others.
+    """
     seen, which = np.zeros(len(centers_m), bool), np.flatnonzero(asked)
     if len(which):
         sideways = normals[which] * [1.0, 1.0, 0.0]
@@ -104,7 +108,7 @@ def _looks_at_itself(caster: RayCaster, centers_m: np.ndarray, normals: np.ndarr
 
 
 def _seen_from_within(opening: Opening, caster: RayCaster, centers_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Tell of pieces ``(P,)`` whether some place on the axis of the hollow sees them."""
+    """Return which pieces ``(P,)`` are visible from a point on the axis of the cavity."""
     start = opening.center_m - 1e-4 * opening.axis
     floor_m = float(caster.first_hits(start[None], -opening.axis[None])[0][0])
     deep_m = min(floor_m, opening.depth_m)
@@ -121,9 +125,9 @@ def _seen_from_within(opening: Opening, caster: RayCaster, centers_m: np.ndarray
 
 
 def _crest(opening: Opening, corners_m: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return the highest places of a vessel's wall around its opening ``(K, 3)``, and the share of directions that have one.
+    """Return the highest points of a vessel's wall around its opening ``(K, 3)``, and the share of directions that have one.
 
-    What rises above the brim by more than a rim is wide is a handle: in its directions no crest is told.
+    Directions in which the wall rises above the brim by more than a rim's width contain a handle and are excluded.
     """
     offset = corners_m - opening.center_m
     above = offset @ opening.axis
@@ -137,25 +141,25 @@ def _crest(opening: Opening, corners_m: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def _shown_by_faces(rim: np.ndarray, graph: SurfaceGraph) -> bool:
-    """Tell whether the mesh's own faces are small enough to show a rim: a wall of one face from top to bottom is not."""
+    """Return whether the mesh's own faces are small enough to represent a rim; a wall of one face from top to bottom is not."""
     by_face = graph.of_pieces(graph.of_faces(rim))
     both, either = (graph.areas_m2[which].sum() for which in (by_face & rim, by_face | rim))
     return bool(both > 0.5 * either)
 
 
-_FLAT, _ROUNDED = 0.8, 0.35  # of a normal, along the axis: what looks up or down, what looks sideways
-_MOST_ROUNDED = 0.2  # of the area, in between: with more it has no faces that end somewhere
+_FLAT, _ROUNDED = 0.8, 0.35  # component of a normal along the axis: limits for vertical and sideways faces
+_MOST_ROUNDED = 0.2  # of the area, in between; with more, the object has no faces bounded by edges
 _LEAST_FACE = 0.03  # of the area
 _UPPER, _LOWER = 0.6, 0.4  # shares of the height
 _LID_SHARE, _LID_LEVELS, _LID_WINDOW = 0.12, 48, 8
-"""Of the height at either end; its levels; those on either side of a hollow."""
+"""Of the height at either end; number of levels there; levels on either side of a concavity."""
 _LID_DIRECTIONS = 24
-_LID_HOLLOW = 0.012  # of the radius, below the chord over the hollow
-_INWARD = -0.5  # outward part of a normal: the wall of a sunk lid looks at the axis
+_LID_HOLLOW = 0.012  # of the radius, below the chord over the concavity
+_INWARD = -0.5  # radial component of a normal; the wall of a sunken lid faces the axis
 
 
 def _closed(shape: Shape, graph: SurfaceGraph, mesh: trimesh.Trimesh) -> Membership | None:
-    """Side wall, top and base of a thing whose top and base end at edges: a can, a box."""
+    """Side wall, top and base of an object whose top and base end at edges, such as a can or box."""
     low, high = shape.bounds_m[:, 2]
     height, up = (graph.centers_m[:, 2] - low) / max(high - low, 1e-9), graph.normals[:, 2]
     share = graph.areas_m2 / graph.areas_m2.sum()
@@ -172,12 +176,12 @@ def _closed(shape: Shape, graph: SurfaceGraph, mesh: trimesh.Trimesh) -> Members
     return Membership(("body", "top", "base"), np.where(top, 1, np.where(base, 2, 0)), confidence, _BAND)
 
 
-_LEAST_LARGE_FACE = 0.15  # of the area, each of the two
-_OUTER = 0.25  # of the thickness, below the outermost: a groove deeper is not of the face
+_LEAST_LARGE_FACE = 0.15  # of the area, for each of the two
+_OUTER = 0.25  # of the thickness, from the outermost point; deeper grooves do not belong to the face
 
 
 def _faced(shape: Shape, graph: SurfaceGraph, mesh: trimesh.Trimesh) -> Membership | None:
-    """Front, back and the narrow side of what is flat: a book, a phone, a sponge."""
+    """Front, back and narrow side of a flat object, such as a book, phone or sponge."""
     looks = graph.normals @ shape.front
     along = graph.centers_m @ shape.front
     thick_m = float(np.ptp(along))
@@ -193,9 +197,10 @@ def _faced(shape: Shape, graph: SurfaceGraph, mesh: trimesh.Trimesh) -> Membersh
 
 
 def _lids(caster: RayCaster, shape: Shape) -> tuple[float, float]:
-    """Return the shares of the height below which all is base, and above which all is top: beads, seams and necks at the ends.
+    """Return the relative heights below which everything is base and above which everything is top, including beads, seams and
+    necks.
 
-    They end at the deepest hollow that the outline has near the end; without one there is only the face (0 and 1).
+    They are at the deepest concavity of the outline near each end; without one, only the face itself counts (0 and 1).
     """
     (low, high), middle = shape.bounds_m[:, 2], shape.bounds_m[:, :2].mean(0)
     reach_m = float(np.ptp(shape.bounds_m[:, :2], axis=0).max())
@@ -217,7 +222,9 @@ def _lids(caster: RayCaster, shape: Shape) -> tuple[float, float]:
 
 
 def _outward(centers_m: np.ndarray, normals: np.ndarray, shape: Shape) -> np.ndarray:
-    """Return how far normals ``(P, 3)`` look away from the upright axis through the middle: 1 outward, -1 at the axis."""
+    """Return the radial component of normals ``(P, 3)`` about the vertical axis through the box centre: 1 outward, -1 towards
+    it.
+    """
     radial = centers_m[:, :2] - shape.bounds_m[:, :2].mean(0)
     return np.asarray(np.einsum("ij,ij->i", normals[:, :2], radial) / np.maximum(np.linalg.norm(radial, axis=1), 1e-9))
 

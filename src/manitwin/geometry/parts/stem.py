@@ -1,4 +1,4 @@
-"""The stem of a round thing: what sticks out of a fruit on one side, wherever that side is as it lies."""
+"""The stem of a round object: a protrusion on one side of a fruit, in any pose."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 _ROUNDS = 4
-_SMOOTH = 1.06  # of the smooth body's radius: beyond, a sample is none of the body's
+_SMOOTH = 1.06  # of the smooth body's radius; samples beyond are not used for the fit
 _STICKS_OUT = 0.10  # of the smooth body's radius, beyond it
-_LEAST_SAMPLES, _MOST_SHARE = 4, 0.25  # a pear's neck is a stem, too
-_SPREAD_RAD = np.radians(50)  # about the sample that sticks out the farthest
-_RIVAL = 0.7  # of what that one does: as much elsewhere makes it no stem, but roots opposite may stick out less
-_LEAST_EXTENTS = 0.5  # shortest to longest side of the box: what is longer is no round thing
+_LEAST_SAMPLES, _MOST_SHARE = 4, 0.25  # the neck of a pear counts as a stem
+_SPREAD_RAD = np.radians(50)  # about the farthest sample
+_RIVAL = 0.7  # of the farthest excess: a similar one elsewhere rules out a stem, but roots opposite may stick out less
+_LEAST_EXTENTS = 0.5  # ratio of the shortest to the longest box side; more elongated objects are not round
 
 
 @dataclass(frozen=True)
 class Stem:
-    """The unit ``direction`` from the body's ``center_m`` to where the stem is, and how far from there it ends (m)."""
+    """The unit ``direction`` from the body's ``center_m`` to the stem, and the distance from there to its end (m)."""
 
     center_m: np.ndarray
     direction: np.ndarray
@@ -25,10 +25,10 @@ class Stem:
 
 
 def find_stem(surface_m: np.ndarray, extents_m: np.ndarray) -> Stem | None:
-    """Find the stem of a round thing by its surface samples ``(N, 3)``; None of what is not round or has nothing like it.
+    """Find the stem of a round object from its surface samples ``(N, 3)``; None if it is not round or has no stem.
 
-    The body's radius by direction is a sum of spherical harmonics up to the second order, fitted to what does not
-    stick out of it.
+    The body's radius by direction is a sum of spherical harmonics up to second order, fitted to the samples that do not stick
+    out.
     """
     if extents_m.min() < _LEAST_EXTENTS * extents_m.max():
         return None

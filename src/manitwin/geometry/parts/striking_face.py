@@ -1,4 +1,4 @@
-"""Find where a hammer strikes: the blunt end of its head, on either side of its handle's line."""
+"""The striking face of a hammer: the blunt end of its head, on either side of the handle's line."""
 
 from __future__ import annotations
 
@@ -6,18 +6,20 @@ import numpy as np
 
 from manitwin.geometry.parts.shape import Shape, SurfacePoints
 
-_BALANCED_HEAD = 0.6  # shorter by longer reach of a head from which both sides may be the striking one
-_HEAD_END = 0.8  # of a head's reach: beyond is its end
-_TALLER = 1.3  # a shorter end, along the handle, by the longer one: that is a claw
-_BEYOND_HANDLE = 1.5  # of the handle's half width: what reaches farther is of the head
+_BALANCED_HEAD = 0.6  # ratio of the shorter to the longer reach of a head from which either side may strike
+_HEAD_END = 0.8  # of a head's reach; beyond is its end
+_TALLER = (
+    1.3  # ratio of the shorter end's extent along the handle to the longer end's, above which the longer is a claw
+)
+_BEYOND_HANDLE = 1.5  # of the handle's half width; farther points belong to the head
 
 
 def striking_face(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    """The outermost point of the head, across the handle: where a hammer strikes.
+    """Score the outermost points of the head across the handle, where a hammer strikes.
 
-    Where the head reaches about as far to both sides, it strikes with the blunt end, which has the larger section; else with
-    the end that reaches farther, as an axe does, unless that tapers to a claw. The handle's own line counts: a long claw turns
-    the box, and then the blunt end seems to reach less far, or not to be of the head.
+    If the head reaches about equally far to both sides, it strikes with the blunt end, which has the larger section; otherwise
+    with the end that reaches farther, as an axe, unless that tapers to a claw. Distances are from the handle's own line: a long
+    claw rotates the box, so that the blunt end would appear shorter or outside the head.
     """
     along = shape.axis.along(shape.surface_m)
     line, direction = handle_line(shape), handle_direction(shape)
@@ -39,7 +41,7 @@ def striking_face(shape: Shape, points: SurfacePoints) -> np.ndarray:
 
 
 def _blunt_side(sides: list[np.ndarray], reach: np.ndarray) -> int | None:
-    """Return which of two sides ``(N, 3)`` of a head is blunt, None where one is not there or the longer one may strike."""
+    """Return which of two sides ``(N, 3)`` of a head is blunt; None if one is missing or the longer one may strike."""
     if not reach.min():
         return None
     ends = [side[np.abs(side[:, 0]) > _HEAD_END * far] for side, far in zip(sides, reach, strict=True)]
@@ -51,13 +53,13 @@ def _blunt_side(sides: list[np.ndarray], reach: np.ndarray) -> int | None:
 
 
 def handle_line(shape: Shape) -> np.ndarray:
-    """Return the middle of the handle half of a long thing, ``(3,)``."""
+    """Return the centre of the handle half of an elongated object, ``(3,)``."""
     handle = shape.surface_m[shape.axis.along(shape.surface_m) > 0.5]
     return (handle.min(0) + handle.max(0)) / 2 if len(handle) else shape.obb_to_object[:3, 3]
 
 
 def handle_direction(shape: Shape) -> np.ndarray:
-    """Return the direction ``(3,)`` in which the handle half of a long thing is longest, away from the head."""
+    """Return the direction ``(3,)`` in which the handle half of an elongated object is longest, away from the head."""
     handle = shape.surface_m[shape.axis.along(shape.surface_m) > 0.5]
     longest = np.linalg.eigh(np.cov(handle.T))[1][:, 2] if len(handle) > 2 else shape.axis.direction
     return np.asarray(longest * np.sign(longest @ shape.axis.direction))

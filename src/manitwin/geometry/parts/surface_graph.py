@@ -1,6 +1,6 @@
-"""A surface as a graph of its faces, and regions that grow over it and stop at hollows.
+"""A surface as a graph of its faces, and region growing that stops at concavities.
 
-Large faces are cut up first, so that a border can run anywhere; each piece knows the face that it is of.
+Large faces are subdivided first, so that borders can run anywhere; each piece knows its original face.
 """
 
 from __future__ import annotations
@@ -14,26 +14,26 @@ from scipy.sparse.csgraph import dijkstra
 
 from manitwin.geometry.parts.cut_up import cut_up
 
-EDGE_SHARE = 1 / 40  # of the longest side: longer edges are cut
-_SMOOTH_SHARE = 0.012  # of the longest side: creases and hollows are looked for at this scale, noise is not
-_MOST_ROUNDS = 60  # of averaging: a dense scan needs more of them
-_CONCAVE_SHARE = 0.35  # of the longest side for each radian of a hollow that is crossed
-_LEAST_TURN_RAD = 0.03  # less is noise that averaging left
+EDGE_SHARE = 1 / 40  # of the longest side: longer edges are subdivided
+_SMOOTH_SHARE = 0.012  # of the longest side: scale at which creases and concavities are detected, above the noise
+_MOST_ROUNDS = 60  # of averaging; a dense scan needs more
+_CONCAVE_SHARE = 0.35  # of the longest side: extra path length per radian of concave bend
+_LEAST_TURN_RAD = 0.03  # smaller bends are noise left by averaging
 
 
 class SurfaceGraph:
-    """The faces of a closed mesh as a graph; ``size_m`` is its longest side."""
+    """The faces of a closed mesh, subdivided, as a graph; ``size_m`` is its longest side."""
 
     def __init__(self, mesh: trimesh.Trimesh):
         self.size_m = float(mesh.extents.max())
-        places, corner = np.unique(np.asarray(mesh.vertices), axis=0, return_inverse=True)  # a seam is no border
+        places, corner = np.unique(np.asarray(mesh.vertices), axis=0, return_inverse=True)  # merges seams
         vertices, faces, of_face = cut_up(places, corner.reshape(-1)[mesh.faces], EDGE_SHARE * self.size_m)
         self._mesh = trimesh.Trimesh(vertices, faces, process=False)
         self._of_face, self._face_count = of_face, len(mesh.faces)
 
     @property
     def centers_m(self) -> np.ndarray:
-        """The middles ``(P, 3)`` of the pieces."""
+        """The centres ``(P, 3)`` of the pieces."""
         return np.asarray(self._mesh.triangles_center)
 
     @property
@@ -43,7 +43,7 @@ class SurfaceGraph:
 
     @property
     def corners_m(self) -> np.ndarray:
-        """The corners ``(C, 3)`` of the pieces."""
+        """The vertices ``(C, 3)`` of the pieces."""
         return np.asarray(self._mesh.vertices)
 
     @property
@@ -52,9 +52,10 @@ class SurfaceGraph:
         return np.asarray(self._mesh.area_faces)
 
     def grown(self, labels: np.ndarray, band_share: float) -> np.ndarray:
-        """Return labels ``(P,)`` believed away from their borders; nearer than the band the regions grow to meet at hollows.
+        """Return labels ``(P,)`` that are kept away from their borders and regrown within a band, so that regions meet at
+        concavities.
 
-        ``band_share`` is of the longest side. A region that is thinner than the band everywhere keeps its middle.
+        ``band_share`` is relative to the longest side. A region thinner than the band everywhere keeps its middle.
         """
         a, b = self._pairs.T
         differ = labels[a] != labels[b]
@@ -74,14 +75,14 @@ class SurfaceGraph:
         return np.where(np.isfinite(distance.min(0)), found, labels)
 
     def of_faces(self, labels: np.ndarray) -> np.ndarray:
-        """Return the label of each face of the mesh ``(F,)``: that of most of its area."""
+        """Return the label of each original face ``(F,)``: that of the largest part of its area."""
         names, place = np.unique(labels, return_inverse=True)
         share = np.zeros((self._face_count, len(names)))
         np.add.at(share, (self._of_face, place), self.areas_m2 + 1e-15)
         return np.asarray(names[share.argmax(1)])
 
     def of_pieces(self, labels: np.ndarray) -> np.ndarray:
-        """Return the label of each piece ``(P,)`` from those of the mesh's faces ``(F,)``."""
+        """Return the label of each piece ``(P,)`` from those of the original faces ``(F,)``."""
         return np.asarray(labels[self._of_face])
 
     @cached_property
@@ -99,7 +100,7 @@ class SurfaceGraph:
 
     @cached_property
     def _averse(self) -> csr_matrix:
-        """The graph in which crossing a hollow costs as much as a way across a good part of the object."""
+        """The graph in which crossing a concavity costs as much as a path across a good part of the object."""
         a, b = self._pairs.T
         normals = self._smooth_normals
         turn = np.arccos(np.clip(np.einsum("ij,ij->i", normals[a], normals[b]), -1, 1))
@@ -110,7 +111,7 @@ class SurfaceGraph:
 
     @cached_property
     def _smooth_normals(self) -> np.ndarray:
-        """Normals ``(P, 3)`` averaged over neighbours, by area, until noise of a scan is gone."""
+        """Normals ``(P, 3)`` averaged over neighbours by area, to suppress scan noise."""
         typical_m = float(np.median(self._steps_m))
         rounds = int(np.clip(round((_SMOOTH_SHARE * self.size_m / typical_m) ** 2), 1, _MOST_ROUNDS))
         a, b = self._pairs.T

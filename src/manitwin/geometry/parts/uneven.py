@@ -1,4 +1,4 @@
-"""Find what makes one side of a thing unlike the other: the teeth of a comb, the case on a watch's strap, a camera's lens."""
+"""Features that make one side of an object unlike the other: teeth of a comb, case on a watch strap, lens of a camera."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ import numpy as np
 from manitwin.geometry.parts.scores import near
 from manitwin.geometry.parts.shape import Shape, SurfacePoints
 
-_TOOTHED = 1.1  # times the surface of the other side: slots between teeth make more of it, samples differ by 1.03
-_OUTER = 0.2  # of half the width: what is nearer to the middle is on neither side
-_LOOP = 0.4  # width by length from which a strap is closed and not laid straight
-_THICKER = 1.5  # times the usual thickness of a strap: less is no case
-_PIECES = 36  # along a strap, whose thickness is compared
-_CASE = 0.05  # of its length: how near to the middle of a case its dial is
-_LOPSIDED = 1.15  # times the reach to the other side: a lens stands out that much
+_TOOTHED = 1.1  # times the samples of the other side: slots between teeth add surface, sampling noise is 1.03
+_OUTER = 0.2  # of half the width: points nearer to the middle belong to neither side
+_LOOP = 0.4  # ratio of width to length from which a strap is a closed loop
+_THICKER = 1.5  # times the usual thickness of a strap, for a case
+_PIECES = 36  # along a strap, for comparing thickness
+_CASE = 0.05  # of its length: largest distance of the dial from the centre of the case
+_LOPSIDED = 1.15  # times the reach to the other side, for a lens
 
 
 def teeth(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
-    """Score the long side with the teeth of a comb; None where neither has any."""
+    """Score the long side with the teeth of a comb; None if neither side has teeth."""
     return _long_side(shape, points, 1.0)
 
 
 def spine(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
-    """Score the long side away from the teeth of a comb; None where it has none."""
+    """Score the long side opposite the teeth of a comb; None if it has no teeth."""
     return _long_side(shape, points, -1.0)
 
 
@@ -40,19 +40,21 @@ def _long_side(shape: Shape, points: SurfacePoints, sign: float) -> np.ndarray |
 
 
 def case(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
-    """Score the outside of the thickest part of a ring or strap, as a watch's case is; None where none is thicker."""
+    """Score the outside of the thickest part of a ring or strap, such as a watch case; None if no part is thicker."""
     found = _along_strap(shape, points.positions_m)
     return None if found is None else _outside(shape, points) * near(found, _CASE)
 
 
 def strap(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
-    """Score the outside of a ring or strap by how far it is from its case; None where it has no case."""
+    """Score the outside of a ring or strap by distance from its case; None if it has no case."""
     found = _along_strap(shape, points.positions_m)
     return None if found is None else _outside(shape, points) * near(1 - found / max(float(found.max()), 1e-9), 0.4)
 
 
 def _along_strap(shape: Shape, positions_m: np.ndarray) -> np.ndarray | None:
-    """Return how far along a strap places ``(N, 3)`` are from its thickest part, in its lengths or turns; None of an even one."""
+    """Return the distance of points ``(N, 3)`` along a strap from its thickest part, in lengths or turns; None for an even
+    strap.
+    """
     axes = shape.obb_to_object[:3, np.argsort(-shape.obb_extents_m, kind="stable")]
     surface, places = ((each - shape.obb_to_object[:3, 3]) @ axes for each in (shape.surface_m, positions_m))
     closed = _is_closed(shape)
@@ -80,7 +82,7 @@ def _is_closed(shape: Shape) -> bool:
 
 
 def _outside(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    """Return how much places look away from the middle: of a closed strap from its hole, of a straight one from its back."""
+    """Score how much points face away from the centre: from the hole of a closed strap, or across a straight one."""
     shortest = shape.obb_to_object[:3, int(shape.obb_extents_m.argmin())]
     offset = points.positions_m - shape.obb_to_object[:3, 3]
     if not _is_closed(shape):
@@ -91,7 +93,7 @@ def _outside(shape: Shape, points: SurfacePoints) -> np.ndarray:
 
 
 def lens(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
-    """Score what stands out from a box across one of its shorter axes, as a camera's lens does; None where nothing does."""
+    """Score a protrusion from a box along one of its shorter axes, such as a camera lens; None if there is none."""
     order = np.argsort(-shape.obb_extents_m, kind="stable")
     best: tuple[float, np.ndarray] | None = None
     for axis in shape.obb_to_object[:3, order[1:]].T:

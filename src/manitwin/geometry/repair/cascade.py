@@ -1,7 +1,8 @@
-"""Any triangle soup made a watertight, outward wound solid, and every step said in words.
+"""Mesh repair: turn a triangle soup into a watertight, outward-oriented solid, and describe each step.
 
-The cascade: weld, drop what collapsed or repeats, drop fins, glue, wind, drop strays, close holes, give open sheets a
-thickness, face outward, split vertices. A mesh that is a solid already passes untouched.
+Steps: weld vertices, drop degenerate and duplicate faces, drop fins, glue faces along edges, make winding consistent, drop
+stray pieces, close holes, thicken open sheets, orient outward, split non-manifold vertices. A mesh that is already a solid is
+returned unchanged.
 """
 
 from __future__ import annotations
@@ -19,18 +20,18 @@ from manitwin.geometry.repair.surface import Surface, face_cross_products, signe
 from manitwin.geometry.repair.thickening import lids_of_openings, thicken
 
 _STRAY_AREA_SHARE = 2e-3  # open pieces below this share of the area are debris
-_HANGING_AREA_SHARE = 0.05  # the same for open pieces that hang on by an edge with more than two faces
-_MEMBRANE_SHARE = 0.2  # of a piece's area: what its holes would take to close, below which it is a body and no membrane
-_FLAT_SHARE = 1e-5  # mean thickness over the root of the area: paper of A4 size has 3e-4
-_MOST_ROUNDS = 20  # of dropping fins or strays: each round can free others
+_HANGING_AREA_SHARE = 0.05  # the same for open pieces attached at an edge with more than two faces
+_MEMBRANE_SHARE = 0.2  # of a piece's area: vector area needed to close it, below which it is a body and not a membrane
+_FLAT_SHARE = 1e-5  # mean thickness over the square root of the area; a sheet of A4 paper has 3e-4
+_MOST_ROUNDS = 20  # of dropping fins or strays, as each round may expose others
 
 
 @dataclass(frozen=True)
 class RepairResult:
-    """A repaired mesh and what was done to it.
+    """A repaired mesh, and the repairs made.
 
-    ``source_face (F,) int64`` is the input face each face came from, -1 for new ones; ``flipped (F,) bool`` tells
-    which run the other way round. ``thickness_m`` is the wall given to open sheets, None where there were none.
+    ``source_face (F,) int64`` is the input face of each face, -1 for new ones; ``flipped (F,) bool`` marks faces with reversed
+    winding. ``thickness_m`` is the wall thickness given to open sheets; None if there were none.
     """
 
     mesh: trimesh.Trimesh
@@ -50,14 +51,14 @@ def repair(
     wall_share: float = 0.01,
     min_wall_m: float = 1e-3,
 ) -> RepairResult:
-    """Make a mesh a watertight solid with outward winding.
+    """Repair a mesh to a watertight solid with outward winding.
 
-    ``weld_tolerance``, ``lid_length`` and ``wall_share`` are shares of the bounding box's diagonal. A hole whose rim
-    is longer than ``lid_length``, and whose closing surface is more than ``lid_area_share`` of the component's area,
-    can be seen from outside and does not carry on the surface around it, is the mouth of an open sheet: the sheet gets
-    a wall of ``wall_share`` (at least ``min_wall_m``) inward and keeps its mouth. All other holes are closed. Where no
-    solid comes out, ``watertight`` is False and ``actions`` says why. Raises ManiTwinError for meshes without faces or
-    with coordinates that are not finite.
+    ``weld_tolerance``, ``lid_length`` and ``wall_share`` are shares of the bounding box's diagonal. A hole is the mouth of an
+    open sheet if its rim is longer than ``lid_length``, and its closing surface has more than ``lid_area_share`` of the
+    component's area, is visible from outside, and does not continue the surrounding surface. Such a sheet gets a wall of
+    ``wall_share`` (at least ``min_wall_m``) inward and keeps its mouth. All other holes are closed. If the result is not a
+    solid, ``watertight`` is False and ``actions`` says why. Raises ManiTwinError for meshes without faces or with non-finite
+    coordinates.
     """
     vertices, faces = np.asarray(mesh.vertices, dtype=float), np.asarray(mesh.faces, dtype=np.int64)
     if not len(faces):
@@ -85,10 +86,9 @@ def repair(
 
 
 def is_solid(vertices: np.ndarray, faces: np.ndarray) -> bool:
-    """Tell whether faces ``(F, 3)`` are closed, wound consistently, and every component encloses a positive volume.
+    """Return whether faces ``(F, 3)`` are closed and consistently wound, and every component encloses a positive volume.
 
-    Not so for shells that lie on each other, nor for cavities: which components are these,
-    ``orientation.face_outward`` decides.
+    False for coincident shells and for cavities, which ``orientation.face_outward`` handles.
     """
     if not halfedges.is_closed_and_consistent(faces, len(vertices)):
         return False
@@ -99,7 +99,9 @@ def is_solid(vertices: np.ndarray, faces: np.ndarray) -> bool:
 
 
 def _as_it_is(mesh: trimesh.Trimesh, actions: list[str]) -> RepairResult | None:
-    """Return a mesh that is a solid but for collapsed faces, which close seams in some files; None where it is none."""
+    """Return a mesh that is a solid once degenerate faces (which close seams in some files) are removed; None for other
+    meshes.
+    """
     faces = np.asarray(mesh.faces, dtype=np.int64)
     kept = ~welding.collapsed_faces(faces)
     if not is_solid(np.asarray(mesh.vertices, dtype=float), faces[kept]):
@@ -112,7 +114,7 @@ def _as_it_is(mesh: trimesh.Trimesh, actions: list[str]) -> RepairResult | None:
 
 
 def _welded_surface(vertices: np.ndarray, faces: np.ndarray, tolerance_m: float, actions: list[str]) -> Surface:
-    """Weld open edges, drop collapsed and repeated faces."""
+    """Weld open edges; drop degenerate and duplicate faces."""
     source = np.arange(len(faces))
     distinct = ~welding.collapsed_faces(faces)
     before = len(vertices)
@@ -133,7 +135,7 @@ def _welded_surface(vertices: np.ndarray, faces: np.ndarray, tolerance_m: float,
 
 
 def _glued_surface(surface: Surface, actions: list[str]) -> Surface:
-    """Drop fins, glue, wind, and drop debris, until nothing more falls off."""
+    """Drop fins, glue faces, make winding consistent, and drop debris, until nothing changes."""
     fins = strays = 0
     for _ in range(_MOST_ROUNDS):
         dangling = nonmanifold.fins(
@@ -164,9 +166,9 @@ def _glued_surface(surface: Surface, actions: list[str]) -> Surface:
 
 
 def _strays(surface: Surface, crowded: np.ndarray) -> np.ndarray:
-    """Tell which faces belong to open pieces that are debris, or membranes that hang between other sheets.
+    """Return which faces belong to open pieces that are debris, or membranes between other sheets.
 
-    ``crowded (3F,)`` are the half-edges, by face of the same surface, on edges with more than two faces.
+    ``crowded (3F,)`` marks the half-edges, by face of the same surface, on edges with more than two faces.
     """
     labels = surface.components()
     count = int(labels.max()) + 1
@@ -175,12 +177,12 @@ def _strays(surface: Surface, crowded: np.ndarray) -> np.ndarray:
     open_at = surface.twin < 0
     of_halfedge = np.repeat(labels, 3)
     opened = np.bincount(of_halfedge, open_at, minlength=count)
-    # A face's half-edges may be renumbered by winding, so count crowded edges by face.
+    # Winding may renumber a face's half-edges, so crowded edges are counted per face.
     hanging_faces = crowded.reshape(-1, 3).any(1) & open_at.reshape(-1, 3).any(1)
     hanging = np.bincount(labels, hanging_faces, minlength=count) > 0
     cross = face_cross_products(surface.vertices, surface.faces) / 2
     unclosed = np.linalg.norm([np.bincount(labels, column, minlength=count) for column in cross.T], axis=0)
-    hanging &= unclosed > _MEMBRANE_SHARE * areas  # a nut that a jaw goes through is nearly closed
+    hanging &= unclosed > _MEMBRANE_SHARE * areas  # excludes a nut with a jaw through it, which is nearly closed
     stray = (opened > 0) & ((share < _STRAY_AREA_SHARE) | (hanging & (share < _HANGING_AREA_SHARE)))
     return stray[labels]
 
@@ -188,7 +190,7 @@ def _strays(surface: Surface, crowded: np.ndarray) -> np.ndarray:
 def _closed_surface(
     surface: Surface, lid_length_m: float, lid_area_share: float, wall_m: float, actions: list[str]
 ) -> tuple[Surface, float | None]:
-    """Close all holes; reopen those that are mouths of open sheets and thicken these."""
+    """Close all holes; reopen those that are mouths of open sheets, and thicken these sheets."""
     loops = boundary_loops(surface)
     if not loops:
         return face_outward(surface), None
@@ -222,7 +224,7 @@ def _closed_surface(
 
 
 def _flat(surface: Surface, labels: np.ndarray) -> np.ndarray:
-    """Tell which faces belong to closed components whose two sides lie on each other."""
+    """Return which faces belong to closed components of negligible thickness."""
     areas = np.bincount(labels, surface.areas)
     thickness_m = (
         2 * np.abs(signed_volumes(surface.vertices, surface.faces, labels)) / np.maximum(areas, np.finfo(float).tiny)
@@ -237,7 +239,7 @@ def _encloses_volume(surface: Surface) -> bool:
 
 
 def _finished(surface: Surface, actions: list[str], thickness_m: float | None) -> RepairResult:
-    """Split vertices, and check what came out."""
+    """Split non-manifold vertices and check the result."""
     turned = int((surface.flipped & (surface.source >= 0)).sum())
     split, parted = nonmanifold.separate_coincident_edges(surface.with_split_vertices())
     mesh = trimesh.Trimesh(split.vertices, split.faces, process=False)

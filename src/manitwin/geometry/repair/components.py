@@ -1,4 +1,4 @@
-"""Tell the parts of one object from several objects side by side."""
+"""Connected parts of a mesh, and counting of separate objects."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from scipy.spatial import ConvexHull, Delaunay, QhullError, cKDTree
 from manitwin.geometry.repair.halfedges import label_components
 from manitwin.geometry.sampling import sample_surface
 
-_POINTS_A_PART = 4000  # surface points besides the vertices: gaps are seen to about the size of a part / 60
-_ENCLOSED_SHARE = 0.5  # of a part's points within another's convex hull
-_MOST_PARTS = 200  # that are compared with each other; smaller ones than the largest 200 are specks
+_POINTS_A_PART = 4000  # surface points besides the vertices: gaps are resolved to about 1/60 of a part's size
+_ENCLOSED_SHARE = 0.5  # least share of a part's points inside another's convex hull for being enclosed
+_MOST_PARTS = 200  # number of parts compared; parts beyond the largest 200 are specks
 
 
 @dataclass(frozen=True)
 class Part:
-    """A connected component of a mesh: its faces, and its share of the sum of areas and of convex hull volumes."""
+    """A connected component of a mesh: its faces, and its shares of the summed area and of the summed convex hull volumes."""
 
     faces: np.ndarray
     area_share: float
@@ -26,20 +26,20 @@ class Part:
 
     @property
     def share(self) -> float:
-        """The larger share: flat things have area, compact ones volume."""
+        """The larger share: flat objects have area, compact ones volume."""
         return max(self.area_share, self.hull_volume_share)
 
 
 @dataclass(frozen=True)
 class SeparateObjects:
-    """The number of objects that stand apart from each other, and of parts that are too small to be one."""
+    """The number of separate objects, and of parts too small to be objects."""
 
     count: int
     specks: int
 
 
 def connected_parts(mesh: trimesh.Trimesh) -> list[Part]:
-    """Return the parts of a mesh that share no vertex, largest hull first."""
+    """Return the parts of a mesh that share no vertices, largest hull first."""
     faces = np.asarray(mesh.faces)
     labels = label_components(len(mesh.vertices), faces[:, :2].ravel(), faces[:, 1:].ravel())[faces[:, 0]]
     _, labels = np.unique(labels, return_inverse=True)
@@ -57,11 +57,11 @@ def connected_parts(mesh: trimesh.Trimesh) -> list[Part]:
 def separate_objects(
     mesh: trimesh.Trimesh, *, gap_m: float, object_share: float, rng: np.random.Generator
 ) -> SeparateObjects:
-    """Count the things in a mesh.
+    """Count the separate objects in a mesh.
 
-    Parts that touch, come within ``gap_m`` of each other, or lie mostly within one another's convex hull are one thing
-    (pads of a headset, screws, a lid over a pot). A group with less than ``object_share`` of the summed area and of
-    the summed hull volumes is no thing but specks.
+    Parts belong to one object if they touch, come within ``gap_m`` of each other, or lie mostly inside one another's convex
+    hull (pads of a headset, screws, a lid over a pot). A group with less than ``object_share`` of the summed area and of the
+    summed hull volumes counts as specks.
     """
     every = connected_parts(mesh)
     parts = sorted(every, key=lambda part: -part.share)[:_MOST_PARTS]
@@ -98,7 +98,7 @@ def _groups(mesh: trimesh.Trimesh, parts: list[Part], gap_m: float, rng: np.rand
 
 
 def _hull_volume(points: np.ndarray) -> float:
-    """Return the volume of the convex hull, 0.0 for flat sets."""
+    """Return the volume of the convex hull; 0.0 for flat sets."""
     try:
         return float(ConvexHull(points).volume)
     except (QhullError, ValueError):
@@ -112,7 +112,7 @@ def _near(a: cKDTree, b: cKDTree, gap_m: float) -> bool:
 
 
 def _enclosed(inner: np.ndarray, outer: np.ndarray) -> bool:
-    """Tell whether most of ``inner`` lies within the convex hull of ``outer``."""
+    """Return whether most of ``inner`` lies inside the convex hull of ``outer``."""
     in_box = ((inner >= outer.min(0)) & (inner <= outer.max(0))).all(1)
     if in_box.mean() < _ENCLOSED_SHARE:
         return False

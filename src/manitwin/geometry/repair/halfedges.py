@@ -1,8 +1,8 @@
-"""Half-edges of triangle faces and which of them are twins.
+"""Half-edges of triangle meshes and their twins.
 
-Half-edge ``3 * f + k`` runs from corner ``k`` of face ``f`` to corner ``(k + 1) % 3``. An array ``twin (3F,)`` holds
-for each the half-edge glued to it, or -1 at a boundary. The gluing is kept apart from the vertex indices: two sheets
-may touch along the same two vertices without being one surface.
+Half-edge ``3 * f + k`` runs from corner ``k`` of face ``f`` to corner ``(k + 1) % 3``. An array ``twin (3F,)`` holds the
+half-edge glued to each, or -1 at a boundary. Gluing is independent of vertex indices: two sheets may touch along the same two
+vertices without being one surface.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ BOUNDARY = -1
 
 
 def halfedge_vertices(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return start and end vertex ``(3F,)`` of every half-edge of faces ``(F, 3)``."""
+    """Return the start and end vertex ``(3F,)`` of every half-edge of faces ``(F, 3)``."""
     return faces.ravel(), np.roll(faces, -1, axis=1).ravel()
 
 
 def next_halfedge(halfedges: np.ndarray) -> np.ndarray:
-    """Return the half-edges that follow in the same faces."""
+    """Return the following half-edges in the same faces."""
     return halfedges - halfedges % 3 + (halfedges + 1) % 3
 
 
 def previous_halfedge(halfedges: np.ndarray) -> np.ndarray:
-    """Return the half-edges that come before in the same faces."""
+    """Return the preceding half-edges in the same faces."""
     return halfedges - halfedges % 3 + (halfedges + 2) % 3
 
 
 @dataclass(frozen=True)
 class EdgeGroups:
-    """Half-edges grouped by the undirected edge they lie on.
+    """Half-edges grouped by undirected edge.
 
     Group ``g`` is ``order[starts[g] : starts[g] + counts[g]]``; ``group_of (3F,)`` is the inverse.
     """
@@ -45,7 +45,7 @@ class EdgeGroups:
 
     @property
     def uses(self) -> np.ndarray:
-        """The number of faces that use the edge of each half-edge ``(3F,)``."""
+        """The number of faces at the edge of each half-edge ``(3F,)``."""
         return self.counts[self.group_of]
 
     def members(self, group: int) -> np.ndarray:
@@ -54,7 +54,7 @@ class EdgeGroups:
 
 
 def edge_keys(start: np.ndarray, end: np.ndarray, vertex_count: int) -> np.ndarray:
-    """Return one int64 per undirected edge."""
+    """Return a unique int64 key per undirected edge."""
     return np.minimum(start, end).astype(np.int64) * vertex_count + np.maximum(start, end)
 
 
@@ -72,7 +72,7 @@ def group_edges(faces: np.ndarray, vertex_count: int) -> EdgeGroups:
 
 
 def twins_of_manifold_edges(groups: EdgeGroups) -> np.ndarray:
-    """Glue the two half-edges of every edge that has exactly two; all others are boundary. Returns ``twin (3F,)``."""
+    """Glue the half-edges of every edge that has exactly two; all others are boundary. Returns ``twin (3F,)``."""
     twin = np.full(len(groups.order), BOUNDARY, dtype=np.int64)
     pairs = groups.starts[groups.counts == 2]
     a, b = groups.order[pairs], groups.order[pairs + 1]
@@ -81,7 +81,7 @@ def twins_of_manifold_edges(groups: EdgeGroups) -> np.ndarray:
 
 
 def is_closed_and_consistent(faces: np.ndarray, vertex_count: int) -> bool:
-    """Tell whether every edge has exactly two faces that run along it in opposite directions."""
+    """Return whether every edge has exactly two faces that traverse it in opposite directions."""
     if len(faces) < 4 or len(faces) % 2:
         return False
     start, end = halfedge_vertices(faces)
@@ -93,7 +93,7 @@ def is_closed_and_consistent(faces: np.ndarray, vertex_count: int) -> bool:
 
 
 def label_components(count: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Label ``count`` nodes joined by links ``a[i] - b[i]``, numbered by their first nodes."""
+    """Label the connected components of ``count`` nodes with links ``a[i] - b[i]``, numbered by their first nodes."""
     _, labels = connected_components(
         coo_matrix((np.ones(len(a), dtype=bool), (a, b)), shape=(count, count)), directed=False
     )
@@ -104,26 +104,26 @@ def label_components(count: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def face_components(twin: np.ndarray) -> np.ndarray:
-    """Return the component label ``(F,)`` of every face, joined across glued half-edges."""
+    """Return the component label ``(F,)`` of every face, connected across glued half-edges."""
     glued = np.flatnonzero(twin >= 0)
     return label_components(len(twin) // 3, glued // 3, twin[glued] // 3)
 
 
 def corner_fans(twin: np.ndarray) -> np.ndarray:
-    """Return the fan label ``(3F,)`` of every corner: those of one fan turn about a vertex through glued edges.
+    """Return the fan label ``(3F,)`` of every corner: corners of one fan are connected around a vertex through glued edges.
 
-    A surface is manifold at a vertex where all its corners are one fan. Expects consistent winding: the start of a
-    half-edge is the end of its twin.
+    A surface is manifold at a vertex if all its corners form one fan. Requires consistent winding: the start of a half-edge is
+    the end of its twin.
     """
     glued = np.flatnonzero(twin >= 0)
     return label_components(len(twin), glued, next_halfedge(twin[glued]))
 
 
 def split_vertices(vertices: np.ndarray, faces: np.ndarray, twin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Give every fan of corners its own vertex, and drop vertices that no face uses.
+    """Give every fan of corners its own vertex, and drop unused vertices.
 
-    Returns vertices and faces ``(F, 3)`` in the order of the input vertices, copies right behind their originals
-    (Gueziec et al. 2001, "Cutting and stitching", section 4: local cutting).
+    Returns vertices and faces ``(F, 3)``. Vertices keep the input order, with copies right after their originals (Gueziec et
+    al. 2001, "Cutting and stitching", section 4: local cutting).
     """
     fans = corner_fans(twin)
     corner_vertex = faces.ravel()

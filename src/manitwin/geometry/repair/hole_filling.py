@@ -1,4 +1,4 @@
-"""Holes closed with triangulations of least area and bending, after Liepa 2003, "Filling holes in meshes"."""
+"""Hole filling with triangulations of least area and bending, after Liepa 2003, "Filling holes in meshes"."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from manitwin.geometry.repair.halfedges import (
 )
 from manitwin.geometry.repair.surface import NEW, Surface, face_normals
 
-_LARGEST_EXACT_LOOP = 120  # edges; the dynamic programme is O(n^3), longer loops are cut in two first
-_BENDING_WEIGHT = 0.25  # of an edge's squared length, times 1 - cos of the fold over it, against area
+_LARGEST_EXACT_LOOP = 120  # edges; the dynamic programme is O(n^3), so longer loops are first divided
+_BENDING_WEIGHT = 0.25  # of an edge's squared length, times 1 - cos of its dihedral bend, relative to area
 
-_SAME_FAN_PENALTY = 4.0  # more than any 1 - cosine: prefer to cross the gap between two fans that meet at a vertex
+_SAME_FAN_PENALTY = 4.0  # exceeds any 1 - cosine, to prefer crossing the gap between two fans at a vertex
 
 
 @dataclass(frozen=True)
 class FilledSurface:
-    """A surface with its holes closed: ``loop_of_face (F,)`` is the loop that a face fills, or -1."""
+    """A surface with its holes closed; ``loop_of_face (F,)`` is the index of the loop that a face fills, or -1."""
 
     surface: Surface
     loop_of_face: np.ndarray
@@ -34,8 +34,8 @@ class FilledSurface:
 def fill_loops(surface: Surface, loops: list[np.ndarray]) -> FilledSurface:
     """Close simple boundary loops (see ``boundary_loops``) with new faces, glued to the rim and to each other.
 
-    A loop of two half-edges is zipped. A diagonal that is an edge of the surface already is never used; where no
-    triangulation is left without one, a fan around the loop's mean point closes the hole.
+    A loop of two half-edges is zipped. Diagonals that are already edges of the surface are not used; if no such triangulation
+    exists, a fan around the loop's mean point closes the hole.
     """
     start, end = halfedge_vertices(surface.faces)
     existing = np.unique(edge_keys(start, end, len(surface.vertices)))
@@ -92,14 +92,14 @@ def _attach(surface: Surface, corners: np.ndarray, patch: np.ndarray, centers: n
 
 
 def _diagonals_taken(polygon: np.ndarray, existing: np.ndarray, vertex_count: int) -> np.ndarray:
-    """Tell which pairs of polygon corners ``(n, n)`` are joined by an edge of the surface already."""
+    """Return which pairs of polygon corners ``(n, n)`` are already joined by an edge of the surface."""
     keys = edge_keys(polygon[:, None], polygon[None], vertex_count)
     at = np.minimum(np.searchsorted(existing, keys), len(existing) - 1)
     return existing[at] == keys
 
 
 def _triangulate(points: np.ndarray, rim_normals: np.ndarray, taken: np.ndarray) -> np.ndarray | None:
-    """Triangulate a loop of points ``(n, 3)``; returns corner triples ``(n - 2, 3)`` wound against the loop, or None.
+    """Triangulate a loop of points ``(n, 3)``; return corner triples ``(n - 2, 3)`` wound against the loop, or None.
 
     ``rim_normals (n, 3)`` are the normals of the faces outside the edges i -> i + 1.
     """
@@ -125,13 +125,13 @@ def _triangulate(points: np.ndarray, rim_normals: np.ndarray, taken: np.ndarray)
 
 
 def _plane_normal(points: np.ndarray) -> np.ndarray:
-    """Return the unit normal of a patch that closes a loop walked with the surface on its left (Newell's method)."""
+    """Return the unit normal of a patch that closes a loop traversed with the surface on its left (Newell's method)."""
     normal = np.cross(points, np.roll(points, -1, axis=0)).sum(0)
     return -normal / max(float(np.linalg.norm(normal)), np.finfo(float).tiny)
 
 
 def _cutting_diagonal(points: np.ndarray, taken: np.ndarray) -> tuple[int, int] | None:
-    """Choose the diagonal that is shortest for the length of rim that it cuts off, each part at least a quarter."""
+    """Return the diagonal that is shortest relative to the rim length it cuts off, with at least a quarter in each part."""
     count = len(points)
     steps = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
     along = np.append(0.0, np.cumsum(steps))
@@ -148,9 +148,9 @@ def _cutting_diagonal(points: np.ndarray, taken: np.ndarray) -> tuple[int, int] 
 
 
 def _least_weight_triangulation(points: np.ndarray, rim_normals: np.ndarray, taken: np.ndarray) -> np.ndarray | None:
-    """Run the dynamic programme of Liepa 2003, section 2, all sub-polygons of one size at a time.
+    """Run the dynamic programme of Liepa 2003, section 2, for all sub-polygons of one size at a time.
 
-    The weight is area plus bending over every inner edge and over the rim; None where every triangulation needs a taken
+    The weight is area plus bending over all inner edges and the rim. Returns None if every triangulation needs a taken
     diagonal.
     """
     count = len(points)
@@ -158,7 +158,7 @@ def _least_weight_triangulation(points: np.ndarray, rim_normals: np.ndarray, tak
     points = (points - points.mean(0)) / max(float(scale), np.finfo(float).tiny)
     weight = np.full((count, count), np.inf)
     apex = np.zeros((count, count), dtype=np.int64)
-    normal = np.zeros((count, count, 3))  # of the triangle that lies on the diagonal i, j inside sub-polygon i..j
+    normal = np.zeros((count, count, 3))  # of the triangle on the diagonal i, j inside sub-polygon i..j
     rim = np.arange(count - 1)
     weight[rim, rim + 1] = 0.0
     normal[rim, rim + 1] = rim_normals[:-1]
@@ -187,7 +187,7 @@ def _least_weight_triangulation(points: np.ndarray, rim_normals: np.ndarray, tak
 
 
 def _collect(apex: np.ndarray, count: int) -> np.ndarray:
-    """Read the triangles off the table of best apexes."""
+    """Reconstruct the triangles from the table of best apexes."""
     triangles = []
     open_spans = [(0, count - 1)]
     while open_spans:
@@ -201,10 +201,10 @@ def _collect(apex: np.ndarray, count: int) -> np.ndarray:
 
 
 def boundary_loops(surface: Surface) -> list[np.ndarray]:
-    """Return the simple loops of boundary half-edges of a consistently wound surface, in walking order.
+    """Return the simple loops of boundary half-edges of a consistently wound surface, in traversal order.
 
-    The end of each half-edge is the start of the next. No vertex occurs twice in a loop: where rims touch at a vertex,
-    each is continued across the gap that it borders, and a loop that still meets itself is cut in two there.
+    The end of each half-edge is the start of the next. No vertex occurs twice in a loop: where rims touch at a vertex, each is
+    continued across the gap that it borders, and a loop that still meets itself is divided there.
     """
     boundary = surface.boundary
     if not len(boundary):
@@ -233,7 +233,7 @@ def loop_lengths(surface: Surface, loops: list[np.ndarray]) -> np.ndarray:
 
 
 def _following(surface: Surface, boundary: np.ndarray, start: np.ndarray, end: np.ndarray) -> dict[int, int]:
-    """Match every boundary half-edge with the one that goes on along the same rim."""
+    """Map every boundary half-edge to its successor along the same rim."""
     order_out, order_in = (
         boundary[np.argsort(start[boundary], kind="stable")],
         boundary[np.argsort(end[boundary], kind="stable")],
@@ -258,7 +258,7 @@ def _following(surface: Surface, boundary: np.ndarray, start: np.ndarray, end: n
 
 
 def _simple_loops(cycle: list[int], start: np.ndarray) -> list[np.ndarray]:
-    """Cut a closed walk of half-edges wherever it comes back to a vertex."""
+    """Divide a closed walk of half-edges wherever it returns to a vertex."""
     loops = []
     path: list[int] = []
     position: dict[int, int] = {}

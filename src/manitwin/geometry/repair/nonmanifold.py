@@ -1,4 +1,4 @@
-"""Edges with more than two faces: fins are dropped, the sheets that cross there are glued in pairs."""
+"""Non-manifold edges (more than two faces): fins are dropped, and crossing sheets are glued in pairs."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from manitwin.geometry.repair.halfedges import (
 )
 from manitwin.geometry.repair.surface import Surface
 
-_FOLD_COSINE = -0.5  # an ear folded by more than 60 degrees out of its neighbour's plane is a fin
-_MOST_WEIGHED = 12  # faces around an edge whose pairings are all weighed; more are paired with their neighbours
-_SAME_WAY_PENALTY = 0.3  # prefers partners that run in opposite directions over slightly flatter ones that do not
+_FOLD_COSINE = -0.5  # an ear folded by more than 60 degrees from its neighbour's plane is a fin
+_MOST_WEIGHED = 12  # faces at an edge up to which all pairings are compared; otherwise neighbours are paired
+_SAME_WAY_PENALTY = 0.3  # prefers partners with opposite winding over slightly flatter ones without
 
 
 def fins(vertices: np.ndarray, faces: np.ndarray, groups: EdgeGroups) -> np.ndarray:
-    """Tell which faces ``(F,)`` dangle: they hang on by edges with other faces, and elsewhere by nothing.
+    """Return which faces ``(F,)`` are fins, attached only at edges with other faces.
 
-    A face on an edge with three or more faces and no edge with exactly two is a fin. So is an ear (two open edges)
-    that folds sharply off its only neighbour: a fin on the rim of a hole.
+    A face on an edge with three or more faces and without an edge with exactly two is a fin. So is an ear (two open edges) that
+    folds sharply from its only neighbour: a fin on the rim of a hole.
     """
     uses = groups.uses.reshape(-1, 3)
     crowded, open_edges = (uses > 2).any(1), (uses == 1).sum(1)
@@ -40,10 +40,10 @@ def fins(vertices: np.ndarray, faces: np.ndarray, groups: EdgeGroups) -> np.ndar
 
 
 def glue_faces(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Glue faces along their edges; returns ``twin (3F,)`` and which half-edges ``(3F,)`` lie on a crowded edge.
+    """Glue faces along their edges; return ``twin (3F,)`` and a mask ``(3F,)`` of half-edges on edges with more than two faces.
 
-    Where as many faces run one way along an edge as the other, partners bound one wedge of matter between them (the
-    solids that touch there come apart). Else the flattest pairs that do not cross are glued and an odd face stays open.
+    If equally many faces traverse an edge in each direction, partners bound one wedge of material, which separates solids
+    touching there. Otherwise the flattest pairs that do not cross are glued, and an odd face stays open.
     """
     groups = group_edges(faces, len(vertices))
     twin = twins_of_manifold_edges(groups)
@@ -64,9 +64,10 @@ def glue_faces(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def separate_coincident_edges(surface: Surface) -> tuple[Surface, int]:
-    """Put a vertex in the middle of glued edges that end at the same two vertices as another; returns how many.
+    """Insert a vertex in the middle of glued edges with the same end vertices as another edge; return the surface and their
+    number.
 
-    Splitting vertices cannot part two sheets that meet along one edge and are joined around both of its ends.
+    Splitting vertices cannot separate two sheets that meet along one edge and are connected around both of its ends.
     """
     groups = group_edges(surface.faces, len(surface.vertices))
     done = 0
@@ -80,7 +81,7 @@ def separate_coincident_edges(surface: Surface) -> tuple[Surface, int]:
 
 
 def _split_glued_edge(surface: Surface, halfedge: int) -> Surface:
-    """Cut the two faces at a glued half-edge in two each; half-edges keep their numbers and starts."""
+    """Split the two faces at a glued half-edge; half-edges keep their numbers and start vertices."""
     faces, twin = surface.faces.copy(), surface.twin.copy()
     middle, count = len(surface.vertices), len(faces)
     pair = (halfedge, int(twin[halfedge]))
@@ -120,7 +121,7 @@ def _apex_directions(vertices: np.ndarray, faces: np.ndarray, halfedges: np.ndar
 
 
 def _angles(toward_apex: np.ndarray, along: np.ndarray) -> np.ndarray:
-    """Return the angles ``(N,)`` rad of faces around an edge, counter-clockwise about ``along`` from the first."""
+    """Return the angles ``(N,)`` rad of faces around an edge, counter-clockwise about ``along``, relative to the first."""
     x = toward_apex[0]
     y = np.cross(along / max(float(np.linalg.norm(along)), np.finfo(float).tiny), x)
     return np.asarray(np.round(np.arctan2(toward_apex @ y, toward_apex @ x), 9) % (2 * np.pi))
@@ -129,8 +130,8 @@ def _angles(toward_apex: np.ndarray, along: np.ndarray) -> np.ndarray:
 def _wedges_of_matter(angle: np.ndarray, forward: np.ndarray) -> list[tuple[int, int]]:
     """Pair balanced faces at angles ``(N,)`` around an edge like brackets.
 
-    Turning counter-clockwise about the edge, matter begins at a face that runs backward and ends at one that runs
-    forward (its normal, along x apex direction, points on in the direction of turning).
+    Counter-clockwise about the edge, material begins at a face that runs backward and ends at one that runs forward (its
+    normal, along x apex direction, points in the direction of turning).
     """
     order = np.lexsort((np.arange(len(angle)), forward, angle))
     balance = np.cumsum(np.where(forward[order], -1, 1))
@@ -146,9 +147,9 @@ def _wedges_of_matter(angle: np.ndarray, forward: np.ndarray) -> list[tuple[int,
 
 
 def _flattest_pairs(angle: np.ndarray, toward_apex: np.ndarray, forward: np.ndarray) -> list[tuple[int, int]]:
-    """Pair faces around an edge so that no two pairs cross there, and are flattest together; one of an odd number is left over.
+    """Return non-crossing pairs of faces around an edge with the least total fold; one face of an odd number is left out.
 
-    Sheets that pass through each other would turn what they bound inside out beyond the edge.
+    Crossing sheets would turn the volume that they bound inside out beyond the edge.
     """
     fold = toward_apex @ toward_apex.T + _SAME_WAY_PENALTY * (forward[:, None] == forward[None])
     order = np.lexsort((np.arange(len(angle)), angle)).tolist()
@@ -157,7 +158,7 @@ def _flattest_pairs(angle: np.ndarray, toward_apex: np.ndarray, forward: np.ndar
     known: dict[tuple[int, int], tuple[float, list[tuple[int, int]]]] = {}
 
     def best(first: int, end: int) -> tuple[float, list[tuple[int, int]]]:
-        """Return the pairs of the faces at places ``first`` to ``end`` of the order that fold least, after their summed fold."""
+        """Return the least total fold, and its pairs, of the faces at positions ``first`` to ``end`` of the order."""
         if end - first < 2:
             return 0.0, []
         if (first, end) not in known:
@@ -166,7 +167,7 @@ def _flattest_pairs(angle: np.ndarray, toward_apex: np.ndarray, forward: np.ndar
             for place in range(first + 1, end):
                 within, behind = best(first + 1, place), best(place + 1, end)
                 if (place - first - 1) % 2 and (end - place - 1) % 2:
-                    continue  # leaves an odd number of faces on each side
+                    continue  # would leave an odd number of faces on each side
                 i, j = sorted((order[first], order[place]))
                 choices.append((float(fold[i, j]) + within[0] + behind[0], [(i, j), *within[1], *behind[1]]))
             known[first, end] = min(choices)
@@ -176,7 +177,7 @@ def _flattest_pairs(angle: np.ndarray, toward_apex: np.ndarray, forward: np.ndar
 
 
 def _neighbours(order: list[int], fold: np.ndarray) -> list[tuple[int, int]]:
-    """Pair faces with those beside them around an edge, the flattest first."""
+    """Pair faces with their neighbours around an edge, flattest first."""
     left = list(order)
     pairs: list[tuple[int, int]] = []
     while len(left) > 1:

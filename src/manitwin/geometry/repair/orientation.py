@@ -1,4 +1,4 @@
-"""Winding: the same way round on every component, and outward on solids."""
+"""Face winding: consistent within every component, and outward on solids."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ _PAIRS_PER_CHUNK = 200_000  # (point, triangle) pairs in memory at once
 
 
 def wind_consistently(surface: Surface) -> Surface:
-    """Reverse as few faces as possible so that glued faces run along their edge in opposite directions.
+    """Reverse as few faces as possible so that glued faces traverse their edge in opposite directions.
 
-    Each component keeps the winding of most of its faces. A one-sided component (Moebius strip) is cut open along the
-    edges where a breadth-first walk over its faces meets itself the wrong way round.
+    Each component keeps the winding of most of its faces. A one-sided component (Moebius strip) is cut open along the edges
+    where a breadth-first traversal meets itself with opposite winding.
     """
     twin, count = surface.twin, len(surface.faces)
     start, _ = halfedge_vertices(surface.faces)
@@ -25,7 +25,7 @@ def wind_consistently(surface: Surface) -> Surface:
     if not same_way.any():
         return surface
     a, b = glued // 3, twin[glued] // 3
-    # Double cover: node f is "face f as it is", node F + f is "face f reversed"; links join states that agree.
+    # Double cover: node f is face f as given, node F + f is face f reversed; links join consistent states.
     labels = label_components(
         2 * count,
         np.concatenate((a, a + count)),
@@ -43,8 +43,8 @@ def wind_consistently(surface: Surface) -> Surface:
 
 
 def _fewer_reversed(as_is: np.ndarray, turned: np.ndarray) -> np.ndarray:
-    """Choose per component between two mirrored states; returns ``reverse (F,)``."""
-    first = np.minimum(as_is, turned)  # the state in which the first face of the component is as it is
+    """Choose the state with fewer reversed faces per component; return ``reverse (F,)``."""
+    first = np.minimum(as_is, turned)  # the state in which the first face of the component is as given
     agrees = as_is == first
     votes = np.bincount(first, np.where(agrees, 1, -1), minlength=int(max(as_is.max(), turned.max())) + 1)
     return np.where(votes[first] >= 0, ~agrees, agrees)
@@ -53,7 +53,7 @@ def _fewer_reversed(as_is: np.ndarray, turned: np.ndarray) -> np.ndarray:
 def _tree_parity(
     labels: np.ndarray, a: np.ndarray, b: np.ndarray, same_way: np.ndarray, which: np.ndarray
 ) -> np.ndarray:
-    """Return ``reverse (F,)`` along breadth-first trees of the components that hold faces ``which``."""
+    """Return ``reverse (F,)`` along breadth-first trees of the components that contain the faces ``which``."""
     count = len(labels)
     links = coo_matrix((np.where(same_way, 2, 1), (a, b)), shape=(count, count)).tocsr()
     reverse = np.zeros(count, dtype=bool)
@@ -66,10 +66,9 @@ def _tree_parity(
 
 
 def face_outward(surface: Surface) -> Surface:
-    """Wind closed components outward, and cavities toward the cavity.
+    """Orient closed components outward, and cavities towards the cavity.
 
-    A component inside another is a cavity where the two came wound opposite to each other; else it is matter of its
-    own.
+    A component inside another is a cavity if the two are given with opposite orientation; otherwise it is a solid of its own.
     """
     labels = surface.components()
     given = np.sign(signed_volumes(surface.vertices, surface.faces, labels))
@@ -91,10 +90,10 @@ def _depth(parents: np.ndarray, component: int) -> int:
 
 
 def enclosing_components(vertices: np.ndarray, faces: np.ndarray, labels: np.ndarray) -> np.ndarray:
-    """Return for each closed component the smallest one that encloses it ``(C,)``, or -1.
+    """Return the smallest component that encloses each closed component ``(C,)``, or -1.
 
-    Enclosed means that its box lies within the other's box and the winding number of the other at one of its vertices,
-    the one farthest inside that box, is not zero.
+    Enclosed means that its box lies within the other's box, and that the winding number of the other is not zero at one of its
+    vertices (the one deepest inside that box).
     """
     count = int(labels.max()) + 1
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
@@ -117,10 +116,10 @@ def enclosing_components(vertices: np.ndarray, faces: np.ndarray, labels: np.nda
 
 
 def winding_numbers(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return the winding number ``(N,)`` of triangles ``(F, 3, 3)`` about points ``(N, 3)``: 1 inside an outward solid.
+    """Return the winding number ``(N,)`` of triangles ``(F, 3, 3)`` at points ``(N, 3)``: 1 inside an outward-oriented solid.
 
-    Source: Jacobson et al. 2013, "Robust inside-outside segmentation using generalized winding numbers", eq. 5
-    (solid angle of Van Oosterom and Strackee 1983).
+    Source: Jacobson et al. 2013, "Robust inside-outside segmentation using generalized winding numbers", eq. 5 (solid angle of
+    Van Oosterom and Strackee 1983).
     """
     result = np.empty(len(points))
     step = max(1, _PAIRS_PER_CHUNK // max(len(triangles), 1))

@@ -1,4 +1,4 @@
-"""A triangle surface under repair: faces, how they are glued, and where each came from."""
+"""The surface under repair: faces, their gluing, and their input faces."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ import numpy as np
 from manitwin.geometry.repair.halfedges import BOUNDARY, face_components, split_vertices
 
 NEW = -1
-_REVERSED_CORNER = np.array([1, 0, 2])  # half-edge k of a face (a, b, c) is half-edge _REVERSED_CORNER[k] of (c, b, a)
+_REVERSED_CORNER = np.array([1, 0, 2])  # half-edge k of face (a, b, c) is half-edge _REVERSED_CORNER[k] of (c, b, a)
 
 
 @dataclass(frozen=True)
 class Surface:
     """Vertices ``(V, 3)``, faces ``(F, 3)`` and their gluing ``twin (3F,)``.
 
-    ``source (F,)`` is the input face each face came from (-1: new); ``flipped (F,)`` tells which run the other way
-    round.
+    ``source (F,)`` is the input face of each face (-1: new); ``flipped (F,)`` marks faces with reversed winding.
     """
 
     vertices: np.ndarray
@@ -28,7 +27,7 @@ class Surface:
 
     @staticmethod
     def unglued(vertices: np.ndarray, faces: np.ndarray, source: np.ndarray, flipped: np.ndarray) -> Surface:
-        """Return a surface of loose faces."""
+        """Return a surface of unconnected faces."""
         return Surface(vertices, faces, source, flipped, np.full(3 * len(faces), BOUNDARY, dtype=np.int64))
 
     @property
@@ -38,7 +37,7 @@ class Surface:
 
     @property
     def boundary(self) -> np.ndarray:
-        """The half-edges that nothing is glued to."""
+        """The half-edges without a twin."""
         return np.flatnonzero(self.twin == BOUNDARY)
 
     def components(self) -> np.ndarray:
@@ -46,7 +45,7 @@ class Surface:
         return face_components(self.twin)
 
     def only(self, keep: np.ndarray) -> Surface:
-        """Return the faces where ``keep (F,)`` holds; what was glued to the others becomes boundary."""
+        """Return the faces selected by ``keep (F,)``; half-edges glued to removed faces become boundary."""
         kept = np.flatnonzero(keep)
         where = np.full(len(self.faces), -1, dtype=np.int64)
         where[kept] = np.arange(len(kept))
@@ -65,12 +64,12 @@ class Surface:
         return replace(self, faces=faces, flipped=self.flipped ^ which, twin=twin)
 
     def with_split_vertices(self) -> Surface:
-        """Return the surface with one vertex a fan of faces; unused vertices are dropped."""
+        """Return the surface with one vertex per fan of faces, without unused vertices."""
         vertices, faces = split_vertices(self.vertices, self.faces, self.twin)
         return replace(self, vertices=vertices, faces=faces)
 
     def followed_by(self, other: Surface) -> Surface:
-        """Return both surfaces side by side, glued nowhere."""
+        """Return the disjoint union of both surfaces."""
         twin = np.where(other.twin >= 0, other.twin + len(self.twin), BOUNDARY)
         return Surface(
             np.concatenate((self.vertices, other.vertices)),
@@ -82,20 +81,20 @@ class Surface:
 
 
 def face_cross_products(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Return ``(F, 3)`` the normal of every face times twice its area."""
+    """Return the unit normal of every face times twice its area, ``(F, 3)``."""
     a, b, c = vertices[faces[:, 0]], vertices[faces[:, 1]], vertices[faces[:, 2]]
     return np.cross(b - a, c - a)
 
 
 def face_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Return the unit normal ``(F, 3)`` of every face; zero where the face has no area."""
+    """Return the unit normal ``(F, 3)`` of every face; zero for degenerate faces."""
     cross = face_cross_products(vertices, faces)
     length = np.linalg.norm(cross, axis=1, keepdims=True)
     return np.divide(cross, length, out=np.zeros_like(cross), where=length > 0)
 
 
 def signed_volumes(vertices: np.ndarray, faces: np.ndarray, labels: np.ndarray) -> np.ndarray:
-    """Return the signed volume of every label (divergence theorem); meaningful for closed components."""
+    """Return the signed volume per label (divergence theorem); meaningful for closed components."""
     count = int(labels.max()) + 1
     weight = np.bincount(labels, minlength=count)
     centers = (

@@ -1,4 +1,4 @@
-"""Open sheets: tell the mouth of a cup from a hole in a solid, and make sheets solid with a wall that grows inward."""
+"""Open sheets: distinguish the mouth of a vessel from a hole in a solid, and thicken sheets inward to solids."""
 
 from __future__ import annotations
 
@@ -12,24 +12,25 @@ from manitwin.geometry.repair.halfedges import BOUNDARY, halfedge_vertices
 from manitwin.geometry.repair.surface import NEW, Surface, face_cross_products, face_normals
 from manitwin.geometry.sampling import sample_surface
 
-_MOST_STRETCH = 2.0  # a corner moves at most so many thicknesses: sharper ones would shoot through
-_DAMPING = 1e-2  # keeps vertices of flat neighbourhoods from sliding along them
-_SHARE_OF_ROOM = 0.4  # of the free way inward: opposite walls must not meet
+_MOST_STRETCH = (
+    2.0  # largest displacement of a corner in thicknesses; sharper corners would intersect the opposite side
+)
+_DAMPING = 1e-2  # keeps vertices of flat neighbourhoods from sliding tangentially
+_SHARE_OF_ROOM = 0.4  # of the free distance inward, so that opposite walls do not meet
 
-_SAMPLES = 32  # points on a closing surface
-_DIRECTIONS = 128  # rays from each
+_SAMPLES = 32  # points per closing surface
+_DIRECTIONS = 128  # rays per point
 _FOLD_COSINE = 0.7
-"""A lid is folded off the wall around it by 45 degrees or more on average; a patch carries its surface on."""
-_BAND = 0.25  # of a patch's size: how wide a band of the surface around it is looked at
+"""A lid deviates by 45 degrees or more on average from the wall around it; a patch continues its surface."""
+_BAND = 0.25  # of a patch's size: width of the surrounding band that is compared
 _OPENNESS = 0.5  # of the half space before a lid; a patch deep in a crevice sees less of the outside
 
 
 def thicken(surface: Surface, thickness_m: float) -> Surface:
-    """Turn outward wound open sheets into closed walls; their rims become narrow bands.
+    """Thicken outward-oriented open sheets to closed walls; their rims become narrow bands.
 
-    Expects one vertex a fan (``Surface.with_split_vertices``). The given faces stay as they are, followed by their
-    inner copies and two faces for each rim edge, all new. The wall is thinner where less than 2.5 thicknesses are free
-    inward.
+    Requires one vertex per fan (``Surface.with_split_vertices``). The given faces are followed by their inner copies and two
+    new faces per rim edge. The wall is thinner where less than 2.5 thicknesses are free inward.
     """
     count, old = len(surface.vertices), len(surface.faces)
     inner = surface.reversed(np.ones(old, dtype=bool))
@@ -60,9 +61,9 @@ def thicken(surface: Surface, thickness_m: float) -> Surface:
 def _glue_band(
     twin: np.ndarray, rim: np.ndarray, inner_at: int, a: np.ndarray, b: np.ndarray, surface: Surface
 ) -> None:
-    """Glue the band's faces to the outside, to the inside and to each other, in place.
+    """Glue the band's faces to the outer and inner surface and to each other, in place.
 
-    Rim edge r has faces (b, a, a') and (b, a', b') whose half-edges begin at ``base[r]`` and ``base[r] + 3``.
+    Rim edge r has the faces (b, a, a') and (b, a', b'), whose half-edges start at ``base[r]`` and ``base[r] + 3``.
     """
     base = 2 * inner_at + 6 * np.arange(len(rim))
     reversed_corner = np.array([1, 0, 2])
@@ -79,10 +80,10 @@ def _glue_band(
 
 
 def _inward_offsets(surface: Surface, thickness_m: float) -> np.ndarray:
-    """Return ``(V, 3)`` by how much to move every vertex inward, as a vector that points outward.
+    """Return the displacement ``(V, 3)`` to subtract from every vertex; it points outward.
 
-    The displacement moves the planes of all faces around by the thickness in the least squares sense, weighted by
-    the corner angle (the quadric of Garland and Heckbert 1997, section 3.4): at the edge of a box that is its corner.
+    It moves the planes of all adjacent faces by the thickness in the least-squares sense, weighted by corner angle (the quadric
+    of Garland and Heckbert 1997, section 3.4); at a corner of a box it keeps the corner.
     """
     normals = np.repeat(face_normals(surface.vertices, surface.faces), 3, axis=0)
     weight = _corner_angles(surface)
@@ -114,7 +115,7 @@ def _corner_angles(surface: Surface) -> np.ndarray:
 
 
 def _room_inward(surface: Surface, normal: np.ndarray, thickness_m: float) -> np.ndarray:
-    """Return the free distance ``(V,)`` from every vertex against ``normal (V, 3)``."""
+    """Return the free distance ``(V,)`` from every vertex along ``-normal (V, 3)``."""
     caster = RayCaster(trimesh.Trimesh(surface.vertices, surface.faces, process=False))
     skip = 0.1 * thickness_m
     distance, _ = caster.first_hits(surface.vertices - skip * normal, -normal)
@@ -124,12 +125,12 @@ def _room_inward(surface: Surface, normal: np.ndarray, thickness_m: float) -> np
 def lids_of_openings(
     closed: Surface, loop_of_face: np.ndarray, rim_lengths: np.ndarray, lid_length_m: float, lid_area_share: float
 ) -> np.ndarray:
-    """Return the loops whose patch would put a lid on an open sheet, ascending.
+    """Return the loops whose patch would be a lid on an open sheet, ascending.
 
-    A lid has a rim longer than ``lid_length_m``, more than ``lid_area_share`` of its component's remaining area, folds
-    away from the faces around it, and sees the outside from most of its face. Patches where scans did not see into a
-    crevice see little of the outside; large faces missing from a coarse mesh lie in the plane of others or have a rim
-    of three edges. ``loop_of_face (F,)`` is -1 for faces that belong to no patch.
+    A lid has a rim longer than ``lid_length_m`` and more than ``lid_area_share`` of its component's remaining area, deviates in
+    direction from the surrounding faces, and sees the outside from most of its area. Patches in crevices that a scanner did not
+    reach see little of the outside; large faces missing from a coarse mesh are coplanar with others or have a rim of three
+    edges. ``loop_of_face (F,)`` is -1 for faces that belong to no patch.
     """
     patch = loop_of_face >= 0
     areas, labels = closed.areas, closed.components()
@@ -152,10 +153,10 @@ def lids_of_openings(
 
 
 def _band_cosine(closed: Surface, is_patch: np.ndarray, patch_area: float) -> float:
-    """Return the mean cosine between the normal of a patch and those of the surface around it, weighted by area.
+    """Return the area-weighted mean cosine between the normal of a patch and those of the surrounding band.
 
-    The surface around is what lies within a quarter of the patch's size of its rim, walked from face to face: so the
-    rounded lip of a cup counts less than the wall below, and the other side of a thin plate not at all.
+    The band is the surface within a quarter of the patch's size from its rim, measured along faces. The rounded lip of a cup
+    then counts less than the wall below it, and the far side of a thin plate not at all.
     """
     glued = np.flatnonzero((closed.twin >= 0) & ~np.repeat(is_patch, 3))
     to_patch = is_patch[closed.twin[glued] // 3]
@@ -173,7 +174,7 @@ def _band_cosine(closed: Surface, is_patch: np.ndarray, patch_area: float) -> fl
 
 
 def _openness(mesh: trimesh.Trimesh, caster: RayCaster, faces: np.ndarray) -> float:
-    """Return in which share of a half space some faces see out of the mesh, from either side."""
+    """Return the share of a half space in which faces see out of the mesh, from either side."""
     piece = trimesh.Trimesh(mesh.vertices, mesh.faces[faces], process=False)
     if piece.area <= 0:
         return 1.0

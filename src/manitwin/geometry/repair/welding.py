@@ -1,4 +1,4 @@
-"""Vertices merged on position, and the faces that fall away with them."""
+"""Vertex welding by position, and detection of degenerate and duplicate faces."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from scipy.spatial import cKDTree
 
 from manitwin.geometry.repair.halfedges import edge_keys, group_edges, halfedge_vertices, label_components
 
-_STEPS = (0.1, 0.3, 1.0)  # of the tolerance: the smallest that leaves the fewest open edges is taken
+_STEPS = (0.1, 0.3, 1.0)  # of the tolerance; the smallest step with the fewest open edges is used
 
 
 def weld_equal(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Merge vertices ``(V, 3)`` at exactly equal positions; the seams of textures and normals vanish.
+    """Merge vertices ``(V, 3)`` at exactly equal positions, which removes texture and normal seams.
 
-    Returns vertices in order of first appearance and faces ``(F, 3)`` in the same order, none dropped.
+    Returns vertices in order of first appearance, and faces ``(F, 3)`` in unchanged order and number.
     """
     order = np.lexsort(vertices.T)
     ordered = vertices[order]
@@ -30,11 +30,11 @@ def weld_equal(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def weld_near(vertices: np.ndarray, faces: np.ndarray, tolerance_m: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """Merge vertices of open edges that lie within a tolerance of each other; closed regions are not touched.
+    """Merge vertices of open edges within a tolerance of each other; closed regions are unchanged.
 
-    Vertices linked by a chain of near neighbours become their mean. The smallest of a few steps up to ``tolerance_m``
-    that leaves the fewest open edges is used, so detail finer than the tolerance survives where it can. Returns
-    vertices, faces ``(F, 3)`` (same order; some may have collapsed) and the step used in m (0.0: nothing was gained).
+    Vertices linked by a chain of near neighbours are replaced by their mean. The smallest of a few steps up to ``tolerance_m``
+    with the fewest open edges is used, to preserve finer detail. Returns vertices, faces ``(F, 3)`` (same order; some may be
+    degenerate) and the step used in m (0.0: no improvement).
     """
     fewest, best, used_m = _open_edges(faces, len(vertices)), (vertices, faces), 0.0
     if not fewest:
@@ -57,13 +57,13 @@ def weld_near(vertices: np.ndarray, faces: np.ndarray, tolerance_m: float) -> tu
 
 
 def collapsed_faces(faces: np.ndarray) -> np.ndarray:
-    """Tell which faces ``(F, 3)`` name a vertex twice."""
+    """Return which faces ``(F, 3)`` contain a vertex twice."""
     a, b, c = faces.T
     return (a == b) | (b == c) | (c == a)
 
 
 def repeated_faces(faces: np.ndarray) -> np.ndarray:
-    """Tell which faces ``(F, 3)`` repeat the three vertices of an earlier face, in either winding."""
+    """Return which faces ``(F, 3)`` repeat the three vertices of an earlier face, in either winding."""
     triples = np.sort(faces, axis=1)
     order = np.lexsort((np.arange(len(faces)), *triples.T))
     ordered = triples[order]
@@ -73,7 +73,7 @@ def repeated_faces(faces: np.ndarray) -> np.ndarray:
 
 
 def _open_edges(faces: np.ndarray, vertex_count: int) -> int:
-    """Count edges with one face."""
+    """Return the number of edges with one face."""
     if not len(faces):
         return 0
     keys = np.sort(edge_keys(*halfedge_vertices(faces), vertex_count))
@@ -82,7 +82,7 @@ def _open_edges(faces: np.ndarray, vertex_count: int) -> int:
 
 
 def _mean_positions(vertices: np.ndarray, labels: np.ndarray) -> np.ndarray:
-    """Return the mean position of every label."""
+    """Return the mean position per label."""
     counts = np.bincount(labels)
     sums = np.stack([np.bincount(labels, weights=column) for column in vertices.T], axis=1)
     merged = sums / counts[:, None]

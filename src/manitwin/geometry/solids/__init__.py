@@ -1,1 +1,1 @@
-"""Closed solids by construction: shapes, sweeps and unions of named parts."""
+"""Constructive solid geometry: primitive shapes, sweeps, and unions of named parts."""

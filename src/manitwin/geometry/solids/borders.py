@@ -1,4 +1,4 @@
-"""Edges of a mesh along the border of a region: faces that it crosses are cut, their neighbours split where it meets them."""
+"""Cutting of mesh faces along the border of a region, with neighbouring faces split so that the mesh stays closed."""
 
 from __future__ import annotations
 
@@ -7,25 +7,27 @@ from collections.abc import Callable
 import numpy as np
 
 STEPS = 40
-"""Halvings by which a crossing of an edge is found: to 1e-12 of its length."""
+"""Bisection steps for the crossing of an edge: accurate to 1e-12 of its length."""
 SNAP = 0.005
-"""Of an edge: a crossing so near to its end is taken to be that end, which makes no slivers."""
+"""Of an edge: a crossing this close to an end is snapped to it, which avoids slivers."""
 
 
 def with_border(
     vertices: np.ndarray, faces: np.ndarray, chosen: np.ndarray, where: Callable[[np.ndarray], np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Cut chosen faces along the border of a region of space, and return vertices, faces, the face each is of, and who is within.
+    """Cut the chosen faces along the border of a spatial region; return vertices, faces, the original face of each, and
+    membership.
 
-    ``vertices (V, 3)``, ``faces (F, 3)``, ``chosen (F,)`` bool, ``where`` from places ``(N, 3)`` to bool ``(N,)``. New vertices
-    lie on edges, which are split in the faces beside them too, so that the surface keeps its shape and stays closed. Between two
-    edges the border is straight. Faces that are not cut are within where their centre is; no face is that is not chosen.
+    ``vertices (V, 3)``, ``faces (F, 3)``, ``chosen (F,) bool``; ``where`` maps positions ``(N, 3)`` to ``(N,) bool``. New
+    vertices lie on edges, which are also split in adjacent faces, so that the surface keeps its shape and stays closed. The
+    border is straight within a face. A face that is not cut is inside if its centre is; faces that were not chosen are never
+    inside.
     """
     within = where(vertices)
     edges, of_edge = np.unique(
         np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_inverse=True
     )
-    of_edge = of_edge.reshape(-1, 3)  # the edges from each corner of a face to the next
+    of_edge = of_edge.reshape(-1, 3)  # the edge from each corner of a face to the next
     crossed = np.zeros(len(edges), dtype=bool)
     crossed[of_edge[chosen]] = True
     crossed &= within[edges[:, 0]] != within[edges[:, 1]]
@@ -48,7 +50,7 @@ def with_border(
         pieces.append(cut)
         of_face.append(np.full(len(cut), number))
     result, origin = np.concatenate(pieces), np.concatenate(of_face)
-    signs = side[result].sum(axis=1)  # of pieces all corners are on one side of the border or on it
+    signs = side[result].sum(axis=1)  # all corners of a piece are on one side of the border or on it
     inside = np.where(whole[origin] | (signs == 0), where(places[result].mean(axis=1)), signs > 0)
     return places, result, origin, inside & chosen[origin]
 
@@ -56,7 +58,7 @@ def with_border(
 def _crossings(
     starts: np.ndarray, ends: np.ndarray, within: np.ndarray, where: Callable[[np.ndarray], np.ndarray]
 ) -> np.ndarray:
-    """Return the shares ``(N,)`` of edges ``(N, 3)`` to ``(N, 3)`` at which a border crosses them, by bisection."""
+    """Return the shares ``(N,)`` at which a border crosses the edges from ``(N, 3)`` to ``(N, 3)``, by bisection."""
     low, high = np.zeros(len(starts)), np.ones(len(starts))
     for _ in range(STEPS):
         middle = 0.5 * (low + high)
@@ -66,7 +68,7 @@ def _crossings(
 
 
 def _pieces(corners: np.ndarray, cut_at: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return the triangles ``(K, 3)`` of one with vertices ``cut_at (3,)`` on its edges, each behind its corner; -1 for none."""
+    """Split a triangle at vertices ``cut_at (3,)`` on its edges (that after each corner; -1: none) into triangles ``(K, 3)``."""
     cuts = np.flatnonzero(cut_at >= 0)
     if len(cuts) == 3:
         a, b, c = corners
@@ -79,7 +81,7 @@ def _pieces(corners: np.ndarray, cut_at: np.ndarray, places: np.ndarray) -> np.n
     uncut = int(np.flatnonzero(cut_at < 0)[0])
     a, b, c = np.roll(corners, -uncut)
     bc, ca = np.roll(cut_at, -uncut)[1:]
-    tip = (bc, c, ca)  # and a quad of a, b, bc, ca, along its shorter diagonal
+    tip = (bc, c, ca)  # plus the quad a, b, bc, ca, split along its shorter diagonal
     if np.linalg.norm(places[a] - places[bc]) <= np.linalg.norm(places[b] - places[ca]):
         return np.array([tip, (a, b, bc), (a, bc, ca)])
     return np.array([tip, (a, b, ca), (b, bc, ca)])

@@ -1,4 +1,4 @@
-"""Unions of named parts: one closed surface, each of whose faces knows the part that it is of."""
+"""Unions of named parts: one closed surface with the part of each face."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from manitwin.geometry.solids.shapes import checked
 
 @dataclass(frozen=True)
 class PartedMesh:
-    """A closed mesh in metres: ``vertices (V, 3)``, ``faces (F, 3)`` wound outward, ``part (F,)`` an index into ``names``."""
+    """A closed mesh in metres: ``vertices (V, 3)``, outward ``faces (F, 3)``, ``part (F,)`` as indices into ``names``."""
 
     vertices: np.ndarray
     faces: np.ndarray
@@ -22,15 +22,15 @@ class PartedMesh:
     names: tuple[str, ...]
 
     def faces_of(self, name: str) -> np.ndarray:
-        """Return the numbers of a part's faces."""
+        """Return the indices of a part's faces."""
         return np.nonzero(self.part == self.names.index(name))[0]
 
 
 @dataclass
 class Assembly:
-    """Parts put together one after another: what is added joins, what is cut away leaves walls of a name of their own.
+    """Parts combined step by step: added solids are united, and cut solids leave walls with their own part name.
 
-    Of two parts that overlap the surface is the outer one's; each keeps its name through every later step.
+    Where parts overlap, the surface belongs to the outer one. Each face keeps its part name through all later steps.
     """
 
     _solid: Manifold = field(default_factory=Manifold)
@@ -39,7 +39,7 @@ class Assembly:
     _volumes: list[tuple[str, Manifold]] = field(default_factory=list)
 
     def add(self, name: str, solid: Manifold) -> Assembly:
-        """Join a solid, whose surface is the part ``name``; where it lies inside of others it adds nothing."""
+        """Unite with a solid, whose surface becomes the part ``name``; the portion inside other parts adds nothing."""
         own = self._named(name, solid)
         before = self._solid
         self._solid = before + own
@@ -47,26 +47,26 @@ class Assembly:
         return self
 
     def cut(self, name: str, solid: Manifold) -> Assembly:
-        """Cut a solid out; the walls that this leaves are the part ``name``."""
+        """Subtract a solid; the resulting walls become the part ``name``."""
         own = self._named(name, solid)
         self._solid = self._solid - own
         self._volumes = [(part, volume - own) for part, volume in self._volumes]
         return self
 
     def region(self, name: str, of: str, where: Callable[[np.ndarray], np.ndarray]) -> Assembly:
-        """Give the faces of part ``of`` whose centre is ``where`` (centres ``(N, 3)`` to bool ``(N,)``) another name."""
+        """Rename faces of part ``of`` whose centre satisfies ``where`` (centres ``(N, 3)`` to ``(N,) bool``)."""
         self._regions.append((name, of, where))
         return self
 
     def moved(self, offset_m: tuple[float, float, float]) -> Assembly:
-        """Return the assembly somewhere else, its regions still given in the frame before."""
+        """Return the translated assembly; its regions are still evaluated in the original frame."""
         shift = np.array(offset_m)
         moved_regions = [(name, of, _shifted(where, shift)) for name, of, where in self._regions]
         volumes = [(name, solid.translate(offset_m)) for name, solid in self._volumes]
         return Assembly(self._solid.translate(offset_m), dict(self._names), moved_regions, volumes)
 
     def turned(self, rotation: np.ndarray) -> Assembly:
-        """Return the assembly turned about the origin by a rotation ``(3, 3)``, its regions still given in the frame before."""
+        """Return the assembly rotated about the origin ``(3, 3)``; its regions are still evaluated in the original frame."""
         matrix = np.column_stack([rotation, np.zeros(3)])
         turned_regions = [(name, of, _turned(where, rotation)) for name, of, where in self._regions]
         volumes = [(name, solid.transform(matrix)) for name, solid in self._volumes]
@@ -82,18 +82,18 @@ class Assembly:
         return float(self._solid.bounding_box()[2])
 
     def solids(self) -> list[tuple[str, Manifold]]:
-        """Return what each part adds to the union, less what was cut, as solids that do not overlap."""
+        """Return the non-overlapping volumes that each part contributes to the union, minus the cuts."""
         return [(name, solid) for name, solid in self._volumes if not solid.is_empty()]
 
     def regions(self) -> list[tuple[str, str]]:
-        """Return the name of each region and that of the part which it is of."""
+        """Return the name of each region and the part that it belongs to."""
         return [(name, of) for name, of, _ in self._regions]
 
     def mesh(self, bordered: Collection[tuple[str, str]] = ()) -> PartedMesh:
-        """Return the union as a mesh; raises SolidError where nothing is left of it.
+        """Return the union as a mesh. Raises SolidError if it is empty.
 
-        ``bordered`` are regions, by their names and their parts', whose borders are edges of the mesh: faces on them are cut.
-        Others are of whole faces.
+        ``bordered`` are regions, as (name, part), whose borders become mesh edges by cutting faces. Other regions consist of
+        whole faces.
         """
         mesh = checked(self._solid, "assembly").to_mesh()
         vertices = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3]

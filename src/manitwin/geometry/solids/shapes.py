@@ -1,6 +1,6 @@
-"""Closed solids: bodies of revolution, rounded boxes, prisms, ellipsoids.
+"""Primitive solids: bodies of revolution, rounded boxes, prisms, ellipsoids.
 
-Metres, Z up. A full circle is cut into ``SIDES`` chords, whatever its radius, or fewer within ``coarser``.
+Metres, Z up. A full circle has ``SIDES`` chords regardless of its radius, or fewer within ``coarser``.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from manifold3d import CrossSection, FillRule, JoinType, Manifold
 from manitwin.errors import ManiTwinError
 
 SIDES = 48
-"""Chords of a full circle: their area is 0.3 % less than the circle's."""
+"""Chords of a full circle; their polygon has 0.3 % less area than the circle."""
 CORNER_SIDES = 16
-"""Chords of a full circle in rounded edges and in the sections of tubes."""
+"""Chords of a full circle in rounded edges and tube sections."""
 _coarseness: ContextVar[float] = ContextVar("coarseness", default=1.0)
 
 Point = tuple[float, float]
 
 
 class SolidError(ManiTwinError):
-    """Measures that give no closed solid."""
+    """Dimensions that do not give a closed solid."""
 
 
 @contextmanager
 def coarser(share: float) -> Iterator[None]:
-    """Cut circles into this share of their usual chords, and no small holes: for solids that are drawn small and thrown away."""
+    """Reduce circles to a share of their usual chords and omit small holes, for solids that are only drawn in small size."""
     token = _coarseness.set(share)
     try:
         yield
@@ -39,17 +39,19 @@ def coarser(share: float) -> Iterator[None]:
 
 
 def is_coarse() -> bool:
-    """Tell whether solids are made coarser now (``coarser``)."""
+    """Return whether solids are currently made coarser (``coarser``)."""
     return _coarseness.get() < 1.0
 
 
 def chords(usual: int) -> int:
-    """Return how many chords a circle of ``usual`` ones has within ``coarser``: a multiple of four, which keeps its extents."""
+    """Return the number of chords of a circle with ``usual`` ones under ``coarser``: a multiple of four, which keeps its
+    extents.
+    """
     return usual if _coarseness.get() == 1.0 else max(8, 4 * round(usual * _coarseness.get() / 4))
 
 
 def box(x_m: float, y_m: float, z_m: float, *, radius_m: float = 0.0) -> Manifold:
-    """Return a box on the plane z = 0, centred in x and y, all of its edges rounded by ``radius_m``."""
+    """Return a box standing on z = 0, centred in x and y, with edges rounded by ``radius_m``."""
     radius_m = min(radius_m, 0.499 * min(x_m, y_m, z_m))
     if radius_m <= 0:
         return checked(Manifold.cube((x_m, y_m, z_m), True).translate((0, 0, z_m / 2)), "box")
@@ -60,15 +62,15 @@ def box(x_m: float, y_m: float, z_m: float, *, radius_m: float = 0.0) -> Manifol
 
 
 def prism(outline: CrossSection, height_m: float, *, radius_m: float = 0.0, top: float = 1.0) -> Manifold:
-    """Return an outline in x and y raised from z = 0, its upper and lower edges rounded by ``radius_m``.
+    """Return an outline in x and y extruded from z = 0, with upper and lower edges rounded by ``radius_m``.
 
-    ``top`` scales the outline towards the upper end about the origin; only a prism without rounding may have it.
+    ``top`` scales the outline about the origin towards the upper end, for prisms without rounding only.
     """
     if radius_m <= 0:
         return checked(outline.extrude(height_m, 0, 0.0, (top, top)), "prism")
     radius_m = min(radius_m, 0.499 * height_m)
     angles = np.linspace(0.0, np.pi / 2, 5)
-    # prisms inside each other, the narrowest the highest: solids that overlap join surely, those that only touch may not
+    # nested prisms, the narrowest highest: overlapping solids unite reliably, touching ones may not
     slabs = []
     for angle in (angles[:-1] + angles[1:]) / 2:
         inset, low = radius_m * (1 - np.sin(angle)), radius_m * (1 - np.cos(angle))
@@ -80,7 +82,7 @@ def prism(outline: CrossSection, height_m: float, *, radius_m: float = 0.0, top:
 
 
 def polygon(points: Sequence[Point] | np.ndarray, *, radius_m: float = 0.0) -> CrossSection:
-    """Return a filled polygon ``(K, 2)`` in metres, its convex and concave corners rounded by ``radius_m``."""
+    """Return a filled polygon ``(K, 2)`` in metres, with convex and concave corners rounded by ``radius_m``."""
     outline = CrossSection([np.asarray(points, dtype=float)], FillRule.NonZero)
     if radius_m > 0:
         outline = outline.offset(-radius_m, JoinType.Round, 2.0, CORNER_SIDES)
@@ -99,7 +101,7 @@ def rectangle(x_m: float, y_m: float, *, radius_m: float = 0.0) -> CrossSection:
 
 
 def lathe(profile: Sequence[Point] | np.ndarray, *, sides: int | None = None) -> Manifold:
-    """Return the solid of a profile ``(K, 2)`` of (radius, z), closed along the axis, turned about Z."""
+    """Return the solid of revolution about Z of a profile ``(K, 2)`` of (radius, z), closed along the axis."""
     points = [(max(0.0, float(r)), float(z)) for r, z in profile]
     first, last = points[0], points[-1]
     points = [*([(0.0, first[1])] if first[0] > 0 else []), *points, *([(0.0, last[1])] if last[0] > 0 else [])]
@@ -109,7 +111,7 @@ def lathe(profile: Sequence[Point] | np.ndarray, *, sides: int | None = None) ->
 def cylinder(
     radius_m: float, height_m: float, *, top_radius_m: float | None = None, sides: int | None = None
 ) -> Manifold:
-    """Return a cylinder or frustum that stands on z = 0."""
+    """Return a cylinder or frustum standing on z = 0."""
     top = radius_m if top_radius_m is None else top_radius_m
     return checked(Manifold.cylinder(height_m, radius_m, top, sides or chords(SIDES)), "cylinder")
 
@@ -120,7 +122,7 @@ def ellipsoid(x_m: float, y_m: float, z_m: float, *, sides: int | None = None) -
 
 
 def torus(ring_radius_m: float, tube_radius_m: float, *, sides: int | None = None) -> Manifold:
-    """Return a ring about Z, centred at the origin."""
+    """Return a torus about Z, centred at the origin."""
     circle = CrossSection.circle(tube_radius_m, chords(CORNER_SIDES)).translate((ring_radius_m, 0))
     return checked(circle.revolve(sides or chords(SIDES)), "torus")
 
@@ -133,7 +135,9 @@ def union(solids: Sequence[Manifold]) -> Manifold:
 
 
 def rounded(profile: Sequence[Point], radius_m: float, *, steps: int = 4) -> list[Point]:
-    """Return an open profile ``(K, 2)`` m, all but its ends rounded by quadratic arcs that begin at most ``radius_m`` away."""
+    """Return an open profile ``(K, 2)`` m with inner corners rounded by quadratic arcs that start at most ``radius_m`` from
+    them.
+    """
     points = [np.array(p, dtype=float) for p in profile]
     out = [points[0]]
     for before, corner, after in zip(points[:-2], points[1:-1], points[2:], strict=True):
@@ -149,7 +153,7 @@ def rounded(profile: Sequence[Point], radius_m: float, *, steps: int = 4) -> lis
 
 
 def checked(solid: Manifold, what: str) -> Manifold:
-    """Return a solid; raises SolidError where it is empty or no closed surface."""
+    """Return the solid. Raises SolidError if it is empty or has no positive volume."""
     if solid.is_empty() or solid.volume() <= 0:
         raise SolidError(f"{what}: its measures give no solid; give others")
     return solid

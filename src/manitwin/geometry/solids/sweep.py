@@ -1,4 +1,4 @@
-"""Sweeps of a section along a curve: handles, spouts, wires, blades of changing width."""
+"""Sweeps of a section along a curve: handles, spouts, wires, blades of varying width."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ def tube(
 ) -> Manifold:
     """Return an elliptic section swept along a path ``(K, 3)`` in metres, with flat ends.
 
-    ``radius_m`` is the half width of the section along ``across``, one or one a point of the path; ``flatten`` scales its
-    half width in the other direction. The frame is carried along without twist (Wang et al. 2008, "Computation of
-    rotation minimizing frames"). Raises SolidError where the path has no length.
+    ``radius_m`` is the half width of the section along ``across``, constant or per path point; ``flatten`` scales the half
+    width in the other direction. The frame is transported without twist (Wang et al. 2008, "Computation of rotation minimizing
+    frames"). Raises SolidError if the path has coincident points.
     """
     angles = np.linspace(0, 2 * np.pi, sides or chords(CORNER_SIDES), endpoint=False)
     return sweep(path_m, np.stack([np.cos(angles), flatten * np.sin(angles)], axis=1), radius_m, across=across)
@@ -35,10 +35,10 @@ def sweep(
     *,
     across: Sequence[float] = (0.0, 1.0, 0.0),
 ) -> Manifold:
-    """Return a convex section ``(S, 2)``, counted counter-clockwise, swept along a path ``(K, 3)`` and closed at its ends.
+    """Return a convex section ``(S, 2)``, counter-clockwise, swept along a path ``(K, 3)`` and closed at its ends.
 
-    The section's first axis begins along ``across``, its second along the path's tangent times it. ``scale_m`` is one
-    scale, or one a point of the path. Raises SolidError where the path has no length.
+    The section's first axis starts along ``across``, its second along tangent x first axis. ``scale_m`` is constant or per path
+    point. Raises SolidError if the path has coincident points.
     """
     path = np.asarray(path_m, dtype=float)
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
@@ -53,10 +53,10 @@ def sweep(
 
 
 def loft(rings_m: np.ndarray, ends_m: np.ndarray | None = None) -> Manifold:
-    """Return the solid between rings ``(K, S, 3)`` in metres, counted alike, closed at its two ends by fans.
+    """Return the solid between rings ``(K, S, 3)`` in metres with corresponding points, closed at both ends by fans.
 
-    The fans meet at ``ends_m (2, 3)``, without them at the middles of the first and the last ring. Seen from where the rings
-    go to, they run counter-clockwise.
+    The fans meet at ``ends_m (2, 3)``, by default the centres of the first and last ring. The rings must be counter-clockwise
+    seen from the direction in which they advance.
     """
     count, around = rings_m.shape[:2]
     middles = rings_m[[0, -1]].mean(axis=1) if ends_m is None else ends_m
@@ -76,7 +76,7 @@ def loft(rings_m: np.ndarray, ends_m: np.ndarray | None = None) -> Manifold:
 
 
 def arc(points: Sequence[Sequence[float]], *, samples: int = 24) -> np.ndarray:
-    """Return a Catmull-Rom curve ``(samples, 3)`` through control points, equally spaced along its length."""
+    """Return a Catmull-Rom curve ``(samples, 3)`` through control points, with equal arc length between samples."""
     control = np.asarray(points, dtype=float)
     padded = np.concatenate([[2 * control[0] - control[1]], control, [2 * control[-1] - control[-2]]])
     pieces = []
@@ -92,7 +92,7 @@ def arc(points: Sequence[Sequence[float]], *, samples: int = 24) -> np.ndarray:
 
 
 def _frames(path: np.ndarray, across: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the section's two axes at each point, carried along by double reflection."""
+    """Return the section's two axes at each point, transported by double reflection."""
     tangents = np.gradient(path, axis=0)
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
     start = across - (across @ tangents[0]) * tangents[0]
