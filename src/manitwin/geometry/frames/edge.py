@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from manitwin.geometry.frames.feature import FeatureFrame, Found, FramedMesh, Unclear, rotation_of
 
-_ANGLE_COSINE = np.cos(np.radians(40))  # outline whose outward normal is nearer to a side's is of that side
+_ANGLE_COSINE = np.cos(np.radians(40))  # outline normals this close to a side's belong to that side
 _CELLS = 96  # along the longer side of the plate's outline
 _FLAT = 0.28  # largest ratio of thickness to second spread (standard deviations) of a plate
 _THIN_FACTOR = 1.6  # times the thickness of the plate at the point; thicker material is another part

@@ -18,7 +18,7 @@ from manitwin.geometry.sampling import sample_surface
 Kind = Literal["opening", "face", "tip", "edge", "hole", "axis", "button", "surface"]
 UP = np.array([0.0, 0.0, 1.0])
 _SAMPLES = 6000
-_LOCAL_SAMPLES, _MOST_LOCAL_SAMPLES = 500, 200_000  # within a circle of that radius, of all faces that reach into it
+_LOCAL_SAMPLES, _MOST_LOCAL_SAMPLES = 500, 200_000  # per circle of the query radius
 
 
 @dataclass(frozen=True)

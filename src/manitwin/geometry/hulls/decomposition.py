@@ -132,7 +132,7 @@ def _cut(solid: manifold3d.Manifold, count: int, opening: Opening | None) -> lis
         gain = worst.hull_volume - total
         helps = gain > worst.hull_volume * 1e-6
         across = None
-        if worst.solid.genus() > 0 and not (helps and opening is not None):  # a vessel's axis has led the first cuts
+        if worst.solid.genus() > 0 and not (helps and opening is not None):  # a vessel was already cut through its axis
             across = _through_hole(worst, max(_CROSS_GAIN * gain, _CONVEX_SHARE * volume))
         if across is not None:
             parts += [_Part(piece) for piece in _pieces(across, volume)]

@@ -154,7 +154,7 @@ _SIXTH_RAD = np.pi / 6  # to each side of its centre
 _OPPOSITE_RAD = np.pi / 6
 _AS_FAR = 0.6  # of the opposite one's reach: the axis of a body with two bulges lies between them
 LEAST_HANDLE_REACH = 0.08  # of the body's radius, beyond the outline's own margin; less is relief
-_TALLER, _STEEPER = 1.1, 2.0  # a handle beside a long spout: its outer half, and that by its reach
+_TALLER, _STEEPER = 1.1, 2.0  # ratios for a handle beside a long spout: height, height over reach
 _ELONGATED, _ELONGATED_LYING = 1.6, 1.15  # ratio of length to width from which an object has ends rather than sides
 
 
