@@ -10,8 +10,8 @@ from manitwin.config.section import Section
 class GraspConfig(Section):
     """Grasp proposals (paper, implementation details: 4,000 candidates, 3 cm, 7-DoF farthest point sampling to 100).
 
-    A share of ``on_support_share`` of the simulated grasps clears the support plane of at least one placement, so that the
-    object can be picked up from it. Each grasp point should get ``least_per_point`` successful grasps: if it has fewer, up to
+    For each placement that the object is picked from, a share of ``on_support_share`` of the simulated grasps is chosen to
+    clear the support plane, as far as there are any. Each grasp point should get ``least_per_point`` successful grasps: if it has fewer, up to
     ``tries_per_point`` further grasps from a denser sample are tried. ``link``: for articulated twins, whose joints are locked,
     both fingertips of each grasp must touch this link (none: any link).
     """

@@ -1,6 +1,6 @@
-"""The paper's pipeline: one module a stage, and ``recipe``, which lists them.
+"""The pipeline of the paper: one module per stage, listed in order by ``recipe``.
 
-Stages in order, with the sections of the paper (figure 2) that they do:
+Stages in order, with the corresponding sections of the paper (figure 2):
 
 I. Asset Generation: ``photo``, ``generate`` ("3D Generation"); ``mesh``, ``views``, ``gate`` ("Quality Verification");
 ``physical`` ("Physical Property Estimation"); ``collision``, ``placement``; ``caption`` ("Semantic Captioning").

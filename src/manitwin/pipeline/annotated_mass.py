@@ -1,4 +1,4 @@
-"""The centre of mass and the inertia that an imported asset gives: kept where a body can have them."""
+"""Centre of mass and inertia stated by an imported asset: used if they are physically possible."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from manitwin.geometry.mass_properties import MassProperties, shell_mass_propert
 from manitwin.twin.import_record import ImportRecord
 
 ROUNDING = 1e-4
-"""Relative to the largest moment: files often hold six digits."""
+"""Relative to the largest moment; files often have six digits."""
 OUTSIDE_SHARE = 1e-3
-"""Of the longest side: how far outside of the convex hull a centre may lie for rounding."""
+"""Of the longest side: tolerated distance of a centre of mass outside the convex hull, for rounding."""
 FACTOR = 3.0
-"""How far moments may be outside those of a filled and of a thin-walled body, as in the audit (INE005)."""
+"""Tolerated factor beyond the moments of a solid and of a thin-walled body, as in audit rule INE005."""
 
 
 def annotated_mass(
     given: ImportRecord, solid: trimesh.Trimesh, mass_kg: float, scale: float, computed: MassProperties
 ) -> MassProperties | None:
-    """Return ``computed`` mass properties with the centre and the inertia that an asset gives; None where it gives neither.
+    """Return ``computed`` mass properties with an asset's stated centre of mass and inertia; None if it states neither.
 
-    ``scale`` is what the object was scaled by since: the centre goes with it, the inertia with its square and with the mass.
-    An inertia without a mass of its own is of none that could be compared, and is not kept. Raises Rejected
-    (``implausible_mass``) for a centre outside of the convex hull, and for an inertia that no body has.
+    ``scale`` is the factor by which the object has been scaled since: the centre of mass scales with it, the inertia with its
+    square and with the mass. An inertia without a stated mass cannot be compared and is ignored. Raises Rejected
+    (``implausible_mass``) for a centre of mass outside the convex hull, and for an impossible inertia.
     """
     center = None if given.center_of_mass_m is None else scale * np.array(given.center_of_mass_m)
     inertia = None
@@ -47,7 +47,7 @@ def annotated_mass(
 def moments_apart(
     annotated: MassProperties, solid: trimesh.Trimesh, mass_kg: float, wall_thickness_m: float, source: str
 ) -> list[str]:
-    """Return a finding where moments are far from those of the filled and of the thin-walled body, none where not."""
+    """Return a finding if the stated moments are far from those of a solid and of a thin-walled body; otherwise an empty list."""
     bodies = (solid_mass_properties(solid, mass_kg), shell_mass_properties(solid, mass_kg, wall_thickness_m))
     band = np.array([np.linalg.eigvalsh(body.inertia_kg_m2) for body in bodies])
     moments = np.linalg.eigvalsh(annotated.inertia_kg_m2)

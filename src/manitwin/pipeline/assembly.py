@@ -1,4 +1,4 @@
-"""Put a finished twin folder together, accepted or rejected, and tell whether a name would make more of it."""
+"""Assembly of the finished twin folder, accepted or rejected, and the hint whether a name would improve the result."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ from manitwin.twin.wholeness import note_sizes
 NAME_HINT = "say what it is with --name (mug, fork, ...) or a column name"
 
 RULES = "rules"
-"""The annotator that knows of a thing what its prior says: of a nameless one, the prior of anything."""
+"""The annotator that uses only priors; for an unnamed object, the prior for any object."""
 
 OF_SIZE = frozenset({"too_wide", "too_thin", "no_proposal", "none_held"})
 OF_MASS = frozenset({"none_held"})
@@ -68,10 +68,11 @@ def assemble(
     fresh: Path,
     keep_source: bool = True,
 ) -> TwinRecord:
-    """Write the twin's folder into the empty folder ``fresh``, to be renamed into place; returns its record.
+    """Write the twin's folder into the empty folder ``fresh``, and return its record.
 
-    ``stages`` are those that ran, the rejecting one included. Where ``rejected`` is given, only the source, the reason and its
-    files are kept. Without ``keep_source`` names, sizes and digests stand for the input, and ``run.json`` says where it lay.
+    ``stages`` are those that ran, including the rejecting one. With ``rejected``, only the source, the reason and the
+    rejection's files are written. Without ``keep_source``, the input is represented by names, sizes and digests, and
+    ``run.json`` contains its path.
     """
     source = _write_source(draft, kind, fresh, keep_source)
     record: dict[str, Any] = {
@@ -120,13 +121,13 @@ def _provenance(stage: Stage, draft: Draft[Item]) -> dict[str, Any]:
 
 
 def _checks_so_far(draft: Draft[Item]) -> list[dict[str, Any]]:
-    """Return the checks of a twin that was rejected; those of an accepted one take their place."""
+    """Return the checks for a rejected twin; an accepted twin gets those of the ``finish`` stage instead."""
     made = [*rehearsal_checks(draft), *naming_checks(draft), *size_checks(draft), *template_checks(draft)]
     return [*(check.model_dump() for check in made), *draft.fields.get("gate", {}).get("checks", [])]
 
 
 def _model(stage: Stage, draft: Draft[Item]) -> str | None:
-    """Return which model did a stage; a generator may know it only afterwards (lift: the primitive that fits)."""
+    """Return the model of a stage; a generator may report it only afterwards (lift: the fitted primitive)."""
     if stage.name == "generate" and "generation" in draft.fields:
         return stage.model or draft.field("generation")["model"]
     return stage.model
@@ -177,7 +178,7 @@ def _write_source(draft: Draft[Item], kind: str, folder: Path, keep: bool) -> di
 
 
 def _readable_poses(item: Item) -> StatedPoses | None:
-    """Return the stated cameras; None where there are none, or what is rejected for them has none that can be read."""
+    """Return the stated camera poses; None if there are none or they cannot be read."""
     try:
         return poses_of(item)
     except InputError:
@@ -185,7 +186,7 @@ def _readable_poses(item: Item) -> StatedPoses | None:
 
 
 def _rejection(rejected: Rejected, stage: str | None, draft: Draft[Item]) -> Rejection:
-    """Return the reason with its stage; where it may be the fault of a size that nobody knows or has, with that."""
+    """Return the rejection with its stage; if an unknown or suspicious size may be the cause, the detail says so."""
     named = rejected.stage or stage or ""
     if rejected.reason not in REJECTION_REASONS.get(named, frozenset()):
         named = next((s for s, reasons in REJECTION_REASONS.items() if rejected.reason in reasons), named)
@@ -217,7 +218,7 @@ def _write_accepted(draft: Draft[Item], folder: Path) -> None:
 
 
 def _write_links(draft: Draft[Item], folder: Path) -> dict[str, Any]:
-    """Write the link of each face of a thing that moves in itself; return its links and joints, nothing for all others."""
+    """Write the link of each face of an articulated object; return its links and joints, or an empty dict for other objects."""
     articulation = read_articulation(draft)
     if articulation is None:
         return {}
@@ -251,7 +252,7 @@ def _accepted_sections(draft: Draft[Item]) -> dict[str, Any]:
 
 
 def _candidates(draft: Draft[Item]) -> dict[str, Any]:
-    """Return the candidates, of which those that a closer look has moved are where their functional points are."""
+    """Return the candidates, with those moved by a closer look at the positions of their functional points."""
     candidates, refined = draft.field("candidates"), draft.field("refined_candidates")
     positions, normals = list(candidates["positions_m"]), list(candidates["normals"])
     moved = {row["candidate"] for row in refined}
@@ -262,7 +263,7 @@ def _candidates(draft: Draft[Item]) -> dict[str, Any]:
 
 
 def name_hint(record: TwinRecord) -> str | None:
-    """Return what to tell of a name, with the classifier's guesses; None where a name would change nothing."""
+    """Return a hint to give a name, with the classifier's guesses; None if a name would not change the result."""
     if not name_would_help(record):
         return None
     if record.naming is None:
@@ -271,10 +272,10 @@ def name_hint(record: TwinRecord) -> str | None:
 
 
 def name_would_help(record: TwinRecord) -> bool:
-    """Tell whether the result rests on what is true of anything, or a classifier says, and a name that is known would be better.
+    """Return whether the result depends on a generic prior or a classifier's guess that a known name would replace.
 
-    Accepted: size, mass or friction rest on no name. Rejected: where a size or mass of that prior decided, where size
-    and mass contradict each other, or where the posture of a lifted photo did, which the name has a say in.
+    For an accepted twin: the mass or friction comes from a generic prior. For a rejected one: a generic size or mass was
+    decisive, or size and mass contradict each other, or a lifted photo has no stable pose, as its posture depends on the name.
     """
     if record.naming is None and lookup(record.name) is not None:
         return False

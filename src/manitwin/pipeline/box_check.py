@@ -1,4 +1,4 @@
-"""Tell whether what was cut out of a photo lies where the thing is said to be: a stated box is a witness of its own."""
+"""Comparison of a photo's cut-out with the stated bounding box of the object, as independent evidence."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from manitwin.geometry.pixel_boxes import PixelBox, box_of_pixels, share_in_comm
 from manitwin.models.matting.matte import DoubtedCutOut, Matte
 
 LEAST_IN_COMMON = 0.8
-"""Of the cut-out's box and the stated one together: boxes of detectors and of people who label are off by less."""
+"""Least intersection over union of the cut-out's box and the stated one; boxes of detectors and annotators are more accurate."""
 ELSEWHERE = 0.25
-"""How likely a cut-out is right that lies elsewhere, at most."""
+"""Largest confidence of a cut-out that lies elsewhere."""
 
 
 def require_in_box(matte: Matte, box_px: PixelBox, file: str) -> None:
-    """Raise DoubtedCutOut for a matte that lies elsewhere than the box of the thing, in its pixels, says."""
+    """Raise DoubtedCutOut if a matte's bounding box disagrees with the stated box of the object, in pixels of the matte."""
     common = share_in_common(box_of_pixels(matte.rgba[..., 3] > 127), box_px)
     if common < LEAST_IN_COMMON:
         raise DoubtedCutOut(

@@ -1,4 +1,4 @@
-"""The end of a build, as a program and a person are told of it: from the ledger, and the records of the twins."""
+"""The report on a build, from the ledger and the records of the twins."""
 
 from __future__ import annotations
 
@@ -24,10 +24,11 @@ ItemStatus = Literal["accepted", "rejected", "unfinished", "duplicate"]
 
 @dataclass(frozen=True)
 class ItemResult:
-    """The end of one item: its folder where it has one (and the data set is no URL), a line that says why, a rejection's code.
+    """The result of one item: its folder if it has one (and the data set is local), a message, and the reason code of a
+    rejection.
 
-    ``unfinished`` has failed, or waits for a service; ``duplicate`` makes the twin that another item made. ``reused`` was
-    there already. ``number`` is the item's in the ledger (``manitwin status --why``).
+    ``unfinished`` items have failed or wait for a service; a ``duplicate`` gives the same twin as another item. ``reused``: the
+    result existed already. ``number`` is the item's number in the ledger (``manitwin status --why``).
     """
 
     number: int
@@ -41,7 +42,7 @@ class ItemResult:
 
     @classmethod
     def of(cls, row: ItemRow, root: DatasetRoot, reused: bool) -> ItemResult:
-        """Return the result that a row of the ledger tells of."""
+        """Return the result described by a row of the ledger."""
         ended = row.state in ("accepted", "rejected")
         return cls(
             number=row.number,
@@ -57,10 +58,10 @@ class ItemResult:
 
 @dataclass(frozen=True)
 class BuildReport:
-    """The end of a build: what became of the items that were given to it (of the whole data set, where none was given).
+    """The results of a build for the given items (for the whole data set if none was given).
 
-    ``run`` is the engine's own report; ``folders`` says what became of every file of a folder that was given. ``ended`` are the
-    numbers of the items that ended in this build, ``found`` those of them whose folder was there already.
+    ``run`` is the engine's report; ``folders`` classifies every file of the given folders. ``ended`` are the numbers of the
+    items that ended in this build, ``found`` those of them whose folder existed already.
     """
 
     dataset: str
@@ -71,11 +72,11 @@ class BuildReport:
 
     @cached_property
     def results(self) -> list[ItemResult]:
-        """The result of each item, in the order of their numbers; read from the ledger when it is first asked for."""
+        """The result of each item by number; read from the ledger on first access."""
         return list(self.iterate())
 
     def iterate(self) -> Iterator[ItemResult]:
-        """Yield the results one by one: 100,000 need not be in memory together."""
+        """Yield the results one at a time, without keeping all of them in memory."""
         root, given = DatasetRoot(self.dataset), frozenset(self.run.given)
         with read_ledger(local_ledger(root)) as ledger:
             for row in read_items(ledger):
@@ -83,12 +84,12 @@ class BuildReport:
                     yield ItemResult.of(row, root, row.number not in self.ended or row.number in self.found)
 
     def count(self, status: str) -> int:
-        """Return how many items ended as 'accepted', 'rejected', 'unfinished' or 'duplicate'."""
+        """Return the number of items that ended as 'accepted', 'rejected', 'unfinished' or 'duplicate'."""
         states = ("open", "failed") if status == "unfinished" else (status,)
         return sum(self.run.counts_of_given.get(state, 0) for state in states)
 
     def records(self) -> Iterator[TwinRecord]:
-        """Read the records of the accepted twins, one after the other."""
+        """Yield the records of the accepted twins."""
         root = DatasetRoot(self.dataset)
         for result in self.iterate():
             if result.status == "accepted":
@@ -97,15 +98,15 @@ class BuildReport:
 
     @property
     def remarks(self) -> list[str]:
-        """Remarks on the inputs for the user, a line each."""
+        """Remarks on the inputs, one line each."""
         return self.run.remarks
 
     @property
     def open(self) -> bool:
-        """True where the same build again would go on; what failed is not tried again by itself (``manitwin retry``)."""
+        """True if repeating the build would continue it; failed items are not retried automatically (``manitwin retry``)."""
         return bool(self.run.stopped or self.run.left or self.run.counts_of_given.get("open"))
 
     @property
     def exit_code(self) -> int:
-        """0 all accepted, 3 some rejected, 4 some unfinished: failed, or open and resumable."""
+        """Exit status: 0 all accepted, 3 some rejected, 4 some unfinished (failed, or open and resumable)."""
         return 4 if self.open or self.count("unfinished") else 3 if self.count("rejected") else 0

@@ -1,4 +1,4 @@
-"""Sample the points among which others are chosen, and draw pictures that number them (paper, "Candidate Point Sampling")."""
+"""Sampling of candidate points, and images with numbered markers (paper, "Candidate Point Sampling")."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from manitwin.render.raycast import merged, seen_tolerance_m, silhouette, visibl
 
 @dataclass(frozen=True)
 class CandidatesStage:
-    """Sample the surface, keep 42 points where functions may be and mark them on the views (paper, "Candidate Point Sampling").
+    """Sample the surface, keep 42 candidate points, and mark them on the views (paper, "Candidate Point Sampling").
 
-    Only what some view shows is sampled: nobody can choose a point that no picture shows. Fields: ``candidates``
-    ``{positions_m, normals}`` in the object frame; ``visible_candidates``, for each view the ids (rows of
-    ``candidates``) that are drawn on it. The number on a picture is the id.
+    Only points visible in some view are candidates, as an annotator can choose only those. Fields: ``candidates``
+    ``{positions_m, normals}`` in the object frame; ``visible_candidates``, for each view the ids (rows of ``candidates``) drawn
+    on it. The number on an image is the id.
     """
 
     settings: CandidatesConfig
@@ -45,7 +45,7 @@ class CandidatesStage:
     model: ClassVar[str | None] = None
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
-        """Choose and mark the candidates; raises Rejected where the solid does not follow the surface that is seen."""
+        """Choose and mark the candidates. Raises Rejected if the solid deviates from the visible surface."""
         solid = load_solid(draft.path("solid.npz"))
         caster = RayCaster(merged(load_visual(draft.path("visual.glb"))))
         scale = draft.field("physical")["scale_applied"]
@@ -86,10 +86,10 @@ def choose_candidates(
     count: int,
     rng: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    """Return positions ``(count, 3)`` m, outward normals ``(count, 3)``, and for each camera the ids that it sees.
+    """Return positions ``(count, 3)`` m, outward normals ``(count, 3)``, and for each camera the ids of the visible points.
 
-    They are far from each other (paper, eq. 1), denser where the surface bends, a fifth at most on the underside, and one in the
-    middle of a vessel's floor (``sample_candidates``). Raises Rejected where fewer than ``count`` samples are seen.
+    The points are far from each other (paper, eq. 1), denser where the surface bends, at most a fifth on the underside, with
+    one at the centre of a vessel's floor (``sample_candidates``). Raises Rejected if fewer than ``count`` samples are visible.
     """
     points, normals, _ = sample_surface(solid, samples, rng)
     tolerance_m = seen_tolerance_m(solid.extents)

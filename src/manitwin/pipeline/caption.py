@@ -1,4 +1,4 @@
-"""Describe category, color, material, size, shape and function in words (paper, "Semantic Captioning")."""
+"""Descriptions of category, color, material, size, shape and function (paper, "Semantic Captioning")."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from manitwin.pipeline.object_state import cut_out_photos, read_scaled_subject
 
 
 class CaptionStage:
-    """Ask the annotator for words."""
+    """Get the object's descriptions from the annotator. Field: ``language``."""
 
     name: ClassVar[str] = "caption"
     version: ClassVar[str] = "22"
@@ -48,25 +48,25 @@ class CaptionStage:
         self.expected_usd = annotator.expected_usd("captions")
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
-        """Return ``language``."""
+        """Return the field ``language``."""
         material = draft.field("physical")["material"]
         subject = read_scaled_subject(draft, known_as=draft.field("called"))
         subject = replace(subject, photographed=is_photographed(draft), light=light_of_texture(draft))
-        # as a ruler shows them: a mesh may lie at any angle to its axes
+        # as measured with a ruler, since a mesh may be oblique to its axes
         extents_m = extents_along_sides(subject.solid.vertices)
         language = self._annotator.describe(subject, material, extents_m)
         return {"language": corrected_language(language, draft).model_dump()}
 
 
 def is_photographed(draft: Draft[Item]) -> bool:
-    """Tell whether a mesh's texture is its photo as it is: only ``lift`` paints one so."""
+    """Return whether the mesh's texture is its photo itself, which is only the case for ``lift``."""
     return (draft.fields.get("generation") or {}).get("generator") == "lift"
 
 
 def light_of_texture(draft: Draft[Item]) -> PhotoLight | None:
-    """Return the light of the photos whose pixels are the mesh's texture; None of any other mesh, or where it is not told.
+    """Return the illumination of the photos that form the mesh's texture; None for other meshes, or if it is unknown.
 
-    Under a given alpha channel there is no ground to read it off.
+    With a given alpha channel there is no background to estimate it from.
     """
     if not is_photographed(draft) or (draft.fields.get("matte") or {}).get("method", "alpha") == "alpha":
         return None

@@ -1,4 +1,4 @@
-"""From several photo files of one object to a carved solid: each cut out as a build cuts it out, then carved."""
+"""Carving of a solid from several photo files of one object, which are cut out as in a build."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ EXAMPLE = "such as --turns 0,90,180"
 
 @dataclass(frozen=True)
 class CarvedPhotos:
-    """A carved solid, its textured ``part`` in the object frame, and what was found of each photo on the way.
+    """A carved solid, its textured ``part`` in the object frame, and findings about the photos.
 
-    ``metric``: the part is in metres, by the unit of the stated poses; else its longest side is 1.
+    ``metric``: the part is in metres, from the unit of the stated poses; otherwise its longest side is 1.
     """
 
     carved: Carved
@@ -40,7 +40,7 @@ class CarvedPhotos:
 
 @dataclass(frozen=True)
 class _CutOut:
-    """The photos that could be cut out, by their numbers, and the lenses that they state."""
+    """The photos that could be cut out, by their numbers, and the focal lengths stated in them."""
 
     photos: dict[int, tuple[str, np.ndarray]]
     focals_mm: list[float | None]
@@ -56,12 +56,12 @@ def carve_photos(
     up: str = "auto",
     units: str = "auto",
 ) -> CarvedPhotos:
-    """Carve what photos show from stated turns (degrees about the vertical, counter-clockwise seen from above, the first 0).
+    """Carve a solid from photos at stated turns (degrees about the vertical, counter-clockwise seen from above, the first 0).
 
-    ``poses`` is a file that states their cameras instead, ``up`` and ``units`` what is said of it. A photo that cannot be cut
-    out is left out, with a finding. Raises UsageError for a photo that is given twice, for turns that are not one a photo or
-    all in one direction, and for poses that are not those of the photos; InputError for a file that cannot be read; Rejected
-    where fewer than two photos can be cut out, and naming the photo that does not go with the others.
+    Alternatively ``poses`` is a file with the camera poses; ``up`` and ``units`` describe it. A photo that cannot be cut out is
+    left out, with a finding. Raises UsageError for a photo given twice, for turns that do not match the photos or all have one
+    direction, and for poses that do not match the photos; InputError for an unreadable file; Rejected if fewer than two photos
+    can be cut out, or naming a photo that is inconsistent with the others.
     """
     _check(paths, turns_deg, poses)
     given = len(paths)
@@ -112,7 +112,7 @@ def _check(paths: Sequence[Path], turns_deg: Sequence[float] | None, poses: Path
 def _thinned(
     paths: Sequence[Path], turns_deg: Sequence[float] | None, poses: Path | None
 ) -> tuple[Sequence[Path], Sequence[float] | None]:
-    """Return as many photos as are used, and their turns."""
+    """Return the photos that are used, and their turns."""
     try:
         kept = kept_photos(paths, turns_deg or (), poses)
     except InputError as error:
@@ -128,7 +128,7 @@ def _stated(paths: Sequence[Path], poses: Path, up: str, units: str) -> StatedPo
 
 
 def _cut_out(paths: Sequence[Path], name: str | None, masks: Sequence[Path | None]) -> _CutOut:
-    """Cut photos out as a build does; raises Rejected where fewer than two are left."""
+    """Cut photos out as a build does. Raises Rejected if fewer than two are left."""
     stage, names = PhotoStage(MattingConfig()), told_apart([str(path.resolve()) for path in paths])
     found = _CutOut({}, [], copies_told([str(path.resolve()) for path in paths]))
     reasons = []

@@ -1,4 +1,4 @@
-"""Make convex hulls for physics, and measure how well they stand for the solid (paper, "3D Generation": sim-ready)."""
+"""Collision geometry: convex decomposition of the solid, with measured error (paper, "3D Generation": sim-ready)."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ HULLS = "hulls.npz"
 class CollisionStage:
     """Decompose the solid, or each of its links, into convex hulls that keep its opening open.
 
-    Field ``collision``: twin.Hulls and ``method``, ``notes``. ``keeps_opening`` is None where the solid has no
-    opening, else whether the hulls keep ``least_cavity_kept`` of it and a ball dropped in stays inside.
-    ``holes_kept`` is the kept share of the hole through it that the hulls close most, None where there is none.
+    Field ``collision``: twin.Hulls, and ``method``, ``notes``. ``keeps_opening`` is None if the solid has no opening; otherwise
+    whether the hulls keep ``least_cavity_kept`` of its volume and a ball dropped in stays inside. ``holes_kept`` is the open
+    share of the through hole that the hulls close most; None without holes.
     """
 
     settings: CollisionConfig
@@ -43,7 +43,7 @@ class CollisionStage:
     model: ClassVar[str | None] = None
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
-        """Write ``hulls.npz`` (``hull_00`` .. ``(V, 3)`` m) and return the field; raises Rejected for flat meshes."""
+        """Write ``hulls.npz`` (``hull_00`` .. ``(V, 3)`` m) and return the field. Raises Rejected for flat meshes."""
         settings = self.settings
         solid = load_solid(draft.path("solid.npz"))
         opening = find_opening(solid)
@@ -62,14 +62,16 @@ class CollisionStage:
         error = hull_error(solid, found.hulls, opening, np.random.default_rng(draft.seed), settings.error_samples)
         keeps_opening, notes = None, list(found.notes)
         if opening is not None and error.cavity_kept is not None:
-            from manitwin.physics.sapien.settle import ball_stays_inside  # the engine loads where a stage needs it
+            from manitwin.physics.sapien.settle import (
+                ball_stays_inside,
+            )  # imported here, as it loads the physics engine
 
             ball_in = ball_stays_inside(found.hulls, opening)
             keeps_opening = ball_in and error.cavity_kept >= settings.least_cavity_kept
             if not keeps_opening:
                 notes.append(f"opening: {error.cavity_kept:.0%} of its volume kept, ball stays inside: {ball_in}")
         arrays = {f"hull_{index:02d}": hull for index, hull in enumerate(found.hulls)}
-        np.savez(folder / HULLS, **arrays)  # type: ignore[arg-type]  # numpy's stub takes the names for its own flags
+        np.savez(folder / HULLS, **arrays)  # numpy's stub takes the names for its own flags
         return {
             "collision": {
                 "count": len(found.hulls),
@@ -93,7 +95,7 @@ class CollisionStage:
         )
 
     def _by_link(self, solids: list[trimesh.Trimesh]) -> tuple[Decomposition, list[dict[str, Any]]]:
-        """Return the hulls of all links, none of which is of two, and the table of what hulls and mass each link has."""
+        """Return the hulls of all links, each belonging to one link, and a table with the hulls and mass share of each link."""
         most = max(1, self.settings.max_hulls // len(solids))
         found = [self._decomposed(solid, most, find_opening(solid)) for solid in solids]
         hulls = [hull for each in found for hull in each.hulls]

@@ -1,4 +1,4 @@
-"""The cut-out of a photo that is not believed: kept to be looked at, and taken where a person says that it is right."""
+"""Doubtful cut-outs of photos: stored for review, and used if a person confirms them."""
 
 from __future__ import annotations
 
@@ -17,19 +17,20 @@ from manitwin.errors import Rejected, UsageError
 from manitwin.models.matting.matte import DoubtedCutOut, Matte
 
 CUTOUT = "cutout.webp"
-"""In the folder of a rejected photo: what would have been cut out, transparent around it."""
+"""File in the folder of a rejected photo: the doubtful cut-out, with transparent background."""
 CONFIRMED = "cutout"
-"""Key of the photo stage's amendment: ``{sha256, alpha_png, source}``: the digest of the picture that was looked at, its alpha
-channel as a PNG file in base64 (what earlier versions wrote has none), and who did so."""
+"""Key of the photo stage's amendment ``{sha256, alpha_png, source}``: the digest of the reviewed image, its alpha channel as a
+base64-encoded PNG file (missing in files of earlier versions), and the reviewer.
+"""
 SHOWN_PX = 1024
 QUALITY = 85
 
 
 def shown_cutout(rgba: np.ndarray) -> bytes:
-    """Return ``rgba (H, W, 4) uint8`` as a WebP file, at most ``SHOWN_PX`` large, for a person to judge."""
+    """Return ``rgba (H, W, 4) uint8`` as a WebP file, at most ``SHOWN_PX`` large, for review."""
     encoded = io.BytesIO()
     picture = Image.fromarray(reduced(rgba, SHOWN_PX))
-    picture.save(encoded, "WEBP", quality=QUALITY, method=4, exact=True)  # what is cut away is judged, too
+    picture.save(encoded, "WEBP", quality=QUALITY, method=4, exact=True)  # exact: keeps colours under transparency
     return encoded.getvalue()
 
 
@@ -40,9 +41,9 @@ def reduced(rgba: np.ndarray, side_px: int) -> np.ndarray:
 
 
 def confirmation(picture: bytes, source: str) -> dict[str, str]:
-    """Return what is kept of a cut-out that a person, the ``source``, has looked at as ``picture`` and found right.
+    """Return the amendment for a cut-out that the reviewer ``source`` has confirmed on the image ``picture``.
 
-    Raises UsageError for a picture that cannot be read.
+    Raises UsageError for an unreadable image.
     """
     try:
         with Image.open(io.BytesIO(picture), formats=("WEBP",)) as shown:
@@ -59,11 +60,11 @@ def confirmation(picture: bytes, source: str) -> dict[str, str]:
 
 
 def _as_confirmed(rgba: np.ndarray, said: Mapping[str, Any]) -> np.ndarray | None:
-    """Return a photo ``(H, W, 4) uint8`` with the alpha that was confirmed; None where there is none, or of another size."""
+    """Return a photo ``(H, W, 4) uint8`` with the confirmed alpha channel; None if it is missing or of another size."""
     try:
         data = base64.b64decode(said["alpha_png"], validate=True)
         with Image.open(io.BytesIO(data), formats=("PNG",)) as picture:
-            if picture.size != reduced(rgba, SHOWN_PX).shape[1::-1]:  # before any of it is unpacked
+            if picture.size != reduced(rgba, SHOWN_PX).shape[1::-1]:  # checked before decompression
                 return None
             alpha = picture.convert("L").resize(rgba.shape[1::-1], Image.Resampling.BILINEAR)
     except (KeyError, TypeError, ValueError, OSError, SyntaxError, Image.DecompressionBombError):
@@ -72,11 +73,11 @@ def _as_confirmed(rgba: np.ndarray, said: Mapping[str, Any]) -> np.ndarray | Non
 
 
 def confirmed_or_rejected(doubted: DoubtedCutOut, name: str, amendment: Mapping[str, Any]) -> Matte:
-    """Return a doubted cut-out that a person has looked at and confirmed; raises Rejected of any other, with its picture.
+    """Return a doubtful cut-out that a person has confirmed. Raises Rejected, with its image, for any other.
 
-    ``amendment`` is the photo stage's. Where the photo would be cut out otherwise now, by another version or other settings, it
-    is cut out as it was when it was confirmed. Where that was not kept, or was of another part of the photo, who confirmed it is
-    told to look again.
+    ``amendment`` is that of the photo stage. If the photo would now be cut out differently (by another version or other
+    settings), the confirmed alpha channel is used. If that is missing or belongs to another part of the photo, the rejection
+    asks for a new review.
     """
     picture, said = shown_cutout(doubted.matte.rgba), amendment.get(CONFIRMED)
     if said is None:

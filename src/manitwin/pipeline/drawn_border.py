@@ -1,6 +1,6 @@
-"""A border around a photo: lines or bars of one colour that were drawn or padded around it, by a screen, an editor or a shop.
+"""Detection of borders drawn or padded around a photo (by screens, editors, shops): lines or bars of a single colour.
 
-What lies within is an upright rectangle that differs from what is around it, as a thing on a ground does, and is none.
+The image inside a border is an upright rectangle that contrasts with its surroundings, and would be mistaken for the object.
 """
 
 from __future__ import annotations
@@ -10,29 +10,33 @@ import numpy as np
 from manitwin.formats.image_file import MIN_SIDE_PX
 
 THIN = 0.04
-"""Of a picture's side: a border as thin as that is a line; what is wider may be the ground of a thing."""
+"""Of a picture's side: largest width of a line; anything wider may be the background of an object."""
 WIDE = 0.45
-"""Of a picture's side: a bar beside a picture, which has another like it at the opposite side."""
+"""Of a picture's side: largest width of a bar, which must have a similar one on the opposite side."""
 LEAST_ALONG = 0.95
-"""Of a side's length, along which a border has one colour, and ends in one row of pixels: the rest are corners and noise."""
+"""Of a side's length: least share over which a border has one colour and ends in one row of pixels; the rest is corners and
+noise.
+"""
 LEAST_OF_BAR = 0.9
-"""The same of a wide bar, across which somebody may have written."""
+"""The same for a wide bar, which may contain text."""
 ALIKE, STEP = 16, 24
-"""Levels within which a border has one colour, and beyond which what follows is another: JPEG smears steps by less."""
+"""Grey levels within which a border has one colour, and beyond which the content starts; JPEG blurs smaller steps."""
 MIXED_PX = 2
-"""Rows between a border and what lies within, which JPEG and scaling mix of both."""
+"""Rows between border and content that JPEG and scaling may mix."""
 LEAST_SIDES = 2
 OF_GROUND = 0.75
-"""Of the outermost pixels of what lies within: as many of one colour are a ground, and what is on it need not be a print."""
+"""Of the outermost pixels of the content: share of one colour from which they count as background, with the object in front of
+it.
+"""
 BORDERED = "a border drawn around the picture was cut off"
 
 
 def without_border(pixels: np.ndarray, rectangular: bool | None) -> np.ndarray | None:
-    """Return the picture ``(H, W, 3) uint8`` within the border that was drawn around ``pixels``; None where there is none.
+    """Return the image ``(H, W, 3) uint8`` inside the border drawn around ``pixels``; None if there is no border.
 
-    ``rectangular`` is whether the thing that is meant has an upright rectangle for its outline, None where nobody says what it
-    is. Of one that has none, what lies within is the picture, also between two wide bars. Else it may be the thing itself, the
-    front of a box: it is a picture only where it has a ground of its own, of one colour along its sides.
+    ``rectangular``: whether the object has an upright rectangular outline (None: unknown). If it has not, the content is the
+    image, even between two wide bars. Otherwise the content may be the object itself, such as the front of a box: it is an
+    image only if it has a background of its own, of one colour along its sides.
     """
     if pixels.shape[2] != 3:
         return None
@@ -45,11 +49,11 @@ def without_border(pixels: np.ndarray, rectangular: bool | None) -> np.ndarray |
 
 
 def _lines(pixels: np.ndarray) -> tuple[int, int, int, int]:
-    """Return how many rows and columns of ``pixels (H, W, 3)`` are lines, at the top, the bottom, the left and the right."""
+    """Return the number of rows and columns of ``pixels (H, W, 3)`` that are border lines: top, bottom, left, right."""
     found = []
     for seen in _from_each_side(pixels):
         most, width = int(THIN * len(seen)), 0
-        while (step := _bar(seen[width:], most - width)) > 0:  # a line may itself have a lighter one around
+        while (step := _bar(seen[width:], most - width)) > 0:  # a line may have a lighter one around it
             width += step
         found.append(width)
     top, bottom, left, right = found
@@ -57,7 +61,7 @@ def _lines(pixels: np.ndarray) -> tuple[int, int, int, int]:
 
 
 def _bars(pixels: np.ndarray) -> tuple[int, int, int, int]:
-    """Return the rows and columns, as ``_lines`` does, of two bars of one colour at opposite sides; zeros without such."""
+    """Return the rows and columns (as ``_lines``) of two bars of one colour on opposite sides; zeros if there are none."""
     sides = _from_each_side(pixels)
     widths = [_bar(seen, int(WIDE * len(seen)), LEAST_OF_BAR) for seen in sides]
     colours = [np.median(seen[0].astype(np.float32), axis=0) for seen in sides]
@@ -69,10 +73,10 @@ def _bars(pixels: np.ndarray) -> tuple[int, int, int, int]:
 
 
 def _bar(seen: np.ndarray, most_px: int, least: float = LEAST_ALONG) -> int:
-    """Return how many rows of ``seen (n, m, 3)``, from the first, are of one colour and end in a step along all of their length.
+    """Return how many rows of ``seen (n, m, 3)``, from the first, have one colour and end in a step along their whole length.
 
-    ``least`` is the share of each row that has the colour. Rows that are mixed of both sides of the step count. 0 where these
-    would be more than ``most_px``, or there is no such step.
+    ``least`` is the share of each row that must have the colour. Rows that mix both sides of the step are included. 0 if this
+    exceeds ``most_px``, or if there is no such step.
     """
     if most_px < 1:
         return 0
@@ -89,13 +93,13 @@ def _bar(seen: np.ndarray, most_px: int, least: float = LEAST_ALONG) -> int:
 
 
 def _from_each_side(pixels: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return views of a picture (H, W, 3) whose first rows are its top, its bottom, its left and its right side."""
+    """Return views of an image (H, W, 3) whose first rows are its top, bottom, left and right side."""
     across = np.swapaxes(pixels, 0, 1)
     return pixels, pixels[::-1], across, across[::-1]
 
 
 def _within(pixels: np.ndarray, border: tuple[int, int, int, int]) -> np.ndarray | None:
-    """Return a picture (H, W, 3) without its ``border`` of rows and columns; None without one, or where too little is left."""
+    """Return an image (H, W, 3) without its ``border`` rows and columns; None if there is none, or if too little is left."""
     top, bottom, left, right = border
     inside = pixels[top : pixels.shape[0] - bottom, left : pixels.shape[1] - right]
     if not any(border) or min(inside.shape[:2]) < MIN_SIDE_PX:
@@ -104,7 +108,7 @@ def _within(pixels: np.ndarray, border: tuple[int, int, int, int]) -> np.ndarray
 
 
 def _has_ground(pixels: np.ndarray) -> bool:
-    """Tell whether most of the outermost pixels of a picture (H, W, 3) are of one colour."""
+    """Return whether most of the outermost pixels of an image (H, W, 3) have one colour."""
     ring = np.concatenate([seen[0] for seen in _from_each_side(pixels)]).astype(np.int16)
     off = np.abs(ring - np.median(ring, axis=0).astype(np.int16)).max(axis=1)
     return bool((off <= ALIKE).mean() >= OF_GROUND)

@@ -1,4 +1,4 @@
-"""Outlines that a person drew of photos, as the masks that a twin keeps beside them: its own files make it again."""
+"""Masks from outlines that a person drew, stored with a twin so that its own files suffice to rebuild it."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from manitwin.pipeline.stated_place import as_box
 
 
 def drawn_mask(draft: Draft[Item], place: int | None = None) -> bytes | None:
-    """Return the outline that a person drew of a photo as a mask of it; None where nobody did, or none that can be used.
+    """Return the outline that a person drew on a photo as a mask file; None if there is none, or it is unusable.
 
-    ``place`` is that of the photo, from 0, where it is one of several of a thing.
+    ``place`` is the index of the photo if it is one of several of an object.
     """
     item, said = draft.payload, draft.amendments.get("photo")
     if said is None:
         return None
-    # what cuts photos out takes half a CPU-second to import, and few photos are amended
+    # importing the cut-out code takes half a CPU-second, and few photos are amended
     from manitwin.pipeline.drawn_outline import drawn_outline, mask_file
 
     try:
@@ -28,12 +28,12 @@ def drawn_mask(draft: Draft[Item], place: int | None = None) -> bytes | None:
         if drawn is None:
             return None
         return mask_file(drawn, full_size(Path(item.files[place or 0]))[:2], as_box(item.box_px))
-    except (Rejected, InputError):  # as the photo was rejected or left out for
+    except (Rejected, InputError):  # the photo was rejected or left out for this reason
         return None
 
 
 def with_drawn_masks(draft: Draft[Item], folder: Path) -> Item:
-    """Return the item of several photos with a mask in ``folder`` for each photo whose outline a person drew."""
+    """Return the item of several photos, with a mask file in ``folder`` for each photo with a drawn outline."""
     item, masks = draft.payload, list(draft.payload.masks or ("",) * len(draft.payload.files))
     for place in range(len(item.files)):
         mask = drawn_mask(draft, place)

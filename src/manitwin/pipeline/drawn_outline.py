@@ -1,4 +1,4 @@
-"""The outline of a thing in its photo as a person drew it: how it is kept among the amendments, and what is cut out by it."""
+"""Outlines of objects drawn by a person on a photo: their storage in amendments, and the cut-outs made from them."""
 
 from __future__ import annotations
 
@@ -20,42 +20,42 @@ from manitwin.pipeline.given_alpha import Given
 from manitwin.pipeline.stated_place import window_of
 
 DRAWN = "outline"
-"""Key of the photo stage's amendment: ``{png, source}``, the outline as a PNG file in base64, and who drew it."""
+"""Key of the photo stage's amendment ``{png, source}``: the outline as a base64-encoded PNG file, and its author."""
 DRAWN_OF_SEVERAL = "outlines"
-"""Its key for several photos of one thing: such an object by the photo's place among them, '0' the first."""
+"""Key for several photos of one object: such amendments by the photo's index, '0' for the first."""
 _REMEDY = "remove its file below DATASET/amendments, build again and redraw the outline"
 _BOUND = 0.02
-"""By which the proportions of an outline and of its photo may differ, relative: both are of whole pixels."""
+"""Tolerated relative difference of the aspect ratios of outline and photo, both of whole pixels."""
 
 
 @dataclass(frozen=True)
 class DrawnOutline:
-    """What a person drew: ``mask (H, W) bool``, at most ``SHOWN_PX`` large, True where the thing is; ``source`` says who."""
+    """A drawn outline: ``mask (H, W) bool``, at most ``SHOWN_PX`` large, True on the object; ``source`` is its author."""
 
     mask: np.ndarray
     source: str
 
     def is_of(self, shape: tuple[int, int]) -> bool:
-        """Tell whether a picture of a ``shape`` (rows, columns) has these proportions."""
+        """Return whether an image of ``shape`` (rows, columns) has the same aspect ratio."""
         return abs(self.mask.shape[0] * shape[1] / (self.mask.shape[1] * shape[0]) - 1) <= _BOUND
 
     def scaled(self, shape: tuple[int, int]) -> np.ndarray:
-        """Return how far each pixel of a picture of a ``shape`` (rows, columns) is the thing's: ``(H, W) uint8``."""
+        """Return the mask resampled to an image of ``shape`` (rows, columns): ``(H, W) uint8``."""
         grey = Image.fromarray(np.where(self.mask, 255, 0).astype(np.uint8))
         return np.asarray(grey.resize(shape[::-1], Image.Resampling.BILINEAR))
 
     def to_json(self) -> dict[str, str]:
-        """Return it as it is kept."""
+        """Return the stored representation."""
         encoded = io.BytesIO()
         Image.fromarray(self.mask).save(encoded, "PNG", optimize=True)
         return {"png": base64.b64encode(encoded.getvalue()).decode("ascii"), "source": self.source}
 
 
 def drawn_outline(amendment: Mapping[str, Any], name: str, place: int | None = None) -> DrawnOutline | None:
-    """Return the outline among the photo stage's amendments, None where there is none.
+    """Return the outline in the photo stage's amendment; None if there is none.
 
-    ``place`` is that of the photo, from 0, where it is one of several of a thing. Raises Rejected where it is none that was kept
-    here: the photo ``name`` is not cut out as nobody meant it.
+    ``place`` is the index of the photo if it is one of several of an object. Raises Rejected for a malformed entry, so that the
+    photo ``name`` is not cut out in an unintended way.
     """
     try:
         said = amendment.get(DRAWN) if place is None else amendment.get(DRAWN_OF_SEVERAL, {}).get(str(place))
@@ -67,17 +67,17 @@ def drawn_outline(amendment: Mapping[str, Any], name: str, place: int | None = N
 
 
 def with_outline(amendment: Mapping[str, Any], drawn: DrawnOutline, place: int | None = None) -> dict[str, Any]:
-    """Return the photo stage's amendment with an outline, in place of an earlier one of the same photo."""
+    """Return the photo stage's amendment with an outline, replacing an earlier one of the same photo."""
     if place is None:
         return {**amendment, DRAWN: drawn.to_json()}
     return {**amendment, DRAWN_OF_SEVERAL: {**amendment.get(DRAWN_OF_SEVERAL, {}), str(place): drawn.to_json()}}
 
 
 def mask_of_png(data: bytes) -> np.ndarray:
-    """Return the mask ``(H, W) bool`` of a PNG file, True where it is brighter than half; raises ValueError for what is none."""
+    """Return the mask ``(H, W) bool`` of a PNG file, True where it is brighter than half. Raises ValueError for other files."""
     try:
         with Image.open(io.BytesIO(data), formats=("PNG",)) as picture:
-            if max(picture.size) > SHOWN_PX:  # before any of it is unpacked
+            if max(picture.size) > SHOWN_PX:  # checked before decompression
                 raise ValueError(f"an outline has at most {SHOWN_PX} pixels a side, not {max(picture.size)}")
             return np.asarray(picture.convert("L")) > 127
     except (OSError, SyntaxError, Image.DecompressionBombError) as error:
@@ -85,16 +85,16 @@ def mask_of_png(data: bytes) -> np.ndarray:
 
 
 def why_no_outline(mask: np.ndarray) -> str | None:
-    """Return why a mask ``(H, W) bool`` is no outline of a thing, as the end of a sentence; None where it may be one."""
+    """Return why a mask ``(H, W) bool`` cannot be an object's outline, as the end of a sentence; None if it can."""
     if not mask.any():
         return "is empty"
     return "covers the whole photo" if (~mask).mean() <= TRANSPARENT_SHARE else None
 
 
 def as_drawn(given: Given, drawn: DrawnOutline, name: str) -> Given:
-    """Return a picture cut out by an outline that a person drew on it, whatever its own alpha channel says.
+    """Return a picture cut out by a drawn outline, regardless of its own alpha channel.
 
-    Raises Rejected where the outline is of a picture of other proportions, is empty, or leaves nothing out.
+    Raises Rejected if the outline has another aspect ratio, is empty, or covers the whole picture.
     """
     height, width = given.pixels.shape[:2]
     if not drawn.is_of((height, width)):
@@ -106,10 +106,10 @@ def as_drawn(given: Given, drawn: DrawnOutline, name: str) -> Given:
 
 
 def mask_file(drawn: DrawnOutline, size_px: tuple[int, int], box_px: PixelBox | None) -> bytes | None:
-    """Return an outline as a mask of the whole photo of ``size_px`` (width, height), upright: a PNG file, as ``--mask`` takes it.
+    """Return an outline as a PNG mask of the whole upright photo of ``size_px`` (width, height), as for ``--mask``.
 
-    ``box_px`` is where in the photo the thing is: the outline was drawn on what lies around that. None where it was drawn on
-    another part of the photo (within a frame that was cut off).
+    ``box_px`` is the object's bounding box in the photo; the outline was drawn on a window around it. None if it was drawn on
+    another part of the photo (inside a border that was cut off).
     """
     width, height = size_px
     left, top, right, bottom = (0, 0, width, height) if box_px is None else window_of(box_px, size_px, "the photo")

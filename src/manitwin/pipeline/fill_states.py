@@ -1,4 +1,4 @@
-"""What a bottle, can or jar weighs empty, half full and full: its mesh is the same, its mass is not."""
+"""Fill states of bottles, cans and jars: mass properties when empty, half full and full."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from manitwin.twin.record_values import Estimate
 
 SHARES = (0.0, 0.5, 1.0)
 HEAVIEST_EMPTY = 0.75
-"""Of the mass said: with an empty vessel that heavy, what was said is hardly that of a full one, and nothing is known of it."""
+"""Of the stated mass: if an empty vessel would be heavier, the stated mass is hardly that of a full one."""
 KNOWN = ("measured", "user", "human:", "imported:")
-"""Sources whose mass is that of one thing in one state, which they do not tell."""
+"""Sources of a mass that holds for one object in an unknown fill state."""
 UNEVEN_WALL = 0.2
-"""Of the wall's matter that may all be in its cap, or all in its base, instead of being even: an assumption, of the size of what
-caps, necks and bottoms of bottles weigh."""
+"""Share of the wall's mass that may be in its cap or in its base instead of being uniform: an assumption of the magnitude of
+caps, necks and bottoms of bottles.
+"""
 WALL_FACTORS = (0.5, 2.0)
-"""The wall may weigh so many times what the prior's least bulk density makes of it."""
-LEVELS = 20  # steps from empty to full at which the centre of mass is looked at
+"""The wall's weight may differ by these factors from that given by the prior's least bulk density."""
+LEVELS = 20  # fill levels at which the centre of mass is computed
 
 
 def filling_of(
@@ -32,12 +33,12 @@ def filling_of(
     prior: Prior | None,
     wall_thickness_m: float,
 ) -> Filling | None:
-    """Return the states of a vessel whose mass is that of a full one; None for what is none, or where that is not known.
+    """Return the fill states of a vessel whose mass is that of a full one; None for other objects, or if the state is unknown.
 
-    ``full`` are its mass properties as the twin has them, ``full_uncertainty_m`` how far its centre of mass may be off. That of
-    another state is uncertain by what a wall of another weight, uneven besides, would make of it. The empty one weighs what the
-    prior's least bulk density makes of the volume (docs/priors.md: there the interval begins with the empty one), its wall is
-    even. The contents of the half-full one fill the lower half of the volume, the object standing as in its frame.
+    ``full`` are the twin's mass properties, ``full_uncertainty_m`` the uncertainty of its centre of mass. That of the other
+    states follows from a wall of another weight that is not uniform. The empty mass is the volume times the prior's least bulk
+    density (docs/priors.md: the lower end of the interval is the empty vessel), in a uniform wall. The contents of the
+    half-full vessel fill the lower half of the volume in the object frame.
     """
     if prior is None or not prior.vessel or prior.bulk_density_kg_m3 is None or mass.source.startswith(KNOWN):
         return None
@@ -71,7 +72,7 @@ def filling_of(
 
 
 def _uncertainty_m(vessel: Vessel, solid: trimesh.Trimesh, empty_kg: float, full_kg: float, share: float) -> float:
-    """Return how far (m) the centre of mass would be off with a wall of another weight that is uneven besides."""
+    """Return the uncertainty (m) of the centre of mass due to a wall of another weight that is not uniform."""
 
     def center_m(wall_kg: float) -> np.ndarray:
         return vessel.center_m(wall_kg, share * (full_kg - wall_kg), share)

@@ -1,4 +1,4 @@
-"""Collect the findings and draw the card (paper, "Consolidated Output"; appendix, "Dataset Examples": four columns)."""
+"""Collection of quality findings, and the card (paper, "Consolidated Output"; appendix, "Dataset Examples": four columns)."""
 
 from __future__ import annotations
 
@@ -70,7 +70,9 @@ class FinishStage:
         return {"quality": {"checks": checks}}
 
     def _card_grasps(self, path: Path) -> list[CardGrasp]:
-        """Return the first gripper's verified grasps, the most different first: the card draws the first of them."""
+        """Return the first gripper's verified grasps, ordered by farthest point sampling, as the card shows only the first
+        ones.
+        """
         table = read_grasp_table(path).to_pydict()
         own = (gripper == self.gripper.name for gripper in table["gripper"])
         chosen = zip(own, table["verified"], table["proposer"], strict=True)
@@ -103,9 +105,9 @@ def _frame_to_object(frame: dict[str, Any] | None) -> np.ndarray | None:
 
 
 def card_text(draft: Draft[Item], solid: trimesh.Trimesh) -> CardText:
-    """Write a card's words: what it is, size, mass, friction, grasps, and where the numbers come from.
+    """Return the text of a card: description, size, mass, friction, grasps, and the sources of the numbers.
 
-    The size is length, width and height along the thing's own sides: those along X and Y are longer where it lies askew.
+    The size is length, width and height along the object's own sides; extents along X and Y are larger if it is oblique.
     """
     language, physical, grasps = (draft.field(name) for name in ("language", "physical", "grasps"))
     mass, friction = physical["mass_kg"], physical["friction_static"]

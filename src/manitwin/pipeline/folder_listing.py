@@ -1,4 +1,4 @@
-"""List the files of a folder as a build takes them: an input, a part of one, or left alone with the reason."""
+"""Classification of the files of an input folder: an input, a part of an input, or ignored with a reason."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from manitwin.pipeline.masks_beside import masks_beside
 from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH
 
 Told = Callable[[str], None]
-"""Takes a few words on how far a listing is."""
+"""Callback with a progress message."""
 TWIN_RECORD = "twin.json"
 _NEVER_NAMED = frozenset({"", ".txt", ".md", ".pdf", ".csv", ".jsonl", ".html", ".py", ".sh", ".log"})
-"""What no mesh names: a folder of meshes and such files alone is listed without opening a mesh."""
-# the last word of the names that exporters give to texture maps
+"""Suffixes that meshes never reference; if a folder has only meshes and such files, no mesh is opened."""
+# last words of the names that exporters give to texture maps
 _MAP_WORDS = frozenset({
     "albedo", "ambientocclusion", "ao", "alpha", "basecolor", "basecolour", "bump", "diff", "diffuse", "disp",
     "displacement", "emission", "emissive", "gloss", "glossiness", "lightmap", "metallic", "metallicroughness",
@@ -29,7 +29,7 @@ _MAP_WORDS = frozenset({
     "occlusionroughnessmetallic", "opacity", "orm", "rough", "roughness", "rma", "spec", "specular", "tex",
     "texture", "texturemap",
 })  # fmt: skip
-_NO_WORDS = frozenset({"k", "px"})  # of 4k, 1024px
+_NO_WORDS = frozenset({"k", "px"})  # in 4k, 1024px
 
 NOT_NAMED_HERE = "a mesh names a file of this name, but not where it lies, so it is not read"
 TEXTURE_BY_NAME = "named like a texture map, but no mesh in its folder uses it; if it is a photo, give its own path"
@@ -37,11 +37,11 @@ TEXTURE_BY_NAME = "named like a texture map, but no mesh in its folder uses it; 
 
 @dataclass(frozen=True)
 class FolderListing:
-    """All files below a folder: each is in one of ``inputs``, ``parts`` and ``left``.
+    """All files below a folder: each is in exactly one of ``inputs``, ``parts`` and ``left``.
 
-    An imported asset's input is its folder, which stands for the mesh in it. ``parts`` gives the input that a file is a part
-    of, of a mask its photo, ``left`` the reason why one is left alone. ``beside_meshes`` are the images among the inputs in a
-    folder with a mesh.
+    The input of an imported asset is its folder, which stands for the mesh in it. ``parts`` maps a file to the input that it
+    belongs to, and a mask to its photo. ``left`` maps ignored files to the reason. ``beside_meshes`` are the images among the
+    inputs in a folder with a mesh.
     """
 
     folder: Path
@@ -52,22 +52,22 @@ class FolderListing:
 
     @property
     def files(self) -> int:
-        """The number of files of the folder, in all folders below it."""
+        """The number of files in the folder and all its subfolders."""
         return len(self.inputs) + len(self.parts) + len(self.left)
 
     @property
     def masks(self) -> dict[Path, Path]:
-        """The masks among the parts, by their photo."""
+        """The masks among the parts, by photo."""
         return {whole: part for part, whole in self.parts.items() if whole.suffix.lower() in IMAGE_SUFFIXES}
 
     def remarks(self) -> list[str]:
-        """Return what a person is told of the folder, a line each; none where every file is an input."""
+        """Return remarks on the folder, one line each; empty if every file is an input."""
         return listing_remarks(self.folder, self.inputs, self.parts, self.left, self.beside_meshes)
 
 
 @dataclass
 class _Found:
-    """Files below the root by their path relative to it, with ``/``; ``closed`` are those that no input may be."""
+    """Files by path relative to the root, with ``/``; ``closed`` are those that cannot be inputs, with the reason."""
 
     open: list[str] = field(default_factory=list)
     closed: dict[str, str] = field(default_factory=dict)
@@ -77,10 +77,10 @@ class _Found:
 
 
 def list_folder(folder: Path, told: Told = lambda said: None) -> FolderListing:
-    """List a folder for a build, everything sorted by path; links to folders are not followed.
+    """Classify the files of a folder for a build, sorted by path; links to folders are not followed.
 
-    An image is a part of a mesh where the mesh names it and the reader finds it there; one that no mesh names is an input, or
-    by its name the mask of one (``masks_beside``). ``told`` hears how far it is.
+    An image is a part of a mesh if the mesh references it and the reader finds it there. An image that no mesh references is an
+    input, or by its name the mask of one (``masks_beside``). ``told`` receives progress messages.
     """
     found = _walk(folder, told)
     meshes = sorted(name for name in found.open if _suffix(name) in MESH_SUFFIXES)
@@ -125,7 +125,7 @@ def _suffix(name: str) -> str:
 
 @dataclass(frozen=True)
 class _Folder:
-    """A folder below the root; ``closed`` says why nothing in it is an input, ``asset`` which imported asset it is of."""
+    """A folder below the root; ``closed``: why no file in it is an input; ``asset``: the imported asset that it belongs to."""
 
     name: str
     closed: str | None = None
@@ -133,7 +133,7 @@ class _Folder:
 
 
 def _walk(folder: Path, told: Told) -> _Found:
-    """Find all files, the folders of one depth after those of another: their records are inspected together."""
+    """Find all files breadth-first, so that the records of one depth are inspected together."""
     found = _Found()
     level = [_Folder("")]
     while level:
@@ -164,7 +164,7 @@ _Scanned = tuple[_Folder, list[os.DirEntry[str]]]
 
 
 def _told_apart(folder: Path, scanned: list[_Scanned], found: _Found) -> list[_Scanned]:
-    """Return the folders, those of twins closed and those of imported assets named as such."""
+    """Return the folders, with those of twins marked as closed and those of imported assets marked as such."""
     names = {below.name: {entry.name for entry in entries} for below, entries in scanned}
     open_ = [below.name for below, _ in scanned if below.closed is None and below.asset is None]
     records = [name for name in open_ if TWIN_RECORD in names[name]]
@@ -199,7 +199,7 @@ def _sort_in(entry: os.DirEntry[str], name: str, closed: str | None, asset: str 
 
 
 def _no_file(entry: os.DirEntry[str]) -> str | None:
-    """Return why an entry that is no folder is no file either, or None where it is one."""
+    """Return why an entry that is not a folder is not a regular file either; None if it is one."""
     try:
         mode = entry.stat().st_mode
     except OSError as error:
@@ -212,8 +212,8 @@ def _no_file(entry: os.DirEntry[str]) -> str | None:
 def _named_parts(
     folder: Path, meshes: list[str], found: _Found, told: Told
 ) -> tuple[dict[str, str], set[str], dict[str, str]]:
-    """Return what meshes name and the reader finds, with the mesh; the names of what it does not find there; and the meshes
-    that could not be inspected, with the reason.
+    """Return the files that meshes reference and the reader finds, with their mesh; the names of referenced files not found
+    there; and the meshes that could not be inspected, with the reason.
     """
     root = folder.resolve()
     known = {*found.open, *found.closed} - set(meshes)
@@ -229,7 +229,7 @@ def _named_parts(
             continue
         for name in names:
             below = _below(mesh, name)
-            if below and below[0] in plain:  # no link on the way: the disk need not be asked, 100,000 times
+            if below and below[0] in plain:  # without links no disk access is needed
                 for path in known.intersection(below):
                     parts.setdefault(path, mesh)
                 continue
@@ -244,7 +244,7 @@ def _named_parts(
 
 
 def _below(mesh: str, name: str) -> list[str]:
-    """Return the paths below the root that a name in a mesh may mean, the likelier first; none where it may lead elsewhere."""
+    """Return the paths below the root that a reference in a mesh may mean, likeliest first; empty if it may lead outside."""
     spelled = spellings(name)
     if any(each.startswith(("/", "~")) or ":" in each or ".." in each.split("/") for each in spelled):
         return []
@@ -252,13 +252,13 @@ def _below(mesh: str, name: str) -> list[str]:
 
 
 def _listed(file: Path, root: Path, mesh: str, name: str) -> list[str]:
-    """Return the paths below the root under which a named file is listed: as it is named, and where a link leads."""
+    """Return the paths below the root under which a referenced file is listed: as written, and with links resolved."""
     resolved = [file.relative_to(root).as_posix()] if file.is_relative_to(root) else []
     return [posixpath.normpath(posixpath.join(posixpath.dirname(mesh), s)) for s in spellings(name)] + resolved
 
 
 def _why_texture(name: str, elsewhere: set[str], mesh_folders: set[str]) -> str | None:
-    """Return why an image is left alone that no mesh names where it lies; None where it is an input."""
+    """Return why an image is ignored that no mesh references at its location; None if it is an input."""
     if posixpath.basename(name).lower() in elsewhere:
         return NOT_NAMED_HERE
     return TEXTURE_BY_NAME if is_texture_by_name(name) and _has_mesh_above(name, mesh_folders) else None
@@ -273,7 +273,7 @@ def _has_mesh_above(name: str, mesh_folders: set[str]) -> bool:
 
 
 def _leave_links_to_listed(folder: Path, links: dict[str, str], inputs: list[str], left: dict[str, str]) -> None:
-    """Take a link to a file that is an input already out of the inputs: it is no second one."""
+    """Remove links to files that are inputs already from the inputs."""
     if not links:
         return
     root = str(folder.resolve())
@@ -289,7 +289,9 @@ def _leave_links_to_listed(folder: Path, links: dict[str, str], inputs: list[str
 
 
 def is_texture_by_name(name: str) -> bool:
-    """Tell whether a name ends in what exporters call texture maps: ``mug_normal.png``, ``texture0.jpg``, ``base_color.png``."""
+    """Return whether a name ends like those that exporters give texture maps (``mug_normal.png``, ``texture0.jpg``,
+    ``base_color.png``).
+    """
     stem = PurePosixPath(name).stem
     spaced = "".join(f" {c}" if c.isupper() and i and stem[i - 1].islower() else c for i, c in enumerate(stem))
     words = [w for w in "".join(c if c.isalpha() else " " for c in spaced.lower()).split() if w not in _NO_WORDS]

@@ -1,4 +1,4 @@
-"""Give the chosen functional points their frames: from geometry, where an import record has none."""
+"""Functional frames of the chosen points, computed from geometry if an import record does not state them."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.twin.point_records import FunctionalFrame, FunctionalPoint
 
 GEOMETRY = "geometry"
-"""The source of a frame that was computed."""
+"""The source of a computed frame."""
 
 
 def with_frames(points: Sequence[FunctionalPoint], surface: FramedMesh) -> tuple[list[FunctionalPoint], list[str]]:
-    """Return the points with the frames of the features that they mean, and why those without one have none.
+    """Return the points with the frames of their features, and the reasons for those without one.
 
-    The point and its label choose the feature, geometry gives the frame. ``surface`` is the watertight mesh in
-    the object frame. What a point brings already is kept.
+    The point and its label select the feature, geometry determines the frame. ``surface`` is the watertight mesh in the object
+    frame. A frame that a point already has is kept.
     """
     framed, missing = [], []
     for point in points:

@@ -1,4 +1,4 @@
-"""Let through one object, a real solid, of a size that hands can hold (paper, "Quality Verification")."""
+"""Quality gate: a single object, a valid solid, a graspable size (paper, "Quality Verification")."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from manitwin.pipeline.object_state import cut_out_photos, load_solid, object_na
 from manitwin.pipeline.size_remarks import TRULY_LARGE
 from manitwin.twin.record_values import Check
 
-_ROUNDING = 1e-9  # of the largest second moment
+_ROUNDING = 1e-9  # relative to the largest second moment
 _LITTLE_LARGER = 1.25
-"""Times the largest such things: what is that little larger is a large one, and no unit explains it."""
+"""Times the largest objects of a kind: a slightly larger one is truly large, which no wrong unit would explain."""
 
 
 class GateStage:
-    """Reject what geometry can tell is no single solid object, then ask the annotator what only an eye can tell.
+    """Reject meshes that by geometry are not a single solid object, then have the annotator judge the views.
 
-    Field ``gate``: ``checks`` in the order they were made. What nobody judged has ``passed`` None, never True.
+    Field ``gate``: ``checks`` in the order they were made. A check that nobody judged has ``passed`` None, never True.
     """
 
     name: ClassVar[str] = "gate"
@@ -42,7 +42,7 @@ class GateStage:
     writes: ClassVar[tuple[str, ...]] = ("gate",)
 
     def __init__(self, settings: GateConfig, annotator: Annotator | None = None):
-        """Take the settings and the annotator that looks at the views; without one nothing is judged by eye."""
+        """Take the settings and the annotator that judges the views; without one nothing is judged visually."""
         self.settings, self.annotator = settings, annotator
         self.backend = "geometry" if annotator is None else annotator.name
         self.model: str | None = None if annotator is None else annotator.model_for("quality")
@@ -50,7 +50,7 @@ class GateStage:
         self.expected_usd = 0.0 if annotator is None else annotator.expected_usd("quality")
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
-        """Return the field ``gate``; raises Rejected with the first check that fails, BackendError of the annotator."""
+        """Return the field ``gate``. Raises Rejected with the first failed check, and BackendError from the annotator."""
         solid = load_solid(draft.path("canonical.npz"))
         geometry = draft.field("geometry")
         checks = [
@@ -70,7 +70,7 @@ class GateStage:
         return {"gate": {"checks": [check.model_dump() for check in checks]}}
 
     def _check_single_object(self, draft: Draft, solid: trimesh.Trimesh) -> Check:
-        """Check that it is one thing; what joints hold together is, whatever gaps there are between its links."""
+        """Check for a single object; links connected by joints count as one, regardless of gaps."""
         articulation = read_articulation(draft)
         if articulation is not None:
             joined = f"{len(articulation.links)} links, which joints hold together"
@@ -86,7 +86,7 @@ class GateStage:
 
 
 def check_watertight(watertight: bool, repairs: list[str]) -> Check:
-    """Check that repair made a closed surface; raises Rejected not_watertight."""
+    """Check that repair produced a closed surface. Raises Rejected ``not_watertight``."""
     if not watertight:
         done = "; ".join(repairs) or "nothing could be done"
         raise Rejected(
@@ -96,15 +96,15 @@ def check_watertight(watertight: bool, repairs: list[str]) -> Check:
 
 
 def check_positive_volume(solid: trimesh.Trimesh, min_thickness_share: float) -> Check:
-    """Check that the solid is not inside out, nor any large part of it, and thicker than a film; raises Rejected degenerate.
+    """Check that no large part of the solid is inside out, and that it is thicker than a film. Raises Rejected ``degenerate``.
 
-    Thickness is twice the volume over the area: that of a plate with the same volume and area. Of matter that is nowhere less
-    than none the second moment is positive in every direction (else engines refuse the inertia: A + B < C).
+    Thickness is twice the volume over the area, that of a plate with the same volume and area. If density is nowhere negative,
+    the second moment is positive in every direction (otherwise engines reject the inertia: A + B < C).
     """
     thickness_m = 2 * float(solid.volume) / float(solid.area) if solid.area > 0 else 0.0
     limit_m = min_thickness_share * float(np.linalg.norm(np.ptp(solid.vertices, axis=0)))
     if thickness_m <= limit_m:
-        what = "inside out" if thickness_m < -limit_m else "as thin as a film"  # but for rounding
+        what = "inside out" if thickness_m < -limit_m else "as thin as a film"  # up to rounding
         detail = (
             f"the solid is {what}: mean thickness {thickness_m:.3g} m, at least {limit_m:.3g} m;"
             " give a mesh that encloses a volume"
@@ -131,10 +131,10 @@ def check_plausible_size(
     *,
     imported: bool = False,
 ) -> Check:
-    """Check the longest side where the scale is known; raises Rejected absurd_size.
+    """Check the longest side if the scale is known. Raises Rejected ``absurd_size``.
 
-    ``prior``: what is usual of such things. It tells what truly is too large for hands from what has the wrong unit, which
-    an ``imported`` asset's own file has.
+    ``prior``: the usual sizes of such objects, which distinguishes an object that is too large for a gripper from a wrong unit.
+    For an ``imported`` asset, the unit is that of its own file.
     """
     side_m = float(np.ptp(solid.vertices, axis=0).max())
     if not metric:
@@ -162,7 +162,7 @@ def check_plausible_size(
 def check_single_object(
     solid: trimesh.Trimesh, gap_share: float, object_share: float, rng: np.random.Generator
 ) -> Check:
-    """Check that all large parts touch, nearly touch or enclose each other; raises Rejected several_objects."""
+    """Check that all large parts touch, nearly touch or enclose each other. Raises Rejected ``several_objects``."""
     gap_m = gap_share * float(np.linalg.norm(np.ptp(solid.vertices, axis=0)))
     found = separate_objects(solid, gap_m=gap_m, object_share=object_share, rng=rng)
     if found.count > 1:
@@ -173,7 +173,7 @@ def check_single_object(
 
 
 def seen_checks(verdict: QualityVerdict) -> list[Check]:
-    """Turn what was seen into checks; raises Rejected where the annotator said no."""
+    """Convert the annotator's verdict to checks. Raises Rejected if it is negative."""
     if verdict.single_object is False:
         raise Rejected("several_objects", f"not one coherent object in its pictures: {verdict.detail}", "gate")
     if verdict.visual_quality is False:

@@ -1,4 +1,4 @@
-"""Turn the matted photo, or a text, into a mesh with a 3D generator (paper, "3D Generation")."""
+"""3D generation of a mesh from the matted photo or a text (paper, "3D Generation")."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from manitwin.pipeline.stated_poses import StatedPoses, poses_of
 
 
 class GenerateStage:
-    """Write ``generated.glb`` and the field ``generation``."""
+    """Generate a mesh from the photo or text. Writes ``generated.glb`` and the field ``generation``."""
 
     name: ClassVar[str] = "generate"
     version: ClassVar[str] = "48"
@@ -29,17 +29,19 @@ class GenerateStage:
     writes: ClassVar[tuple[str, ...]] = ("generated.glb", "generation")
 
     def __init__(self, settings: GenerateConfig, generator: Generator, submit_again: bool = False):
-        """Take the settings, the generator, and whether a submit of unknown outcome may be made again (it may pay twice)."""
+        """Take the settings and the generator; ``submit_again``: repeat a submission of unknown outcome, which may be charged
+        twice.
+        """
         self.settings, self._submit_again = settings, submit_again
         self.generator = generator
         self.backend: str = generator.name
         self.model: str | None = generator.model
         self.needs: Resource = generator.needs
-        # a generator that asks a vision-language model is charged by tokens, and says what it expects
+        # a generator that calls a vision-language model is charged per token, and states its expected cost
         self.expected_usd: float = getattr(generator, "expected_usd", generator.usd_per_job)
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
-        """Generate; raises Rejected ``generator_failed``, or BackendError where the generator cannot work now."""
+        """Generate the mesh. Raises Rejected ``generator_failed``, or BackendError if the generator is not available now."""
         rgba = np.asarray(Image.open(draft.path("photo.png"))) if "photo.png" in draft.paths else None
         poses = poses_of(draft.payload)
         views = read_views(draft, poses)
@@ -79,7 +81,7 @@ class GenerateStage:
 
 
 def read_views(draft: Draft[Item], poses: StatedPoses | None = None) -> tuple[PhotoView, ...]:
-    """Return the cut-outs of several photos of one thing, with stated turns or poses; none where fewer than two are left."""
+    """Return the cut-outs of several photos of one object, with stated turns or poses; empty if fewer than two are left."""
     pictures = sorted(draft.path("photos/").glob("*.png")) if "photos/" in draft.paths else []
     if len(pictures) < 2:
         return ()
@@ -101,7 +103,7 @@ def read_views(draft: Draft[Item], poses: StatedPoses | None = None) -> tuple[Ph
 
 
 def generator_seed(draft: Draft[Item]) -> int:
-    """Return the run's seed, or for a further variation of a text 31 bits that are mixed from both."""
+    """Return the run's seed; for a further variation of a text, a 31-bit seed mixed from both."""
     if not draft.payload.variation:
         return draft.seed
     return int(np.random.SeedSequence([draft.seed, draft.payload.variation]).generate_state(1)[0] >> 1)

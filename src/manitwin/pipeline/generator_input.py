@@ -1,4 +1,4 @@
-"""Find inputs that the chosen generator can never make a mesh of, before anything is begun."""
+"""Selection of the generator, and detection of inputs that it cannot process, before a build starts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from manitwin.pipeline.item import Item
 
 
 def chosen_generator(config: BuildConfig, annotator: Annotator) -> Generator:
-    """Return the generator of a build; a built-in one that has templates is guided by an annotator that can fill them in."""
+    """Return the generator of a build; a built-in generator with templates is guided by an annotator that can fill them in."""
     generator: Generator = create("generator", config.generator, config)
     reader = getattr(annotator, "template_reader", None)
     if reader is None or not hasattr(generator, "guided_by"):
@@ -29,9 +29,9 @@ def chosen_generator(config: BuildConfig, annotator: Annotator) -> Generator:
 
 
 def refusal(config: BuildConfig) -> Callable[[Item], str | None]:
-    """Return what says why the chosen generator can never make a mesh of an item; None of one that it can be asked for.
+    """Return a function that states why the chosen generator cannot process an item; None if it can.
 
-    The generator is created for the first item: what is wrong with it is raised then.
+    The generator is created for the first item, and errors in its configuration are raised then.
     """
 
     @cache
@@ -58,7 +58,7 @@ def refusal(config: BuildConfig) -> Callable[[Item], str | None]:
 
 
 def _two_things(item: Item) -> str | None:
-    """Return what is wrong where an item's text and its name are those of different things that the priors know."""
+    """Return an error if an item's text and name denote different known objects; otherwise None."""
     by_text, by_name = (lookup(said) if said else None for said in (item.text, item.name))
     if by_text is None or by_name is None:
         return None
@@ -71,7 +71,7 @@ def _two_things(item: Item) -> str | None:
 
 
 def _without_template(config: BuildConfig, text: str) -> str | None:
-    """Return why a generator that makes only some texts never makes this one, and which ones make any."""
+    """Return why a generator restricted to templates cannot process a text, and which generators can; otherwise None."""
     generator = chosen_generator(config, create("annotator", config.annotator, config))
     reason = generator.why_not(text) if hasattr(generator, "why_not") else None
     if reason is None:
@@ -85,9 +85,9 @@ def _asked_with(generator: Any) -> frozenset[Asked]:
 
 
 def _generators_asked_with(asked: str) -> list[str]:
-    """Return the names of the generators that may be asked with a text, or an image."""
+    """Return the names of the generators that accept a text, or an image."""
     found = []
     for name in sorted(backends()["generator"]):
-        with suppress(Unavailable):  # of a package that is not whole: nobody can choose it now
+        with suppress(Unavailable):  # a package that is not completely installed cannot be chosen
             found += [name] if asked in _asked_with(factory("generator", name)) else []
     return found

@@ -1,4 +1,4 @@
-"""A picture's own alpha channel: whether it cuts a thing out, is merely faint, or frames a picture with transparent bars."""
+"""Interpretation of a picture's own alpha channel: a cut-out, a faint cut-out, or an opaque picture with transparent bars."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from manitwin.models.matting.matte import TRANSPARENT_SHARE, DoubtedCutOut, Matt
 from manitwin.pipeline.drawn_border import BORDERED, without_border
 
 OPAQUE = 250
-"""Alpha from which a pixel counts as opaque: what compresses with losses is off by a few."""
+"""Alpha from which a pixel counts as opaque; lossy compression deviates by a few levels."""
 LEAST_DRAWN = 26
-"""A tenth of opaque: a channel that reaches less is empty."""
+"""A tenth of opaque; a channel that does not reach it is empty."""
 MOST_OF_CORNERS = 1 / 500
-"""Of an upright rectangle, what its round corners may leave transparent: those of a window on a screen do."""
+"""Share of an upright rectangle that rounded corners, such as those of a window on a screen, may leave transparent."""
 DOUBTFUL = 0.5
-"""How likely a rectangle is the thing that is meant, where nobody says what it is."""
+"""Probability that a rectangle is the intended object, if its name is unknown."""
 RECTANGULAR_SHAPES = frozenset({"flat and rectangular", "flat board", "box-shaped", "block-shaped"})
 FRAMED = "its alpha channel frames an upright rectangle, a picture with transparent bars: cropped to it"
 
 
 @dataclass(frozen=True)
 class Given:
-    """What of a picture is cut out: ``pixels (H, W, 3 or 4) uint8``, findings, and whether its alpha channel is doubted."""
+    """The picture to be cut out: ``pixels (H, W, 3 or 4) uint8``, findings, and whether its alpha channel is doubtful."""
 
     pixels: np.ndarray
     findings: tuple[str, ...] = ()
@@ -35,11 +35,11 @@ class Given:
 
 
 def as_given(pixels: np.ndarray, name: str | None) -> Given:
-    """Return what of a picture ``(H, W, 3 or 4) uint8`` is cut out, where a person calls the thing ``name``.
+    """Interpret a picture ``(H, W, 3 or 4) uint8`` of an object that the user calls ``name``.
 
-    Where what is opaque is an upright rectangle with bars around, the name says whether that is the thing (a book, a box) or a
-    picture of it, which is then taken out of its bars; it is doubted where there is no name, or one that is not known. A border
-    that was drawn around a photo is cut off (``drawn_border``).
+    If the opaque region is an upright rectangle with bars around it, the name decides whether that is the object (a book, a
+    box) or a picture of it, which is then cropped to. It is doubtful without a known name. A border drawn around a photo is cut
+    off (``drawn_border``).
     """
     pixels, findings = usable(pixels)
     rectangular = is_rectangular(name)
@@ -55,9 +55,9 @@ def as_given(pixels: np.ndarray, name: str | None) -> Given:
 
 
 def as_masked(pixels: np.ndarray, mask: Path, orientation: int) -> Given:
-    """Return a picture ``(H, W, 3 or 4) uint8`` cut out as the file ``mask`` says, and as its own alpha channel does too.
+    """Return a picture ``(H, W, 3 or 4) uint8`` cut out by the mask file, combined with its own alpha channel.
 
-    ``orientation`` is that of the photo's EXIF. Raises InputError as ``read_mask`` does.
+    ``orientation`` is the photo's EXIF orientation. Raises InputError like ``read_mask``.
     """
     pixels, findings = usable(pixels)
     alpha = read_mask(mask, pixels.shape[:2], orientation)
@@ -67,10 +67,10 @@ def as_masked(pixels: np.ndarray, mask: Path, orientation: int) -> Given:
 
 
 def usable(pixels: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Return a picture ``(H, W, 3 or 4) uint8`` with an alpha channel that may cut something out, or without one, and findings.
+    """Return a picture ``(H, W, 3 or 4) uint8`` with a usable alpha channel or without one, and findings.
 
-    A channel that is the same everywhere cuts nothing out. One that is nowhere opaque is that of a faint cut-out (a glass that
-    is drawn translucent): it is stretched until its highest value is opaque.
+    A constant channel is dropped. A channel that is opaque nowhere belongs to a faint cut-out (e.g. a glass drawn translucent):
+    it is stretched so that its highest value is opaque.
     """
     if pixels.shape[2] != 4:
         return pixels, ()
@@ -87,9 +87,10 @@ def usable(pixels: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
 
 
 def framed_picture(pixels: np.ndarray) -> np.ndarray | None:
-    """Return the picture ``(H, W, 3) uint8`` inside where what is opaque of ``pixels`` is an upright rectangle with bars around.
+    """Return the picture ``(H, W, 3) uint8`` inside, if the opaque region of ``pixels`` is an upright rectangle with bars; else
+    None.
 
-    Round corners as small as a window's are none; beside it may be what is not opaque, such as the shadow of a window.
+    Rounded corners as small as a window's are tolerated, and pixels outside that are not opaque, such as a window's shadow.
     """
     if pixels.shape[2] != 4:
         return None
@@ -104,13 +105,13 @@ def framed_picture(pixels: np.ndarray) -> np.ndarray | None:
 
 
 def is_rectangular(name: str | None) -> bool | None:
-    """Tell whether things of a name may have an upright rectangle for their outline; None where nothing is known of them."""
+    """Return whether objects with a name may have an upright rectangular outline; None for an unknown name."""
     prior = lookup(name)
     return None if prior is None else prior.shape in RECTANGULAR_SHAPES
 
 
 def doubted_rectangle(matte: Matte, file: str, name: str | None) -> DoubtedCutOut:
-    """Return the doubt of a cut-out that is an upright rectangle, where nothing is known of what a person calls ``name``."""
+    """Return the doubt about a cut-out that is an upright rectangle, if the user's ``name`` for the object is unknown."""
     remedy = (
         "name the object with --name" if name is None else f"the priors have no {name!r}; give a name that they have"
     )

@@ -1,7 +1,7 @@
-"""What a grasp holds: the part that its fingertips touch, and the points whose places they touch.
+"""Association of grasps with the parts that their fingertips touch, and with the points at those places.
 
-Source: paper, "Spatial Filtering and Semantic Association" (3 cm); that a grasp belongs to what it touches, and not to the
-nearest point, is this project's: a knob 11 cm from a handle would carry the handle's scenario.
+Source: paper, "Spatial Filtering and Semantic Association" (3 cm). Unlike the paper, a grasp is associated by contact instead
+of with the nearest point: a knob 11 cm from a handle would otherwise inherit the handle's scenario.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.twin.part_records import NO_PART
 
 READS = ("solid.npz", PARTS_FILE, "parts")
-"""What a stage reads that asks what grasps hold."""
+"""The artifacts that a stage needs for this association."""
 PAD_HALF_M = 0.006
-"""Rays start from a grid of three by three over so much of each fingertip, and its middle: most pads are 16 to 22 mm wide."""
+"""Half width of the three by three grid over each fingertip from which rays start; most pads are 16 to 22 mm wide."""
 REACH_M = 0.008
-"""How far from the place that ``width_m`` says a contact may be: real ones lie up to 6 mm off (95 % of them, measured)."""
+"""Largest distance of a contact from the place implied by ``width_m``; real contacts are up to 6 mm off (95 %, measured)."""
 PAD_M = 0.009
-"""Half of a pad's width: what is as near to a place is under the fingertip that holds it there."""
+"""Half of a pad's width: points within this distance of a contact are under the fingertip."""
 _OVER_PAD_M = np.array([(u, v) for u in (-PAD_HALF_M, 0.0, PAD_HALF_M) for v in (-PAD_HALF_M, 0.0, PAD_HALF_M)])
-"""Where over a fingertip rays start, across and along the approach ``(9, 2)``."""
+"""Ray starts over a fingertip, across and along the approach ``(9, 2)``."""
 _ALL_OVER_PAD_M = np.array(
     [
         (u, v)
@@ -44,20 +44,20 @@ _ALL_OVER_PAD_M = np.array(
         for u, v in ((long, short), (short, long))
     ]
 )
-"""As close to each other as 1.5 mm and out to the pad's border ``(78, 2)``: what is thin lies between fewer of them."""
+"""A denser set of ray starts, 1.5 mm apart and out to the pad's border ``(78, 2)``, for thin objects."""
 _NARROW, _BESIDE = 0.5, 0.25
-"""Of the surface there: a part that has less is narrower than a fingertip; one beside it has more."""
+"""Of the nearby surface: below the first share a part is narrower than a fingertip; above the second a neighbour counts."""
 _SAMPLES = 20_000
-_TIE = 1e-6  # less than the ninth of a fingertip that shares are told to, over all of 255 parts
+_TIE = 1e-6  # smaller than the resolution of shares (a ninth of a fingertip), over all 255 parts
 NOBODY = ""
-"""The id of no part and of no point: null in the table."""
+"""The id of no part and of no point; null in the table."""
 
 
 @dataclass(frozen=True)
 class Contacts:
-    """Where the two fingertips of each of N grasps touch: ``positions_m (N, 2, 3)``, ``touches (N, 2)``, ``part (N, 2)``.
+    """Contacts of the two fingertips of N grasps: ``positions_m (N, 2, 3)``, ``touches (N, 2)``, ``part (N, 2)``.
 
-    ``share (N, 2)`` is how much of the fingertip touches that part; 255 is no part.
+    ``share (N, 2)`` is the share of the fingertip that touches the part; 255 is no part.
     """
 
     positions_m: np.ndarray
@@ -70,22 +70,22 @@ class Contacts:
         return Contacts(*(getattr(self, f.name)[rows] for f in fields(Contacts)))
 
     def put(self, rows: np.ndarray, others: Contacts) -> None:
-        """Put others in the place of some rows."""
+        """Replace the contacts of some rows."""
         for field in fields(Contacts):
             getattr(self, field.name)[rows] = getattr(others, field.name)
 
     @staticmethod
     def joined(parts: Sequence[Contacts]) -> Contacts:
-        """Return the contacts of all parts, one after the other."""
+        """Return the concatenated contacts."""
         return Contacts(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Contacts)))
 
 
 @dataclass(frozen=True)
 class PartedSolid:
-    """A closed solid whose faces are of parts ``labels (F,) uint8`` called ``part_ids``: none are told where these are empty.
+    """A closed solid with the part of each face, ``labels (F,) uint8`` as indices into ``part_ids`` (empty: no parts).
 
-    ``opening_m`` is how far apart the pads of a parallel gripper are before they close on a line; None for other hands, whose
-    fingertips are taken to touch what is nearest to them.
+    ``opening_m`` is the distance of a parallel gripper's pads before closing; None for other hands, whose fingertips are
+    assumed to touch the nearest surface.
     """
 
     solid: trimesh.Trimesh
@@ -97,7 +97,7 @@ class PartedSolid:
 
     @classmethod
     def read(cls, draft: Draft, gripper: Gripper, radius_m: float) -> PartedSolid:
-        """Read what a gripper holds; a point is served within the radius of association."""
+        """Read the solid and parts for a gripper; ``radius_m`` is the association radius of points."""
         solid = load_solid(draft.path("solid.npz"))
         with np.load(draft.path(PARTS_FILE)) as arrays:
             labels = arrays["solid"]
@@ -105,10 +105,10 @@ class PartedSolid:
         return cls(solid, RayCaster(solid), labels, ids, radius_m, pads_apart_m(gripper))
 
     def contacts(self, gripper_to_object: np.ndarray, depth_m: np.ndarray, width_m: np.ndarray) -> Contacts:
-        """Return where grasps ``(N, 4, 4)`` touch; with rays nothing that is farther than their reach from where it should be.
+        """Return the contacts of grasps ``(N, 4, 4)``; with rays, only surface within reach of the expected place counts.
 
-        What is thin may lie between the rays, or be held by the border of the pads alone. What lies beside the middle of an open
-        hand is met by one fingertip first, and pushed to the other.
+        Thin objects may lie between the rays, or be held by the border of the pads only, and are tried with the denser grid. An
+        object beside the middle of an open hand is met by one fingertip first and pushed towards the other.
         """
         middle = fingertips(gripper_to_object, depth_m)
         found = self._contacts(middle, width_m / 2, width_m / 2, gripper_to_object)
@@ -121,7 +121,7 @@ class PartedSolid:
         found.put(lost[met], wider.taken(met))
         lost = lost[~met]
         plus_m, minus_m = self._met(middle[lost], gripper_to_object[lost], self.opening_m)
-        beside = np.abs(plus_m + minus_m - width_m[lost]) <= REACH_M  # as wide as it was said to be, and elsewhere
+        beside = np.abs(plus_m + minus_m - width_m[lost]) <= REACH_M  # as wide as stated, but off-centre
         lost = lost[beside]
         found.put(lost, self._contacts(middle[lost], plus_m[beside], minus_m[beside], gripper_to_object[lost]))
         return found
@@ -134,7 +134,9 @@ class PartedSolid:
         gripper_to_object: np.ndarray,
         offsets_m: np.ndarray = _OVER_PAD_M,
     ) -> Contacts:
-        """Return where fingertips touch that end ``plus_m (N,)`` and ``minus_m (N,)`` from the middle along +X and -X."""
+        """Return the contacts of fingertips at the distances ``plus_m (N,)`` and ``minus_m (N,)`` from the middle along +X and
+        -X.
+        """
         find = self._nearest if self.opening_m is None else partial(self._by_rays, offsets_m=offsets_m)
         closing = gripper_to_object[:, :3, 0]
         plus = find(middle_m + plus_m[:, None] * closing, gripper_to_object, 1.0)
@@ -144,7 +146,9 @@ class PartedSolid:
     def _met(
         self, middle_m: np.ndarray, gripper_to_object: np.ndarray, opening_m: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return how far from the middle ``(N,)`` along +X and -X the fingertips of an open hand meet the surface, if they do."""
+        """Return the distances from the middle ``(N,)`` along +X and -X at which the fingertips of an open hand meet the
+        surface.
+        """
         found = []
         for sign in (1.0, -1.0):
             starts, inward = _grid(
@@ -156,9 +160,9 @@ class PartedSolid:
         return found[0], found[1]
 
     def regions(self, contacts: Contacts) -> np.ndarray:
-        """Return the id of the part ``(N,)`` that more of the fingertips touches, at a tie the first of the table; '' for none.
+        """Return the id of the part ``(N,)`` that is touched most; on a tie the first of the table; '' for none.
 
-        A hand turned by half a turn about its approach is the same grasp, and holds the same part.
+        The result is the same for a hand turned by half a turn about its approach, which is the same grasp.
         """
         share = np.where(contacts.part == NO_PART, 0.0, contacts.share)
         rows, most = np.arange(len(share)), (share - _TIE * contacts.part).argmax(1)
@@ -167,10 +171,11 @@ class PartedSolid:
         return np.asarray(names[index])
 
     def served(self, contacts: Contacts, places_m: np.ndarray) -> np.ndarray:
-        """Return which of places ``(P, 3)`` each grasp serves ``(N,)``, -1: none.
+        """Return the index of the place ``(P, 3)`` that each grasp serves ``(N,)``; -1 for none.
 
-        A fingertip touches the place's own part within the radius; of several places the nearest counts. A part that is narrower
-        there than a fingertip, as the edge of a wall, is held by what borders it. Without parts the radius alone decides.
+        A fingertip must touch the place's own part within the radius; the nearest of several places counts. A part that is
+        narrower there than a fingertip, such as the edge of a wall, may be held by adjacent parts. Without parts only the
+        radius decides.
         """
         if not len(places_m) or not len(contacts.part):
             return np.full(len(contacts.part), -1)
@@ -183,7 +188,9 @@ class PartedSolid:
         return np.where(np.isfinite(nearest_m.min(1)), nearest_m.argmin(1), -1)
 
     def _parts_at(self, places_m: np.ndarray) -> np.ndarray:
-        """Tell which parts a fingertip at each place may touch, ``(P, 256) bool``: its own, and what borders a narrow one."""
+        """Return which parts a fingertip at each place may touch, ``(P, 256) bool``: its own part, and those adjacent to a narrow
+        one.
+        """
         keys = [place.tobytes() for place in places_m]
         new = [row for row, key in enumerate(keys) if key not in self._known_parts_at]
         if new:
@@ -193,7 +200,7 @@ class PartedSolid:
 
     @cached_property
     def _known_parts_at(self) -> dict[bytes, np.ndarray]:
-        """What was found so far, by the place: a search asks for the same few places after every trial."""
+        """Cached results by place, as a search queries the same few places after every trial."""
         return {}
 
     def _found_parts_at(self, places_m: np.ndarray) -> np.ndarray:
@@ -214,14 +221,14 @@ class PartedSolid:
 
     @cached_property
     def _samples(self) -> tuple[np.ndarray, cKDTree]:
-        """The parts ``(N,)`` of samples of the surface, and these by place."""
+        """The parts ``(N,)`` of surface samples, and a k-d tree of their positions."""
         positions, _, faces = sample_surface(self.solid, _SAMPLES, np.random.default_rng(0))
         return self.labels[faces], cKDTree(positions)
 
     def _by_rays(
         self, place_m: np.ndarray, gripper_to_object: np.ndarray, sign: float, offsets_m: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Send rays along the closing axis from around each contact's place into the object."""
+        """Cast rays along the closing axis, from around each expected contact into the object."""
         begin_m = place_m + sign * REACH_M * gripper_to_object[:, :3, 0]
         grid, inward = _grid(begin_m, gripper_to_object, sign, offsets_m)
         starts = grid.reshape(-1, 3)
@@ -251,14 +258,14 @@ class PartedSolid:
 
 
 def pads_apart_m(gripper: Gripper) -> float | None:
-    """Return how far apart the pads of a parallel gripper are before they close; None for other hands."""
+    """Return the distance of a parallel gripper's pads before closing; None for other hands."""
     return gripper.opening_m if isinstance(gripper, ParallelGripper) else None
 
 
 def _grid(
     place_m: np.ndarray, gripper_to_object: np.ndarray, sign: float, offsets_m: np.ndarray = _OVER_PAD_M
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return starts ``(N, K, 3)`` over a fingertip at each place, and the way inward of each ``(K N, 3)``."""
+    """Return ray starts ``(N, K, 3)`` over a fingertip at each place, and the inward direction of each ``(K N, 3)``."""
     closing, across, approach = (gripper_to_object[:, :3, k] for k in range(3))
     starts = place_m[:, None] + offsets_m @ np.stack([across, approach], axis=1)
     return starts, np.repeat(-sign * closing, len(offsets_m), axis=0)
@@ -270,9 +277,9 @@ def region_columns(
     functional: Sequence[dict[str, Any]],
     grasp: Sequence[dict[str, Any]],
 ) -> dict[str, np.ndarray]:
-    """Return the table's columns of what grasps (arrays of ``proposals.npz``) hold: ids, '' for none.
+    """Return the table columns with the associations of grasps (arrays of ``proposals.npz``): ids, '' for none.
 
-    ``distance_to_point_m`` is that of the nearest contact from the nearest of all points.
+    ``distance_to_point_m`` is the distance of the nearest contact from the nearest of all points.
     """
     contacts = held.contacts(grasps["gripper_to_object"], grasps["depth_m"], grasps["width_m"])
     everywhere = np.array([point["position_m"] for point in (*functional, *grasp)], float).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Propose grasps: near the selected points, touching well, free of collision, and different from each other.
+"""Grasp proposal: near the selected points, with good pad contact, collision-free, and diverse.
 
 Source: paper, "Grasp Proposal Generation", "Spatial Filtering and Semantic Association" and, in the appendix, "Grasp Generation
 and Filtering" (4,000 candidates, 3 cm, 7-DoF farthest point sampling to 100).
@@ -36,19 +36,19 @@ from manitwin.robots.grippers.parallel import ParallelGripper
 PROPOSALS = "proposals{}.npz"
 PROPOSED = "proposals{}"
 GRASP_POINTS = "grasp_points"
-"""The grasp points as the first gripper's trials leave them: ``{grasp, withdrawn}``."""
+"""The grasp points after the first gripper's trials: ``{grasp, withdrawn}``."""
 UNFILTERED = ":unfiltered"
 QUOTA_MARGIN = 1.3
-"""How many more are tried at a point than should hold there."""
+"""How many more grasps are tried per point than should hold there."""
 Quota = tuple[np.ndarray, int]
-"""Which grasps are asked for ``(N,)`` bool, and of how many."""
+"""A mask ``(N,) bool`` of grasps, and how many of them are requested."""
 
 
 class GraspsStage:
-    """Propose, filter, associate and choose grasps.
+    """Propose, filter, associate and select grasps.
 
-    ``suffix`` is part of the artifacts' names: empty for the twin's first gripper. Where nothing fits, the first gripper
-    rejects the object; another one is left with no proposals and the reason.
+    ``suffix`` is part of the artifact names and empty for the twin's first gripper. If no grasp fits, the first gripper rejects
+    the object; any other gripper writes no proposals and the reason.
     """
 
     version = "11"
@@ -68,7 +68,7 @@ class GraspsStage:
         self.file, self.proposed = PROPOSALS.format(suffix), PROPOSED.format(suffix)
         self.writes: tuple[str, ...] = (self.file, self.proposed)
         self.may_reject, self.answered = not suffix, bool(suffix)
-        if suffix:  # the first gripper's trials have the last word on where the object is held
+        if suffix:  # the grasp points of other gripper runs follow the first gripper's trials
             self.reads = (*self.reads, f"{GRASP_POINTS}?")
         self.settings, self.grasper, self.gripper = settings, grasper, gripper
         self.backend = grasper.name
@@ -76,7 +76,7 @@ class GraspsStage:
         self.model: str | None = f"{grasper.model or grasper.name} for {gripper.name} {gripper.sha256[:12]}"
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
-        """Write ``proposals.npz``, return the field ``proposals``; raises Rejected where nothing fits the gripper."""
+        """Write ``proposals.npz`` and return the field ``proposals``. Raises Rejected if nothing fits the first gripper."""
         settings, points = self.settings, draft.field("points")
         if self.answered:
             points = points | draft.fields.get(GRASP_POINTS, {})
@@ -136,9 +136,9 @@ class GraspsStage:
         given: list[str],
         seed: int,
     ) -> None:
-        """Write the chosen grasps, then the unfiltered sample.
+        """Write the selected grasps, then the unfiltered sample.
 
-        ``given`` are the proposers of the first of the chosen.
+        ``given`` are the proposers of the first of the selected grasps.
         """
         raw, count = kept.raw, min(self.settings.unfiltered, len(kept.raw))
         drawn = np.sort(np.random.default_rng(seed).choice(len(raw), count, replace=False))
@@ -150,7 +150,7 @@ class GraspsStage:
 
 
 def grasp_request(draft: Draft, points: dict[str, Any], gripper: Gripper, settings: GraspConfig) -> GraspRequest:
-    """Read what a grasper is told of an object with these points."""
+    """Build the grasper's request for an object with these points."""
     physical = draft.field("physical")
     return GraspRequest(
         solid=load_solid(draft.path("solid.npz")),
@@ -169,12 +169,12 @@ def grasp_request(draft: Draft, points: dict[str, Any], gripper: Gripper, settin
 
 
 def positions_of(points: list[dict[str, Any]]) -> np.ndarray:
-    """Return the places ``(P, 3)`` of points."""
+    """Return the positions ``(P, 3)`` of points."""
     return np.array([point["position_m"] for point in points], float).reshape(-1, 3)
 
 
 def proposal_arrays(grasps: GraspProposals, proposer: list[str]) -> dict[str, np.ndarray]:
-    """Return the arrays of ``proposals.npz``: the grasps, and who proposed them."""
+    """Return the arrays of ``proposals.npz`` for grasps and their proposers."""
     return {
         "gripper_to_object": grasps.gripper_to_object,
         "width_m": grasps.width_m,
@@ -186,9 +186,9 @@ def proposal_arrays(grasps: GraspProposals, proposer: list[str]) -> dict[str, np
 
 
 def picked_from(placements: list[dict[str, Any]]) -> tuple[np.ndarray, ...]:
-    """Return ``object_to_plane (4, 4)`` of the placements that robots will find the object in.
+    """Return ``object_to_plane (4, 4)`` of the placements from which robots will pick the object.
 
-    These are the most probable of those that stayed, and the most probable upright one of them.
+    These are the most probable stable placement, and the most probable upright one.
     """
     settled = sorted((p for p in placements if p["settled"]), key=lambda p: -p["probability"])
     upright = [p for p in settled if p["upright"]]
@@ -202,16 +202,16 @@ def picked_from(placements: list[dict[str, Any]]) -> tuple[np.ndarray, ...]:
 def support_quotas(
     kept: Kept, near: np.ndarray, gripper: Gripper, supports: Sequence[np.ndarray], settings: GraspConfig
 ) -> list[Quota]:
-    """Ask of each support for its share of those near a point that leave room for it and are fit, and for a few of others.
+    """Request for each support its share of grasps near a point that clear the support plane and are fit, and a few others.
 
-    Under a pan that lies on its rim the handle alone is free, and all that hold it there may drop: trials of many would tell
-    no more than a few.
+    Under a pan that lies on its rim only the handle is accessible, and all grasps there may drop the pan: many trials would not
+    tell more than a few.
     """
     if not isinstance(gripper, ParallelGripper):
         return []
     is_near = np.zeros(len(kept.proposals), bool)
     is_near[near] = True
-    radius_m = float("inf")  # what is near enough was decided by the association
+    radius_m = float("inf")  # proximity was decided by the association
     count = round(settings.on_support_share * settings.simulated)
     members = [is_near & on_support(kept, gripper, support, radius_m) for support in supports]
     few = min(HOPELESS_TRIES, count)
@@ -219,9 +219,9 @@ def support_quotas(
 
 
 def _at_points(kept: Kept, near: np.ndarray, count: int, settings: GraspConfig) -> list[Quota]:
-    """Ask at each of the last ``count`` points, the grasp points, for what should hold there and some that may not.
+    """Request at each of the last ``count`` points (the grasp points) the grasps that should hold there, with a margin.
 
-    Of those that are fit only: where what there is asks too much of the pads, trials of many would tell no more than a few.
+    Only fit grasps are requested: if all grasps there demand too much of the pads, many trials would not tell more than a few.
     """
     nearest = kept.distance_m[:, -count:].argmin(1)
     within = kept.distance_m[:, -count:].min(1) <= settings.association_radius_m
@@ -232,9 +232,9 @@ def _at_points(kept: Kept, near: np.ndarray, count: int, settings: GraspConfig) 
 
 
 def _likely(kept: Kept, near: np.ndarray, quotas: list[Quota], count: int) -> np.ndarray:
-    """Choose ``count`` among the kept at ``near``; of those in each quota no fewer than it asks for, as far as there are.
+    """Select ``count`` of the grasps at ``near``, with at least the requested number of each quota as far as available.
 
-    What fills one quota counts for the next; where they ask for more than ``count`` in all, the first go first.
+    Grasps that fill one quota count for the next. If the quotas exceed ``count`` in total, the first ones take precedence.
     """
     chosen = _select(kept, near, count)
     if all(member[chosen].sum() >= min(wanted, int(member.sum())) for member, wanted in quotas):
@@ -257,7 +257,7 @@ def _select(kept: Kept, among: np.ndarray, count: int) -> np.ndarray:
 
 
 def _hand_joints(proposals: GraspProposals) -> dict[str, np.ndarray]:
-    """Return the joints as the arrays that a table keeps, none for a gripper without."""
+    """Return the joint values as arrays for the table; empty for a gripper without several joints."""
     if proposals.joints_rad is None:
         return {}
     return dict(zip(JOINTS, proposals.joints_rad.transpose(1, 0, 2), strict=True))

@@ -1,4 +1,4 @@
-"""The kinds of grippers in the pipeline: who proposes and screens, where grasps are tried, why none of them held."""
+"""Strategies per kind of gripper: proposal, screening, simulator, and the explanation if no grasp held."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def why_none_held(
     body: RigidBody,
     settings: TrialSettings,
 ) -> str:
-    """Say how often which outcome came, then whether jaws have too little friction or the centre of mass is out of reach."""
+    """Describe the outcomes, and whether friction is too low for the weight or the centre of mass is out of reach."""
     friction = (settings.finger_friction + body.friction_static) / 2
     needed_n = body.mass_kg * (GRAVITY_M_S2 + PEAK_SLIDE_ACCELERATION_M_S2)
     carried_n = 2 * friction * settings.force_n
@@ -47,7 +47,7 @@ def why_none_held(
 
 
 def outcomes_of(results: list[TrialResult]) -> str:
-    """Say how often which outcome came."""
+    """Describe how often each outcome occurred."""
     failures = Counter(result.outcome for result in results)
     counted = ", ".join(f"{count} {outcome}" for outcome, count in sorted(failures.items()))
     return f"none of {len(results)} simulated grasps held: {counted}"
@@ -60,15 +60,15 @@ def nearest_lever_m(gripper_to_object: np.ndarray, depth_m: np.ndarray, center_o
 
 
 WhyNoneHeld = Callable[[list[TrialResult], np.ndarray, np.ndarray, RigidBody, TrialSettings], str]
-"""From the results, the grasps ``(N, 4, 4)`` and their depths, the object and the settings: one line."""
+"""Returns a one-line explanation from the results, the grasps ``(N, 4, 4)`` and their depths, the body and the settings."""
 
 
 @dataclass(frozen=True)
 class GripperKind:
-    """One kind: names are those of the registry.
+    """The strategies of one kind of gripper; backend names are those of the registry.
 
-    ``second_simulator`` is None where no other engine could tell anything new, as a closed form has one answer, or where
-    no other engine has such a hand.
+    ``second_simulator`` is None if no other engine adds information, as a closed form has one answer, or if no other engine
+    supports such a hand.
     """
 
     screen: Callable[[GraspRequest], Screen]

@@ -1,4 +1,4 @@
-"""What a twin is guessed to be and how large: a classifier's or a model's word where nobody said it, as checks and in words."""
+"""Quality checks and messages on guessed names and sizes, and on templates filled in by a model."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from manitwin.twin.record_values import Check
 
 PRIOR = "prior:"
 UNKNOWN = f"{PRIOR}unknown"
-"""The source of what is only usual of anything."""
+"""The source of values from the prior for any object."""
 OF_NO_NAME = frozenset({UNKNOWN, OF_LIKELY_NAMES})
-"""The sources of what rests on no name: of anything, or of the names that a thing may have."""
+"""Sources that do not depend on a name: the generic prior, or a mixture over likely names."""
 
 SIZE_UNSAID = "nobody says how large it is"
-"""What a rejection's detail says where the size is only a usual one; remedies go by it."""
+"""Text in a rejection's detail if the size is only a typical one; remedies look for it."""
 OF_ANYTHING = "usual of anything"
-"""What it says besides where nobody has named the thing either."""
+"""Addition if the object is unnamed as well."""
 LIKE_IT = " that looks like it"
-"""And what it adds where a classifier has guesses."""
+"""Addition if a classifier has guesses."""
 SPELT_ALIKE = 0.8
-"""Of two names, from where one may be meant by the other (``difflib``'s ratio)."""
+"""Similarity of two names (``difflib`` ratio) from which one may be a misspelling of the other."""
 MOST_NAMES = 3
-"""Of those that a name is a word of, what is shown."""
+"""Number of known names shown that contain the given word."""
 
 
 def naming_checks(draft: Draft) -> list[Check]:
-    """Return what a thing is taken for that nobody has named, by a model or a classifier: a finding, unless one is sure.
+    """Return the check on an unnamed object's name as guessed by a model or classifier; it passes if one is confident.
 
-    Of an input that a person has named since who that was; none for others.
+    For an input that a person has named later, it states who; empty for other inputs.
     """
     said = None if corrected_category(draft) is not None else said_name(draft)
     if said is not None:
@@ -54,9 +54,9 @@ def naming_checks(draft: Draft) -> list[Check]:
 
 
 def size_checks(draft: Draft) -> list[Check]:
-    """Return the failed check of a size that is only what is usual of anything; none where somebody said it or what it is.
+    """Return the failed check of a size from the generic prior; empty if the size or name was stated.
 
-    Of an input whose size a person has stated since, who that was.
+    For an input whose size a person has stated later, a passed check that states who.
     """
     size, stated = draft.fields.get("size"), (draft.fields.get("geometry") or {}).get(SIZE)
     if stated is not None and size is None:
@@ -69,7 +69,7 @@ def size_checks(draft: Draft) -> list[Check]:
 
 
 def unknown_size_words(size: dict[str, Any]) -> str:
-    """Say of a size that only a prior gives: '15 cm is what is usual of anything (2 to 60 cm)', or '... of a mug'."""
+    """Describe a size from a prior: '15 cm is what is usual of anything (2 to 60 cm)', or '... of a mug'."""
     value, low, high = (f"{100 * size[key]:.3g}" for key in ("value", "low", "high"))
     category = size["source"].removeprefix(PRIOR)
     usual = {UNKNOWN: OF_ANYTHING, OF_LIKELY_NAMES: OF_ANYTHING + LIKE_IT}.get(
@@ -79,7 +79,7 @@ def unknown_size_words(size: dict[str, Any]) -> str:
 
 
 def unsaid_size_words(draft: Draft) -> str | None:
-    """Say that a size is only what is usual of such things, so that nobody has said it; None where somebody has."""
+    """Describe that the size is only typical of such objects; None if it was stated."""
     size = draft.fields.get("size")
     if size is None or not size["source"].startswith(PRIOR):
         return None
@@ -87,9 +87,9 @@ def unsaid_size_words(draft: Draft) -> str | None:
 
 
 def unknown_name_words(name: str, remedy: str = "say what kind of thing it is with --name, in English") -> str:
-    """Say that a name is not among the priors', and the names that it is a word of, else those that are spelt like it.
+    """Describe that a name is unknown to the priors, with known names that contain it or are spelt alike.
 
-    ``remedy`` ends it where there are no such names.
+    ``remedy`` is appended if there are no such names.
     """
     known = sorted({word for prior in load_priors().values() for word in (prior.category, *prior.aliases)})
     near = names_with(name)[:MOST_NAMES] or get_close_matches(normalised(name), known, n=2, cutoff=SPELT_ALIKE)
@@ -100,18 +100,18 @@ def unknown_name_words(name: str, remedy: str = "say what kind of thing it is wi
 
 
 def likeliest_words(naming: dict[str, Any]) -> str:
-    """Say the likeliest names with their probabilities: 'orange 41 %, lemon 12 %, apple 3 %'."""
+    """Describe the likeliest names with their probabilities: 'orange 41 %, lemon 12 %, apple 3 %'."""
     return ", ".join(f"{guess['name']} {100 * guess['probability']:.0f} %" for guess in naming["likeliest"])
 
 
 def filled_in(draft: Draft) -> dict[str, Any] | None:
-    """Return the note of what a model filled in; None where none was asked."""
+    """Return the generator's note on a template that a model filled in; None if there is none."""
     generation = draft.fields.get("generation") or {}
     return cast(dict[str, Any] | None, generation.get("notes", {}).get("filled"))
 
 
 def template_checks(draft: Draft) -> list[Check]:
-    """Return what is to be said of how a template was filled in: by a model, else by the words of a text."""
+    """Return checks on how a template was filled in: by a model, else by the words of a text."""
     filled = filled_in(draft)
     return _unused_words_checks(draft) if filled is None else [_filled_check(filled)]
 
@@ -123,7 +123,7 @@ def _filled_check(filled: dict[str, Any]) -> Check:
 
 
 def _unused_words_checks(draft: Draft) -> list[Check]:
-    """Return the failed check of a text with words that say nothing to its template; none for all others."""
+    """Return the failed check of a text with words that its template does not use; empty for other inputs."""
     unused = (draft.fields.get("generation") or {}).get("notes", {}).get("unused_words", [])
     if not unused:
         return []
@@ -132,9 +132,9 @@ def _unused_words_checks(draft: Draft) -> list[Check]:
 
 
 def shape_checks(draft: Draft) -> list[Check]:
-    """Return the failed check of a photo's thing whose outline no template of its name has; none for all others.
+    """Return the failed check of a photo whose outline fits no template of its name; empty for other inputs.
 
-    Such a name may be that of what is in it (yogurt in a carton), or of one of several that the photo shows.
+    The name may be that of the contents (yogurt in a carton), or of one of several objects in the photo.
     """
     poor = (draft.fields.get("generation") or {}).get("notes", {}).get("poor_fit")
     if poor is None:

@@ -1,4 +1,4 @@
-"""What people have said or put right of a twin takes the place of what was estimated or chosen: ``source`` human:<annotator>."""
+"""Corrections by people, which replace estimated or selected values; their ``source`` is human:<annotator>."""
 
 from __future__ import annotations
 
@@ -25,39 +25,41 @@ STAGES = {
     SIZE: ("physical",),
     MOVES: ("points",),
 }
-"""The stages that a correction concerns: the category is a name, as the user's is, of all that comes after the mesh."""
+"""The stages that read each correction; a category acts as a name, like the user's, for all stages after the mesh."""
 NAME = "name"
 NAME_STAGES = ("photo", "name", "generate", "mesh", "gate", *STAGES[CATEGORY])
-"""Key of the amendments that name an input, and their stages: a ``SaidName``, which counts as --name does, from the photo on."""
+"""Key of the amendments that name an input, and their stages: a ``SaidName`` acts like --name, from the photo stage on."""
 SIZE_STAGE = "mesh"
-"""Its amendment ``SIZE``, an Estimate, is the longest side as --longest-side states it; one of ``physical`` is applied after."""
+"""Its amendment ``SIZE``, an Estimate, is the longest side as in --longest-side; the one of ``physical`` is applied
+afterwards.
+"""
 
 
 class SaidName(Record):
-    """What a person calls an input that was built without a name, or with another; ``source`` is who."""
+    """A name given by a person to an input that was built without a name, or with another; ``source`` is the person."""
 
     value: str
     source: str
 
 
 def is_human(source: str) -> bool:
-    """Tell whether a person has said it."""
+    """Return whether a source is a person."""
     return source.startswith(HUMAN)
 
 
 def corrected_category(draft: Draft[Item]) -> str | None:
-    """Return the category that a person has given, as far as the stage that runs is concerned."""
+    """Return the category given by a person, if the running stage reads it."""
     return next((str(each[CATEGORY]) for each in draft.amendments.values() if CATEGORY in each), None)
 
 
 def said_name(draft: Draft[Item]) -> SaidName | None:
-    """Return the name that a person has given an input since, as far as the stage that runs is concerned."""
+    """Return the name given later by a person, if the running stage reads it."""
     said = next((each[NAME] for each in draft.amendments.values() if NAME in each), None)
     return None if said is None else SaidName.model_validate(said)
 
 
 def name_by_person(draft: Draft[Item]) -> str | None:
-    """Return what people call the object: the word of whoever has corrected it counts before the user's; None: nobody says."""
+    """Return the object's name as stated by people: a correction takes precedence over the user's input; None if not stated."""
     corrected = corrected_category(draft)
     if corrected is not None:
         return corrected
@@ -66,13 +68,13 @@ def name_by_person(draft: Draft[Item]) -> str | None:
 
 
 def said_size(draft: Draft[Item]) -> Estimate | None:
-    """Return the longest side (m) that a person has stated of an input since, where the mesh stage runs."""
+    """Return the longest side (m) stated later by a person, if the running stage is the mesh stage."""
     said = draft.amendments.get(SIZE_STAGE, {}).get(SIZE)
     return None if said is None else Estimate.model_validate(said)
 
 
 def corrected_estimates(estimates: PhysicalEstimates, amendment: Mapping[str, Any]) -> PhysicalEstimates:
-    """Return the estimates with the mass (kg) and longest side (m) that a person has given."""
+    """Return the estimates with a person's mass (kg) and longest side (m)."""
     mass, size = amendment.get(MASS), amendment.get(SIZE)
     return replace(
         estimates,
@@ -82,17 +84,17 @@ def corrected_estimates(estimates: PhysicalEstimates, amendment: Mapping[str, An
 
 
 def corrected_language(language: Language, draft: Draft[Item]) -> Language:
-    """Return the words under the category that a person has given."""
+    """Return the description with a person's category."""
     category = corrected_category(draft)
     return language if category is None else language.model_copy(update={"category": category})
 
 
 def corrected_points(selected: SelectedPoints, request: PointsRequest, amendment: Mapping[str, Any]) -> SelectedPoints:
-    """Return the points, those that a person has moved at their candidates.
+    """Return the points, with those that a person has moved at their new candidates.
 
-    A correction is of the point with its id and label; where the annotator has since chosen others, of the only one with the
-    label. Raises BadReply where there is none, and where the candidate is another place of the object by now: the twin has to be
-    looked at again.
+    A correction applies to the point with its id and label; if the annotator has since selected others, to the only point with
+    that label. Raises BadReply if there is none, or if the candidate is now at another place of the object: the twin must be
+    reviewed again.
     """
     functional, grasp = list(selected.functional), list(selected.grasp)
     for point_id, move in sorted(amendment.get(MOVES, {}).items()):
@@ -106,16 +108,17 @@ def corrected_points(selected: SelectedPoints, request: PointsRequest, amendment
 
 
 def place_in_box(positions_m: np.ndarray, candidate: int) -> list[float]:
-    """Return where a candidate lies among all, ``(N, 3)``: from the lower corner of their box, in its longest sides.
+    """Return a candidate's position among all ``(N, 3)``: relative to the lower corner of their box, in units of its longest
+    side.
 
-    So it is the same whatever the object's size is said to be.
+    This makes it independent of the object's size.
     """
     lower, side_m = _box(positions_m)
     return [round(float(each), 6) for each in (positions_m[candidate] - lower) / side_m]
 
 
 def is_at(positions_m: np.ndarray, candidate: int, place: np.ndarray) -> bool:
-    """Tell whether of all candidates none is nearer than this one to a place as ``place_in_box`` gives it."""
+    """Return whether a candidate is the nearest of all to a position as returned by ``place_in_box``."""
     lower, side_m = _box(positions_m)
     distances = np.linalg.norm((positions_m - lower) / side_m - place, axis=1)
     return bool(distances[candidate] <= distances.min())
@@ -141,7 +144,7 @@ def _moved(point: Any, request: PointsRequest, move: Mapping[str, Any]) -> Any:
     candidate = int(move["candidate"])
     if candidate >= len(request.positions_m):
         raise BadReply(f"{point.id} was moved to candidate {candidate}, of {len(request.positions_m)}; review it again")
-    place = move.get("place")  # corrections of earlier versions do not say it
+    place = move.get("place")  # corrections of earlier versions lack it
     if place is not None and not is_at(request.positions_m, candidate, np.asarray(place, float)):
         raise BadReply(
             f"{point.id} was moved by {move['source']} to candidate {candidate}, which is now at another place of"

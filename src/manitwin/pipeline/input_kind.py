@@ -1,4 +1,4 @@
-"""What kind of thing an input is: by the bytes of its files, or by what it claims to be."""
+"""Kinds of inputs, by the content of their files or by their names."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from manitwin.formats.source_files import MESH_SUFFIXES
 from manitwin.pipeline.item import Item
 
 Kind = Literal["image", "photos", "text", "mesh"]
-"""``photos``: several photos of one thing."""
+"""``photos``: several photos of one object."""
 KINDS_OF_INPUT: tuple[Kind, ...] = ("image", "photos", "text", "mesh")
 
 
 def kind_of(item: Item) -> Kind:
-    """Return the kind of an input by its bytes.
+    """Return the kind of an input from the content of its files.
 
-    Raises InputError, also ``wrong_type`` where one of several views of a thing is no photo, and OSError for a file that is gone.
+    Raises InputError (``wrong_type`` also if one of several views is not a photo), and OSError for a missing file.
     """
     kinds: list[Kind] = [sniff(Path(file)).kind for file in item.files]
     if not kinds:
@@ -30,7 +30,7 @@ def kind_of(item: Item) -> Kind:
 
 
 def claimed_kind(item: Item) -> Kind:
-    """Return what an input claims to be: for a file, by its suffix."""
+    """Return the kind of an input that its suffix claims."""
     if item.file is None:
         return "text"
     if item.views:

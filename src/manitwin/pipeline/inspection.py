@@ -1,6 +1,6 @@
-"""What a build has to know of its inputs before anything is made of them, found out in a process with limits of its own.
+"""Inspection of inputs before a build, in a separate process with limits on time and memory.
 
-The functions that begin with ``read_`` run there; nothing else of the driver opens an input. This module imports little: the
+The functions named ``read_*`` run in that process; the driver itself opens no input. This module has few imports, because the
 process imports it.
 """
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from manitwin.pipeline.item import Item
 
 LIMITS = Limits(seconds=10.0, memory_bytes=4 << 30)
-"""Of the inspection of one file: a mesh of 500 MB takes 2 s and the memory of its text."""
+"""Limits for inspecting one file; a mesh of 500 MB takes 2 s, and memory for its text."""
 MAX_NAMES = 10_000
 MAX_RECORD_BYTES = 64 << 20
 _THIS = __name__
@@ -35,20 +35,20 @@ _BY_SUFFIX = {
 
 
 WHOLE = Limits(seconds=300.0, memory_bytes=4 << 30)
-"""Of reading a whole input once, for its digest: 4 GiB from a disk of 15 MB/s."""
+"""Limits for reading a whole input once for its digest: 4 GiB from a disk with 15 MB/s."""
 
 
 class NotInspected(Exception):
-    """An input that could not be looked at within the limits, or at all; its text is the reason why it is left alone."""
+    """An input that could not be inspected at all or within the limits; the message is the reason for ignoring it."""
 
 
 def names_of(meshes: Iterable[Path]) -> Iterator[list[str] | NotInspected]:
-    """Yield the names of other files that each mesh file names, or why nobody can tell."""
+    """Yield for each mesh the names of other files that it references, or why they are unknown."""
     return (_found(answer) for _, answer in iterate_isolated(f"{_THIS}:read_names", meshes, LIMITS))
 
 
 def why_no_inputs(files: Collection[Path]) -> list[str | None]:
-    """Return of each file that has no suffix of an input why it is none, None for an image under another name."""
+    """Return for each file without an input's suffix why it is not an input; None for an image with another suffix."""
     known = {file: _BY_SUFFIX.get(file.suffix.lower()) for file in files}
     unknown = [file for file, reason in known.items() if reason is None]
     for file, answer in iterate_isolated(f"{_THIS}:read_whether_image", unknown, LIMITS):
@@ -58,20 +58,20 @@ def why_no_inputs(files: Collection[Path]) -> list[str | None]:
 
 
 def are_twins(records: Iterable[Path]) -> Iterator[bool]:
-    """Yield of each file called twin.json whether it is a twin's record."""
+    """Yield for each file named twin.json whether it is a twin's record."""
     for _, answer in iterate_isolated(f"{_THIS}:read_whether_twin", records, LIMITS):
-        yield _found(answer) is True  # what cannot be read is listed, and named there
+        yield _found(answer) is True  # unreadable files are listed and reported elsewhere
 
 
 def are_imported(records: Iterable[Path]) -> Iterator[str | None]:
-    """Yield of each import.json why the asset cannot be taken, None where it can."""
+    """Yield for each import.json why the asset cannot be used; None if it can."""
     for _, answer in iterate_isolated(f"{_THIS}:read_import", records, LIMITS):
         found = _found(answer)
         yield str(found) if isinstance(found, NotInspected) else None
 
 
 def imported(record: Path) -> tuple[str, str | None, str | None]:
-    """Return name, licence and attribution of an imported asset; raises UsageError."""
+    """Return the name, licence and attribution of an imported asset. Raises UsageError."""
     found = inspected("read_import", record)
     if isinstance(found, NotInspected):
         raise UsageError(f"{record}: {found}")
@@ -80,19 +80,19 @@ def imported(record: Path) -> tuple[str, str | None, str | None]:
 
 
 def is_image(file: Path) -> bool:
-    """Tell whether a file holds an image; what cannot be inspected is none."""
+    """Return whether a file contains an image; False if it cannot be inspected."""
     return inspected("read_kind", file) == "image"
 
 
 def identified(recipe: Recipe, item: Item, frame: int | None) -> tuple[Identity, Rejected | None] | NotInspected:
-    """Return an input's identity, and why an image is refused by its header; ``frame`` chooses a picture of an animation."""
+    """Return an input's identity, and a rejection if an image's header is invalid; ``frame`` selects a frame of an animation."""
     found: tuple[Identity, Rejected | None] | NotInspected
     found = inspected("read_identity", recipe, item, frame, limits=WHOLE)
     return found
 
 
 def inspected(function: str, *arguments: Any, limits: Limits = LIMITS) -> Any:
-    """Return what a function of this module returns in the process with limits; NotInspected where it does not."""
+    """Run a function of this module in the limited process and return its result; NotInspected if it fails."""
     try:
         return run_isolated(f"{_THIS}:{function}", *arguments, limits=limits)
     except (Rejected, UsageError, InputChanged, NotInspected, ProcessCrashed, MemoryError) as error:
@@ -117,8 +117,10 @@ def _found(answer: tuple[bool, Any], limits: Limits = LIMITS) -> Any:
 
 
 def read_identity(recipe: Recipe, item: Item, frame: int | None) -> tuple[Identity, Rejected | None]:
-    """Return an input's identity, and why an image is refused by its header; raises InputError, and InputChanged of one gone."""
-    from manitwin.formats.image_file import check_header  # takes 0.1 CPU-s
+    """Return an input's identity, and a rejection if an image's header is invalid. Raises InputError; InputChanged for a missing
+    file.
+    """
+    from manitwin.formats.image_file import check_header  # 0.1 CPU-seconds to import
 
     identity = recipe.identify(item)
     try:
@@ -130,7 +132,7 @@ def read_identity(recipe: Recipe, item: Item, frame: int | None) -> tuple[Identi
 
 
 def read_names(mesh: Path) -> list[str]:
-    """Return the names of other files in a mesh file; none where it cannot be read, which its reader will say."""
+    """Return the names of other files that a mesh references; empty if it is unreadable, which its reader will report."""
     try:
         return list(islice(named_files(mesh), MAX_NAMES))
     except OSError:
@@ -138,7 +140,7 @@ def read_names(mesh: Path) -> list[str]:
 
 
 def read_whether_image(file: Path) -> str | None:
-    """Return None for an image under another name, else why the file is no input."""
+    """Return None for an image with another suffix, else why the file is not an input."""
     with open_regular(file, NotInspected) as stream:
         try:
             found = image_format(stream.read(64))
@@ -150,18 +152,18 @@ def read_whether_image(file: Path) -> str | None:
 
 
 def read_whether_twin(record: Path) -> bool:
-    """Tell whether a file is a twin's record."""
+    """Return whether a file is a twin's record."""
     return b'"twin_id"' in read_bytes(record, MAX_RECORD_BYTES, NotInspected)
 
 
 def read_import(record: Path) -> tuple[str, str | None, str | None]:
-    """Return name, licence and attribution of an imported asset; raises UsageError."""
-    from manitwin.twin.import_record import read_import_record  # takes 0.5 CPU-s
+    """Return the name, licence and attribution of an imported asset. Raises UsageError."""
+    from manitwin.twin.import_record import read_import_record  # 0.5 CPU-seconds to import
 
     given = read_import_record(record)
     return given.called, given.license, given.attribution
 
 
 def read_kind(file: Path) -> str:
-    """Return the kind of an input by its bytes; raises InputError."""
+    """Return the kind of an input from its content. Raises InputError."""
     return sniff(file).kind

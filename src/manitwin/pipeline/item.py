@@ -1,4 +1,4 @@
-"""One input of the pipeline as the user gave it: the payload of the tasks that make twins."""
+"""One input of the pipeline as given by the user: the payload of the tasks that make twins."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from manitwin.twin.import_record import IMPORTED_MESH
 from manitwin.twin.store import sha256_of_json
 
 ID_DIGITS = 16
-"""64 bits: among 100,000 twins two share an id with a probability of 3e-10."""
+"""64 bits: the probability that two of 100,000 twins share an id is 3e-10."""
 
 
 _END_BYTES = 1 << 20
@@ -31,17 +31,20 @@ _END_BYTES = 1 << 20
 
 @dataclass(frozen=True)
 class Item(Payload):
-    """One input as the user gave it.
+    """One input as given by the user.
 
-    ``file`` is an absolute path, or None where ``text`` is given. ``units`` and ``up`` are what the user said ('auto': unsaid).
-    ``longest_side_m`` is the longest of its length, width and height as it stands, None where the user does not say it.
-    ``given`` is the import.json beside an imported mesh: what another tool says of it. ``variation`` counts the things that are
-    made of one text: each is drawn from a seed of its own. ``views`` are the absolute paths of further photos of the thing that
-    the photo ``file`` shows; ``turns_deg`` is the camera's turn about the vertical in each photo, counter-clockwise seen from
-    above, that of the first 0; empty where nobody states them. ``poses`` is the absolute path of a file, or of the folder of a
-    COLMAP model, that states the cameras of the photos. ``photos_given`` is how many photos there were where they were thinned
-    out; None where all are here. ``masks`` are the absolute paths of pictures of the thing's outline, one a photo, '' where a
-    photo has none; empty where nobody gives one. ``box_px`` is where the thing is in the one photo: left, top, right, bottom.
+    - ``file``: absolute path, or None if ``text`` is given
+    - ``units``, ``up``: as stated by the user ('auto': not stated)
+    - ``longest_side_m``: the largest of length, width and height of the object as it stands; None if not stated
+    - ``given``: the import.json of an imported mesh, with what the asset states
+    - ``variation``: number of the object among those made from one text, each with a seed of its own
+    - ``views``: absolute paths of further photos of the object in the photo ``file``
+    - ``turns_deg``: the camera's rotation about the vertical in each photo, counter-clockwise seen from above, the first 0;
+      empty if not stated
+    - ``poses``: absolute path of a file, or of a COLMAP model folder, with the camera poses
+    - ``photos_given``: original number of photos if they were thinned out; None otherwise
+    - ``masks``: absolute paths of mask images, one per photo, '' for a photo without; empty if there are none
+    - ``box_px``: bounding box of the object in a single photo: left, top, right, bottom
     """
 
     file: str | None
@@ -63,16 +66,15 @@ class Item(Payload):
 
     @property
     def files(self) -> tuple[str, ...]:
-        """All files that were given: the mesh, or the photos in order; none of a text."""
+        """All given files: the mesh, or the photos in order; empty for a text."""
         return () if self.file is None else (self.file, *self.views)
 
     @property
     def title(self) -> str:
-        """The name of the file and the number of further photos, or the begin of the text, with the number of a variation.
+        """The file name with the number of further photos, or the beginning of the text with the variation's number.
 
-        Of a photo with a box that too: others of its things may be inputs.
-
-        The mesh of every imported asset has the same name: it is told by its folder.
+        The box is included for a photo, as it may contain several inputs. Imported assets are called by their folder, because
+        their meshes all have the same name.
         """
         if self.file:
             path = Path(self.file)
@@ -86,7 +88,9 @@ class Item(Payload):
 
     @property
     def modified_at(self) -> float | None:
-        """When its files were last changed (st_ctime, which nobody sets), None where it has none now."""
+        """When the files were last changed (st_ctime, which cannot be set by users); None if there are none, or one is
+        missing.
+        """
         try:
             beside = () if self.poses is None else (self.poses, *_named_masks(Path(self.poses)))
             beside = (*beside, *filter(None, self.masks))
@@ -95,7 +99,7 @@ class Item(Payload):
             return None
 
     def to_json(self) -> dict[str, Any]:
-        """Return the fields as a ledger keeps them; of those that came later, only what is said: old rows stay equal."""
+        """Return the fields as stored in the ledger; fields added later are omitted at their defaults, to keep old rows equal."""
         fields = super().to_json()
         later = {"given": self.given is None, "variation": not self.variation}
         later |= {"views": not self.views, "turns_deg": not self.turns_deg}
@@ -106,7 +110,7 @@ class Item(Payload):
 
     @classmethod
     def from_json(cls, fields: Mapping[str, Any]) -> Self:
-        """Return the item that a ledger of this version or an earlier one keeps."""
+        """Return the item from a ledger of this version or an earlier one."""
         told: dict[str, Any] = {
             name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()
         }
@@ -114,11 +118,11 @@ class Item(Payload):
 
 
 def twin_id(item: Item) -> str:
-    """Return the id of the twin that an item makes: a hash of the input's bytes, name, size, units and up axis, of nothing else.
+    """Return the id of an item's twin: a hash of the input's content, name, size, units and up axis only.
 
-    Of several photos of one thing it covers all, in their order, and the stated turns, or poses and masks; of one its mask and
-    box. What another tool says of an imported mesh is part of the input. Another configuration is another revision of the same
-    twin. Raises InputError ``unreadable`` where a file has gone since the input was listed, or is no regular one now.
+    For several photos it covers all of them in order, with the stated turns, or poses and masks; for a single photo its mask
+    and box. An imported asset's import.json is part of the content. Another configuration gives another revision of the same
+    twin. Raises InputError ``unreadable`` if a file is missing or is not a regular file.
     """
     if item.file is None:
         content: dict[str, object] = {"text": item.text}
@@ -152,9 +156,9 @@ def twin_id(item: Item) -> str:
 
 
 def masks_of(item: Item) -> list[Path | None]:
-    """Return the mask of each photo: the one that is given of it, else the one that the file of poses names, else None.
+    """Return the mask of each photo: the given one, else the one named in the file of poses, else None.
 
-    Raises InputError as ``cameras_of_photos`` does.
+    Raises InputError like ``cameras_of_photos``.
     """
     files = [Path(file) for file in item.files]
     named = [None] * len(files) if item.poses is None else masks_of_photos(files, Path(item.poses))
@@ -163,7 +167,7 @@ def masks_of(item: Item) -> list[Path | None]:
 
 
 def _named_masks(poses: Path) -> list[str]:
-    """Return the masks that a file of poses names and that are there; none where it is not read."""
+    """Return the existing masks that a file of poses names; empty if it is unreadable."""
     try:
         cameras = read_poses(poses).cameras
     except InputError:
@@ -172,7 +176,7 @@ def _named_masks(poses: Path) -> list[str]:
 
 
 def require_readable_size(path: Path) -> None:
-    """Raise InputError ``too_large`` for a file that no reader takes."""
+    """Raise InputError ``too_large`` for a file beyond the limit of all readers."""
     size = path.stat().st_size
     if size > MAX_KEPT_BYTES:
         said = f"{size} bytes exceed the limit of {MAX_KEPT_BYTES}"
@@ -182,7 +186,7 @@ def require_readable_size(path: Path) -> None:
 
 
 def file_sha256(path: Path) -> str:
-    """Return the sha256 of a file; of one that no reader takes, that of its size, beginning and end."""
+    """Return the SHA-256 of a file; for a file beyond the size limit, that of its size, beginning and end."""
     try:
         with open_regular(path, partial(InputError, "unreadable")) as stream:
             size = os.fstat(stream.fileno()).st_size

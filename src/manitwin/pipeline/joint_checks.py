@@ -1,4 +1,4 @@
-"""What becomes of a thing that moves in itself when it is set down with its joints free."""
+"""Quality checks of an articulated object set down with its joints free."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from manitwin.twin.record_values import Check
 
 DROP_M, SECONDS = 0.002, 3.0
 MOVED_M, TURNED_RAD = 0.01, math.radians(5.0)
-"""As of a rigid body that stays in a placement (``PlacementConfig``); a joint stays that moves by no more."""
+"""As for a rigid body in a stable placement (``PlacementConfig``); the same limits apply to joint motion."""
 
 
 def joint_checks(draft: Draft[Item]) -> list[Check]:
-    """Return whether the thing stays in its first placement with its joints free, and whether these stay; none of a rigid one."""
+    """Check whether an articulated object stays in its first placement with free joints, and its joints too; empty if rigid."""
     articulation = read_articulation(draft)
     if articulation is None:
         return []
-    from manitwin.physics.mujoco.articulated import settle_articulated  # the engine loads where a stage needs it
+    from manitwin.physics.mujoco.articulated import settle_articulated  # imported here, as it loads the physics engine
 
     body, first = articulated_body(draft, articulation), draft.field("placements")[0]
     rotation = rotation_from_quaternion_wxyz(np.array(first["quaternion_wxyz"]))

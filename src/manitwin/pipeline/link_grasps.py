@@ -1,4 +1,4 @@
-"""Grasps of one link of a thing that moves in itself, its joints locked: both fingertips touch that link."""
+"""Grasps restricted to one link of an articulated object with locked joints: both fingertips must touch it."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from manitwin.pipeline.object_state import load_solid
 from manitwin.robots.grippers.gripper import Gripper
 
 ON_LINK = "on_link"
-"""The filter's name in the counts of what was left."""
+"""The filter's name in the counts of remaining proposals."""
 FOCUS_POINTS = 64
-"""Of a link's surface: around them proposals are denser."""
+"""Number of points on the link's surface around which proposals are denser."""
 
 
 @dataclass(frozen=True)
 class LinkScreen:
-    """A screen that also asks for one link: ``surface`` is the solid with its links in the place of parts."""
+    """A screen that also requires contact with one link; ``surface`` is the solid with links as parts."""
 
     screen: Screen
     surface: PartedSolid
     link: str
 
     def __call__(self, raw: GraspProposals) -> Screened:
-        """Keep the proposals that pass the screen and of which both fingertips touch the link."""
+        """Keep the proposals that pass the screen and whose fingertips both touch the link."""
         left = self.screen(raw)
         grasps = left.proposals
         contacts = self.surface.contacts(grasps.gripper_to_object, grasps.depth_m, grasps.width_m)
@@ -41,7 +41,7 @@ class LinkScreen:
         return replace(left, proposals=grasps.take(on_link), merits=left.merits.take(on_link), counts=counts)
 
     def why_none(self, counts: dict[str, int]) -> Rejected:
-        """Say why nothing was left."""
+        """Explain why no proposal remained."""
         before = [count for name, count in counts.items() if name != ON_LINK]
         if not before or not before[-1]:
             return self.screen.why_none(counts)
@@ -54,14 +54,14 @@ class LinkScreen:
 
 @dataclass(frozen=True)
 class ChosenLink:
-    """The link of which grasps are asked: the solid with the link of each of its faces, and the link's name."""
+    """The link to be grasped: the solid with the link of each face, and the link's name."""
 
     surface: PartedSolid
     link: str
 
     @classmethod
     def read(cls, draft: Draft, gripper: Gripper, link: str | None) -> ChosenLink | None:
-        """Return the link of a name; None where none is asked for. Raises Rejected where the thing has no such link."""
+        """Return the link with a name; None if none is requested. Raises Rejected if the object has no such link."""
         if link is None:
             return None
         articulation = read_articulation(draft)
@@ -74,12 +74,12 @@ class ChosenLink:
         return cls(PartedSolid(solid, RayCaster(solid), labels, names, 0.0, pads_apart_m(gripper)), link)
 
     def focused(self, request: GraspRequest) -> GraspRequest:
-        """Return the request with places all over the link in the place of the selected points: few of these may lie on it."""
+        """Return the request with focus points all over the link instead of the selected points, few of which may lie on it."""
         faces = self.surface.labels == self.surface.part_ids.index(self.link)
         piece = trimesh.Trimesh(self.surface.solid.vertices, self.surface.solid.faces[faces], process=False)
         places, _, _ = sample_surface(piece, FOCUS_POINTS, np.random.default_rng(request.seed))
         return replace(request, focus_points_m=places)
 
     def screened(self, screen: Screen) -> LinkScreen:
-        """Return a screen that also asks for the link."""
+        """Return a screen that also requires contact with the link."""
         return LinkScreen(screen, self.surface, self.link)

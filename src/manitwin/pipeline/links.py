@@ -1,4 +1,4 @@
-"""The links and joints of an imported thing that moves in itself, as its mesh was brought to the object frame and its size."""
+"""Links and joints of an imported articulated object, transformed to the object frame and scaled to the twin's size."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import load_hulls, load_visual, read_given
 from manitwin.twin.link_records import Articulation, Link
 
-_ROUNDING = 1e-9  # of the mass
+_ROUNDING = 1e-9  # relative to the mass
 
 
 @dataclass(frozen=True)
 class LinkMass:
-    """Mass, centre of mass ``(3,)`` and inertia ``(3, 3)`` about it of one link in the object frame, and who said so."""
+    """Mass, centre of mass ``(3,)`` and inertia ``(3, 3)`` about it of one link in the object frame, with their source."""
 
     mass_kg: float
     center_of_mass_m: np.ndarray
@@ -36,7 +36,7 @@ class LinkMass:
 
 
 def read_articulation(draft: Draft[Item]) -> Articulation | None:
-    """Return what moves in a thing, in the object frame at the size that it has by now; None where nothing does."""
+    """Return an object's articulation in the object frame at its current size; None for a rigid object."""
     given = read_given(draft)
     if given is None or given.articulation is None:
         return None
@@ -44,9 +44,9 @@ def read_articulation(draft: Draft[Item]) -> Articulation | None:
 
 
 def face_links(draft: Draft[Item], articulation: Articulation, mesh: trimesh.Trimesh) -> np.ndarray:
-    """Return the link of each face ``(F,) uint8`` of a mesh of the thing: that of the nearest place of the imported surface.
+    """Return the link of each face ``(F,) uint8`` of a mesh of the object: that of the nearest place on the imported surface.
 
-    Raises InputError where the imported mesh is not the one that its import.json was written for.
+    Raises InputError if the imported mesh does not match its import.json.
     """
     assert draft.payload.file is not None
     parts = read_mesh(Path(draft.payload.file)).parts
@@ -64,7 +64,7 @@ def face_links(draft: Draft[Item], articulation: Articulation, mesh: trimesh.Tri
 
 
 def link_solids(solid: trimesh.Trimesh, labels: np.ndarray, count: int) -> list[trimesh.Trimesh]:
-    """Return the closed solid of each link; where repair had joined links, what it had cut open is closed again."""
+    """Return the closed solid of each link; where repair had joined links, the cuts are closed again."""
     found = []
     for link in range(count):
         faces = np.asarray(solid.faces)[labels == link]
@@ -75,7 +75,7 @@ def link_solids(solid: trimesh.Trimesh, labels: np.ndarray, count: int) -> list[
 
 
 def shape_of_link(solid: trimesh.Trimesh, hulls: list[int]) -> dict[str, Any]:
-    """Return what a table of links wants to know of a link's solid: its hulls, and its mass properties as if of one kilogram."""
+    """Return the hulls of a link's solid, and its mass properties for one kilogram."""
     even = solid_mass_properties(solid, 1.0)
     return {
         "hulls": hulls,
@@ -86,10 +86,10 @@ def shape_of_link(solid: trimesh.Trimesh, hulls: list[int]) -> dict[str, Any]:
 
 
 def link_masses(draft: Draft[Item], articulation: Articulation) -> list[LinkMass]:
-    """Return the mass properties of the links, which weigh together what the twin does.
+    """Return the mass properties of the links, which add up to the twin's mass.
 
-    Where the asset gives those of all of them these are kept, an inertia that it lacks as of an even filling; else each is filled
-    evenly, all with one density.
+    If the asset states mass and centre of mass of all links, these are used (scaled to the twin's mass), with the inertia of a
+    uniform solid where it is missing. Otherwise all links are uniform solids with one density.
     """
     shapes, mass_kg = draft.field("collision")["links"], draft.field("physical")["mass_kg"]["value"]
     given = read_given(draft)
@@ -157,7 +157,7 @@ def articulated_body(draft: Draft[Item], articulation: Articulation) -> Articula
 
 
 def _scale(draft: Draft[Item]) -> float:
-    """Return by how much the thing has grown since it was brought to the object frame."""
+    """Return the scale factor applied since the object was brought to the object frame."""
     if "solid.npz" not in draft.paths:
         return 1.0
     sizes = []

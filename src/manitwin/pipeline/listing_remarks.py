@@ -1,4 +1,4 @@
-"""What a person is told of a listed folder: its files counted by what they are, and why some are left alone."""
+"""Messages about a listed input folder: counts of files by class, and reasons for ignored files."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def listing_remarks(
     left: dict[Path, str],
     beside_meshes: tuple[Path, ...],
 ) -> list[str]:
-    """Return a line of counts that add up to all files, then one a reason; none where every file is an input of its own."""
+    """Return a line of counts that add up to all files, then one line per reason; empty if every file is an input of its own."""
     if not (parts or left or beside_meshes):
         return []
     masks = [part for part, whole in parts.items() if whole.suffix.lower() in IMAGE_SUFFIXES]

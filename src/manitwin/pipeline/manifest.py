@@ -1,4 +1,4 @@
-"""Read the inputs of a build: files, folders and CSV or JSONL manifests, as a list of items."""
+"""Reading of a build's inputs (files, folders, CSV or JSONL manifests) as items."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ _KNOWN = frozenset(COLUMNS)
 
 Refusal = Callable[[Item], str | None]
 Turns = Sequence[float] | Callable[[int], Sequence[float]]
-"""The turns of photos, or what makes them of their number, which a folder tells only once it is listed."""
+"""The turns of photos, or a function of their number, which for a folder is known only once it is listed."""
 
 
 @dataclass
 class Notes:
-    """Collect what a user should be told of the inputs: ``remarks`` are lines, ``folders`` say what became of each file.
+    """Messages to the user about the inputs: ``remarks`` are lines, ``folders`` classify the files of folders.
 
-    ``under_way`` says how far they are read: a folder of 100,000 files takes a while.
+    ``under_way`` is the progress of reading, as a folder of 100,000 files takes a while.
     """
 
     remarks: list[str] = field(default_factory=list)
@@ -51,12 +51,14 @@ class Notes:
     under_way: str = ""
 
     def tell(self, under_way: str) -> None:
-        """Note how far the inputs are read."""
+        """Set the progress of reading the inputs."""
         self.under_way = under_way
 
 
 def require_inputs(root: DatasetRoot, inputs: Sequence[str | Path], texts: Sequence[str]) -> None:
-    """Raise UsageError where a build has no inputs and no data set to go on with, and where it cannot be made or written."""
+    """Raise UsageError if a build has neither inputs nor an existing data set, or if the data set cannot be created or
+    written.
+    """
     if root.flat:
         raise UsageError(
             f"{root.url}: contains twins in the flat layout of earlier versions, which can be read but not"
@@ -83,11 +85,11 @@ def iterate_items(
     poses: str | Path | None = None,
     refusal: Refusal = lambda item: None,
 ) -> Iterator[Item]:
-    """Yield as ``_given_items`` does, of each text ``count`` variations; with ``views`` one item of all photos.
+    """Yield the items of ``_given_items``, with ``count`` variations of each text; with ``views`` a single item of all photos.
 
-    Photos of a folder of ``views`` are in natural order (2 before 10). ``poses`` is a file that states their cameras; those of
-    a folder of which it has none are left out and noted. A mask or a box among the ``defaults`` is of one photo. Raises
-    UsageError as it does, for a photo or a mesh where more than one is asked for, and for views that are not all photos.
+    Photos from a folder of ``views`` are in natural order (2 before 10). ``poses`` is a file with their camera poses; photos of
+    a folder without a pose are left out, with a remark. A mask or box among the ``defaults`` is that of a single photo. Raises
+    UsageError like ``_given_items``, if variations are requested of a file, and for views that are not all photos.
     """
     if any(defaults.get(column) is not None for column in (MASK, BOX)):
         inputs, texts = list(inputs), list(texts)
@@ -150,13 +152,11 @@ def _given_items(
     strict: bool,
     refusal: Refusal,
 ) -> Iterator[Item]:
-    """Yield the items one by one, so that a manifest may be of any length; notes are added at the end of each.
+    """Yield the items one at a time, so that manifests may have any length; notes are added at the end of each input.
 
-    ``texts`` are things to make from words alone, after the ``inputs``. ``strict``: a column that nobody knows is an error.
-    ``refusal`` says of an item why nothing can ever be made of it.
-
-    Raises UsageError for a path that is not there, a folder without inputs or a manifest that cannot be read; and, behind
-    the last item, for the rows with an unknown value and the items that are refused, all of them together.
+    ``texts`` follow the ``inputs``. ``strict``: an unknown column is an error. ``refusal`` returns why an item can never be
+    built. Raises UsageError for a missing path, a folder without inputs or an unreadable manifest; and, after the last item,
+    one error for all rows with invalid values and all refused items.
     """
     refused = RefusedInputs()
     unsaid = dict.fromkeys(("name", "longest_side_m", "license", "attribution"))
@@ -210,7 +210,7 @@ def _manifest_items(
 ) -> Iterator[Item]:
     unknown: dict[str, str] = {}
     groups = PhotoGroups(path)
-    forget_folders()  # a link may lead elsewhere than at the last reading
+    forget_folders()  # a link may have changed since the last reading
     line = None
     for line, row in manifest_rows(path, COLUMNS):
         for column in sorted(map(str, row.keys() - _KNOWN - unknown.keys())):
@@ -227,7 +227,7 @@ def _manifest_items(
             item = None if groups.takes(line, row) else item_of(row, path.parent, defaults, where, unknown)
         if item is not None:
             yield from _allowed(item, where, refusal, refused)
-    with refused.noted():  # a group that contradicts itself is told with the rows before, and ends the groups
+    with refused.noted():  # an inconsistent group is reported with the preceding rows, and ends the groups
         for item, where in groups.items(lambda row, where: item_of(row, path.parent, defaults, where, unknown)):
             notes.remarks.extend(_thinned(item, where))
             yield from _allowed(item, where, refusal, refused)
@@ -241,6 +241,6 @@ def _manifest_items(
 
 
 def _nearest(column: str) -> list[str]:
-    """Return the column that one may be meant for, if any; a short name is like much (a mask like mass_kg)."""
+    """Return the column that a name may be meant for, if any; for short columns a closer match is required (mask vs. mass_kg)."""
     near = get_close_matches(column, COLUMNS, n=1, cutoff=0.6)
     return get_close_matches(column, near, cutoff=0.75) if near and len(near[0]) <= SHORT else near

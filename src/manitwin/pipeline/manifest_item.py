@@ -1,4 +1,4 @@
-"""What one row of a manifest, one file or one text says, as an item of a build."""
+"""Conversion of a manifest row, a file or a text to an item."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH, is_importe
 
 _COLUMNS_SHOWN = 20
 LONGEST = {"name": 200, "text": 4000, "license": 200, "attribution": 4000, "file": 4095, "poses": 4095, "mask": 4095}
-"""Characters of a column: a longer name is none, and a longer text is taken by no generator."""
+"""Most characters of a column's value; a longer name is not a name, and no generator accepts longer texts."""
 _CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
-"""What changes a terminal or the order of what is read, and lone surrogates; a tab and an end of line do not."""
+"""Characters that control a terminal or the reading direction, and lone surrogates; tab and end of line are allowed."""
 _LINES = re.compile(r"[\r\n\t\u2028\u2029]")
 COLUMNS = (
     "file",
@@ -45,9 +45,9 @@ Up = Literal["y", "z", "auto"]
 def item_of(
     row: dict[str, Any], folder: Path, defaults: dict[str, Any], where: str, unknown: dict[str, str] | None = None
 ) -> Item:
-    """Return the item that a row says, on top of the ``defaults``; paths are absolute or relative to ``folder``.
+    """Return the item of a row, completed by the ``defaults``; paths are absolute or relative to ``folder``.
 
-    ``where`` begins messages; ``unknown`` are the row's other columns. Raises UsageError.
+    ``where`` is the prefix of messages; ``unknown`` are the row's other columns. Raises UsageError.
     """
     said = {key: str(value).strip() for key, value in row.items() if key in COLUMNS and value not in (None, "")}
     values = with_defaults(said, defaults)
@@ -86,10 +86,10 @@ def item_of(
 
 
 def _resolved(path: str) -> str:
-    """Return the real path of a file: that of its folder is asked for once, since a manifest names many in few folders.
+    """Return the real path of a file; the path of its folder is cached, as manifests name many files in few folders.
 
-    A link to a file of another ending stays: stores of content, such as the cache of Hugging Face, keep ``mug.obj`` as a link to
-    a file that is named by its digest, beside which nothing lies that the mesh names.
+    A link to a file with another suffix is kept: content stores such as the cache of Hugging Face have ``mug.obj`` as a link to
+    a file named by its digest, without the files that the mesh references beside it.
     """
     place = os.path.join(_real_folder(os.path.dirname(path)), os.path.basename(path))
     if not os.path.islink(place):
@@ -104,18 +104,18 @@ def _real_folder(path: str) -> str:
 
 
 def forget_folders() -> None:
-    """Ask anew where folders truly lie: a link may have been changed."""
+    """Clear the cache of folder paths, as links may have changed."""
     _real_folder.cache_clear()
 
 
 def listed_columns(unknown: dict[str, str]) -> str:
-    """Name the unknown columns, of many the first."""
+    """List the unknown columns, truncated if there are many."""
     named = [unknown[column] for column in sorted(unknown)[:_COLUMNS_SHOWN]]
     return ", ".join([*named, "..."] if len(unknown) > _COLUMNS_SHOWN else named)
 
 
 def unusable(key: str, value: str) -> str | None:
-    """Return why a value of a column cannot be used, None where it can; a file may have any name that there is."""
+    """Return why a column's value cannot be used; None if it can. File names may contain any characters except NUL."""
     most = LONGEST.get(key, LONGEST["name"])
     if len(value) > most:
         return f"{len(value)} characters; give at most {most}"
@@ -129,14 +129,14 @@ def unusable(key: str, value: str) -> str | None:
 
 
 def shortened(path: str) -> str:
-    """Return a path for a message: its beginning and end."""
+    """Return a path for a message, shortened in the middle."""
     return printable_line(path, max_characters=200)
 
 
 def _imported_item(folder: Path, values: dict[str, Any], where: str) -> Item:
-    """Return the item of an imported asset; unit and axes are those that the import wrote, whatever the user says.
+    """Return the item of an imported asset; its unit and axes are those that the import wrote, regardless of the user's input.
 
-    A stated longest side counts: files of some converters have the wrong unit, and those of some data sets have none.
+    A stated longest side is used: some converters write a wrong unit, and some data sets have none.
     """
     longest_side_m = stated_size_m(values, where)
     require_of_photo(values, str(folder / IMPORTED_MESH), where)

@@ -1,4 +1,4 @@
-"""The rows of a manifest as they stand in its file: CSV with a header, or JSONL."""
+"""The rows of a manifest file: CSV with a header, or JSONL."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from manitwin.formats.json_file import parse_json
 
 
 def manifest_rows(path: Path, columns: tuple[str, ...]) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield the rows of a manifest, each with the number of its line; a value of ``columns`` is a text, a number or None.
+    """Yield each row of a manifest with its line number; values of ``columns`` are strings, numbers or None.
 
-    Raises UsageError naming file and line.
+    Raises UsageError with file and line.
     """
     yield from read_csv(path, UsageError) if path.suffix.lower() == ".csv" else _jsonl_rows(path, columns)
 

@@ -1,4 +1,4 @@
-"""Pictures in a folder that are masks of the photos beside them, by their names: ``mug.jpg`` and ``mug_mask.png``."""
+"""Masks in a folder that belong to photos by their names: ``mug.jpg`` and ``mug_mask.png``."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ _OF_A_PHOTO = re.compile(r"(.+)[_.-]mask", re.IGNORECASE)
 
 
 def masks_beside(names: Sequence[str]) -> dict[str, str]:
-    """Return of images by their names, with ``/``, each that is called a mask of another one in its folder: mask to photo.
+    """Map masks to photos among image names (with ``/``), by name within the same folder.
 
-    What is a mask of two photos of one name (``mug.jpg``, ``mug.png``) is that of neither, and a mask has none itself.
+    A mask that matches two photos of one name (``mug.jpg``, ``mug.png``) belongs to neither, and a mask has no mask itself.
     """
     photos: dict[str, list[str]] = {}
     for name in names:
@@ -31,9 +31,9 @@ def masks_beside(names: Sequence[str]) -> dict[str, str]:
 
 
 def masks_of_photos(photos: Sequence[Path]) -> dict[Path, Path]:
-    """Return the mask that lies beside each of some photos, where one does: a folder of theirs is read once.
+    """Return the mask beside each photo that has one; each folder is read once.
 
-    In a folder with a mesh there is none, as pictures there may be its textures. A folder that cannot be read has none.
+    Folders with a mesh are skipped, as their images may be textures. An unreadable folder has no masks.
     """
     found: dict[Path, dict[str, str]] = {}
     for photo in photos:

@@ -1,4 +1,4 @@
-"""Mass spread over parts of unlike matter: a hammer's steel head weighs more than the wood of its handle."""
+"""Mass distribution over parts of different materials, such as a hammer's steel head and wooden handle."""
 
 from __future__ import annotations
 
@@ -18,11 +18,10 @@ from manitwin.models.annotators.priors import load_materials
 def mass_by_parts(
     solid: trimesh.Trimesh, mass_kg: float, materials: Mapping[str, str], prior: Prior, seed: int
 ) -> MassProperties | None:
-    """Return the mass properties of a solid of ``mass_kg`` whose parts are each of their material, by role.
+    """Return the mass properties of a solid of ``mass_kg`` whose parts have the given materials, by role.
 
-    The parts are those that the rule of the prior's form tells (``geometry/parts/part_rules.py``), the shares of the mass those
-    of volume times the materials' usual densities; the whole keeps its mass. None where the form shows no such parts or a part's
-    material is not said: nothing is guessed.
+    The parts are found by the part rule of the prior (``geometry/parts/part_rules.py``). The mass is distributed in proportion
+    to volume times the materials' typical densities. None if the shape shows no such parts, or a part's material is not stated.
     """
     if prior.parts is None or len(set(materials.values())) < 2:
         return None
@@ -33,7 +32,7 @@ def mass_by_parts(
     if found is None or any(found.roles[role] not in materials for role in np.unique(found.index)):
         return None
     known = load_materials()
-    # of roles that the solid does not show nothing is asked
+    # roles that the solid does not have need no material
     density = np.array([known[materials[r]].density_kg_m3.typical if r in materials else 0.0 for r in found.roles])
     masses = volumes_m3 * density[found.index]
     return mass_properties_of(centers_m, masses * (mass_kg / masses.sum()), float(solid.volume))

@@ -1,4 +1,4 @@
-"""Make any mesh textured parts and a watertight solid, upright in the object frame, in metres (paper, "3D Generation")."""
+"""Standardization of any mesh: textured parts and a watertight solid, in the object frame, in metres (paper, "3D Generation")."""
 
 from __future__ import annotations
 
@@ -36,13 +36,16 @@ from manitwin.twin.import_record import ImportRecord, read_import_record
 
 _GENERATED = "generated.glb"
 _LEAST_LENGTH_M = 1e-9
-_LEAST_AREA = 1e-12  # of the square of the longest side
-_TURNED_DEG = 10.0  # less is a scan that stands a little off its base, not another pose
+_LEAST_AREA = 1e-12  # relative to the square of the longest side
+_TURNED_DEG = 10.0  # a smaller angle is a scan slightly off its base, not another pose
 
 
 @dataclass(frozen=True)
 class MeshStage:
-    """Read, repair, scale and orient the mesh (the paper's "standardization": watertight, metres, canonical pose)."""
+    """Read, repair, scale and orient the mesh (paper, "standardization": watertight, metres, canonical pose).
+
+    Writes ``canonical.glb``, ``canonical.npz`` and the field ``geometry``.
+    """
 
     settings: MeshConfig
 
@@ -57,7 +60,7 @@ class MeshStage:
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Write ``canonical.glb`` and ``canonical.npz`` (vertices (V, 3) m, faces (F, 3)); return ``geometry``.
 
-        Raises InputError where the file cannot be read, and Rejected ``degenerate`` where its surface has no extent.
+        Raises InputError for an unreadable file, and Rejected ``degenerate`` for a surface without extent.
         """
         generated = _GENERATED in draft.paths
         path = _input_path(draft, generated)
@@ -72,9 +75,7 @@ class MeshStage:
         soup = _soup(parts)
         _check_extent(soup, path)
         try:
-            with np.errstate(
-                all="ignore"
-            ):  # numbers at the edge of what a double holds: what comes of them is looked at
+            with np.errstate(all="ignore"):  # overflows at the limits of double precision; the results are checked
                 said = _said_up(draft, generated), _said_by(draft, generated)
                 by_convention = prior is not None and not generated and _up_is_convention(draft)
                 result, chosen, to_object = self._solid(soup, file, said, prior, by_convention)
@@ -100,7 +101,7 @@ class MeshStage:
             to_mesh = to_object @ np.diag([unit.factor / larger] * 3 + [1.0]) @ OBJECT_TO_GLTF
             moved = ImportRecord.model_validate(known).moved(to_mesh)
             geometry["known"] = (moved if larger == 1.0 else moved.scaled(larger)).model_dump(mode="json")
-        if draft.payload.given is not None:  # what else is given of the mesh has to follow it
+        if draft.payload.given is not None:  # other data of the import must follow the mesh
             geometry["input_to_object"] = (sized @ to_metres).tolist()
         return {"geometry": geometry}
 
@@ -112,9 +113,9 @@ class MeshStage:
         prior: Prior | None,
         by_convention: bool,
     ) -> tuple[RepairResult, UpChoice, np.ndarray]:
-        """Return the repaired solid, how it was turned, and its transform to the object frame ``(4, 4)``.
+        """Return the repaired solid, its up axis, and its transform to the object frame ``(4, 4)``.
 
-        ``said`` is the up axis that was said, and who said it; ``by_convention`` as ``choose_up`` has it.
+        ``said`` is the stated up axis with its source; ``by_convention`` as in ``choose_up``.
         """
         result = repair(soup, **self.settings.repair.model_dump())
         stands = None if prior is None or prior.often_stands else prior.stands
@@ -137,13 +138,13 @@ class MeshStage:
 
 
 def _check_extent(soup: trimesh.Trimesh, path: Path) -> None:
-    """Raise Rejected ``degenerate`` for a surface in metres that is a point, a line, or no larger than an atom."""
+    """Raise Rejected ``degenerate`` for a surface in metres that is a point, a line, or smaller than an atom."""
     triangles = np.asarray(soup.vertices)[np.asarray(soup.faces)]
     low = triangles.min(axis=(0, 1))
     longest = float((triangles.max(axis=(0, 1)) - low).max())
     if not longest >= _LEAST_LENGTH_M:
         raise _degenerate(path, f"all of its points lie within {longest:.3g} m")
-    scaled = (triangles - low) / longest  # areas of small lengths would be rounded to zero
+    scaled = (triangles - low) / longest  # areas of small lengths would underflow
     cross = np.cross(scaled[:, 1] - scaled[:, 0], scaled[:, 2] - scaled[:, 0])
     if not float(np.linalg.norm(cross, axis=1).sum()) > _LEAST_AREA:
         raise _degenerate(path, "all of its faces have zero area")
@@ -164,9 +165,10 @@ def _input_path(draft: Draft[Item], generated: bool) -> Path:
 
 
 def _to_about_stated_size(file: MeshFile, factor: float, draft: Draft[Item]) -> float:
-    """Return the factor that brings the file's longest side, ``factor`` m for each of its units, to the length that was stated.
+    """Return the factor from the file's longest side (``factor`` m per unit) to the stated length; 1 if none is stated.
 
-    Repair goes by lengths in metres, such as the wall of an open sheet; turned as it stands, the thing may be a little longer.
+    Repair uses lengths in metres, such as the wall of an open sheet. The exact scale is applied later, since the object may be
+    a little longer once upright.
     """
     longest_m = _stated_m(draft)
     if longest_m is None:
@@ -176,7 +178,7 @@ def _to_about_stated_size(file: MeshFile, factor: float, draft: Draft[Item]) -> 
 
 
 def _stated_m(draft: Draft[Item]) -> float | None:
-    """Return the longest side (m) that a person stated, in a review or with the input; None where nobody did."""
+    """Return the longest side (m) stated in a review or with the input; None if not stated."""
     said = said_size(draft)
     return draft.payload.longest_side_m if said is None else said.value
 
@@ -184,10 +186,10 @@ def _stated_m(draft: Draft[Item]) -> float | None:
 def _to_stated_size(
     vertices: np.ndarray, faces: np.ndarray, draft: Draft[Item], prior: Prior | None, *, may_hold: bool
 ) -> tuple[float, bool]:
-    """Return the factor to the size that a person stated, and whether one did: the longest side of a thing as it stands.
+    """Return the scale factor to the stated size of the upright object, and whether a size was stated.
 
-    ``may_hold``: else the volume that its name says it holds counts (``stated_volume``); not of a mesh of its own, which may
-    have its walls.
+    ``may_hold``: otherwise a volume stated in the name is used (``stated_volume``); not for a mesh file, which may include
+    walls.
     """
     longest_m = _stated_m(draft)
     if longest_m is not None:
@@ -200,27 +202,27 @@ def _to_stated_size(
 
 
 def _said_up(draft: Draft[Item], generated: bool) -> Literal["y", "z", "auto"]:
-    """Return the up axis as the user said it, or as a generator did that sets its meshes down by itself."""
+    """Return the up axis stated by the user, or implied by a generator that sets its meshes down."""
     if not generated:
         return draft.payload.up
     return "y" if draft.field("generation").get("rests", False) else "auto"
 
 
 def _said_by(draft: Draft[Item], generated: bool) -> str:
-    """Return who said the up axis: a generator and an import write it, and nobody is asked then."""
+    """Return the source of the stated up axis: the generator, the import, or the user."""
     if generated:
         return "the generator"
     return "the user" if draft.payload.given is None else "the import"
 
 
 def _up_is_convention(draft: Draft[Item]) -> bool:
-    """Tell whether the up axis is that of the world an imported asset was made for, in which nobody said how it stands."""
+    """Return whether the up axis is only that of an imported asset's world, without points or poses that show its orientation."""
     return draft.payload.given is not None and not read_import_record(Path(draft.payload.given)).has_places
 
 
 def _unit(file: MeshFile, draft: Draft[Item], generated: bool, prior: Prior | None) -> LengthUnit:
     if generated:
-        # a generator's glTF says metres because glTF has no other unit; only the generator knows whether it meant them
+        # glTF always means metres; only the generator knows whether its meshes are metric
         metric = bool(draft.field("generation").get("metric", False))
         return LengthUnit(file.unit_m or 1.0, metric, "declared" if metric else "unknown", None)
     usual = None if prior is None else (prior.longest_axis_m.low, prior.longest_axis_m.high)
@@ -230,15 +232,15 @@ def _unit(file: MeshFile, draft: Draft[Item], generated: bool, prior: Prior | No
 
 
 def _longest(file: MeshFile) -> float:
-    """Return the longest side of a mesh along the axes of its file, in its units."""
+    """Return the longest side of a mesh along the axes of its file, in the file's units."""
     points = np.concatenate([part.vertices[np.unique(part.faces)] for part in file.parts])
     return float(np.ptp(points, axis=0).max())
 
 
 def _soup(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
-    """Return the faces of all parts, in their order, each welded where normals and textures split it.
+    """Return the faces of all parts in order, each part welded at texture and normal seams.
 
-    Parts that are closed so stay bodies of their own: welded to what they touch, boxes would share edges of four faces.
+    Closed parts stay separate bodies: if touching boxes were welded, they would share edges with four faces.
     """
     welded = [weld_equal(np.asarray(part.vertices, float), np.asarray(part.faces)) for part in parts]
     vertices, faces = trimesh.util.append_faces([each for each, _ in welded], [each for _, each in welded])

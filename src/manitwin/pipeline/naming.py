@@ -1,4 +1,4 @@
-"""Say what a thing is that nobody has named, from its photo or from pictures of its mesh."""
+"""Naming of unnamed objects from their photo or from rendered views."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from manitwin.render.grounds import shown_object
 from manitwin.twin.record import Likely, Naming
 
 VIEWS_FROM_ABOVE = (0, 1, 2, 4, 5, 6)
-"""The numbers of those of the eight views that look down, as people see a thing on a table (``ORBIT_ELEVATIONS_DEG``)."""
+"""Indices of the views from above, as people see objects on a table (``ORBIT_ELEVATIONS_DEG``)."""
 
 
 class NameStage:
-    """Write the field ``naming``: what a classifier takes an unnamed thing for; None where a person has said it."""
+    """Classify an unnamed object. Writes the field ``naming``; None if a person has named it."""
 
     name: ClassVar[str] = "name"
     version: ClassVar[str] = "7"
@@ -37,7 +37,7 @@ class NameStage:
         self.settings = settings
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
-        """Classify; raises Unavailable without the classifier's weights."""
+        """Classify the object. Raises Unavailable without the classifier's weights."""
         if object_name(draft) is not None or not self.settings.enabled:
             return {"naming": None}
         if "photos/" in draft.paths:
@@ -52,7 +52,7 @@ class NameStage:
 
 
 def known_length_m(draft: Draft[Item]) -> float | None:
-    """Return the longest side (m) of an upright mesh; None of a photo, and of a mesh whose unit is not known."""
+    """Return the longest side (m) of an upright mesh; None for a photo, and for a mesh of unknown unit."""
     if "canonical.npz" not in draft.paths:
         return None
     geometry = draft.field("geometry")

@@ -1,4 +1,4 @@
-"""Read the object from what earlier stages left: solid, hulls, rigid body, annotator's subject; object frame, SI units."""
+"""Access to the object as left by earlier stages: solid, hulls, rigid body, annotator's subject; object frame, SI units."""
 
 from __future__ import annotations
 
@@ -26,21 +26,22 @@ from manitwin.render.cameras import Camera
 from manitwin.twin.grasp_table import JOINTS
 from manitwin.twin.import_record import ImportRecord, read_import_record
 
-_ROUNDING = 1e-9  # of a factor of one
+_ROUNDING = 1e-9  # of a scale factor of one
 
 KEPT = 3
-"""A worker has the stages of so many items in turn where two work: of each of two, one is done and one waits beside it;
-one more would spare a worker a few loads, and costs it 10 MB."""
+"""Number of loaded meshes kept per worker. With two workers, the stages of two items alternate in each of them, with one more
+waiting; keeping another would save a few loads and cost 10 MB.
+"""
 MOST_TEXTURE_PIXELS = 9_000_000
-"""Of all that are kept, two scans' textures, 17 MB each; the mesh that was loaded last is kept whatever it has."""
+"""Limit over all kept meshes: the textures of two scans, 17 MB each; the mesh loaded last is always kept."""
 _meshes: dict[str, OrderedDict[bytes, tuple[list[int], list[trimesh.Trimesh]]]] = {
     "solid": OrderedDict(), "visual": OrderedDict()
 }  # fmt: skip
-"""The meshes that were loaded last by the digests of their files, with their own: one stage after the other wants them."""
+"""The most recently loaded meshes by file digest, with their hashes: consecutive stages need the same meshes."""
 
 
 def load_solid(path: Path) -> trimesh.Trimesh:
-    """Load the watertight mesh of ``solid.npz``; what was made of it for another stage (rays, its opening) comes with it."""
+    """Load the watertight mesh of ``solid.npz``, with cached data that other stages derived from it (rays, its opening)."""
 
     def read(content: bytes) -> list[trimesh.Trimesh]:
         with np.load(io.BytesIO(content)) as arrays:
@@ -50,7 +51,7 @@ def load_solid(path: Path) -> trimesh.Trimesh:
 
 
 def load_visual(path: Path) -> list[trimesh.Trimesh]:
-    """Load the parts of ``visual.glb`` or ``canonical.glb``, the same ones for stage after stage: nobody changes them."""
+    """Load the parts of ``visual.glb`` or ``canonical.glb``; stages share them, so they must not be modified."""
     return list(_loaded("visual", path, lambda content: read_glb(path)))
 
 
@@ -58,7 +59,7 @@ def _loaded(kind: str, path: Path, read: Callable[[bytes], list[trimesh.Trimesh]
     content, known = path.read_bytes(), _meshes[kind]
     digest = hashlib.blake2b(content, digest_size=16).digest()
     hashes, meshes = known.pop(digest, ([], []))
-    if not meshes or hashes != [hash(mesh) for mesh in meshes]:  # the last: somebody has changed one
+    if not meshes or hashes != [hash(mesh) for mesh in meshes]:  # a stage has modified a mesh
         meshes = read(content)
         hashes = [hash(mesh) for mesh in meshes]
     known[digest] = hashes, meshes
@@ -68,7 +69,7 @@ def _loaded(kind: str, path: Path, read: Callable[[bytes], list[trimesh.Trimesh]
 
 
 def let_go_of_textures() -> None:
-    """Forget the meshes with textures: of the next thing whole pictures are read, four times as large as those of most twins."""
+    """Drop cached meshes with textures before reading a new input, whose full textures are four times as large as most twins'."""
     known = _meshes["visual"]
     for digest in [digest for digest, each in known.items() if _texture_pixels([each])]:
         del known[digest]
@@ -87,13 +88,13 @@ def _texture_pixels(kept: Iterable[tuple[list[int], list[trimesh.Trimesh]]]) -> 
 
 
 def load_hulls(path: Path) -> tuple[np.ndarray, ...]:
-    """Load the convex vertices of ``hulls.npz``, each ``(V, 3)``, in the order of their names."""
+    """Load the vertices of the convex hulls in ``hulls.npz``, each ``(V, 3)``, sorted by name."""
     with np.load(path) as arrays:
         return tuple(arrays[name] for name in sorted(arrays.files))
 
 
 def load_body(draft: Draft) -> RigidBody:
-    """Load the hulls and the surface of ``solid.npz`` with the mass properties and friction of the field ``physical``."""
+    """Load the hulls and the surface of ``solid.npz``, with mass properties and friction from the field ``physical``."""
     physical = draft.field("physical")
     return RigidBody(
         hulls=load_hulls(draft.path("hulls.npz")),
@@ -107,7 +108,9 @@ def load_body(draft: Draft) -> RigidBody:
 
 
 def joints_of(proposals: Mapping[str, np.ndarray], index: np.ndarray) -> dict[str, np.ndarray]:
-    """Return what a trial wants to know of the grasps at ``index`` beside their poses: the joints of hands with more."""
+    """Return the trial arguments of the grasps at ``index`` besides their poses: the joint values of hands with several
+    joints.
+    """
     if JOINTS[0] not in proposals:
         return {}
     return {"joints_rad": np.stack([proposals[name][index] for name in JOINTS], axis=1)}
@@ -116,10 +119,10 @@ def joints_of(proposals: Mapping[str, np.ndarray], index: np.ndarray) -> dict[st
 def read_subject(
     draft: Draft[Item], *, solid: str, visual: str, metric: bool, scale: float = 1.0, size_estimated: bool = False
 ) -> Subject:
-    """Read the subject of a draft; ``solid`` and ``visual`` name the artifacts that hold the meshes.
+    """Read the subject of a draft; ``solid`` and ``visual`` are the names of the mesh artifacts.
 
-    ``scale`` is how much larger these are than the canonical mesh, which the views were taken of; ``size_estimated`` says
-    that an estimate gave it.
+    ``scale`` is the scale of these meshes relative to the canonical mesh, which the views show; ``size_estimated``: it is an
+    estimate.
     """
     given = read_given(draft)
     return Subject(
@@ -137,7 +140,7 @@ def read_subject(
 
 
 def read_scaled_subject(draft: Draft[Item], *, known_as: str | None) -> Subject:
-    """Read the subject at the size that the physical stage gave it; ``known_as`` is what it was found to be since."""
+    """Read the subject at the size determined by the physical stage; ``known_as`` is what it has been identified as since."""
     subject = read_subject(
         draft,
         solid="solid.npz",
@@ -150,7 +153,9 @@ def read_scaled_subject(draft: Draft[Item], *, known_as: str | None) -> Subject:
 
 
 def read_given(draft: Draft[Item]) -> ImportRecord | None:
-    """Return what an imported asset gives or a generator knows, moved as the mesh stage moved its mesh; None for others."""
+    """Return an imported asset's record, or a generator's knowledge, in the object frame at the mesh stage's scale; None for
+    others.
+    """
     known = _known(draft)
     if known is not None:
         return ImportRecord.model_validate(known)
@@ -158,7 +163,7 @@ def read_given(draft: Draft[Item]) -> ImportRecord | None:
         return None
     record = read_import_record(Path(draft.payload.given))
     to_object = np.array(draft.field("geometry")["input_to_object"]) @ OBJECT_TO_GLTF
-    larger = float(np.cbrt(np.linalg.det(to_object[:3, :3])))  # than its file says, where a person does
+    larger = float(np.cbrt(np.linalg.det(to_object[:3, :3])))  # scale relative to the file, if a person stated the size
     if abs(larger - 1.0) <= _ROUNDING:
         return record.moved(to_object)
     rigid = np.eye(4)
@@ -167,9 +172,9 @@ def read_given(draft: Draft[Item]) -> ImportRecord | None:
 
 
 def object_name(draft: Draft[Item]) -> str | None:
-    """Return what the object is called; None: nobody says.
+    """Return the object's name; None if unknown.
 
-    A person's word counts first, then that of a generator that knows what it made, then a classifier's.
+    A person's statement takes precedence, then a generator that knows what it made, then a classifier.
     """
     said = name_by_person(draft)
     if said is not None:
@@ -181,7 +186,7 @@ def object_name(draft: Draft[Item]) -> str | None:
 
 
 def likely_names(draft: Draft[Item]) -> tuple[tuple[str, float], ...]:
-    """Return the names that a thing without one may have, each with its probability; none of what has a name."""
+    """Return the possible names of an unnamed object with their probabilities; empty for a named one."""
     if object_name(draft) is not None:
         return ()
     guesses = (draft.fields.get("naming") or {}).get("likeliest", [])
@@ -189,7 +194,7 @@ def likely_names(draft: Draft[Item]) -> tuple[tuple[str, float], ...]:
 
 
 def _known(draft: Draft[Item]) -> dict[str, Any] | None:
-    """Return what the generator knows of the object, in the object frame once the mesh stage has left ``geometry``."""
+    """Return the generator's knowledge of the object, in the object frame once the mesh stage has written ``geometry``."""
     if "geometry" in draft.fields:
         known = draft.field("geometry").get("known")
     else:
@@ -198,17 +203,17 @@ def _known(draft: Draft[Item]) -> dict[str, Any] | None:
 
 
 def cut_out_photos(draft: Draft[Item]) -> tuple[Path, ...]:
-    """Return the cut-out photos that the mesh was made of; none where it was made of something else."""
+    """Return the cut-out photos from which the mesh was made; empty for other inputs."""
     if "photos/" in draft.paths:
         return tuple(sorted(draft.path("photos/").glob("*.png")))
     return (draft.path("photo.png"),) if "photo.png" in draft.paths else ()
 
 
 def pictures(folder: Path, kind: str) -> tuple[Path, ...]:
-    """Return the eight pictures of a kind ('rgb', 'marked') in the order of their numbers."""
+    """Return the eight images of a kind ('rgb', 'marked'), sorted by number."""
     return tuple(sorted(folder.glob(f"{kind}_*.webp")))
 
 
 def findings_of(answer: PhysicalEstimates | SelectedPoints) -> list[str] | None:
-    """Return what still spoke against an answer when it was given again; None: nobody looked."""
+    """Return the remaining objections to an answer after it was repeated; None if it was not examined."""
     return None if answer.findings is None else list(answer.findings)

@@ -1,4 +1,4 @@
-"""Tell the parts of the surface: those that a template was built of, else what its form shows, else none."""
+"""Segmentation of the surface into parts: those of the template, else those found from its shape, else none."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from manitwin.pipeline.object_state import load_solid, load_visual, object_name,
 from manitwin.twin.part_records import NO_PART, Part
 
 PARTS_FILE = "parts.npz"
-"""``visual (F,)`` and ``solid (S,)`` uint8: the part of each face of visual.glb and of solid.npz, 255 where it is of none."""
+"""``visual (F,)`` and ``solid (S,)`` uint8: the part of each face of visual.glb and of solid.npz; 255 for no part."""
 
 
 @dataclass(frozen=True)
 class _Told:
-    """The parts of both meshes by place in ``names``, who says so, and how surely."""
+    """The parts of both meshes as indices into ``names``, with source and confidence."""
 
     names: tuple[str, ...]
     visual: np.ndarray
@@ -36,7 +36,7 @@ class _Told:
 
 
 class PartsStage:
-    """Give each face of ``visual.glb`` its part, or none where geometry does not tell it."""
+    """Assign each face of ``visual.glb`` to a part, or to none. Writes ``parts.npz`` and the field ``parts``."""
 
     name: ClassVar[str] = "parts"
     version: ClassVar[str] = "16"
@@ -51,7 +51,7 @@ class PartsStage:
     settings = NO_SETTINGS
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
-        """Write ``parts.npz`` and return the table ``parts``, empty where no parts are told."""
+        """Write ``parts.npz`` and return the table ``parts``, empty if there are no parts."""
         solid, meshes = load_solid(draft.path("solid.npz")), load_visual(draft.path("visual.glb"))
         visual = trimesh.Trimesh(
             *trimesh.util.append_faces([m.vertices for m in meshes], [m.faces for m in meshes]), process=False
@@ -67,7 +67,7 @@ def _nothing(solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _Told:
 
 
 def _given(draft: Draft, solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _Told | None:
-    """Return the parts that the thing was built of; None where nobody gives any, or repair has changed the faces."""
+    """Return the parts of which the object was built; None if they are unknown, or repair has changed the faces."""
     given = read_given(draft)
     if given is None or given.parts is None or len(given.parts.of_face) != len(visual.faces):
         return None
@@ -79,7 +79,7 @@ def _given(draft: Draft, solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _To
 
 
 def _by_form(draft: Draft, solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _Told | None:
-    """Return the parts that the rule of its form tells; None where it has no rule, or the surface does not show them."""
+    """Return the parts found by the rule for the object's form; None if it has no rule, or the surface does not show them."""
     usual = _prior(draft)
     if usual is None or usual.parts is None:
         return None
@@ -107,19 +107,19 @@ def _by_form(draft: Draft, solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _
 
 
 def _prior(draft: Draft) -> Prior | None:
-    """Return what is usual of such things, by the object's name, else by the category that it was given."""
+    """Return the prior of the object's name, else of the category assigned to it."""
     return lookup(object_name(draft)) or lookup(draft.field("language")["category"])
 
 
 def parts_at(points_m: np.ndarray, mesh: trimesh.Trimesh, labels: np.ndarray) -> np.ndarray:
-    """Return the label of the face of a mesh that each point ``(N, 3)`` lies on."""
+    """Return the label of the mesh face nearest to each point ``(N, 3)``."""
     if not len(points_m):
         return np.zeros(0, labels.dtype)
     return np.asarray(labels[closest_faces(points_m, mesh)[0]])
 
 
 def table_of(names: tuple[str, ...], labels: np.ndarray, visual: trimesh.Trimesh, told: _Told) -> list[Part]:
-    """Return the table of parts: how much of the visual surface each is, and where."""
+    """Return the table of parts with their share of the visual surface and their centroids."""
     areas = np.asarray(visual.area_faces)
     rows = []
     for place, name in enumerate(names):

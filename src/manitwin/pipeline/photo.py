@@ -1,4 +1,4 @@
-"""Read a photo and cut its object out of the background (paper, "3D Generation": background removal, resolution)."""
+"""Photo input: reading, and cutting the object out of the background (paper, "3D Generation": background removal, resolution)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from manitwin.pipeline.stated_place import as_box
 
 
 class PhotoStage:
-    """Write ``photo.png`` (RGBA, upright, alpha is the matte) and the field ``matte``."""
+    """Cut out the object of a photo. Writes ``photo.png`` (RGBA, upright, alpha is the matte) and the field ``matte``."""
 
     name: ClassVar[str] = "photo"
     version: ClassVar[str] = "27"
@@ -40,7 +40,7 @@ class PhotoStage:
     needs: ClassVar[Resource] = "cpu"
 
     def __init__(self, settings: MattingConfig, networks: Sequence[Network] = ()):
-        """Take the settings, and the networks that they name: these decide by their content, wherever their files are."""
+        """Take the settings, and the matting networks that they name; networks enter the stage's key by content, not by path."""
         self.settings = settings.model_copy(update={"network": None})
         self.networks = tuple(networks)
         self.backend: str = "rules+network"
@@ -48,7 +48,7 @@ class PhotoStage:
         self.model: str | None = ", ".join(models)
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
-        """Read and matte; raises InputError, or Rejected where no single object can be told from the background."""
+        """Read and matte the photo. Raises InputError, or Rejected if no single object can be separated from the background."""
         if draft.payload.file is None:
             raise InputError("empty", "no image was given; give an image file")
         amendment = draft.amendments.get(self.name, {})
@@ -74,12 +74,11 @@ class PhotoStage:
         box_px: PixelBox | None = None,
         drawn: DrawnOutline | None = None,
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Return a photo ``(H, W, 4) uint8`` of what a person called ``name`` with its matte, and what is known of that.
+        """Return a photo ``(H, W, 4) uint8`` with its matte, and the field ``matte``; ``name`` is the user's name of the object.
 
-        ``called`` is what messages call the file: its name by default. ``confirmed`` returns the matte of a doubted cut-out
-        that is right all the same, or raises. ``mask`` is a picture of its outline, ``box_px`` where in the photo the thing is:
-        what is returned is the photo around that. ``drawn`` is an outline that a person drew on what is looked at; it goes
-        before all of these. Raises InputError, Rejected.
+        ``called`` is the file's name in messages. ``confirmed`` returns the matte of a doubtful cut-out that is nevertheless
+        right, or raises. ``mask`` is a mask image, ``box_px`` the object's bounding box in the photo: the result is then the
+        photo around it. ``drawn`` is an outline drawn by a person, which takes precedence. Raises InputError, Rejected.
         """
         settings, file = self.settings, called or path.name
         photo = pixels_of_photo(path, name, settings, mask=mask, box_px=box_px)
@@ -113,7 +112,7 @@ class PhotoStage:
         }
 
     def _networks_asked(self, matte: Matte) -> dict[str, Any]:
-        """Return what is recorded of the named networks where they were asked: the built-in one goes by its own name then."""
+        """Return the record of the named networks if they were used; the built-in network is then recorded under its own name."""
         if "built_in_network" not in matte.agreement:
             return {}
         told = ("name", "sha256", "source", "licence")
@@ -124,16 +123,17 @@ class PhotoStage:
 
 
 class PhotosStage(PhotoStage):
-    """Cut several photos of one thing out: ``photos/`` has each by its number, ``photo.png`` is the first of them.
+    """Cut out several photos of one object: ``photos/`` contains each by its number, ``photo.png`` is the first.
 
-    One that cannot be cut out is left out, with a finding; the field ``matte`` is that of the least sure of the others.
+    Photos that cannot be cut out are left out, with a finding; the field ``matte`` is that of the least confident remaining
+    photo.
     """
 
     version: ClassVar[str] = "19"
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "photos/", "matte")
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
-        """Read and matte; raises InputError of a photo that cannot be read, Rejected where none can be cut out."""
+        """Read and matte the photos. Raises InputError for an unreadable photo, Rejected if none can be cut out."""
         (folder / "photos").mkdir()
         kept: list[tuple[str, dict[str, Any]]] = []
         doubts: list[Rejected] = []
@@ -143,7 +143,7 @@ class PhotosStage(PhotoStage):
             try:
                 drawn = drawn_outline(amendment, called, number)
                 rgba, field = self.cut_out(Path(file), name, refused, called, mask, drawn=drawn)
-            except InputError:  # no photo: what was given is not what was meant
+            except InputError:  # not a photo: the input is not what was intended
                 raise
             except Rejected as answer:
                 doubts.append(answer)
@@ -170,7 +170,7 @@ class PhotosStage(PhotoStage):
 
 
 def refused(doubted: DoubtedCutOut) -> Matte:
-    """Raise the doubt of a cut-out that nobody can confirm."""
+    """Raise the doubt about a cut-out that nobody can confirm."""
     raise doubted
 
 

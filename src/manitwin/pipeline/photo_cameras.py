@@ -1,4 +1,4 @@
-"""The cameras that a file states for the photos of one thing: one a photo, with a lens for the photo as it is uncropped."""
+"""Stated camera poses of the photos of an object: one camera per photo, with the lens of the uncropped photo."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from manitwin.formats.image_file import full_size
 from manitwin.formats.outline_mask import require_mask
 from manitwin.formats.printable import printable_line
 
-_ROUNDED_PX, _ROUNDED_SHARE = 1.0, 0.005  # by which the sides of a scaled picture are off its shape
+_ROUNDED_PX, _ROUNDED_SHARE = 1.0, 0.005  # tolerances of the aspect ratio of a scaled picture
 _UPRIGHT, _TURNED = 1, (6, 8)  # EXIF orientations
 _SHOWN = 6
-_DIGITS = 9  # of numbers that make an identity: the last ones differ between processors
+_DIGITS = 9  # of numbers in an identity, as the last digits differ between processors
 
 
 def without_pose(photos: Sequence[Path], poses: Path) -> list[Path]:
-    """Return the photos of which a file has no pose; raises InputError for a file that is not read."""
+    """Return the photos for which a file has no pose. Raises InputError for an unreadable file."""
     found = read_poses(poses)
     return [
         photo
@@ -33,7 +33,9 @@ def without_pose(photos: Sequence[Path], poses: Path) -> list[Path]:
 
 
 def poses_identity(photos: Sequence[Path], poses: Path) -> list[object]:
-    """Return what an identity of photos covers of their poses: the cameras' numbers and the unit, not how a file writes them."""
+    """Return the part of an identity that covers the poses of photos: camera parameters and unit, independent of the file's
+    notation.
+    """
     found = read_poses(poses)
     cameras = [
         {
@@ -50,12 +52,12 @@ def poses_identity(photos: Sequence[Path], poses: Path) -> list[object]:
 
 
 def masks_of_photos(photos: Sequence[Path], poses: Path) -> list[Path | None]:
-    """Return the mask that a file of poses names for each photo; raises InputError as ``cameras_of_photos`` does."""
+    """Return the mask that a file of poses names for each photo. Raises InputError like ``cameras_of_photos``."""
     return [camera.mask for camera in cameras_of_photos(photos, read_poses(poses))]
 
 
 def read_poses(poses: Path) -> CameraPoses:
-    """Read a file of poses once for all that ask; it is read again where it was changed. Raises InputError."""
+    """Read a file of poses, cached until it changes. Raises InputError."""
     files = sorted(file for file in poses.glob("*") if file.is_file()) if poses.is_dir() else [poses]
     try:
         changed = tuple((file.name, file.stat().st_mtime_ns, file.stat().st_size) for file in files)
@@ -72,8 +74,8 @@ def _read_as(poses: Path, changed: tuple[tuple[str, int, int], ...]) -> CameraPo
 def cameras_of_photos(photos: Sequence[Path], found: CameraPoses) -> list[PosedCamera]:
     """Return the camera of each photo.
 
-    Raises InputError for a photo without a pose, or of another shape than its pose is of, and for a mask that is not there or
-    not as large as its photo.
+    Raises InputError for a photo without a pose or with another aspect ratio than its pose, and for a mask that is missing or
+    of another size than its photo.
     """
     file = called(found)
     cameras = cameras_of(photos, found.cameras, file)
@@ -95,9 +97,9 @@ def cameras_of_photos(photos: Sequence[Path], found: CameraPoses) -> list[PosedC
 
 
 def _require_own(photo: Path, camera: PosedCamera | None, found: CameraPoses) -> None:
-    """Raise InputError where the file names a picture below its folder that is another one: splits have the same names.
+    """Raise InputError if the named picture exists below the file's folder and differs: splits of a data set reuse file names.
 
-    Only whether it is there and how large it is are asked, and of nothing outside the folder.
+    Only its existence and size are checked, and only inside the folder.
     """
     folder = found.file if found.file.is_dir() else found.file.parent
     if camera is None or os.path.isabs(camera.file):
@@ -107,7 +109,7 @@ def _require_own(photo: Path, camera: PosedCamera | None, found: CameraPoses) ->
     try:
         there = named.is_relative_to(folder) and named.is_file() and not named.samefile(photo)
         other = there and named.stat().st_size != photo.stat().st_size
-    except (OSError, ValueError):  # a name that no file can have
+    except (OSError, ValueError):  # not a valid file name
         return
     if other:
         shown = printable_line(f"{photo.parent.name}/{photo.name}", max_characters=120)
@@ -120,9 +122,9 @@ def _require_own(photo: Path, camera: PosedCamera | None, found: CameraPoses) ->
 
 
 def _of_upright(photo: Path, camera: PosedCamera, found: CameraPoses) -> PosedCamera:
-    """Return the camera for a photo as it is upright; raises InputError where the pose is of a picture of another shape.
+    """Return the camera for the upright photo. Raises InputError if the pose is for a picture of another aspect ratio.
 
-    Programs that estimate poses look at the picture as it is stored, or as its EXIF turns it: its shape tells which.
+    Pose estimation programs use the picture as stored, or as rotated by its EXIF orientation; the aspect ratio tells which.
     """
     width, height, orientation = full_size(photo)
     file = called(found)
@@ -162,7 +164,7 @@ def _same_shape(size_px: tuple[float, float], stated: tuple[float, float]) -> bo
 
 
 def called(found: CameraPoses) -> str:
-    """Return what a file of poses is called in messages."""
+    """Return the name of a file of poses for messages."""
     return printable_line(found.file.name or str(found.file), max_characters=120)
 
 

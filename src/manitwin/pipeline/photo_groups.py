@@ -1,4 +1,4 @@
-"""Several photos of one thing as one item: what their rows, or the command line, may say of it."""
+"""Grouping of several photos of one object into one item, from manifest rows or the command line."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from manitwin.pipeline.stated_place import BOX
 from manitwin.pipeline.stated_poses import poses_of
 
 OF_THE_THING = ("name", "units", "up", "longest_side_m", "license", "attribution", "poses")
-"""Columns that say something of the thing, not of a photo: rows of one group may not contradict each other."""
+"""Columns that describe the object, not a photo: rows of one group must not contradict each other."""
 
 Row = Mapping[str, Any]
 ToItem = Callable[[dict[str, Any], str], Item]
-"""Makes the item of one row; the second argument says where the row is."""
+"""Makes the item of one row; the second argument is the row's location for messages."""
 
 
 def one_of_photos(
     items: Sequence[Item], turns_deg: Sequence[float] | None, where: str, poses: str | None = None
 ) -> Item:
-    """Return the item of one thing that the photos of ``items`` show, in their order.
+    """Return the item of one object shown in the photos of ``items``, in their order.
 
-    ``turns_deg`` is the camera's turn in each photo; kept relative to the first, in 0..360. ``poses`` is a file that states their
-    cameras. Where either is given, too many photos are thinned out evenly. One photo is an item of its own. Raises UsageError
-    for meshes, texts, a photo that is given twice, too many photos, turns that are not one a photo, and poses that are not
-    read or not those of the photos.
+    ``turns_deg`` is the camera's rotation for each photo, stored relative to the first in 0..360. ``poses`` is a file with the
+    camera poses. With either, excess photos are thinned out evenly. A single photo is returned as it is. Raises UsageError for
+    meshes, texts, a photo given twice, too many photos, turns that do not match the photos, and poses that are unreadable or do
+    not match.
     """
     meshes = [item.title for item in items if item.file is not None and _is_mesh(item)]
     if meshes or any(item.file is None for item in items):
@@ -92,12 +92,12 @@ def _posed(items: Sequence[Item], masks: tuple[str, ...], poses: str, where: str
 
 
 def given_twice(files: Sequence[str]) -> str | None:
-    """Return the first of some files that stands there a second time, None where each is there once."""
+    """Return the first file that occurs twice; None if there is none."""
     return next((file for number, file in enumerate(files) if file in files[:number]), None)
 
 
 def told_apart(files: Sequence[str]) -> list[str]:
-    """Return what photos are called: their names, where two have the same one with as many of their folders as differ."""
+    """Return the display names of photos: file names, preceded by as many parent folders as needed to distinguish them."""
     paths = [Path(file).parts for file in files]
     names = []
     for number, own in enumerate(paths):
@@ -108,9 +108,9 @@ def told_apart(files: Sequence[str]) -> list[str]:
 
 
 def copies_told(files: Sequence[str]) -> list[str]:
-    """Say which files have the bytes of another one before them: renders of a round thing may, two photos of a thing do not.
+    """Report files with the same content as an earlier one, which is possible for renders of a round object but not for photos.
 
-    Raises InputError of a file that is not read.
+    Raises InputError for an unreadable file.
     """
     first: dict[str, str] = {}
     earlier = [(file, first.setdefault(file_sha256(Path(file)), file)) for file in files]
@@ -124,13 +124,13 @@ def _is_mesh(item: Item) -> bool:
 
 @dataclass
 class PhotoGroups:
-    """The rows of a manifest that have a group, kept until its end; ``turn_deg`` is a column of theirs."""
+    """The manifest rows with a group, collected until the manifest's end; ``turn_deg`` is one of their columns."""
 
     manifest: Path
     rows: dict[str, list[tuple[int, Row]]] = field(default_factory=lambda: defaultdict(list))
 
     def takes(self, line: int, row: Row) -> bool:
-        """Keep a row that has a group; tell whether it has. Raises UsageError for a turn or poses without a group."""
+        """Store a row if it has a group, and return whether it has. Raises UsageError for a turn or poses without a group."""
         group = _said(row, "group")
         if not group and _said(row, "turn_deg"):
             raise UsageError(
@@ -145,9 +145,9 @@ class PhotoGroups:
         return bool(group)
 
     def items(self, to_item: ToItem) -> Iterator[tuple[Item, str]]:
-        """Yield each group's item, and where its rows are, in the order of their first rows.
+        """Yield each group's item, and the location of its rows, in the order of their first rows.
 
-        Raises UsageError naming the rows where they contradict each other, and as ``one_of_photos`` does.
+        Raises UsageError with the rows if they contradict each other, and like ``one_of_photos``.
         """
         for group, rows in self.rows.items():
             shown = printable_line(group, max_characters=60)
@@ -166,7 +166,7 @@ def _said(row: Row, column: str) -> str:
 
 
 def _agreed(where: str, column: str, rows: Iterable[tuple[int, Row]]) -> str:
-    """Return what the rows that say it say in a column; raises UsageError where they differ."""
+    """Return the value of a column on which all rows with a value agree. Raises UsageError if they differ."""
     values: dict[str, int] = {}
     for line, row in rows:
         value = _said(row, column)

@@ -1,4 +1,4 @@
-"""What of a photo is looked at: its pixels as its alpha channel, a mask beside it and the box of the thing say."""
+"""The pixels of a photo to be cut out, given its alpha channel, a mask and the object's bounding box."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ CROPPED = "looked at within the box that was stated of it"
 
 @dataclass(frozen=True)
 class PhotoPixels:
-    """What is cut out, ``given``, the lens as 35 mm equivalent for a picture of that size, and the thing's box in its pixels.
+    """The picture to be cut out, ``given``, its focal length (35 mm equivalent), and the object's box in its pixels.
 
-    ``window_px`` is what of the whole photo it shows, in the photo's pixels; None where a frame around the picture was cut off.
+    ``window_px`` is the shown region in pixels of the whole photo; None if a border was cut off.
     """
 
     given: Given
@@ -36,9 +36,9 @@ class PhotoPixels:
 def pixels_of_photo(
     path: Path, name: str | None, settings: MattingConfig, *, mask: Path | None = None, box_px: PixelBox | None = None
 ) -> PhotoPixels:
-    """Read a photo of what a person calls ``name``; ``mask`` is a picture of its outline, ``box_px`` where the thing is.
+    """Read a photo of an object called ``name``; ``mask`` is a mask image, ``box_px`` the object's bounding box.
 
-    Of a photo with a box only what lies around that is read at its full size. Raises InputError.
+    With a box, only the region around it is used, at full resolution. Raises InputError.
     """
     photo = read_image(path, frame=settings.frame, max_side_px=settings.photo_side_px if box_px is None else None)
     width, height, orientation = full_size(path)
@@ -72,7 +72,7 @@ def _scaled(pixels: np.ndarray, scale: float) -> np.ndarray:
 
 
 def _focal_of_window(photo: Photo, shape: tuple[int, ...]) -> float | None:
-    """Return the lens that a picture of a window's ``shape`` would have: the same angle of view a pixel."""
+    """Return the 35 mm equivalent focal length of a crop of ``shape``, with the same angle of view per pixel."""
     if photo.focal_mm is None:
         return None
     height, width = photo.pixels.shape[:2]

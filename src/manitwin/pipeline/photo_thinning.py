@@ -1,4 +1,4 @@
-"""Which of very many photos of one thing are used: those from directions that are spread evenly over all."""
+"""Selection from very many photos of one object: directions spread evenly over all."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from manitwin.models.generators.protocol import MOST_PHOTOS
 from manitwin.pipeline.photo_cameras import called, read_poses
 
 MOST_GIVEN = 4096
-"""Of one thing: the frames of a film of two minutes; each is looked at."""
+"""Limit per object: the frames of a two-minute video; each is examined."""
 
 
 def kept_photos(photos: Sequence[Path], turns_deg: Sequence[float], poses: Path | None) -> list[int]:
-    """Return the numbers of the photos that are used, in order: all of ``MOST_PHOTOS``, of more as many spread evenly.
+    """Return the numbers of the photos to use, in order: all up to ``MOST_PHOTOS``, otherwise as many, spread evenly.
 
-    Where a photo was taken from say ``turns_deg``, one a photo, or the file ``poses``; where neither does, or a photo has no
-    pose, all are returned. The first photo is one of them. Raises InputError for poses that are not read.
+    The directions come from ``turns_deg``, one per photo, or the file ``poses``. All photos are returned if neither is given or
+    a photo has no pose. The first photo is always included. Raises InputError for unreadable poses.
     """
     every = list(range(len(photos)))
     if len(photos) <= MOST_PHOTOS:
@@ -40,5 +40,5 @@ def kept_photos(photos: Sequence[Path], turns_deg: Sequence[float], poses: Path 
 
 
 def thinned_words(used: int, given: int) -> str:
-    """Say that not all photos of a thing are used."""
+    """Describe that not all photos of an object are used."""
     return f"{used} of {given} photos used, spread evenly over the directions: more say nothing new of the shape"

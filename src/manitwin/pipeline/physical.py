@@ -1,4 +1,4 @@
-"""Estimate true size, mass, friction, and how the mass is spread (paper, "Physical Property Estimation")."""
+"""Physical properties: true size, mass, friction and mass distribution (paper, "Physical Property Estimation")."""
 
 from __future__ import annotations
 
@@ -31,19 +31,20 @@ from manitwin.twin.record import OrientedBox, Physical
 from manitwin.twin.record_values import Estimate
 
 CONFIRMED = ("measured", "user")
-"""Sources that a plausibility check does not overrule (docs/imports.md: an implausible mass of another source is rejected)."""
+"""Sources that plausibility checks do not overrule (docs/imports.md: an implausible mass from another source is rejected)."""
 
 NOMINAL_WALL_M = 0.002
-"""The wall of an ordinary bottle or housing: what the centre of mass is compared with where no wall is known."""
+"""The wall thickness of an ordinary bottle or housing, assumed for comparison if it is unknown."""
 
 
 OF_OTHER_MATTER = 1 / 3
-"""Of the way from the even solid's centre of mass to that by parts: how far the true one is from the latter where a handle is of
-another matter than such things usually have (benchmarks/center_of_mass.py: at most 0.33 of what has parts of unlike density)."""
+"""Uncertainty of the centre of mass by parts, as a share of its distance from that of the uniform solid, if a handle is of an
+unusual material (benchmarks/center_of_mass.py: at most 0.33 for objects with parts of different density).
+"""
 
 
 class PhysicalStage:
-    """Ask for size, mass and friction, scale the object, and compute the mass properties of its real shape."""
+    """Estimate size, mass and friction, scale the object, and compute the mass properties of its shape."""
 
     name: ClassVar[str] = "physical"
     version: ClassVar[str] = "26"
@@ -59,13 +60,12 @@ class PhysicalStage:
         self.expected_usd = annotator.expected_usd("physical")
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
-        """Write ``visual.glb`` and ``solid.npz`` in true metres; return ``physical``, what speaks against it, and ``size``.
+        """Write ``visual.glb`` and ``solid.npz`` in metres; return ``physical``, objections to it, and ``size``.
 
-        ``size`` is the Estimate that gave the scale, of the longest extent in metres; None where the mesh had it. ``called`` is
-        what an annotator that looks took the object for. An annotated centre of mass and inertia are kept.
-
-        Raises Rejected where size, mass or density are beyond what a thing of this name has, or an annotated centre or inertia
-        is that of no body; BadReply where the annotator gives neither mass nor density.
+        ``size`` is the Estimate of the longest extent in metres that determined the scale; None if the mesh was metric.
+        ``called`` is what an annotator identified the object as. A stated centre of mass and inertia are kept. Raises Rejected
+        if size, mass or density are implausible for the object's name, or a stated centre of mass or inertia is impossible;
+        BadReply if the annotator gives neither mass nor density.
         """
         metric = bool(draft.field("geometry")["metric"])
         subject = read_subject(draft, solid="canonical.npz", visual="canonical.glb", metric=metric)
@@ -134,7 +134,7 @@ class PhysicalStage:
     def _of_parts(
         self, draft: Draft[Item], solid: trimesh.Trimesh, mass_kg: float, estimates: PhysicalEstimates
     ) -> MassProperties | None:
-        """Return the mass properties by parts of unlike matter; None where parts or their materials are not told."""
+        """Return mass properties from parts of different materials; None if parts or materials are unknown."""
         prior = _prior_of(draft, estimates)
         if prior is None or not estimates.part_materials or estimates.wall_thickness_m is not None:
             return None
@@ -151,7 +151,7 @@ class PhysicalStage:
             )
 
     def _check_mass(self, name: str | None, mass: Estimate, volume_m3: float, to_check: str) -> None:
-        """Raise Rejected for the mass of no such thing; ``name`` is None of a template, whose mass is that of its parts."""
+        """Raise Rejected for an implausible mass; ``name`` is None for a template, whose mass is the sum of its parts."""
         if _is_confirmed(mass):
             return
         prior, as_named = lookup(name), prior_as_named(name)
@@ -172,15 +172,15 @@ class PhysicalStage:
 
 
 def _one(prior: Prior) -> str:
-    """Return what a prior is of in words: an apple, a pair of scissors."""
+    """Return the noun phrase of a prior: an apple, a pair of scissors."""
     counted = f"{prior.counter} {prior.category}" if prior.counter else prior.category
     return f"{article(counted)} {counted}"
 
 
 def _to_check(draft: Draft[Item], *, rescaled: bool) -> str:
-    """Say what may be wrong where a size or mass is that of no such thing: who gave the size, and the name.
+    """Say what to check if a size or mass is implausible: the source of the size, and the name.
 
-    A mesh's numbers that were read by a guess are then likely at fault.
+    If the mesh's unit was guessed, it is the likely cause.
     """
     geometry = draft.field("geometry")
     if draft.payload.longest_side_m is not None or SIZE in geometry:
@@ -190,22 +190,22 @@ def _to_check(draft: Draft[Item], *, rescaled: bool) -> str:
 
 
 def _declared(mass: Estimate) -> str:
-    """Say how a mass that an imported asset declares can be left to the annotators."""
+    """Say how to have a mass estimated that an imported asset declares."""
     if not mass.source.startswith("imported:"):
         return ""
     return ", or set mass_kg in its import.json to null: it is then estimated"
 
 
 def _prior_of(draft: Draft[Item], estimates: PhysicalEstimates) -> Prior | None:
-    """Return the prior of what the object is called, else of what an annotator that looks took it for."""
+    """Return the prior of the object's name, else of what an annotator identified it as."""
     return lookup(object_name(draft)) or lookup(estimates.called)
 
 
 def size_scale(subject: Subject, estimates: PhysicalEstimates, longest: float) -> float:
-    """Return the factor to true size by the ``longest`` extent of the object as it stands; 1 for a metric mesh nobody corrects.
+    """Return the scale factor to true size, given the ``longest`` extent of the upright object; 1 for an uncorrected metric mesh.
 
-    The paper scales by the longest axis of the oriented box, which of a teapot is the diagonal from its spout to its foot: by
-    a length of 0.24 m the pot would become 0.32 m long.
+    The paper scales by the longest axis of the oriented box, which for a teapot is the diagonal from spout to foot: given a
+    length of 0.24 m, the pot would become 0.32 m long.
     """
     said = estimates.longest_axis_m
     if said is None or (subject.metric and not is_human(said.source)):
@@ -214,7 +214,7 @@ def size_scale(subject: Subject, estimates: PhysicalEstimates, longest: float) -
 
 
 def mass_estimate(estimates: PhysicalEstimates, volume_m3: float) -> Estimate:
-    """Return the mass as said, or bulk density times volume; raises BadReply where neither is said."""
+    """Return the stated mass, or bulk density times volume. Raises BadReply if neither is stated."""
     if estimates.mass_kg is not None:
         return estimates.mass_kg
     density = estimates.bulk_density_kg_m3
@@ -229,9 +229,9 @@ def mass_estimate(estimates: PhysicalEstimates, volume_m3: float) -> Estimate:
 
 
 def spread_mass(solid: trimesh.Trimesh, mass_kg: float, wall_thickness_m: float | None) -> tuple[MassProperties, float]:
-    """Return mass properties, and how far (m) the centre of mass would be off if the mass were spread the other way.
+    """Return the mass properties, and the uncertainty (m) of the centre of mass from the alternative mass distribution.
 
-    With a wall thickness the closed skin is hollow: a shell. Without, the mesh is the matter itself or full: a solid.
+    With a wall thickness the object is a shell; without, the mesh encloses material or is full: a solid.
     """
     as_solid = solid_mass_properties(solid, mass_kg)
     as_shell = shell_mass_properties(solid, mass_kg, wall_thickness_m or NOMINAL_WALL_M)
@@ -246,7 +246,7 @@ def _distribution(estimates: PhysicalEstimates, by_parts: MassProperties | None)
 
 
 def _known_mass(subject: Subject) -> MassProperties | None:
-    """Return the mass properties of a template's parts, which have matter of their own each; None for any other subject."""
+    """Return the mass properties of a template built from parts with a material each; None for other subjects."""
     known = subject.given
     if known is None or not known.made_of_parts or known.center_of_mass_m is None or known.inertia_kg_m2 is None:
         return None
@@ -262,7 +262,7 @@ def _write_meshes(
     scale: float,
     max_texture_size: int,
 ) -> None:
-    # An unscaled mesh keeps its file: encoding its textures again would only lose detail.
+    # An unscaled mesh keeps its file, as encoding its textures again would lose detail.
     unscaled = draft.path("canonical.glb").read_bytes() if scale == 1.0 else None
     (folder / "visual.glb").write_bytes(unscaled or write_glb(parts, max_texture_size=max_texture_size))
     np.savez(folder / "solid.npz", vertices=np.asarray(solid.vertices), faces=np.asarray(solid.faces, dtype=np.int64))

@@ -1,4 +1,4 @@
-"""Find the poses in which the object stays when it is set down on a plane (paper, "Consolidated Output": placements)."""
+"""Stable placements of the object on a plane, verified in simulation (paper, "Consolidated Output": placements)."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ UP = np.array([0.0, 0.0, 1.0])
 SAME_POSE_DEG = 5.0
 SNAP_DEG = 3.0
 NUDGE_DEG = 4.0
-MOST_POSES = 500  # of a ball's thousands: no 12 degrees are then without one
-# Of 371 quasi-static poses of 25 objects, 7 of the 52 that rise by 0.5 to 1 of tilt_rise_m turned by more than 5 degrees
-# when released in MuJoCo, but none of the 17 that also pass the trial of loose poses; below a half, 110 of the 189.
+MOST_POSES = 500  # of thousands for a ball; enough to cover all directions to within 12 degrees
+# Of 371 quasi-static poses of 25 objects, 7 of the 52 with a rise of 0.5 to 1 tilt_rise_m turned by more than 5 degrees when
+# released in MuJoCo, but none of the 17 that also pass the trial of loose poses; below one half, 110 of 189 turned.
 LOOSE_SHARE = 0.5
-SPARE_TRIALS = 2  # poses tried beyond those kept: some of the likeliest may roll away
+SPARE_TRIALS = 2  # poses tried beyond those kept, as some of the likeliest may roll away
 
 
 @dataclass(frozen=True, eq=False)
 class _Rest:
-    """A way to rest: ``rotation (3, 3)`` object to plane, its probability, and whether it stayed in simulation."""
+    """A resting pose: ``rotation (3, 3)`` from object to plane, its probability, and whether it was stable in simulation."""
 
     rotation: np.ndarray
     probability: float
@@ -52,9 +52,9 @@ class _Rest:
 
 @dataclass(frozen=True)
 class PlacementStage:
-    """Find stable poses and prove them in simulation.
+    """Find stable poses and verify them in simulation.
 
-    Field ``placements``: a list of twin.Placement, those that stayed first, most likely first.
+    Field ``placements``: a list of twin.Placement, sorted by stability in simulation, then by decreasing probability.
     """
 
     settings: PlacementConfig
@@ -68,7 +68,7 @@ class PlacementStage:
     model: ClassVar[str | None] = None
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
-        """Return the field ``placements``; raises Rejected where the object stays in no pose."""
+        """Return the field ``placements``. Raises Rejected if no pose is stable."""
         body = load_body(draft)
         rests = find_rests(body, self.settings)
         outline = convex_corners(np.vstack([load_solid(draft.path("solid.npz")).vertices, *body.hulls]))[0]
@@ -76,12 +76,12 @@ class PlacementStage:
 
 
 def find_rests(body: RigidBody, settings: PlacementConfig) -> list[_Rest]:
-    """Return the ways in which a body rests on a plane: those that stay in simulation first, most likely first.
+    """Return the resting poses of a body on a plane, sorted by stability in simulation, then by decreasing probability.
 
-    A pose that a slight tilt turns over (a can on its side) does not count as staying. Where no likely pose is firm,
-    the loose ones count that pass the harder trial, else the firm ones that are unlikely (a pencil on its end). The upright pose
-    always counts where it passes that trial: in it people put down a spoon, which stands on little. What falls over is tried
-    once more from where it came to rest. Raises Rejected where nothing stays.
+    A pose that a slight tilt overturns (a can on its side) does not count as stable. If no likely pose is firm, loose poses
+    count if they pass the harder trial, else firm but unlikely ones (a pencil on its end). The upright pose counts if it passes
+    that trial, as people put down a spoon that way although it rests on little. A body that falls over is tried again from
+    where it came to rest. Raises Rejected if nothing is stable.
     """
     shape = _Shape(body, settings)
     guesses, unlikely = shape.guesses()
@@ -112,7 +112,7 @@ class _Shape:
         self.corners = convex_corners(np.vstack(body.hulls))[0]
         outermost = set(map(tuple, self.corners))
         touching = tuple(hull for hull in body.hulls if not outermost.isdisjoint(map(tuple, hull)))
-        self.plane_body = replace(body, hulls=touching)  # the others cannot reach a plane, but cost time
+        self.plane_body = replace(body, hulls=touching)  # the other hulls cannot touch a plane but cost time
         poses = stable_poses(self.corners, body.center_of_mass_m)[:MOST_POSES]
         self.rotations = np.array([pose.rotation for pose in poses])
         self.probabilities = np.array([pose.probability for pose in poses])
@@ -123,18 +123,18 @@ class _Shape:
         return easiest_tilt(self.corners, self.body.center_of_mass_m, rotations, tilt_rad)[0]
 
     def is_firm(self, rotation: np.ndarray) -> bool:
-        """Tell whether a slight tilt does not turn the body over."""
+        """Return whether a slight tilt does not overturn the body."""
         return self.rises_by(rotation, self.settings.tilt_rise_m)
 
     def rises_by(self, rotation: np.ndarray, least_m: float) -> bool:
-        """Tell whether a slight tilt raises the centre of mass by no less than ``least_m``."""
+        """Return whether a slight tilt raises the centre of mass by at least ``least_m``."""
         return bool(self._rises(rotation[None])[0] >= least_m)
 
     def guesses(self) -> tuple[list[_Rest], list[_Rest]]:
-        """Return the likeliest poses and the upright one, and as many unlikely; of poses that roll into each other one.
+        """Return the likeliest poses including the upright one, and as many unlikely ones; poses that roll into each other count
+        as one.
 
-        That is the firmest. A round side is many narrow facets: each a pose to the estimator, all of them one to a
-        person.
+        The firmest of them represents the group. A round side consists of many narrow facets, each a pose to the estimator.
         """
         near = self.rotations[:, 2] @ self.rotations[:, 2].T > np.cos(np.radians(self.settings.merge_deg))
         _, family = connected_components(csr_matrix(near), directed=False)
@@ -151,14 +151,14 @@ class _Shape:
         return (likely if any(_is_upright(guess) for guess in likely) else [*likely, standing[0]]), unlikely
 
     def settle(self, rests: list[_Rest], loosely: bool) -> list[tuple[Settled, bool]]:
-        """Set the body down in simulation in each of the poses; tell where it went, and whether it stayed.
+        """Settle the body in simulation from each pose; return the outcomes, and whether it stayed.
 
-        Staying is judged level in two engines, and in the first one nudged, tilted by ``NUDGE_DEG`` the way it tilts most
-        easily: it must not go on. A body that rests ``loosely`` is nudged the other way too, and must fall back to within
-        ``SNAP_DEG`` from both.
+        Stability requires staying when released level in two engines, and in the first engine when released tilted by
+        ``NUDGE_DEG`` in the direction of easiest tilt. A ``loosely`` resting body is also tilted the opposite way, and must
+        return to within ``SNAP_DEG`` from both.
         """
         from manitwin.physics.sapien.settle import (
-            settle_on_plane,  # an engine loads when a stage runs, not with the recipe
+            settle_on_plane,  # imported here, as it loads the physics engine
         )
 
         if not rests:
@@ -167,7 +167,7 @@ class _Shape:
         nudged = easiest_tilt(self.corners, self.body.center_of_mass_m, level, np.radians(NUDGE_DEG))[1]
         landings = [level, nudged]
         if loosely:
-            landings.append(level @ nudged.transpose(0, 2, 1) @ level)  # the same tilt the other way
+            landings.append(level @ nudged.transpose(0, 2, 1) @ level)  # the same tilt in the opposite direction
         poses = [
             transform(rotation, np.array([0, 0, -float((self.corners @ rotation[2]).min())]))
             for rotation in np.concatenate(landings)
@@ -188,7 +188,7 @@ class _Shape:
         return found
 
     def _stays_in_second_engine(self, pose: np.ndarray, level: np.ndarray, most_rad: float) -> bool:
-        """Tell whether the body stays in another solver too: on a narrow facet, the two need not agree."""
+        """Return whether the body is stable in a second solver too; on a narrow facet the two may disagree."""
         from manitwin.physics.mujoco.settle import settle_on_plane_in_mujoco
 
         drop_m, seconds = self.settings.drop_m, self.settings.seconds
@@ -196,23 +196,25 @@ class _Shape:
         return self._stayed(again, level, most_rad)
 
     def _stayed(self, outcome: Settled, level: np.ndarray, most_rad: float, way_back_m: float = 0.0) -> bool:
-        """Tell whether a body ended near ``level``, its centre of mass at most ``way_back_m`` beyond the limit from its start."""
+        """Return whether a body ended near ``level``, with its centre of mass at most ``way_back_m`` beyond the limit from its
+        start.
+        """
         turned_rad = Rotation.from_matrix(outcome.object_to_plane[:3, :3] @ level.T).magnitude()
         return bool(outcome.moved_m < self.settings.max_moved_m + way_back_m and turned_rad < most_rad)
 
     def _way_back_m(self, tilted: np.ndarray) -> float:
-        """Return how far the centre of mass goes where a nudged body falls back over the point that it stands on.
+        """Return the displacement of the centre of mass when a tilted body falls back about its contact point.
 
-        That is no movement of the body: of a tall one it alone is more than ``max_moved_m``.
+        This does not count as movement of the body; for a tall one it alone exceeds ``max_moved_m``.
         """
         offsets = self.corners - self.body.center_of_mass_m
         pivot = offsets[int((offsets @ tilted[2]).argmin())]
         return float(np.linalg.norm(pivot)) * np.radians(NUDGE_DEG)
 
     def tried(self, guesses: list[_Rest], loosely: bool) -> list[_Rest]:
-        """Set the body down in each pose and say where it stays; again from where it fell to, if that is no worse.
+        """Try each pose in simulation, and again from where the body came to rest, if that pose is no worse.
 
-        Poses that a slight tilt hardly raises are not tried: a solver's own friction would hold a cylinder.
+        Poses with hardly any rise on tilting are not tried, as a solver's friction would hold a cylinder.
         """
         least_rise_m = self.settings.tilt_rise_m * (LOOSE_SHARE if loosely else 1.0)
         rests = [guess for guess in guesses if not self.rises_by(guess.rotation, least_rise_m)]
@@ -232,11 +234,11 @@ class _Shape:
         return rests
 
     def resting(self, start: _Rest, outcome: Settled) -> np.ndarray:
-        """Return the orientation in which the body came to rest, with the heading it started with.
+        """Return the orientation in which the body came to rest, with its initial heading.
 
-        That of the firmest quasi-static pose within ``SNAP_DEG`` of where it ended; the start itself is one of them
-        where it stayed. Solvers leave a body tilted by their contact tolerance, and another one lets it roll off from
-        there.
+        It is that of the firmest quasi-static pose within ``SNAP_DEG`` of the final orientation; if the body stayed, the start
+        is one of the candidates. Solvers leave a body tilted within their contact tolerance, from where another solver may let
+        it roll off.
         """
         up = outcome.object_to_plane[2, :3]
         cosine = np.cos(np.radians(SNAP_DEG))
@@ -249,7 +251,7 @@ class _Shape:
 
 
 def _joined(rests: list[_Rest], found: _Rest) -> bool:
-    """Give the probability of a pose to an equal one that stayed; tell whether there is one."""
+    """Add the probability of a pose to an equal stable one; return whether there is one."""
     for index, rest in enumerate(rests):
         if rest.settled and float(rest.up @ found.up) > np.cos(np.radians(SAME_POSE_DEG)):
             rests[index] = replace(rest, probability=min(1.0, rest.probability + found.probability))
@@ -267,7 +269,7 @@ def _is_upright(rest: _Rest) -> bool:
 
 
 def _placement(rest: _Rest, outline: np.ndarray, hull_points: np.ndarray) -> dict[str, Any]:
-    """Return a twin.Placement: the plane frame's origin is the centre of the circle around the projection."""
+    """Return a twin.Placement; the plane frame's origin is the centre of the circle enclosing the projection."""
     center, radius = smallest_enclosing_circle((outline @ rest.rotation.T)[:, :2])
     height = -float((hull_points @ rest.up).min())
     return {

@@ -1,4 +1,6 @@
-"""Search at grasp points where too few grasps held: denser proposals there, tried best first, until enough hold or none will."""
+"""Search for further grasps at points with too few successes: denser proposals, tried best first until enough hold or none
+will.
+"""
 
 from __future__ import annotations
 
@@ -17,30 +19,30 @@ from manitwin.pipeline.proposals import Kept
 from manitwin.twin.point_records import GraspPoint
 
 FIRST_POINT_SEED = 100_000
-"""Seeds of the rounds at points begin here, apart from those of the rounds for the whole object and for supports."""
+"""The first seed of rounds at points, apart from those of the rounds for the whole object and for supports."""
 POINT_ROUNDS = 3
 RAW_SHARE = 0.5
-"""Of the proposals of a round over the whole object: one at a point looks at a small part of it."""
+"""Of a round's proposals for the whole object, as a round at a point covers a small part of it."""
 HOPELESS_TRIES, HOPELESS_SHARE = 8, 0.5
-"""After so many of which a smaller share than this has held, it is no place to hold the object: the rest is not tried."""
+"""The search at a point ends after so many tries if a smaller share than this has held."""
 
 Try = Callable[[GraspProposals], list[TrialResult]]
 
 
 @dataclass
 class Tried:
-    """Grasps and how they ended, row by row."""
+    """Grasps and their outcomes, row by row."""
 
     grasps: GraspProposals
     outcome: list[str]
 
     def add(self, grasps: GraspProposals, outcome: list[str]) -> None:
-        """Append grasps, and the outcome of each."""
+        """Append grasps with their outcomes."""
         self.grasps, self.outcome = GraspProposals.joined([self.grasps, grasps]), self.outcome + outcome
 
 
 class PointSearch:
-    """One object, its grasp points, and all that was tried at them so far."""
+    """The search on one object: its grasp points, and all grasps tried at them so far."""
 
     def __init__(
         self,
@@ -52,28 +54,28 @@ class PointSearch:
         tried: Tried,
         attempt: Try,
     ):
-        """Take what a grasper is asked, the filter, the settings, the parts, what the first pass tried, and how to try more."""
+        """Take the grasper's request, the screen, the settings, the parts, the grasps tried first, and the trial function."""
         self.held = held
         self.request, self.grasper, self.screen, self.settings = request, grasper, screen, settings
         self.tried, self.attempt = tried, attempt
         self.results: list[TrialResult] = []
-        self._touched = self._contacts(tried.grasps)  # of all that was tried, row by row
+        self._touched = self._contacts(tried.grasps)  # of all tried grasps, row by row
         self.passed: dict[int, Counter[str]] = {}
-        """How many proposals at a candidate passed each filter."""
+        """The number of proposals that passed each filter, by candidate."""
 
     def outcomes_at(self, point: GraspPoint, others: list[GraspPoint]) -> Counter[str]:
-        """Count the outcomes of what was tried at a point: fingertips touch its part there, no other point more nearly."""
+        """Count the outcomes of grasps tried at a point: their fingertips touch its part there, and no other point is nearer."""
         mine = self._serves(self._touched, point, others)
         return Counter(outcome for outcome, is_mine in zip(self.tried.outcome, mine, strict=True) if is_mine)
 
     def short(self, point: GraspPoint, others: list[GraspPoint]) -> bool:
-        """Tell whether fewer hold at a point than were asked for."""
+        """Return whether fewer grasps hold at a point than requested."""
         return self.outcomes_at(point, others)["held"] < self.settings.least_per_point
 
     def search(self, point: GraspPoint, others: list[GraspPoint]) -> None:
-        """Propose at a point and try, until enough hold there, the tries are used up, or few of many have held."""
+        """Propose and try grasps at a point until enough hold, the tries are used up, or too few of many have held."""
         left = self._proposed_at(point, others)
-        free = self._belongs(left.proposals, point, others)  # their widths are those at the pads by now
+        free = self._belongs(left.proposals, point, others)  # the screen has set their widths to those at the pads
         budget = self.settings.tries_per_point
         while budget > 0 and free.any() and self.short(point, others):
             so_far = self.outcomes_at(point, others)
@@ -93,7 +95,7 @@ class PointSearch:
             budget -= len(chosen)
 
     def shortfall(self, point: GraspPoint, others: list[GraspPoint]) -> str:
-        """Say why fewer hold at a point than were asked for; empty where they do not."""
+        """Say why fewer grasps hold at a point than requested; empty if enough hold."""
         outcomes = self.outcomes_at(point, others)
         if outcomes["held"] >= self.settings.least_per_point:
             return ""
@@ -104,7 +106,7 @@ class PointSearch:
         return f"{said}{f' ({counted})' if counted else ''}; proposals there: {filters}"
 
     def _proposed_at(self, point: GraspPoint, others: list[GraspPoint]) -> Kept:
-        """Return the proposals at a point that pass the screen, of one round and more where they are few."""
+        """Return the proposals at a point that pass the screen, with further rounds if they are few."""
         settings, passed, parts = self.settings, Counter[str](), list[Kept]()
         rounds = POINT_ROUNDS if self.grasper.rounds is None else min(1, self.grasper.rounds)
         enough = 2 * settings.tries_per_point
@@ -127,7 +129,7 @@ class PointSearch:
         return Kept.joined(parts, parts[0].raw)
 
     def _belongs(self, grasps: GraspProposals, point: GraspPoint, others: list[GraspPoint]) -> np.ndarray:
-        """Tell which grasps ``(N,)`` serve a point, by what their fingertips touch, and none of the other points more nearly."""
+        """Return which grasps ``(N,)`` serve a point, by fingertip contact, with no other point nearer."""
         return self._serves(self._contacts(grasps), point, others)
 
     def _serves(self, contacts: Contacts, point: GraspPoint, others: list[GraspPoint]) -> np.ndarray:

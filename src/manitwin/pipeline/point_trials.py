@@ -1,8 +1,8 @@
-"""Let physics answer back: see that enough grasps hold at every grasp point, or say why not and put another in its place.
+"""Trials at grasp points: ensure that enough grasps hold at every point, explain a shortfall, or replace the point.
 
-The selection of grasps spreads over the object, so that a mug's handle may get three trials of a hundred. Where fewer hold at a
-point than were asked for, more are proposed at that very place and tried. A point at which still none holds is withdrawn, and
-the next best one at which some do takes its place; where there is none, it stays with a confidence that says so.
+The selection of grasps is spread over the object, so that a mug's handle may get three trials of a hundred. If fewer grasps
+hold at a point than requested, more are proposed there and tried. A point at which still none holds is withdrawn and replaced
+by the next best point with successful grasps. Without such a point it is kept with low confidence.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.point_records import GraspPoint
 
 DISPROVED = 0.1
-"""The confidence of a grasp point at which nothing holds."""
+"""The confidence of a grasp point at which no grasp holds."""
 
 
 class PointTrialsStage:
-    """Try more grasps where too few held, and write all rows again, with the ids of the points that are left.
+    """Try more grasps at points with too few successes; write all rows again with the ids of the remaining points.
 
-    Of the twin's first gripper only: others tell what of its points transfers to them.
+    Only for the twin's first gripper: other grippers report which of its points transfer to them.
     """
 
     name: ClassVar[str] = "point_trials"
@@ -48,7 +48,7 @@ class PointTrialsStage:
     def __init__(
         self, settings: GraspConfig, verify: VerifyConfig, grasper: Grasper, trial: GraspTrial, gripper: Gripper
     ):
-        """Take the settings, the trial's, the grasper, the engine and the gripper."""
+        """Take the settings of grasps and trials, the grasper, the engine and the gripper."""
         self.settings, self.verify = settings, verify
         self.grasper, self.trial, self.gripper = grasper, trial, gripper
         self.backend = trial.name
@@ -59,7 +59,7 @@ class PointTrialsStage:
         )
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
-        """Write all rows and return the field ``grasp_points``: those that are left, and those withdrawn."""
+        """Write all rows and return the field ``grasp_points``: the remaining and the withdrawn points."""
         first, verdicts = read_arrays(draft, PROPOSALS.format("")), read_arrays(draft, VERDICTS.format(""))
         chosen = np.flatnonzero(~np.char.endswith(first["proposer"], UNFILTERED))
         grasps, points = grasps_of(first), draft.field("points")
@@ -102,7 +102,7 @@ class PointTrialsStage:
 
 
 def answer(search: PointSearch, points: list[GraspPoint], spares: list[GraspPoint]) -> dict[str, list[dict[str, Any]]]:
-    """Return the points with what holds at them, and the withdrawn, after searching wherever that is too little."""
+    """Search wherever too few grasps hold; return the points with the number of successful grasps, and the withdrawn points."""
     searched: set[str] = set()
     number = len(points)
     withdrawn: list[GraspPoint] = []
@@ -110,7 +110,7 @@ def answer(search: PointSearch, points: list[GraspPoint], spares: list[GraspPoin
     _search_where_short(search, points, searched, points)
     for place, point in enumerate(list(points)):
         if not search.outcomes_at(point, points)["held"]:
-            _search_where_short(search, points, searched, [point])  # a new point may have taken what it had
+            _search_where_short(search, points, searched, [point])  # a new point may have taken over its grasps
         if search.outcomes_at(point, points)["held"] or not search.short(point, points):
             continue
         others = [p for p in points if p.id != point.id]
@@ -122,7 +122,7 @@ def answer(search: PointSearch, points: list[GraspPoint], spares: list[GraspPoin
             points, number = [*points[:place], spare, *points[place + 1 :]], number + 1
             if spare.candidate in search.passed:
                 searched.add(spare.id)
-    _search_where_short(search, points, searched, points)  # a new point may be the nearest of what was another one's
+    _search_where_short(search, points, searched, points)  # a new point may now be the nearest to grasps of another one
     return {
         "grasp": [_counted(search, point, points).model_dump() for point in points],
         "withdrawn": [point.model_dump() for point in withdrawn],
@@ -130,9 +130,9 @@ def answer(search: PointSearch, points: list[GraspPoint], spares: list[GraspPoin
 
 
 def _next_best(search: PointSearch, name: str, others: list[GraspPoint], spares: list[GraspPoint]) -> GraspPoint | None:
-    """Take from ``spares`` the first at which enough hold; where there is none, the one at which most do; None: no one."""
+    """Take the first spare point at which enough grasps hold, else the one with the most successes; None if there is none."""
     best, most = None, 0
-    spares.sort(key=lambda spare: search.short(spare, others))  # those at which enough hold already go first
+    spares.sort(key=lambda spare: search.short(spare, others))  # points with enough successful grasps already go first
     while spares:
         spare = spares.pop(0).model_copy(update={"id": name})
         if search.short(spare, others):
@@ -148,7 +148,7 @@ def _next_best(search: PointSearch, name: str, others: list[GraspPoint], spares:
 def _search_where_short(
     search: PointSearch, points: list[GraspPoint], searched: set[str], some: list[GraspPoint]
 ) -> None:
-    """Search at ``some`` of the points, those at which too little holds and that were not searched."""
+    """Search at those of ``some`` points at which too few grasps hold and that have not been searched."""
     for point in some:
         if point.id not in searched and search.short(point, points):
             searched.add(point.id)
@@ -162,6 +162,6 @@ def _counted(search: PointSearch, point: GraspPoint, points: list[GraspPoint]) -
 
 
 def grasps_of(arrays: dict[str, np.ndarray]) -> GraspProposals:
-    """Return the grasps of ``proposals.npz``."""
+    """Return the grasps in ``proposals.npz``."""
     joints = np.stack([arrays[name] for name in JOINTS], axis=1) if JOINTS[0] in arrays else None
     return GraspProposals(arrays["gripper_to_object"], arrays["width_m"], arrays["depth_m"], arrays["score"], joints)

@@ -1,4 +1,4 @@
-"""Choose functional and grasp points among the candidates (paper, "VLM-Based Point Selection")."""
+"""Selection of functional and grasp points among the candidates (paper, "VLM-Based Point Selection")."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.point_records import FunctionalPoint, GraspPoint, RefinedCandidate
 
 FUNCTIONAL, GRASP = (2, 4), (2, 3)
-"""How many points an object has (paper: 2-4 functional and 2-3 grasp points)."""
+"""Least and largest number of points (paper: 2-4 functional and 2-3 grasp points)."""
 WEBP_QUALITY = 90
-"""Of what is kept of the pictures from nearby."""
+"""Quality of the stored close-up images."""
 
 
 class PointsStage:
-    """Ask the annotator for points, see that each is one of the candidates, and give the functional ones their frames.
+    """Have the annotator select points among the candidates, and compute the frames of the functional points.
 
-    An annotator that can looks at the functional points once more, from nearby; ``closer/`` has the pictures that it was shown.
-    ``frames_missing`` says of each functional point without a frame why it has none, ``refined_candidates`` where the views
-    have marked those that have moved since.
+    An annotator with that ability looks at the functional points again in close-up; ``closer/`` contains the images it was
+    shown. ``frames_missing`` gives the reason for each functional point without a frame, ``refined_candidates`` the marked
+    positions of points that have moved since.
     """
 
     name: ClassVar[str] = "points"
@@ -59,7 +59,9 @@ class PointsStage:
         self.expected_usd = annotator.expected_usd("points")
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
-        """Return ``points`` ``{functional, grasp}``; raises BadReply for too few, too many, or no candidates."""
+        """Return ``points`` ``{functional, grasp}``. Raises BadReply for too few or too many points, or points that are not
+        candidates.
+        """
         candidates, physical = draft.field("candidates"), draft.field("physical")
         request = PointsRequest(
             subject=read_scaled_subject(draft, known_as=draft.field("language")["category"]),
@@ -84,7 +86,7 @@ class PointsStage:
         functional, refined = refined_points(framed, surface, taken, _on(request.subject))
         marked = {
             row.candidate: row for row in (*refined, *seen_nearby)
-        }  # where the views marked it: before the first move
+        }  # the position in the marked views, before the first move
         return {
             "points": {
                 "functional": [point.model_dump() for point in functional],
@@ -99,7 +101,7 @@ class PointsStage:
     def _looked_at(
         self, points: Sequence[FunctionalPoint], request: PointsRequest, kept: set[int]
     ) -> tuple[list[FunctionalPoint], list[RefinedCandidate], Mapping[str, np.ndarray]]:
-        """Return the points where the annotator chose from nearby, where the views have marked those, and its pictures."""
+        """Return the points as corrected by the annotator in close-up, their positions in the marked views, and its images."""
         if not isinstance(self._annotator, LooksCloser):
             return list(points), [], {}
         closer = self._annotator.look_closer(request, points)
@@ -118,19 +120,19 @@ class PointsStage:
 
 
 def _spares(selected: SelectedPoints, request: PointsRequest) -> list[GraspPoint]:
-    """Return the next best grasp points, best first: the annotator's own, then by geometry as many as there are points."""
+    """Return the next best grasp points, best first: the annotator's own, then geometric ones up to the number of points."""
     taken = [point.candidate for point in (*selected.grasp, *selected.spare)]
     missing = max(0, GRASP[1] - len(selected.spare))
     return [*selected.spare, *(spare_grasp_points(request, taken)[:missing] if missing else ())]
 
 
 def _moved(points: Iterable[FunctionalPoint]) -> set[int]:
-    """Return the candidates at which a person has put points: these stay where they are."""
+    """Return the candidates at which a person has placed points, which are not moved."""
     return {point.candidate for point in points if point.source is not None}
 
 
 def _on(subject: Subject) -> Callable[[np.ndarray], bool]:
-    """Return what tells of a place ``(3,)`` whether it is on the surface that is seen, as candidates are."""
+    """Return a function that tests whether a position ``(3,)`` lies on the visible surface, as candidates do."""
     limit_m, corners = seen_tolerance_m(subject.solid.extents), merged(list(subject.parts)).triangles
 
     def is_seen(place_m: np.ndarray) -> bool:
@@ -141,7 +143,7 @@ def _on(subject: Subject) -> Callable[[np.ndarray], bool]:
 
 
 def check_selection(selected: SelectedPoints, positions_m: np.ndarray) -> None:
-    """Raise BadReply where the points are not 2-4 and 2-3 different candidates at their places."""
+    """Raise BadReply unless the points are 2-4 and 2-3 different candidates at their positions."""
     _check_kind("functional", selected.functional, FUNCTIONAL, positions_m)
     _check_kind("grasp", selected.grasp, GRASP, positions_m)
 

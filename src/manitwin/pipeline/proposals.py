@@ -1,8 +1,8 @@
-"""Propose grasps, filter them, and associate them with the selected points.
+"""Rounds of grasp proposals: propose, filter, and associate with the selected points.
 
-Source: paper, "Grasp Proposal Generation" and "Spatial Filtering and Semantic Association". A grasper is asked in rounds until
-enough proposals are near the points; more rounds look for grasps that leave room for what the object stands on; grasps that an
-imported asset gives are brought among the proposals and tried like all others.
+Source: paper, "Grasp Proposal Generation" and "Spatial Filtering and Semantic Association". The grasper is called in rounds
+until enough proposals are near the points. Further rounds look for grasps that clear the support plane. Grasps of an imported
+asset are added to the proposals and tried like all others.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from manitwin.twin.import_record import ImportRecord
 
 GROWTH = 1.5
 FIRST_SUPPORT_SEED = 1000
-"""Seeds of the rounds for supports begin here, those of the others at 0."""
+"""The first seed of rounds for supports; other rounds start at 0."""
 HOPELESS_ROUNDS = 4
-"""After so many rounds without a single one there are no more: a plate's rim is too low for the hand."""
+"""Rounds without a single success after which no more are tried, e.g. if a plate's rim is too low for the hand."""
 
 
 def distances_to_grasps(points_m: np.ndarray, grasps: GraspProposals) -> np.ndarray:
-    """Return the distances ``(N, P)`` of points ``(P, 3)`` from the lines, contact to contact, of grasps.
+    """Return the distances ``(N, P)`` of points ``(P, 3)`` from the line segments between the contacts of grasps.
 
-    Selected points lie on the surface and so do the contacts, but the fingertips' centre lies inside the object:
-    measured from there a wide body would be far from its own faces.
+    Selected points and contacts lie on the surface, whereas the point between the fingertips is inside the object: measured
+    from there, a wide body would be far from its own faces.
     """
     closing = grasps.gripper_to_object[:, :3, 0]
     offset = points_m[None] - fingertips(grasps.gripper_to_object, grasps.depth_m)[:, None]
@@ -42,7 +42,7 @@ def distances_to_grasps(points_m: np.ndarray, grasps: GraspProposals) -> np.ndar
 
 @dataclass(frozen=True)
 class Association:
-    """The radius that was needed, whether it had to grow, and the indices of the grasps within it."""
+    """The association radius used, whether it was widened, and the indices of the grasps within it."""
 
     radius_m: float
     widened: bool
@@ -50,7 +50,7 @@ class Association:
 
 
 def associate(distance_m: np.ndarray, *, radius_m: float, enough: int, object_size_m: float) -> Association:
-    """Keep the grasps near a point; where they are too few, let the radius grow by half up to the object's size.
+    """Keep the grasps near a point; if they are too few, widen the radius by half repeatedly, up to the object's size.
 
     ``distance_m (N,)`` is each grasp's distance from its nearest point.
     """
@@ -62,9 +62,9 @@ def associate(distance_m: np.ndarray, *, radius_m: float, enough: int, object_si
 
 @dataclass(frozen=True)
 class Kept:
-    """Grasps that passed the filters: what speaks for them, and how far each is from each point ``(N, P)`` m.
+    """Grasps that passed the filters, their merits, and their distances from each point ``(N, P)`` m.
 
-    ``raw`` are the first round's proposals before any filter; ``counts`` says how many were left after each filter.
+    ``raw`` are the first round's proposals before filtering; ``counts`` are the numbers of grasps after each filter.
     """
 
     proposals: GraspProposals
@@ -81,7 +81,7 @@ class Kept:
 
     @classmethod
     def joined(cls, parts: list[Kept], raw: GraspProposals) -> Kept:
-        """Return the grasps of all parts, one after the other; ``raw`` are those of the whole."""
+        """Return the concatenated grasps of all parts; ``raw`` are those of the whole."""
         return cls(
             GraspProposals.joined([part.proposals for part in parts]),
             Merits.joined([part.merits for part in parts]),
@@ -92,10 +92,10 @@ class Kept:
 
 
 def propose_in_rounds(request: GraspRequest, grasper: Grasper, screen: Screen, settings: GraspConfig) -> Kept:
-    """Propose and filter until ``near_enough`` are within the radius of a point, or the rounds are used up.
+    """Propose and filter until ``near_enough`` grasps are within the radius of a point, or the rounds are used up.
 
-    There are more rounds while fewer than are to be simulated are likely to hold; while fewer have passed at all, the
-    next round looks around those that did.
+    More rounds are made while fewer grasps than will be simulated are likely to hold. While fewer than that have passed the
+    filters at all, the next round also proposes around those that have.
     """
     points = request.focus_points_m
     rounds: list[Kept] = []
@@ -133,11 +133,10 @@ def _around(points: np.ndarray, rounds: list[Kept]) -> np.ndarray:
 def with_support_rounds(
     kept: Kept, request: GraspRequest, grasper: Grasper, screen: Screen, settings: GraspConfig
 ) -> Kept:
-    """Propose until enough grasps near the points leave room for each of ``request.supports``, or the rounds are used up.
+    """Propose until enough grasps near the points clear each of ``request.supports``, or the rounds are used up.
 
-    Proposals that would reach through a support are drawn back along their approach until they do not. What has enough
-    already, has none at all, or is not for a parallel gripper, stays as it is. A grasper that bounds its rounds is asked
-    once more at most.
+    Proposals that would penetrate a support are retracted along their approach. Nothing is changed if there are enough already,
+    if there are no grasps, or if the gripper is not parallel. A grasper with limited rounds is called at most once more.
     """
     gripper = request.gripper
     if not isinstance(gripper, ParallelGripper) or not len(kept.proposals):
@@ -158,23 +157,23 @@ def with_support_rounds(
 
 
 def on_support(kept: Kept, gripper: ParallelGripper, support: np.ndarray, radius_m: float) -> np.ndarray:
-    """Tell which grasps ``(N,)`` are near a point and leave room for a support."""
+    """Return which grasps ``(N,)`` are near a point and clear a support."""
     near = kept.distance_m.min(1) <= radius_m if len(kept.proposals) else np.zeros(0, bool)
     return near & (lowest_points_m(gripper, kept.proposals.gripper_to_object, support) > 0)
 
 
 def _clear_of(support: np.ndarray, gripper: ParallelGripper, raw: GraspProposals) -> GraspProposals:
-    """Return the proposals whose hand is clear of a support, and others drawn back until it is."""
+    """Return the proposals whose hand clears a support, and others retracted until it does."""
     clear = np.flatnonzero(lowest_points_m(gripper, raw.gripper_to_object, support) > 0)
     poses, index = raised(gripper, raw.gripper_to_object, support)
     return GraspProposals.joined([raw.take(clear), replace(raw.take(index), gripper_to_object=poses)])
 
 
 def given_proposals(given: ImportRecord, gripper: Gripper, most: int) -> GraspProposals | None:
-    """Return the given grasps of a gripper, those said to hold first, at most ``most``; None where there are none.
+    """Return an asset's grasps for a gripper, those stated to hold first, at most ``most``; None if there are none.
 
-    Contact frames that say how to approach and close are grasps of any parallel gripper, its fingertips at the frame.
-    Hands with more joints have none: an asset does not give their joints.
+    Contact frames with approach and closing directions are grasps for any parallel gripper, with its fingertips at the frame.
+    Hands with several joints get none, as assets do not state joint values.
     """
     if gripper.kind == "multi_finger":
         return None
@@ -189,7 +188,7 @@ def given_proposals(given: ImportRecord, gripper: Gripper, most: int) -> GraspPr
             widths += [grasps.width_m[i] for i in order]
             depths += [grasps.depth_m[i] for i in order]
             scores += [float(grasps.held[i]) for i in order]
-    if gripper.kind == ParallelGripper.kind:  # a contact frame, with an approach and a closing direction, is enough
+    if gripper.kind == ParallelGripper.kind:  # a contact frame with approach and closing direction is sufficient
         frames = [p for p in given.grasp_points if p.approach is not None and p.closing is not None]
         poses += [_at_contact(np.array(p.position_m), p.approach, p.closing, gripper.tip_depth_m) for p in frames]
         widths += [gripper.opening_m] * len(frames)
@@ -204,7 +203,7 @@ def given_proposals(given: ImportRecord, gripper: Gripper, most: int) -> GraspPr
 def with_given(
     kept: Kept, given: ImportRecord | None, gripper: Gripper, screen: Screen, request: GraspRequest, most: int
 ) -> tuple[Kept, list[str]]:
-    """Put the given grasps that pass the filters before the proposed ones; return all, and the proposers of the given."""
+    """Prepend the asset's grasps that pass the filters to the proposals; return all, and the proposers of the former."""
     proposals = None if given is None else given_proposals(given, gripper, most)
     if given is None or proposals is None:
         return kept, []
@@ -217,10 +216,14 @@ def with_given(
 def _at_contact(
     position_m: np.ndarray, approach: list[float] | None, closing: list[float] | None, tip_depth_m: float
 ) -> np.ndarray:
-    """Return ``gripper_to_object`` with the fingertips at a contact frame: Z along the approach, X along the closing."""
+    """Return ``gripper_to_object`` with the fingertips at a contact frame: Z along the approach, X along the closing
+    direction.
+    """
     z = np.array(approach)
     x = np.array(closing) - (np.array(closing) @ z) * z
-    if np.linalg.norm(x) < 1e-6:  # closing along the approach is no grasp: any closing lets the filters refuse it
+    if (
+        np.linalg.norm(x) < 1e-6
+    ):  # closing along the approach is invalid; any perpendicular direction lets the filters reject it
         x = np.eye(3)[int(np.abs(z).argmin())] - z * z[int(np.abs(z).argmin())]
     x = x / np.linalg.norm(x)
     pose = np.eye(4)

@@ -1,4 +1,4 @@
-"""Findings about a twin that do not reject it: shown, counted, filterable (paper, "Failure Cases and Filtering")."""
+"""Quality findings that do not reject a twin but are reported and can be filtered by (paper, "Failure Cases and Filtering")."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from manitwin.twin.record_values import Check
 from manitwin.twin.shares import wilson_interval
 
 UNCOVERED_LIMIT_M = 0.002
-"""Of the surface that no collision hull covers: more would let fingers sink in (docs/measured/meshes.md)."""
+"""Largest distance of the surface from the hulls; beyond it fingers would sink in (docs/measured/meshes.md)."""
 
 CAVITY_LIMIT = 0.8
-"""Of the open cavity that the hulls keep: less, and a container holds visibly less than it shows."""
+"""Least share of the open cavity kept by the hulls; below it a container holds visibly less than it shows."""
 
 HOLE_LIMIT = 0.5
-"""Of each hole straight through, seen along it, that the hulls keep: less, and nothing goes through that would."""
+"""Least open share of each straight through hole, in projection; below it objects that fit would not pass."""
 
 AGREEMENT_LIMIT = 0.9
-"""Of the verified grasps that a second engine holds: below it, the two disagree about the object and not about single grasps."""
+"""Least share of the verified grasps confirmed by a second engine; below it the engines disagree on the object as a whole."""
 
 CENTER_OF_MASS_LIMIT = 0.1
-"""Of the longest side: an uncertainty beyond it decides whether a grasp holds."""
+"""Of the longest side: uncertainty beyond which the centre of mass may decide whether a grasp holds."""
 
 REHEARSAL = "rehearsal"
-"""The check that only fails, and is only there, where a rehearsal server stood in for a model."""
+"""Name of the check that is present, and failed, only if a rehearsal server replaced a model."""
 
 ESTIMATES = ("mass_kg", "friction_static", "friction_dynamic", "restitution")
 
 
 def quality_checks(draft: Draft) -> list[dict[str, Any]]:
-    """Collect the gate's checks and the findings of the later stages, in the order of the stages."""
+    """Collect the gate's checks and the findings of later stages, in stage order."""
     checks = [
         *rehearsal_checks(draft),
         *naming_checks(draft),
@@ -74,7 +74,7 @@ def quality_checks(draft: Draft) -> list[dict[str, Any]]:
 
 
 def findings_of_import(draft: Draft) -> list[str]:
-    """Return a finding where files that an imported asset names were not there: what they show is not in the twin."""
+    """Return a finding if files that an imported asset references are missing, so that their content is not in the twin."""
     given = None if draft.payload.given is None else read_import_record(Path(draft.payload.given))
     names = [] if given is None else given.missing_files
     if not names:
@@ -85,7 +85,7 @@ def findings_of_import(draft: Draft) -> list[str]:
 
 
 def _unseen(draft: Draft) -> list[Check]:
-    """Return what the photo did not show, where the generator says how much of the surface that is."""
+    """Return the check for surface not visible in the photo, if the generator states its share."""
     share = draft.field("generation").get("unseen_share") if "generation" in draft.fields else None
     if share is None:
         return []
@@ -94,7 +94,7 @@ def _unseen(draft: Draft) -> list[Check]:
 
 
 def photos_checks(draft: Draft) -> list[Check]:
-    """Return of several photos how many the mesh was made of; none for a single one."""
+    """Return the check for how many of several photos were used; empty for a single photo."""
     given = len(draft.payload.files)
     if given < 2 or "generation" not in draft.fields:
         return []
@@ -122,7 +122,7 @@ def photos_checks(draft: Draft) -> list[Check]:
 
 
 def _turns_told(notes: dict[str, Any]) -> list[str]:
-    """Say which turns of the camera were estimated and how sure the fits are, and where it stood where outlines told that."""
+    """Describe the estimated camera turns with their confidence, stated poses, and the camera position found from outlines."""
     said, estimated = [], [view for view in notes.get("views", []) if not view["turn_stated"]]
     if estimated:
         turns = ", ".join(
@@ -150,7 +150,7 @@ def _turns_told(notes: dict[str, Any]) -> list[str]:
 
 
 def rehearsal_checks(draft: Draft) -> list[Check]:
-    """Return the failed check of a twin that a rehearsal server had a part in; none for all others."""
+    """Return the failed check of a twin with a stage answered by a rehearsal server; empty for other twins."""
     if not draft.rehearsed:
         return []
     message = f"{rehearsed_words(draft.rehearsed)}; nothing of this twin is to be believed"
@@ -158,7 +158,7 @@ def rehearsal_checks(draft: Draft) -> list[Check]:
 
 
 def rehearsed_words(stages: Iterable[str]) -> str:
-    """Say which stages a rehearsal server answered for."""
+    """Describe the stages answered by a rehearsal server."""
     return f"a rehearsal server (manitwin fake), not a model, answered for {', '.join(sorted(stages))}"
 
 
@@ -194,7 +194,7 @@ def _physical_checks(draft: Draft) -> list[Check]:
 
 
 def _examined(draft: Draft) -> list[Check]:
-    """Return what spoke against the answers of an annotator that were examined."""
+    """Return checks for objections to the annotator's answers, if they were examined."""
     checks = []
     for name, field in (("estimates_agree", "physical_findings"), ("points_agree", "points_findings")):
         findings = draft.field(field)
@@ -206,7 +206,7 @@ def _examined(draft: Draft) -> list[Check]:
 
 
 def _frame_checks(draft: Draft) -> list[Check]:
-    """Return which functional points have no frame, and why."""
+    """Return the check for functional points without a frame, with the reasons."""
     missing = draft.field("frames_missing")
     framed = sum(point["frame"] is not None for point in draft.field("points")["functional"])
     message = "; ".join(missing)
@@ -250,7 +250,7 @@ def _collision_checks(draft: Draft) -> list[Check]:
 
 
 def point_checks(draft: Draft) -> list[Check]:
-    """Return whether enough grasps hold at every grasp point, and what was said of those where they do not."""
+    """Return the check for enough successful grasps at every grasp point, with the shortfalls."""
     points = draft.field(GRASP_POINTS)
     said = [
         f"{p['id']} ({p['scenario']}), confidence {p['confidence']:g}: {p['shortfall']}"
@@ -263,7 +263,7 @@ def point_checks(draft: Draft) -> list[Check]:
 
 
 def agreement_checks(grasps: dict[str, Any]) -> list[Check]:
-    """Return whether a second engine holds what the first one does; none where no other was asked or nothing held."""
+    """Return the check for agreement with a second engine; empty if there was none or no grasp held."""
     second = grasps.get("second_opinion")
     if second is None or second["holds_share"] is None:
         return []

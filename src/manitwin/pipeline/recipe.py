@@ -1,4 +1,4 @@
-"""The paper's figure 2 as a list of stages, and the recipe that the engine follows."""
+"""The list of stages (paper, figure 2), and the recipe for the engine."""
 
 from __future__ import annotations
 
@@ -54,11 +54,11 @@ from manitwin.twin.wholeness import size_damage
 RUN = logging.getLogger("manitwin.run")
 _STAGES_NAMED = 4
 OF_TEMPLATE = "template:"
-"""What a generator's model begins with where a template made the thing."""
+"""Prefix of a generator's model name if a template made the object."""
 
 
 def check_names(config: BuildConfig) -> None:
-    """Raise UsageError for a backend or gripper that cannot be had, before any work is begun."""
+    """Raise UsageError for an unavailable backend or gripper, before any work starts."""
     for kind in ("generator", "annotator", "grasper", "simulator"):
         create(kind, getattr(config, kind), config)
     target("simulator", config.second_simulator)
@@ -70,7 +70,7 @@ def check_names(config: BuildConfig) -> None:
 
 
 def log_choices(config: BuildConfig) -> None:
-    """Tell the log what twins are made with, and what of it is only the default."""
+    """Log the chosen backends, and which of them are defaults."""
     default = BuildConfig()
     RUN.info("configuration %s, seed %d", config_sha256(config), config.seed)
     for name in ("generator", "annotator", "grasper", "simulator", "second_simulator", "grippers"):
@@ -80,7 +80,7 @@ def log_choices(config: BuildConfig) -> None:
 
 
 def _check_agreement(grippers: list[Gripper], config: BuildConfig) -> None:
-    """Raise UsageError where agreement is asked for and nobody could give it: what is not judged is not accepted."""
+    """Raise UsageError if agreement is required but cannot be judged, as grasps are not accepted unjudged."""
     if not config.second_opinion.enabled:
         raise UsageError("second_opinion requires agreement and is not enabled; enable it, or require none")
     if config.second_opinion.sample_of_held is not None:
@@ -96,7 +96,7 @@ def _check_agreement(grippers: list[Gripper], config: BuildConfig) -> None:
 
 
 def stages_for(kind: Kind, config: BuildConfig) -> list[Stage]:
-    """Return the stages of the paper's pipeline for a kind of input, in order."""
+    """Return the pipeline's stages for a kind of input, in order."""
     own = create("annotator", config.annotator, config)
     annotator = KeepsGiven(own)
     grippers = _grippers(config)
@@ -121,7 +121,7 @@ def stages_for(kind: Kind, config: BuildConfig) -> list[Stage]:
 
 
 def _grippers(config: BuildConfig) -> list[tuple[Gripper, str]]:
-    """Return the grippers with the suffixes of their artifacts' names; raises UsageError where two have one name."""
+    """Return the grippers with the suffixes of their artifact names. Raises UsageError if two have the same name."""
     grippers = [load_gripper(name) for name in config.grippers]
     names = [gripper.name for gripper in grippers]
     if len(set(names)) < len(names):
@@ -170,9 +170,9 @@ def _networks(config: BuildConfig) -> tuple[Network, ...]:
 
 
 def config_sha256(config: BuildConfig) -> str:
-    """Return the digest of all in the configuration that decides a twin, but the seed, which a twin states by itself.
+    """Return the digest of everything in the configuration that affects a twin, except the seed, which a twin states separately.
 
-    Grippers count by their content: a changed file is another configuration.
+    Grippers enter by content: a changed file is another configuration.
     """
     decides = config.model_dump(mode="json", exclude={"seed", "services", "run"})
     decides["grippers"] = [gripper.sha256 for gripper, _ in _grippers(config)]
@@ -182,23 +182,23 @@ def config_sha256(config: BuildConfig) -> str:
         decides["matting"]["network"] = ",".join(network.sha256 for network in networks)
     else:
         del decides["matting"]["network"]
-    if config.source == SourceConfig():  # as before there was a choice
+    if config.source == SourceConfig():  # omitted at its default, to keep digests from before the setting existed
         del decides["source"]
     if config.second_opinion.sample_of_held is None:
         del decides["second_opinion"]["sample_of_held"]
     if config.grasps.link is None:
         del decides["grasps"]["link"]
-    del decides["vlm"]["prompts"]  # their content counts, as part of what each stage is asked with
+    del decides["vlm"]["prompts"]  # their content is part of the model of each stage that uses them
     return sha256_of_json(decides)
 
 
 def is_current(record: TwinRecord, config: BuildConfig) -> bool:
-    """Tell whether a record is what this configuration and seed, and the stages as they are now, would make."""
+    """Return whether this configuration, seed and version of the stages would make the same record."""
     return not _otherwise_set(record, config) and not _other_stages(record, config)
 
 
 def made_otherwise(record: TwinRecord, config: BuildConfig) -> str:
-    """Return in words what of a configuration, seed and stages is not as it was when a twin was made; empty where all is."""
+    """Describe how configuration, seed and stages differ from those that made a twin; empty if they do not."""
     said = _otherwise_set(record, config)
     if stages := _other_stages(record, config):
         more = f" and {len(stages) - _STAGES_NAMED} more stages" if len(stages) > _STAGES_NAMED else ""
@@ -212,11 +212,11 @@ def _otherwise_set(record: TwinRecord, config: BuildConfig) -> list[str]:
 
 
 def _other_stages(record: TwinRecord, config: BuildConfig) -> list[str]:
-    """Return the stages that ran otherwise than they would now, or that would run now, in their order."""
+    """Return the stages that would run differently now, or that would be added, in pipeline order."""
     now = {stage.name: _decided_by(stage) for stage in stages_for(record.source.kind, config)}
     ran = {name: _decided_by(stage) for name, stage in record.provenance.stages.items()}
     if "generate" in ran and "generate" in now and now["generate"][2] is None:
-        ran["generate"] = (*ran["generate"][:2], None)  # which model it was, this generator knows only afterwards
+        ran["generate"] = (*ran["generate"][:2], None)  # this generator reports its model only afterwards
     names = {*ran, *now} if record.status == "accepted" else ran.keys()
     return sorted((name for name in names if now.get(name) != ran.get(name)), key=place_in_pipeline)
 
@@ -227,7 +227,7 @@ def _decided_by(stage: Stage | StageProvenance) -> tuple[str, str, str | None]:
 
 @dataclass(frozen=True)
 class TwinRecipe(FolderRecipe[TwinRecord]):
-    """The engine's recipe that makes a twin of an item. ``tables`` are kept of the twins while a run goes on."""
+    """The engine's recipe for a twin. ``tables`` are the index tables updated during a run."""
 
     payload = Item
     record = RECORD
@@ -237,7 +237,7 @@ class TwinRecipe(FolderRecipe[TwinRecord]):
 
     @cached_property
     def sha256(self) -> str:
-        """The digest of the configuration and of every stage that there is."""
+        """The digest of the configuration, seed and all stages."""
         stages = [
             [kind, stage.name, stage.version, stage.backend, stage.model]
             for kind in KINDS_OF_INPUT
@@ -247,19 +247,22 @@ class TwinRecipe(FolderRecipe[TwinRecord]):
 
     @property
     def seed(self) -> int:
-        """The seed of everything random."""
+        """The random seed."""
         return self.config.seed
 
     def folder_of(self, item_id: str) -> str:
-        """Return the twin's folder."""
+        """Return the path of the twin's folder relative to the data set's root."""
         return twin_name(item_id)
 
     def damage(self, root: DatasetRoot, item_id: str) -> str | None:
-        """Return what is wrong with a twin's folder by the sizes of its files."""
+        """Return what is wrong with a twin's folder, judged by file sizes; None if nothing is."""
         return size_damage(root, twin_name(item_id))
 
     def identify(self, payload: Item) -> Identity:
-        """Return the id by the input's bytes, and its kind by what they are, not by what they claim to be."""
+        """Return the id and kind of an input from the content of its files.
+
+        Raises InputChanged if a file is missing.
+        """
         if payload.file is None:
             return Identity(twin_id(payload), "text")
         identity = None
@@ -277,23 +280,23 @@ class TwinRecipe(FolderRecipe[TwinRecord]):
             return Identity(identity, claimed_kind(payload), answer)
 
     def stages(self, kind: str) -> list[Stage]:
-        """Return the stages of the paper's pipeline for a kind of input, in order."""
+        """Return the pipeline's stages for a kind of input, in order."""
         return stages_for(cast(Kind, kind), self.config)
 
     def parse(self, record: bytes) -> TwinRecord:
-        """Read a twin's record; raises TwinError for one that is unreadable or of another version: it is built again."""
+        """Parse a twin's record. Raises TwinError if it is unreadable or of an unknown version; the twin is then built again."""
         return parse_record(record)
 
     def is_current(self, record: TwinRecord) -> bool:
-        """Tell whether this recipe would make the same twin."""
+        """Return whether this recipe would make the same twin."""
         return is_current(record, self.config)
 
     def amended_sha256(self, record: TwinRecord) -> str | None:
-        """Return the digest of the amendments that a twin was made with."""
+        """Return the digest of the amendments with which a twin was made."""
         return record.provenance.amendments_sha256
 
     def ending(self, record: TwinRecord) -> Ending:
-        """Return how a twin's record says that its item ended."""
+        """Return how the item of a twin's record ended."""
         return ending_of(record)
 
     def write(
@@ -315,7 +318,7 @@ class TwinRecipe(FolderRecipe[TwinRecord]):
 
 
 def ending_of(record: TwinRecord) -> Ending:
-    """Return how a twin's record says that its item ended."""
+    """Return how the item of a twin's record ended."""
     reason = record.rejection.reason if record.rejection is not None else None
     if record.rejection is not None:
         detail = record.rejection.detail
@@ -329,7 +332,7 @@ def ending_of(record: TwinRecord) -> Ending:
 
 
 def _taken_as(record: TwinRecord) -> str | None:
-    """Return what a text was taken as by a template, where it does not say so itself: a king, as a chess king."""
+    """Return the category that a template assigned to a text, if the text does not contain it: a king as a chess king."""
     model = record.provenance.stages["generate"].model if "generate" in record.provenance.stages else None
     if record.source.kind != "text" or model is None or not model.startswith(OF_TEMPLATE):
         return None
@@ -338,10 +341,10 @@ def _taken_as(record: TwinRecord) -> str | None:
 
 
 def estimate_usd(config: BuildConfig) -> dict[str, float]:
-    """Return about what services charge for a twin, by the kind of its input."""
+    """Return the approximate charge for a twin in USD, by kind of input."""
     return {kind: expected_usd(stages_for(kind, config)) for kind in KINDS_OF_INPUT}
 
 
 def expected_usd(stages: list[Stage]) -> float:
-    """Return about what services charge for a twin that goes through these stages."""
+    """Return the approximate charge for a twin that passes through these stages, in USD."""
     return sum(stage.expected_usd for stage in stages if isinstance(stage, PaidStage))

@@ -1,4 +1,4 @@
-"""Write the table of grasps, best first, and the summary of every gripper (paper, "Consolidated Output")."""
+"""The grasp table, best first, and the summary per gripper (paper, "Consolidated Output")."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from manitwin.twin.grasp_table import JITTERED, PART, POINTED, GripperRows, writ
 
 TABLE = "grasps.parquet"
 NO_PART, NO_POINT = "no part", "no point"
-"""What counts of outcomes call the grasps that hold no part that is told, and those at no grasp point."""
+"""Keys in outcome counts for grasps of no part and at no grasp point."""
 
 
 class RecordGraspsStage:
-    """Write ``grasps.parquet`` and the field ``grasps`` for the twin's first gripper and all others."""
+    """Write ``grasps.parquet`` and the field ``grasps``, for the twin's first gripper and all others."""
 
     name = "record_grasps"
     version = "6"
@@ -38,9 +38,9 @@ class RecordGraspsStage:
     model: str | None = None
 
     def __init__(self, settings: SecondOpinionConfig, grippers: list[tuple[Gripper, str]], link: str | None = None):
-        """Take whether both engines must agree, and the grippers with the suffixes of their artifacts, the first one first.
+        """Take the settings, and the grippers with their artifact suffixes, the first gripper first.
 
-        ``link`` is the one of which grasps were asked, None where they may be of any.
+        ``link`` is the link to which grasps were restricted; None for no restriction.
         """
         self.settings, self.grippers, self.link = settings, grippers, link
         self.model = ", ".join(f"{gripper.name} {gripper.sha256[:12]}" for gripper, _ in grippers)
@@ -57,7 +57,7 @@ class RecordGraspsStage:
         )
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
-        """Write the table and return the summary; raises Rejected where engines must agree and do so on no grasp."""
+        """Write the table and return the summary. Raises Rejected if both engines must agree and do so on no grasp."""
         points = draft.fields.get(GRASP_POINTS) or draft.field("points")
         types = {point["id"]: point["type"] for point in points["grasp"]}
         types[NOBODY] = NO_POINT
@@ -87,7 +87,7 @@ class RecordGraspsStage:
         return {"grasps": summary.model_dump(mode="json")}
 
     def _rows(self, draft: Draft, gripper: Gripper, suffix: str) -> tuple[GripperRows, list[dict[str, list[Any]]]]:
-        """Return the rows of the proposals, and the columns of the jittered controls where there are any."""
+        """Return the rows of the proposals, and the columns of the jittered controls if there are any."""
         proposals, verdicts = read_tried(draft, suffix)
         held = PartedSolid.read(draft, gripper, draft.field(PROPOSED.format(suffix))["point_radius_m"])
         points = draft.field("points") | (draft.fields.get(GRASP_POINTS) or {})
@@ -125,7 +125,7 @@ class RecordGraspsStage:
 
 
 def _none_agreed(draft: Draft, rows: GripperRows) -> Rejected:
-    """Say what became in the second engine of all that held in the first."""
+    """Return the rejection with the second engine's outcomes for grasps that held in the first."""
     held = (read_tried(draft, "")[1]["outcome"] == "held") & ~_unfiltered(rows)
     counted = ", ".join(f"{n} {outcome}" for outcome, n in sorted(Counter(rows.outcome[held].tolist()).items()))
     engine, second = (draft.field(name.format(""))["engine"] for name in (TRIAL, AGREEMENT))
@@ -137,7 +137,7 @@ def _unfiltered(rows: GripperRows) -> np.ndarray:
 
 
 def _best_first(rows: GripperRows) -> np.ndarray:
-    """Order: held before failed, robust before fragile, unfiltered last; else as proposed."""
+    """Return the row order: held before failed, robust before fragile, unfiltered last; else as proposed."""
     trials = np.array([n or 0 for n in rows.robustness_trials])
     held = np.array([round((share or 0.0) * n) for share, n in zip(rows.robustness, trials, strict=True)], int)
     rank = rank_values(held, trials)
@@ -151,7 +151,7 @@ def _controls(
     moved = {name: values[of] for name, values in proposals.items()}
     moved["gripper_to_object"] = second["jittered_gripper_to_object"]
     moved["proposer"] = np.char.add(moved["proposer"], JITTERED)
-    for name in POINTED:  # where it was moved to holds something else
+    for name in POINTED:  # the association does not apply after the move
         moved[name] = np.full(len(of), NOBODY)
     rows = GripperRows(
         gripper.name,
@@ -203,7 +203,7 @@ def _summary(
 
 
 def _outcomes_by(rows: GripperRows, column: str, names: dict[str, str], which: np.ndarray) -> dict[str, dict[str, int]]:
-    """Count outcomes of the rows ``which`` by the name of what they hold."""
+    """Count the outcomes of the rows ``which`` by the name of what they hold."""
     counts: dict[str, Counter[str]] = defaultdict(Counter)
     for point, outcome in zip(rows.proposals[column][which].tolist(), rows.outcome[which].tolist(), strict=True):
         counts[names[point]][outcome] += 1

@@ -1,6 +1,7 @@
-"""A second, closer look: functional points move from their candidates to the features that they mean.
+"""Refinement of functional points: they move from their candidates to the features that they mean.
 
-42 candidates are some 2 to 4 cm apart on a thing of a hand's size, so the nearest to a face's middle may lie at its border.
+The 42 candidates are about 2 to 4 cm apart on a hand-sized object, so that the nearest to a face's centre may lie at its
+border.
 """
 
 from __future__ import annotations
@@ -18,24 +19,24 @@ from manitwin.geometry.sampling import farthest_point_sampling
 from manitwin.twin.point_records import FunctionalFrame, FunctionalPoint, RefinedCandidate
 
 CLOSER = 12
-"""How many places around a candidate are looked at."""
-_LEAST_MOVE_M = 0.002  # less is not worth another place than the one that the views show
+"""Number of positions tried around a candidate."""
+_LEAST_MOVE_M = 0.002  # a smaller improvement does not justify moving the point from its marked position
 _LEAST_LEVEL_M, _LEVEL_SHARE = 0.0005, 0.003
-"""M, of the longest side: a point farther off a face's plane is on another part."""
-_BESIDE = -0.1  # cosine: a face's border is beside it, what looks away is another side
-_ON_FRAME_M = 0.005  # the feature's own place is where the surface is this near to the frame's origin
+"""Metres, and share of the longest side: a point farther from a face's plane is on another part."""
+_BESIDE = -0.1  # cosine: excludes other sides, but not the border of a face
+_ON_FRAME_M = 0.005  # largest distance of the surface from the frame's origin for the feature's own position
 
 
 def refined_points(
     points: Sequence[FunctionalPoint], surface: FramedMesh, kept: Collection[int], is_seen: Callable[[np.ndarray], bool]
 ) -> tuple[list[FunctionalPoint], list[RefinedCandidate]]:
-    """Return the points, each at the place of a closer set around its candidate that is nearest to its frame's feature.
+    """Return the points, each moved to the position near its candidate that is closest to its frame's feature.
 
-    The set is eleven places of the surface around the candidate, as far apart as can be and on its side of the matter, and the
-    feature's own. The refined place takes the candidate's row; the second list says where the views have marked it. Candidates
-    in ``kept`` stay where they are, as others lie on them; so do points without a frame, and those whose label means more than
-    the frame's feature: a handle is not the wall of its hole, an inside not the rim, bristles not their end, and of a base or a
-    front any place is as good. ``is_seen`` tells of a place ``(3,)`` whether it lies on the surface that is seen.
+    The positions tried are eleven surface samples around the candidate, as far apart as possible and on the same side, and the
+    feature's own position. A moved point replaces its candidate; the second list has the positions marked in the views.
+    Candidates in ``kept`` are not moved, as other points use them. Neither are points without a frame, or with a label that
+    means more than the feature: a handle is not the wall of its hole, an inside not the rim, bristles not their end, and any
+    position on a base or front is as good. ``is_seen`` tests whether a position ``(3,)`` lies on the visible surface.
     """
     moved: list[FunctionalPoint] = []
     rows: list[RefinedCandidate] = []
@@ -49,14 +50,14 @@ def refined_points(
 
 
 def marked_at(point: FunctionalPoint) -> RefinedCandidate:
-    """Return what says of a point that is about to move where the views have marked its candidate."""
+    """Return the record of a candidate's marked position, before its point moves."""
     return RefinedCandidate(candidate=point.candidate, marked_position_m=point.position_m, marked_normal=point.normal)
 
 
 def _closer(
     point: FunctionalPoint, frame: FunctionalFrame, surface: FramedMesh
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the position and normal of the place nearest to a feature, None where that is hardly nearer than the point."""
+    """Return the position and normal closest to a feature; None if the improvement is negligible."""
     if not means_place(point.label, frame.kind):
         return None
     positions, normals = surface.samples
@@ -81,7 +82,7 @@ def _closer(
 
 
 def away_from_feature_m(frame: FunctionalFrame, places_m: np.ndarray) -> np.ndarray:
-    """Return how far places ``(N, 3)`` are from a feature: of an opening and a hole from the circle of its rim or wall."""
+    """Return the distances of positions ``(N, 3)`` from a feature; for openings and holes, from the circle of the rim or wall."""
     local = (places_m - np.array(frame.position_m)) @ rotation_from_quaternion_wxyz(np.array(frame.quaternion_wxyz))
     if frame.kind in ("opening", "hole"):
         return np.hypot(np.hypot(local[:, 0], local[:, 1]) - frame.size_m, local[:, 2])
@@ -92,7 +93,7 @@ def away_from_feature_m(frame: FunctionalFrame, places_m: np.ndarray) -> np.ndar
 
 
 def _own_place(frame: FunctionalFrame, surface: FramedMesh, at: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the place of the surface at a feature, of one that is as wide as long as it is that nearest to the point."""
+    """Return the surface position at a feature; for an extended feature, the one nearest to the point."""
     goal = np.array(frame.position_m)
     rotation = rotation_from_quaternion_wxyz(np.array(frame.quaternion_wxyz))
     local = (at - goal) @ rotation

@@ -1,4 +1,4 @@
-"""What is wrong with inputs, told of all of them at once: who lists 10,000 things corrects their list in one go."""
+"""Collection of errors in inputs, so that all of them are reported at once and a long list can be corrected in one pass."""
 
 from __future__ import annotations
 
@@ -10,33 +10,33 @@ from manitwin.errors import UsageError
 from manitwin.formats.printable import printable_line
 
 TOLD = 8
-"""So many are told with their reason besides the first, which is told whole; of the rest where they stand, if in rows."""
+"""Number of errors reported with their reason besides the first, which is reported in full; of the rest only row numbers."""
 ROWS_NAMED = 200
 MOST = 1000
-"""A list with so many is not the one that was meant: the rest of it is not read."""
+"""Number of errors at which reading stops, as the list is hardly the intended one."""
 _CHARACTERS = 200
 
 
 @dataclass
 class RefusedInputs:
-    """The inputs that cannot be used, by what is wrong with each; a line begins with where it stands."""
+    """The messages on unusable inputs, each starting with its location."""
 
     lines: list[str] = field(default_factory=list)
 
     @contextmanager
     def noted(self) -> Iterator[None]:
-        """Keep a UsageError for later, so that the next input is looked at too; the last of ``MOST`` raises one of all."""
+        """Collect a UsageError, so that the next input is read too; on reaching ``MOST``, raise one UsageError for all."""
         try:
             yield
         except UsageError as error:
-            if len(self.lines) >= MOST:  # of all already
+            if len(self.lines) >= MOST:  # raised for all inputs already
                 raise
             self.lines.append(str(error))
         if len(self.lines) >= MOST:
             self.tell()
 
     def tell(self) -> None:
-        """Raise UsageError where there is any, in one line: the first whole, the others as far as their first semicolon."""
+        """Raise UsageError for all collected errors: the first in full, the others up to their first semicolon."""
         if not self.lines:
             return
         first, *others = self.lines

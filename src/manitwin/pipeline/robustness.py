@@ -1,4 +1,4 @@
-"""Try each held grasp again under perturbations until a sequential test is settled (paper, "Simulation Verification")."""
+"""Repeated trials of held grasps under perturbations until a sequential test decides (paper, "Simulation Verification")."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ROBUSTNESS = "robustness{}"
 
 
 class RobustnessStage:
-    """Try each held grasp again and again; writes ``held (N,)`` and ``trials (N,)``, zero trials where it never held."""
+    """Repeat the trials of each held grasp. Writes ``held (N,)`` and ``trials (N,)``; zero trials if it did not hold at first."""
 
     version = "8"
     needs: Resource = "cpu"
@@ -39,7 +39,7 @@ class RobustnessStage:
     def __init__(
         self, settings: RobustnessConfig, verify: VerifyConfig, trial: GraspTrial, gripper: Gripper, suffix: str = ""
     ):
-        """Take the settings, the trial's, the engine and the gripper."""
+        """Take the settings of perturbations and trials, the engine and the gripper."""
         self.settings, self.verify, self.trial, self.gripper = settings, verify, trial, gripper
         self.backend = trial.name
         self.model: str | None = f"{gripper.name} {gripper.sha256[:12]}, {verify.model_dump_json()}"
@@ -50,7 +50,7 @@ class RobustnessStage:
         self.writes: tuple[str, ...] = (self.file, self.field)
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
-        """Write how many trials each grasp survived and return the summary."""
+        """Write how many trials each grasp survived, and return the summary."""
         proposals, verdicts = read_tried(draft, self.suffix)
         poses, depth_m = proposals["gripper_to_object"], proposals["depth_m"]
         chosen = ~np.char.endswith(proposals["proposer"], UNFILTERED)
@@ -60,7 +60,7 @@ class RobustnessStage:
         spread = self._spread(draft.field("physical"), filling)
         draws = draw_perturbations(spread, self.settings.max_trials, draft.seed)
         body = load_body(draft)
-        # what falls at the first step counts as fallen here: a robust grasp has more than the least that holds
+        # a fall at the first time step size counts here: a robust grasp exceeds the least grasp that holds
         settings = replace(trial_settings(self.verify, self.gripper), doubts_tried_again=False)
         variants = [(draw, draw.body(body, filling), draw.settings(settings)) for draw in draws]
 
@@ -108,17 +108,17 @@ class RobustnessStage:
 
 
 def fill_curve(physical: dict[str, Any]) -> FillCurve | None:
-    """Return how a vessel's centre of mass goes with its mass, None for what has no fill states."""
+    """Return a vessel's centre of mass and inertia as functions of its mass; None without fill states."""
     filling = physical.get("filling")
     if filling is None:
         return None
     names = ("mass_kg", "center_of_mass_m", "inertia_kg_m2")
-    known_m = physical["center_of_mass_uncertainty_m"]  # of the full one, where a state does not say its own
+    known_m = physical["center_of_mass_uncertainty_m"]  # of the full state, for states that do not have their own
     off_m = [state.get("center_of_mass_uncertainty_m") for state in filling["states"]]
     masses, centers, inertias = (np.array([state[name] for state in filling["states"]]) for name in names)
     return FillCurve(masses, centers, inertias, np.array([known_m if each is None else each for each in off_m]))
 
 
 def rank_values(held: np.ndarray, trials: np.ndarray) -> np.ndarray:
-    """Return by what grasps are ranked: the posterior mean of the share, and less than any of these where none was tried."""
+    """Return the ranking values of grasps: the posterior mean of the success share, and less than any of these if not tried."""
     return np.array([Robustness(int(h), int(n)).rank_value if n else -1.0 for h, n in zip(held, trials, strict=True)])

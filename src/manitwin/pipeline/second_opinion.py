@@ -1,4 +1,4 @@
-"""Try the grasps in a second engine, and negative controls in both (paper, "Simulation Verification", beyond one solver)."""
+"""Trials in a second engine, and negative controls in both (paper, "Simulation Verification", extended beyond one solver)."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ SECOND_OPINION = "second_opinion{}.npz"
 AGREEMENT = "second_opinion{}"
 NOT_TRIED, FAILS, HOLDS = -1, 0, 1
 SAMPLE_STREAM = 8
-JITTER_STREAM = 7  # keeps the draws apart from those of other stages with the same seed
+JITTER_STREAM = 7  # separates these random draws from those of other stages with the same seed
 
 
 class SecondOpinionStage:
-    """Try the held grasps or a sample of them, a share of the failed ones, and jittered ones again.
+    """Repeat in a second engine the held grasps or a sample of them, a share of the failed ones, and jittered ones.
 
-    Writes ``holds (N,) int8`` and ``outcome (N,)`` of the second engine, one for each proposal, and the jittered grasps
-    with both engines' verdicts.
+    Writes ``holds (N,) int8`` and ``outcome (N,)`` of the second engine per proposal, and the jittered grasps with the verdicts
+    of both engines.
     """
 
     version = "9"
@@ -45,7 +45,7 @@ class SecondOpinionStage:
         gripper: Gripper,
         suffix: str = "",
     ):
-        """Take the settings, the trial's, both engines and the gripper."""
+        """Take the settings of the second opinion and trials, both engines and the gripper."""
         self.settings, self.verify, self.first, self.second, self.gripper = settings, verify, first, second, gripper
         self.backend = second.name
         self.model: str | None = (
@@ -58,7 +58,7 @@ class SecondOpinionStage:
         self.writes: tuple[str, ...] = (self.file, self.field)
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
-        """Write the second engine's verdicts and return how far the two agree."""
+        """Write the second engine's verdicts, and return the agreement of the two engines."""
         proposals, verdicts = read_tried(draft, self.suffix)
         poses, depth_m = proposals["gripper_to_object"], proposals["depth_m"]
         chosen = ~np.char.endswith(proposals["proposer"], UNFILTERED)
@@ -75,7 +75,7 @@ class SecondOpinionStage:
         body, settings = load_body(draft), trial_settings(self.verify, self.gripper)
         tried = np.concatenate([some_good, some_bad])
         outcome = np.full(len(poses), "", "U16")
-        outcome[tried] = verdicts["second_outcome"][tried]  # of what the second engine has confirmed or refused already
+        outcome[tried] = verdicts["second_outcome"][tried]  # those that the second engine has judged already
         asked = tried[outcome[tried] == ""]
         again = self.second.run(
             body,
@@ -106,9 +106,9 @@ class SecondOpinionStage:
         return {self.field: record.model_dump(mode="json")}
 
     def _sample(self, held: np.ndarray, poses: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Return the held grasps that are tried: all, or every so-manieth of them in the order of their approach's octants.
+        """Return the held grasps to try: all, or a systematic sample in the order of their approach octants.
 
-        So each octant has its share of the sample (systematic sampling with a random start; Cochran 1977, 8.1 and 5.4).
+        Each octant gets its share of the sample (systematic sampling with a random start; Cochran 1977, 8.1 and 5.4).
         """
         count = self.settings.sample_of_held
         if count is None or len(held) <= count:
@@ -138,7 +138,7 @@ def _agreement(
 
 
 def cohens_kappa(first: np.ndarray, second: np.ndarray) -> float | None:
-    """Return Cohen's kappa of two boolean verdicts ``(N,)``; None where it is not defined: no rows, or chance alone agrees.
+    """Return Cohen's kappa of two boolean verdicts ``(N,)``; None if undefined: no rows, or agreement by chance is certain.
 
     kappa = (p_o - p_e) / (1 - p_e) with p_e from the two marginals (Cohen 1960, "A coefficient of agreement for nominal
     scales").

@@ -1,4 +1,4 @@
-"""The arguments of a build: inputs, and the configuration with what a command line or a call says on top of it."""
+"""Arguments of a build: the inputs, and the configuration with overrides from a command line or call."""
 
 from __future__ import annotations
 
@@ -18,44 +18,44 @@ from manitwin.pipeline.manifest import Notes, Turns, iterate_items, require_inpu
 from manitwin.twin.dataset_root import DatasetRoot
 
 RETIRED = ("item_timeout_s",)
-"""Settings that earlier versions wrote into a data set's configuration, and that decided no twin."""
+"""Settings in configurations of earlier versions that did not affect twins; they are ignored."""
 
 
 class Flags(TypedDict, total=False):
-    """Flags of a build beside its configuration; None, like what is left out, leaves the configuration as it is."""
+    """Overrides of a build's configuration; None or a missing key leaves the configuration unchanged."""
 
     seed: int | None
-    """The seed of everything random."""
+    """The random seed."""
     grippers: Iterable[str] | None
-    """Names or ``.toml`` files; the first one's grasps are the twin's own."""
+    """Names or ``.toml`` files; the grasps of the first gripper are the twin's own."""
     vlm: str | None
     """The vision-language model: ``openai:MODEL@URL``, ``anthropic:MODEL``, ``replay:FILE`` or ``rules``."""
     generator: str | None
-    """What makes meshes of photos and texts (docs/generators.md)."""
+    """The generator of meshes from photos and texts (docs/generators.md)."""
     grasper: str | None
-    """What proposes grasps (docs/served_grasps.md)."""
+    """The proposer of grasps (docs/served_grasps.md)."""
     matting: str | None
-    """A learned opinion on the cut-outs of photos: ``isnet``, an ONNX file, or ``none``."""
+    """A matting network used in addition to the built-in method: ``isnet``, an ONNX file, or ``none``."""
     max_cost_usd: float | None
-    """Once services have charged so much, items that would cost more are left for another run."""
+    """Once services have charged this sum, items that would cost more are left for another run."""
     record: str | Path | None
-    """A file that the model's answers are added to, for ``replay:FILE``."""
+    """A file to which the model's answers are appended, for ``replay:FILE``."""
     require_agreement: bool
-    """Verify only grasps that a second engine holds too."""
+    """Verify only grasps that a second engine confirms."""
     second_opinion: Literal["all", "sample"] | None
-    """Whether the second engine tries all grasps that held, or a sample of 20 that tells their share with an interval."""
+    """Whether the second engine tries all held grasps, or a sample of 20, which gives their share with an interval."""
     quick: bool
-    """No second engine and no robustness."""
+    """Skip the second engine, robustness trials and second trials of doubtful grasps."""
     link: str | None
-    """Of things with joints: both fingertips of each grasp touch this link, the joints locked."""
+    """For articulated objects with locked joints: both fingertips of each grasp must touch this link."""
 
 
 SAMPLE_OF_HELD = 20
-"""Where 20 of 20 hold, at least 84 % of all do (Wilson's interval of 95 %)."""
+"""If 20 of 20 hold, at least 84 % of all do (Wilson's interval, 95 %)."""
 
 
 def with_flags(settings: BuildConfig, flags: Flags) -> BuildConfig:
-    """Return the settings with the flags on top; raises UsageError where two of them contradict each other."""
+    """Return the settings with the flags applied. Raises UsageError if flags contradict each other."""
     quick, agree = flags.get("quick", False), flags.get("require_agreement", False)
     if quick and agree:
         raise UsageError("--quick skips the second engine, but --require-agreement needs it; give only one of them")
@@ -98,11 +98,11 @@ def _given(said: dict[str, Any]) -> dict[str, Any]:
 
 
 class NotTwins(UsageError):
-    """A folder that another command than ``build`` made: scenes, episodes, pictures."""
+    """A folder that was made by another command than ``build``: scenes, episodes, pictures."""
 
 
 def stored_config(root: DatasetRoot) -> BuildConfig:
-    """Return the configuration of a data set, the defaults for a new one. Raises UsageError where it cannot be read."""
+    """Return the configuration of a data set, or the defaults for a new one. Raises UsageError if it cannot be read."""
     if not root.exists(CONFIG):
         return BuildConfig()
     place = f"{root.url}/{CONFIG}"
@@ -121,9 +121,9 @@ _MOST_NAMED, _MOST_SHOWN = 6, 80
 
 
 def _not_by_default(settings: BuildConfig) -> str:
-    """Return the settings that decide twins and are not as an empty configuration of this version has them, in one line.
+    """List the settings that affect twins and differ from this version's defaults, in one line.
 
-    They were chosen once, or were the defaults of the version that made the data set.
+    They were chosen earlier, or were the defaults of the version that made the data set.
     """
     default = dict(_flat(BuildConfig().model_dump(mode="json")))
     differ = [
@@ -144,14 +144,14 @@ def _flat(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, 
 
 
 MOST_VARIATIONS = 100_000
-"""Of one text: more than any data set of the paper has of one category."""
+"""Limit per text: more than the paper's data set has of one category."""
 
 
 @dataclass(frozen=True)
 class BuildRequest:
-    """The arguments of ``build``, checked; nothing is written yet. ``items`` are read, and noted, as they are iterated.
+    """The checked arguments of ``build``; nothing has been written. ``items`` are read, with their notes, while being iterated.
 
-    ``out`` is the data set as it was given.
+    ``out`` is the data set as given by the user.
     """
 
     out: str
@@ -176,7 +176,7 @@ def request_build(
     turns_deg: Turns | None = None,
     poses: str | Path | None = None,
 ) -> BuildRequest:
-    """Check the arguments of ``build``; ``defaults`` hold for all inputs. Raises UsageError for wrong ones."""
+    """Check the arguments of ``build``; ``defaults`` apply to all inputs. Raises UsageError for invalid ones."""
     if jobs is not None and not 1 <= jobs <= MOST_SLOTS:
         raise UsageError(f"jobs is {jobs:.6g}; give 1 to {MOST_SLOTS}")
     if not 1 <= count <= MOST_VARIATIONS:
@@ -188,7 +188,7 @@ def request_build(
     settings = with_flags(base, flags)
     if jobs is not None:
         settings = settings.model_copy(update={"run": settings.run.model_copy(update={"cpu": jobs})})
-    # these take two CPU-seconds to import, so wrong arguments are refused before
+    # imported here, as it takes two CPU-seconds: invalid arguments are rejected first
     from manitwin.pipeline.generator_input import refusal
     from manitwin.pipeline.recipe import check_names
 

@@ -1,8 +1,8 @@
-"""What messages say of sizes that are unlikely, or no hand's; remedies go by it."""
+"""Phrases in messages on implausible sizes; remedies look for them."""
 
 from __future__ import annotations
 
 TRULY_LARGE = "is that large, and no gripper here holds it"
-"""Of what is too large for a twin and has the size of such things."""
+"""For objects too large for a twin whose size is typical of their kind."""
 
 CHECK_SCALE = "check its unit and scale first"

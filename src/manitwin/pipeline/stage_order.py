@@ -1,4 +1,4 @@
-"""The order of the pipeline's stages, for tables and pages that name stages and build none."""
+"""The order of the pipeline's stages, for tables and pages that name stages without creating them."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ STAGE_ORDER = (
     ),
     *("points", "parts", "grasps", "verify", "point_trials", "second_opinion", "robustness", "record_grasps", "finish"),
 )
-"""The order of ``recipe.stages_for``; twin.json keeps its stages by name."""
+"""The order of ``recipe.stages_for``; twin.json sorts its stages by name."""
 
 
 def place_in_pipeline(stage: str) -> tuple[int, str, int]:
-    """Return what sorts stages as they run: all trials of one gripper (``verify-robotiq_2f85``) before the next one's.
+    """Return a sort key in execution order: all trials of one gripper (``verify-robotiq_2f85``) precede those of the next.
 
-    A stage that is none of the pipeline's comes behind them.
+    Stages that are not part of the pipeline come last.
     """
     name, _, gripper = stage.partition("-")
     place = STAGE_ORDER.index(name) if name in STAGE_ORDER else len(STAGE_ORDER)

@@ -1,4 +1,4 @@
-"""Where in a photo the thing is, as a person or a data set states it: its box in pixels, or a picture of its outline."""
+"""The object's location in a photo, as stated by a person or data set: a bounding box in pixels, or a mask image."""
 
 from __future__ import annotations
 
@@ -16,22 +16,20 @@ from manitwin.formats.source_files import MESH_SUFFIXES
 from manitwin.geometry.pixel_boxes import PixelBox
 
 MASK, BOX = "mask", "box_px"
-"""The columns of a manifest."""
+"""Columns of a manifest."""
 MARGIN = 0.15
-"""Of the box's longer side, what of the photo around it is looked at too: the ground, and how the thing ends."""
+"""Of the box's longer side: margin of the photo around the box that is used too, for background and edges of the object."""
 LEAST_MARGIN_PX = 8.0
 OUTSIDE_PX = 1.0
-"""By which a box may lie outside its photo: programs count pixels from 0 or from 1."""
+"""Tolerance for boxes outside their photo, as programs count pixels from 0 or 1."""
 _EXAMPLE = "left,top,right,bottom in pixels, such as 120,80,410,395"
 _SHOWN = 60
 
 
 def stated_box_px(said: object, where: str) -> PixelBox | None:
-    """Return the box that is said of a thing, None where none is; a text of four numbers, or a sequence of them.
+    """Return the stated bounding box of an object, None if there is none; from a text of four numbers, or a sequence.
 
-    Its edges are in pixels of the upright photo at its own size.
-
-    Raises UsageError for what is no box.
+    The edges are in pixels of the upright photo at its own size. Raises UsageError for anything else.
     """
     if said is None or said == "":
         return None
@@ -54,7 +52,7 @@ def stated_box_px(said: object, where: str) -> PixelBox | None:
 
 
 def stated_mask(said: object, folder: Path, where: str) -> str | None:
-    """Return the absolute path of the mask that is said of a photo, None where none is; raises UsageError where none is there."""
+    """Return the absolute path of a photo's stated mask; None if there is none. Raises UsageError if the file does not exist."""
     if said is None or said == "":
         return None
     path = os.path.realpath(os.path.join(folder, str(said)))
@@ -65,7 +63,7 @@ def stated_mask(said: object, folder: Path, where: str) -> str | None:
 
 
 def require_of_photo(values: Mapping[str, Any], file: str | None, where: str) -> None:
-    """Raise UsageError where a mask or a box is said of what is no photo."""
+    """Raise UsageError if a mask or box is stated for an input that is not a photo."""
     said = [column for column in (MASK, BOX) if values.get(column) not in (None, "", ())]
     if said and (file is None or Path(file).suffix.lower() in MESH_SUFFIXES):
         what = "a text" if file is None else "a mesh"
@@ -73,7 +71,7 @@ def require_of_photo(values: Mapping[str, Any], file: str | None, where: str) ->
 
 
 def require_one_photo(inputs: Sequence[str | Path], texts: Sequence[str], *, views: bool) -> None:
-    """Raise UsageError where a mask or box is said of other inputs than one file: rows of a manifest have their own."""
+    """Raise UsageError if a mask or box is given with other inputs than one file; manifest rows have their own."""
     one = len(inputs) == 1 and not texts and not views
     if not one or os.path.isdir(inputs[0]) or Path(inputs[0]).suffix.lower() in (".csv", ".jsonl"):
         raise UsageError(
@@ -83,9 +81,9 @@ def require_one_photo(inputs: Sequence[str | Path], texts: Sequence[str], *, vie
 
 
 def window_of(box_px: PixelBox, size_px: tuple[int, int], name: str) -> tuple[int, int, int, int]:
-    """Return what of a photo of ``size_px`` (width, height) is looked at: left, top, right, bottom, whole pixels.
+    """Return the region of a photo of ``size_px`` (width, height) around a box: left, top, right, bottom in whole pixels.
 
-    Raises InputError for a box that is not inside the photo, or too small to show anything.
+    Raises InputError for a box outside the photo, or too small to show anything.
     """
     (left, top, right, bottom), (width, height) = box_px, size_px
     told = f"{left:g},{top:g},{right:g},{bottom:g}"
@@ -111,5 +109,5 @@ def window_of(box_px: PixelBox, size_px: tuple[int, int], name: str) -> tuple[in
 
 
 def as_box(numbers: Sequence[float]) -> PixelBox | None:
-    """Return the four numbers of an item as a box; None where it has none."""
+    """Return the four numbers of an item as a box; None if there are none."""
     return (numbers[0], numbers[1], numbers[2], numbers[3]) if numbers else None

@@ -1,4 +1,4 @@
-"""The cameras that a file states for the photos of one thing: one a photo, the world turned upright, the unit as it is known."""
+"""Stated camera poses of the photos of an object: one per photo, in an upright world, with the known unit."""
 
 from __future__ import annotations
 
@@ -18,15 +18,14 @@ from manitwin.pipeline.item import Item, masks_of
 from manitwin.pipeline.photo_cameras import called, cameras_of_photos, read_poses
 
 USUAL_UP = {"transforms.json": "z", "colmap": None}
-"""The axis that is up in the files of a format; a model of COLMAP stands as it came about."""
+"""The usual up axis of each format's files; a COLMAP model has an arbitrary orientation."""
 
 
 @dataclass(frozen=True)
 class StatedPoses:
-    """One camera a photo, ``cameras``, their lenses those of the uncropped photos, the world's z up.
+    """One camera per photo, ``cameras``, with lenses for the uncropped photos and z up in the world.
 
-    ``file`` and ``format`` say whose they are; ``unit_m`` is how many metres their unit is, None where nobody says, and
-    ``unit_said`` who does.
+    ``file`` and ``format`` are their source; ``unit_m`` is their unit in metres, None if unknown, and ``unit_said`` its source.
     """
 
     file: str
@@ -38,12 +37,12 @@ class StatedPoses:
 
     @property
     def turns_deg(self) -> tuple[float, ...]:
-        """The cameras' turns about the vertical, counter-clockwise seen from above, that of the first 0."""
+        """The cameras' rotations about the vertical, counter-clockwise seen from above, relative to the first."""
         turns = [azimuth_deg(camera.world_to_camera[:, :3]) for camera in self.cameras]
         return tuple(round((turn - turns[0]) % 360.0, 6) % 360.0 for turn in turns)
 
     def to_json(self) -> dict[str, object]:
-        """Return what a twin says of its source."""
+        """Return the record of the poses in a twin's source."""
         return {
             "file": self.file,
             "format": self.format,
@@ -55,7 +54,7 @@ class StatedPoses:
 
 
 def poses_of(item: Item) -> StatedPoses | None:
-    """Return the cameras that are stated for the photos of an item, with their masks; None where none are. Raises InputError."""
+    """Return the stated cameras of an item's photos, with their masks; None if there are none. Raises InputError."""
     if item.poses is None:
         return None
     stated = stated_poses([Path(file) for file in item.files], Path(item.poses), item.up, item.units)
@@ -66,10 +65,11 @@ def poses_of(item: Item) -> StatedPoses | None:
 
 
 def stated_poses(photos: Sequence[Path], poses: Path, up: str = "auto", units: str = "auto") -> StatedPoses:
-    """Return the cameras of photos by the file ``poses``; ``up`` (y, z, auto) and ``units`` (m, cm, mm) are what a person says.
+    """Return the cameras of photos from the file ``poses``; ``up`` (y, z, auto) and ``units`` (m, cm, mm) are the user's
+    statements.
 
-    Raises InputError with one line: for a file that is not read, a photo without a pose or of another shape than its pose is
-    of, and for cameras that do not tell which way is up.
+    Raises InputError for an unreadable file, a photo without a pose or with another aspect ratio than its pose, and if the up
+    direction cannot be determined from the cameras.
     """
     found = read_poses(poses)
     cameras = cameras_of_photos(photos, found)

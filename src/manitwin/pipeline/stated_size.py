@@ -1,4 +1,4 @@
-"""The size of an input as a person states it: a row's before what holds for all, and nothing that is said twice."""
+"""Stated sizes of inputs: a row's value takes precedence over the default, and contradictory statements are errors."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ COLUMN = "longest_side_m"
 MEANT = frozenset(
     f"{word}{unit}" for word in ("size", "length", "longest", "longest_side", "height", "width") for unit in ("", "_m")
 )
-"""Columns that people give for it."""
+"""Column names that are mistaken for it."""
 LEAST_M, MOST_M = 1e-6, 1e6
-"""Of a stated length: numbers beyond are no lengths of things, and a mesh scaled to them has no numbers any more."""
+"""Range of a stated length (m); a mesh scaled beyond it would overflow."""
 _NO_UNIT = ("auto", "none")
 _SHOWN_CHARACTERS = 60
 
 
 def with_defaults(said: Mapping[str, str], defaults: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a row says on top of what holds for all; of unit and longest side the row's counts alone where it has one."""
+    """Merge a row's values with the defaults; a row with a unit or a longest side overrides both defaults."""
     row = dict(said)
     if COLUMN in said and "units" not in said:
         row["units"] = "auto"
@@ -31,9 +31,9 @@ def with_defaults(said: Mapping[str, str], defaults: Mapping[str, Any]) -> dict[
 
 
 def stated_size_m(values: Mapping[str, Any], where: str) -> float | None:
-    """Return the longest side (m) that is said of a file, None where none is.
+    """Return the stated longest side (m) of a file; None if there is none.
 
-    Raises UsageError for what is no length, and where the input says its size by itself: a text, or a mesh by its unit.
+    Raises UsageError for an invalid length, and if the input states its size itself: a text, or a mesh with a stated unit.
     """
     said = values[COLUMN]
     if said is None or said == "":

@@ -1,4 +1,4 @@
-"""How large a thing of unknown size is by what its name says that it holds: 'juice 1 l', 'cola can 330 ml'."""
+"""Size from the volume stated in a name: 'juice 1 l', 'cola can 330 ml'."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from manitwin.models.generators.templates.stated_amounts import amounts_in
 from manitwin.models.generators.templates.stated_lengths import in_figures
 
 HEADSPACE = 1.05
-"""Of the volume that is sold, what a package holds to the brim: bottles of wine 1.03, cartons 1.05, cans 1.07."""
+"""Capacity to the brim relative to the sold volume: wine bottles 1.03, cartons 1.05, cans 1.07."""
 
 
 def stated_volume_m3(name: str | None, prior: Prior | None) -> float | None:
-    """Return the one volume that the name of a closed vessel states; None of other things, or where it states several."""
+    """Return the single volume stated in the name of a closed vessel; None for other objects, or if several are stated."""
     if name is None or prior is None or not prior.vessel:
         return None
     try:
         said = amounts_in(in_figures(name), prior)
-    except UsageError:  # from which to which volume: a name may say that, and states none then
+    except UsageError:  # a range of volumes, which a name may contain, counts as not stated
         return None
     volumes = {amount.volume_m3 for amount in said if amount.volume_m3 is not None}
     return volumes.pop() if len(volumes) == 1 else None
 
 
 def factor_to_hold(solid: trimesh.Trimesh, volume_m3: float, prior: Prior) -> float | None:
-    """Return the factor that makes a closed ``solid`` of any size a package of a volume; None where its wall is not known.
+    """Return the scale factor that makes a closed ``solid`` hold a volume; None if its wall is unknown.
 
-    What it holds is what is within its outside, less a wall of the material that is usual of such things.
+    The capacity is the enclosed volume minus a wall of the usual material of such objects.
     """
     wall_m = CLOSED_WALLS_M.get(prior.surface)
     outside, area = float(solid.volume), float(solid.area)

@@ -1,4 +1,4 @@
-"""A size that a mesh declares and such things do not have: said first where grasps fail, since it explains them."""
+"""Declared sizes that are unusual for the object, which are reported first if grasps fail, as they explain the failure."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ FACTORS = {
     25.4: "inches taken for millimetres", 1 / 1000: "millimetres taken for metres", 1 / 100: "centimetres taken for metres",
     1 / 10: "millimetres taken for centimetres", 1 / 25.4: "millimetres taken for inches",
 }  # fmt: skip
-"""By how much the true size is larger than the declared one, and what happened."""
+"""The true size relative to the declared one, and the mistake."""
 
 _BEYOND = 1.25
-"""Times the largest such things: what is that little larger (or smaller) is a large one, and no unit explains it."""
+"""Tolerance beyond the usual sizes that no wrong unit would explain."""
 
 
 def suspicious_size_words(draft: Draft[Any]) -> str | None:
-    """Say that a declared size is not that of such things, and which unit would make it so; None where it is theirs.
+    """Describe that a declared size is unusual, and which unit would be plausible; None if it is usual.
 
-    Nothing is said where the size was estimated (``guesses.unsaid_size_words``).
+    Estimated sizes are not considered (``guesses.unsaid_size_words``).
     """
     if draft.fields.get("size") is not None or not draft.fields.get("geometry", {}).get("metric"):
         return None

@@ -1,4 +1,4 @@
-"""Try a twin's grasp again as it was tried when the twin was made, and keep what could be seen of it."""
+"""Replay of a grasp trial as it was made for a twin, with a recording for display."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ ENGINES = {
     ("suction", "statics"): "manitwin.physics.suction_trial:SuctionTrial",
     ("multi_finger", "sapien"): "manitwin.physics.sapien.fingers:ArticulatedTrial",
 }
-"""By kind of gripper and engine; imported where one is needed."""
+"""Trial classes by kind of gripper and engine, imported on demand."""
 
 
 @dataclass(frozen=True)
 class ReplayedTrial:
-    """A grasp that was tried again: how (``gripper_to_object (4, 4)``), by what, and what the twin says of it."""
+    """A replayed trial: the pose ``gripper_to_object (4, 4)``, gripper and engine, and the outcome in the twin's record."""
 
     recording: TrialRecording
     gripper: Gripper
@@ -43,18 +43,18 @@ class ReplayedTrial:
 
 
 def replay_trial(twin: Twin, gripper_name: str, grasp_id: str) -> ReplayedTrial:
-    """Try one grasp of a twin again with the settings, mass and friction of its record.
+    """Repeat the trial of one grasp of a twin with the settings, mass and friction of its record.
 
-    What the first engine holds and the record does not is tried in the engine that had to confirm it. Hulls and poses are
-    those of the files, rounded, so that what was on the edge may end otherwise. Raises UsageError where there is no such grasp,
-    or its gripper or engine is none that comes with the package.
+    A grasp that holds in the first engine but failed in the record is repeated in the confirming engine. Hulls and poses are
+    read from rounded files, so that a marginal grasp may end differently. Raises UsageError if there is no such grasp, or if
+    its gripper or engine does not come with the package.
     """
     summary, gripper = summary_of(twin, gripper_name), known_gripper(twin, gripper_name)
     engine, confirmed_by = summary.trial.engine, summary.trial.confirmed_by
     trial = _recording_trial(gripper, engine)
     pose, joints_rad, outcome = _grasp(twin, gripper_name, grasp_id)
     body = twin.rigid_body()
-    if gripper.kind == "suction":  # a cup feels what hulls smooth over
+    if gripper.kind == "suction":  # a suction cup depends on details that hulls smooth out
         body = replace(body, surface=_surface(twin))
     settings = settings_of_trial(twin, summary.trial, gripper)
     recording = trial.record(body, gripper, pose, settings, joints_rad)
@@ -76,7 +76,7 @@ def _recording_trial(gripper: Gripper, engine: str) -> RecordingTrial:
 
 
 def summary_of(twin: Twin, gripper_name: str) -> GraspSummary:
-    """Return what a twin's record tells of the grasps of a gripper; raises UsageError where it tells nothing."""
+    """Return the grasp summary of a gripper in a twin's record. Raises UsageError if there is none."""
     first = twin.record.grasps
     if first is not None and first.gripper == gripper_name:
         return first
@@ -89,7 +89,7 @@ def summary_of(twin: Twin, gripper_name: str) -> GraspSummary:
 
 
 def known_gripper(twin: Twin, gripper_name: str) -> Gripper:
-    """Return a gripper that comes with the package and is the one of the twin's record; raises UsageError for another."""
+    """Return a gripper of the package that matches the twin's record. Raises UsageError for another one."""
     if gripper_name not in shipped_grippers():
         raise UsageError(
             "this gripper is not shipped with the package, and a twin stores only its name; no trial can be replayed"
@@ -101,7 +101,7 @@ def known_gripper(twin: Twin, gripper_name: str) -> Gripper:
 
 
 def settings_of_trial(twin: Twin, trial: Trial, gripper: Gripper) -> TrialSettings:
-    """Return the numbers of the trial that a record tells; raises UsageError where they are none that can be run."""
+    """Return the trial settings in a record. Raises UsageError if they are invalid."""
     known = trial.model_dump()
     try:
         asked = VerifyConfig(**{name: known[name] for name in VerifyConfig.model_fields if name in known})
@@ -121,7 +121,7 @@ def _surface(twin: Twin) -> RayCaster:
 
 
 def _grasp(twin: Twin, gripper_name: str, grasp_id: str) -> tuple[np.ndarray, np.ndarray | None, str]:
-    """Return the pose of a grasp ``(4, 4)``, the joints ``(2, J)`` of a hand that has more of them, and the outcome."""
+    """Return the pose of a grasp ``(4, 4)``, the joint values ``(2, J)`` of a hand with several joints, and the outcome."""
     table = twin.grasp_table()
     names = zip(table["gripper"].to_pylist(), table["grasp_id"].to_pylist(), strict=True)
     row = next((place for place, name in enumerate(names) if name == (gripper_name, grasp_id)), None)

@@ -1,4 +1,4 @@
-"""The grasps of one gripper that were tried, with their verdicts: the chosen, the unfiltered, then more at grasp points."""
+"""Access to one gripper's tried grasps and verdicts: the selected, the unfiltered, then those added at grasp points."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from manitwin.pipeline.grasps import PROPOSALS
 from manitwin.pipeline.verify import VERDICTS
 
 POINT_PROPOSALS, POINT_VERDICTS = "point_proposals.npz", "point_verdicts.npz"
-"""The first gripper's, all of them: the rows of ``proposals.npz`` and ``verdicts.npz``, and behind them those at points."""
+"""All rows of the first gripper: those of ``proposals.npz`` and ``verdicts.npz``, followed by those added at points."""
 
 
 def tried_names(suffix: str) -> tuple[str, ...]:
-    """Return what a stage reads that asks for the grasps of the gripper with this suffix."""
+    """Return the artifacts to read for the tried grasps of the gripper with this suffix."""
     more = () if suffix else (f"{POINT_PROPOSALS}?", f"{POINT_VERDICTS}?")
     return (PROPOSALS.format(suffix), VERDICTS.format(suffix), *more)
 

@@ -1,4 +1,4 @@
-"""Verify grasps by simulation, and keep every verdict (paper, "Simulation Verification")."""
+"""Verification of grasps by simulation; every verdict is kept (paper, "Simulation Verification")."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ TRIAL = "trial{}"
 
 
 class VerifyStage:
-    """Try every chosen grasp of a gripper, and the unfiltered sample beside it.
+    """Try every selected grasp of a gripper, and the unfiltered sample.
 
-    ``suffix`` is part of the artifacts' names: empty for the twin's first gripper. Without one that held, the first
-    gripper rejects the object; another gripper does not.
+    ``suffix`` is part of the artifact names and empty for the twin's first gripper. If no grasp holds, only the first gripper
+    rejects the object.
     """
 
     version = "9"
     needs: Resource = "cpu"
 
     def __init__(self, settings: VerifyConfig, trial: GraspTrial, gripper: Gripper, suffix: str = ""):
-        """Take the settings, the engine, and the gripper."""
+        """Take the settings, the engine and the gripper."""
         self.settings, self.trial, self.gripper = settings, trial, gripper
         self.backend = trial.name
         self.model: str | None = f"{gripper.name} {gripper.sha256[:12]}{confirmation(trial)}"
@@ -46,7 +46,7 @@ class VerifyStage:
         self.may_reject = not suffix
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
-        """Write the verdicts and return the field ``trial``; raises Rejected where no grasp held."""
+        """Write the verdicts and return the field ``trial``. Raises Rejected if no grasp held."""
         with np.load(draft.path(self.proposals)) as arrays:
             poses, depth_m, proposer = (arrays[n] for n in ("gripper_to_object", "depth_m", "proposer"))
             joints = joints_of(arrays, np.arange(len(poses)))
@@ -62,7 +62,7 @@ class VerifyStage:
 
 
 def trial_settings(settings: VerifyConfig, gripper: Gripper) -> TrialSettings:
-    """Return the trial's numbers: the configuration's, and the gripper's own force where that names none."""
+    """Return the trial settings from the configuration, with the gripper's own force by default."""
     return TrialSettings(
         force_n=gripper.force_n if settings.force_n is None else settings.force_n,
         finger_friction=gripper.finger_friction,
@@ -72,7 +72,7 @@ def trial_settings(settings: VerifyConfig, gripper: Gripper) -> TrialSettings:
 
 
 def describe(trial: GraspTrial, settings: TrialSettings, object_friction: float) -> Trial:
-    """Return what a twin says of the trial that its grasps went through: the settings that a user may set, and frictions."""
+    """Return the record of a trial's settings, those that a user may set and the friction coefficients."""
     numbers = {name: value for name, value in asdict(settings).items() if name in Trial.model_fields}
     first = trial.first if isinstance(trial, ConfirmedTrial) else trial
     numbers["doubts_tried_again"] = settings.doubts_tried_again and isinstance(first, SapienTrial)
@@ -87,14 +87,14 @@ def describe(trial: GraspTrial, settings: TrialSettings, object_friction: float)
 
 
 def confirmation(trial: GraspTrial) -> str:
-    """Return what a stage's model says of the engine that confirms a trial's verdicts; nothing where none does."""
+    """Return the addition to a stage's model for the engine that confirms a trial's verdicts; empty if there is none."""
     return f", confirmed by {trial.confirmed_by}" if isinstance(trial, ConfirmedTrial) else ""
 
 
 def result_arrays(results: list[TrialResult]) -> dict[str, np.ndarray]:
     """Return the arrays of ``verdicts.npz``: outcome, displacement (m) and rotation (rad) of each trial.
 
-    ``second_outcome`` is that of the engine that was asked to confirm it, empty where none was.
+    ``second_outcome`` is that of the confirming engine, empty if it was not used.
     """
     return {
         "outcome": np.array([result.outcome for result in results], dtype="U16"),

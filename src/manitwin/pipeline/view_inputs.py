@@ -1,4 +1,4 @@
-"""The photos of one thing that lie in a folder: in natural order, without those of which a file of cameras has no pose."""
+"""Photos of one object in a folder: natural order, without those that have no camera pose in a given file."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ _MOST_SHOWN = 20
 
 
 def natural_order(name: str) -> tuple[list[tuple[int, int | str]], str]:
-    """Return what names are sorted by so that numbers in them count as such: photo 2 comes before photo 10."""
+    """Return a sort key under which numbers in names count as numbers: photo 2 precedes photo 10."""
     parts = re.split(r"([0-9]+)", name)
     return [(0, int(part)) if part.isascii() and part.isdigit() else (1, part) for part in parts if part], name
 
 
 def in_order(files: Sequence[Path], poses: Path | None) -> tuple[list[Path], list[Path]]:
-    """Return the files of a folder in natural order, and those that are left out, since ``poses`` has none of them.
+    """Return the files of a folder in natural order, and those left out because ``poses`` has no pose for them.
 
-    Programs that estimate poses find that some photos go with no others. Where none has a pose, none is left out. Raises
-    UsageError for poses that are not read.
+    Pose estimation programs may fail to register some photos. If no photo has a pose, none is left out. Raises UsageError for
+    unreadable poses.
     """
     found = sorted(files, key=lambda file: natural_order(str(file)))
     if poses is None:
@@ -39,7 +39,7 @@ def in_order(files: Sequence[Path], poses: Path | None) -> tuple[list[Path], lis
 
 
 def no_pose_told(without: Sequence[Path], poses: str | Path | None) -> list[str]:
-    """Say which photos of a folder have no pose; nothing where all have one."""
+    """Describe the photos of a folder that have no pose; empty if all have one."""
     if not without or poses is None:
         return []
     named = ", ".join(file.name for file in without[:_MOST_SHOWN]) + (", ..." if len(without) > _MOST_SHOWN else "")
@@ -47,7 +47,7 @@ def no_pose_told(without: Sequence[Path], poses: str | Path | None) -> list[str]
 
 
 def listed_views(paths: Sequence[Path], poses: Path | None) -> list[Path]:
-    """Return the photos that are given, and those of the folders among them; raises UsageError for a folder without any."""
+    """Return the given photos, with folders expanded. Raises UsageError for a folder without photos."""
     found: list[Path] = []
     for path in paths:
         if not path.is_dir():

@@ -1,4 +1,4 @@
-"""Draw eight pictures of the object, for people and for annotators that see (paper, "Physical Property Estimation")."""
+"""Rendering of eight views of the object, for people and annotators (paper, "Physical Property Estimation")."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from manitwin.render.renderer import BACKDROP, shared_renderer
 from manitwin.render.visibility import is_closed_and_outward
 
 VIEWS = 8
-"""Paper, "Physical Property Estimation"."""
+"""Number of views (paper, "Physical Property Estimation")."""
 
 
 class ViewsStage:
-    """Draw ``canonical.glb`` from eight sides (paper, "Physical Property Estimation").
+    """Render ``canonical.glb`` from eight sides (paper, "Physical Property Estimation").
 
     Field ``cameras``: for each view ``camera_to_object`` (OpenGL axes, translation in the unit of the canonical mesh),
     ``fov_y_rad``, ``width_px``, ``height_px``.
@@ -39,12 +39,12 @@ class ViewsStage:
     model: str | None = None
 
     def __init__(self, settings: ViewsConfig, size_px: int):
-        """Take the settings and the side of the pictures, where these do not say."""
+        """Take the settings, and the image size to use if they do not state one."""
         self.settings = settings.model_copy(update={"size_px": settings.size_px or size_px})
         self._size_px = settings.size_px or size_px
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
-        """Draw the views; raises RendererMissing where nothing renders."""
+        """Render the views. Raises RendererMissing if no renderer is available."""
         parts = load_visual(draft.path("canonical.glb"))
         cameras, pictures = draw_views(parts, self.settings, self._size_px)
         (folder / "views").mkdir(parents=True, exist_ok=True)
@@ -56,7 +56,9 @@ class ViewsStage:
 def draw_views(
     parts: Sequence[trimesh.Trimesh], settings: ViewsConfig, size_px: int
 ) -> tuple[list[Camera], list[np.ndarray]]:
-    """Return the eight cameras around meshes and their pictures ``(H, W, 3) uint8``, on a ground that shows the outline."""
+    """Return eight cameras around the meshes and their images ``(H, W, 3) uint8``, on a background that contrasts with the
+    object.
+    """
     points = np.concatenate([part.vertices for part in parts])
     cameras = orbit_cameras(
         points, fov_y_deg=settings.fov_y_deg, size_px=size_px, elevations_deg=settings.elevations_deg
@@ -67,6 +69,6 @@ def draw_views(
 
 
 def write_webp(picture: np.ndarray, path: Path, quality: int) -> None:
-    """Write a picture ``(H, W, 3) uint8``; equal pictures give equal bytes."""
-    # Method 2 of 6 takes half the time of 4, for files 5 % larger (measured on 32 views).
+    """Write an image ``(H, W, 3) uint8`` as WebP; equal images give equal bytes."""
+    # Method 2 of 6 takes half the time of 4, with files 5 % larger (measured on 32 views).
     Image.fromarray(picture).save(path, WebPImagePlugin.WebPImageFile.format, quality=quality, method=2)
