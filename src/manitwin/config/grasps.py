@@ -11,9 +11,9 @@ class GraspConfig(Section):
     """Grasp proposals (paper, implementation details: 4,000 candidates, 3 cm, 7-DoF farthest point sampling to 100).
 
     For each placement that the object is picked from, a share of ``on_support_share`` of the simulated grasps is chosen to
-    clear the support plane, as far as there are any. Each grasp point should get ``least_per_point`` successful grasps: if it has fewer, up to
-    ``tries_per_point`` further grasps from a denser sample are tried. ``link``: for articulated twins, whose joints are locked,
-    both fingertips of each grasp must touch this link (none: any link).
+    clear the support plane, as far as there are any. Each grasp point should get ``least_per_point`` successful grasps: if
+    it has fewer, up to ``tries_per_point`` further grasps from a denser sample are tried. ``link``: for articulated twins,
+    whose joints are locked, both fingertips of each grasp must touch this link (none: any link).
     """
 
     max_proposals: int = Field(default=4000, ge=1)

@@ -1,7 +1,7 @@
-"""Pinhole cameras around an object, and where its points land in their pictures.
+"""Pinhole cameras around an object, and projection of points.
 
-Camera frame (OpenGL's): x right, y up, looking along -z. Pixel coordinates: x right, y down, the centre of the upper
-left pixel is (0.5, 0.5).
+Camera frame (OpenGL): x right, y up, looking along -z. Pixel coordinates: x right, y down, with the centre of the upper left
+pixel at (0.5, 0.5).
 """
 
 from __future__ import annotations
@@ -16,27 +16,27 @@ import numpy as np
 from manitwin.geometry.poses import inverse, transform_points
 
 OPENGL_TO_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
-"""OpenGL's camera frame (x right, y up, looking along -z) to OpenCV's (x right, y down, looking along +z), and back."""
+"""OpenGL's camera frame (x right, y up, looking along -z) to OpenCV's (x right, y down, looking along +z), and vice versa."""
 
-# Eight views: every 45 degrees of azimuth. Four from the height of a person who looks at a thing on a table, two from
-# well above (into cavities) and two from below, on opposite sides: what is seen once only cannot be checked.
+# Eight views, one every 45 degrees of azimuth: four from the height of a person looking at a table, two from well above (into
+# cavities) and two from below, on opposite sides, so that most surface is seen more than once.
 ORBIT_ELEVATIONS_DEG = (20.0, 50.0, 20.0, -35.0, 20.0, 65.0, 20.0, -35.0)
 ORBIT_FIRST_AZIMUTH_DEG = -60.0
 ORBIT_ASPECTS = (1.0, 1.62, 2.62, 4.24)
-"""Long by short side of the pictures: steps so close that a thing fills 60 % of both sides, up to one of 1 : 6."""
+"""Aspect ratios of the views, close enough that an object fills 60 % of both sides, up to a ratio of 1 : 6."""
 HERO_ELEVATION_DEG, HERO_FLAT_ELEVATION_DEG = 26.0, 50.0
-FLAT = 0.3  # height, in the longer side of the footprint, below which a thing lies rather than stands
+FLAT = 0.3  # ratio of height to the longer side of the footprint, below which an object lies rather than stands
 HERO_AZIMUTHS_DEG = np.arange(-60.0, 300.0, 30.0)
-HERO_FRONT_AZIMUTHS_DEG = np.array([-60.0, -90.0, -120.0])  # about -Y, the front of what was made of a photo or a text
-FILL = 0.88  # share of the picture's half width that the silhouette may reach
+HERO_FRONT_AZIMUTHS_DEG = np.array([-60.0, -90.0, -120.0])  # about -Y, the front of an object made from a photo or text
+FILL = 0.88  # largest share of the image's half width for the silhouette
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera with square pixels and its principal point in the middle.
+    """A pinhole camera with square pixels and its principal point at the image centre.
 
-    ``camera_to_object`` is ``(4, 4)``, OpenGL axes, translation in the object's unit of length; ``fov_y_rad`` is the
-    full vertical angle.
+    ``camera_to_object`` is ``(4, 4)``, with OpenGL axes and translation in the object's unit of length; ``fov_y_rad`` is the
+    full vertical field of view.
     """
 
     camera_to_object: np.ndarray
@@ -46,7 +46,7 @@ class Camera:
 
     @property
     def focal_px(self) -> float:
-        """The focal length in pixels, along both axes."""
+        """The focal length in pixels, for both axes."""
         return self.height_px / 2 / float(np.tan(self.fov_y_rad / 2))
 
     @property
@@ -55,13 +55,13 @@ class Camera:
         return self.camera_to_object[:3, 3]
 
     def scaled(self, factor: float) -> Camera:
-        """Return the camera that sees the same picture of the object scaled by ``factor`` about its origin."""
+        """Return the camera with the same image of the object scaled by ``factor`` about its origin."""
         pose = self.camera_to_object.copy()
         pose[:3, 3] *= factor
         return Camera(pose, self.fov_y_rad, self.width_px, self.height_px)
 
     def resized(self, width_px: int, height_px: int) -> Camera:
-        """Return the same camera with another picture size; the vertical angle stays."""
+        """Return the same camera with another image size; the vertical field of view is kept."""
         return Camera(self.camera_to_object, self.fov_y_rad, width_px, height_px)
 
     def to_json(self) -> dict[str, Any]:
@@ -75,21 +75,21 @@ class Camera:
 
     @classmethod
     def from_json(cls, value: dict[str, Any]) -> Camera:
-        """Read what ``to_json`` returned."""
+        """Create a camera from the values of ``to_json``."""
         pose = np.array(value["camera_to_object"], dtype=float)
         return cls(pose, value["fov_y_rad"], value["width_px"], value["height_px"])
 
 
 def sapien_axes(camera: Camera) -> np.ndarray:
-    """Return the rotation ``(3, 3)`` of SAPIEN's camera frame (x forward, y left, z up) to the object frame."""
+    """Return the rotation ``(3, 3)`` from SAPIEN's camera frame (x forward, y left, z up) to the object frame."""
     right, up, backward = camera.camera_to_object[:3, :3].T
     return np.stack([-backward, -right, up], 1)
 
 
 def look_at(eye: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Return ``camera_to_object (4, 4)`` of a camera at ``eye`` that looks at ``target``, +Z up in its picture.
+    """Return ``camera_to_object (4, 4)`` of a camera at ``eye`` that looks at ``target``, with +Z up in the image.
 
-    Straight up or down, +Y is up in the picture.
+    Looking straight up or down, +Y is up in the image.
     """
     backward = np.asarray(eye, dtype=float) - target
     backward /= np.linalg.norm(backward)
@@ -104,7 +104,7 @@ def look_at(eye: np.ndarray, target: np.ndarray) -> np.ndarray:
 def framing_camera(
     points: np.ndarray, *, azimuth_deg: float, elevation_deg: float, fov_y_deg: float, width_px: int, height_px: int
 ) -> Camera:
-    """Return the camera from a given side that shows all points ``(N, 3)``, centred and as large as may be.
+    """Return the camera from a given direction that shows all points ``(N, 3)``, centred and as large as possible.
 
     Equivariant to scale: points scaled by s give this camera scaled by s.
     """
@@ -115,7 +115,7 @@ def framing_camera(
     seen = (points - center) @ rotation
     tangent_y = FILL * np.tan(np.deg2rad(fov_y_deg) / 2)
     tangents = np.array([tangent_y * width_px / height_px, tangent_y])
-    # |x - cx| <= t (d - z) for all points bounds d and cx from both sides; the least d is where both bounds meet.
+    # x - cx| <= t (d - z) for all points bounds d and cx from both sides; the least d is where both bounds meet.
     depths = [seen[:, 2] * tangent for tangent in tangents]
     upper, lower = (
         np.array([(seen[:, axis] + depth).max() for axis, depth in enumerate(depths)]),
@@ -138,9 +138,9 @@ def orbit_cameras(
 ) -> list[Camera]:
     """Return a camera for each elevation around ``points (N, 3)``, at equal steps of azimuth.
 
-    Source: paper, "Physical Property Estimation" (8 multi-view renders); which elevations is our choice. A picture is as
-    wide by its height as the object from there, to a step of ``ORBIT_ASPECTS``, and has about ``size_px`` squared pixels;
-    ``fov_y_deg`` is the angle of its longer side.
+    Source: paper, "Physical Property Estimation" (8 multi-view renders); the elevations are this project's choice. The aspect
+    ratio of an image is that of the object in it, rounded to one of ``ORBIT_ASPECTS``, with about ``size_px`` squared pixels;
+    ``fov_y_deg`` is the field of view along the longer side.
     """
     return [
         _fitted_camera(points, first_azimuth_deg + 360.0 / len(elevations_deg) * i, elevation, fov_y_deg, size_px)
@@ -175,11 +175,11 @@ def _fitted_camera(
 def hero_camera(
     points: np.ndarray, *, fov_y_deg: float, width_px: int, height_px: int, from_front: bool = False
 ) -> Camera:
-    """Return the camera, of twelve three-quarter views, that shows the object best: much of it, and large.
+    """Return the camera, among twelve three-quarter views, that shows the object best: the one with the largest silhouette.
 
-    That is the largest silhouette in the object's unit. Flat things are seen from higher up, and turned towards the
-    picture's diagonal: there the area in the picture counts too. ``from_front``: seen from the side of
-    -Y, where a photo showed what stands, and from where what lies is the right way up.
+    The silhouette is measured in the object's unit. Flat objects are seen from a higher elevation, and their area in the image
+    counts as well, which favours the image's diagonal. ``from_front``: only views from -Y, the side that a photo shows of a
+    standing object, and from which a lying object is the right way up.
     """
     flat = not stands(points)
     elevation = HERO_FLAT_ELEVATION_DEG if flat else HERO_ELEVATION_DEG
@@ -203,21 +203,21 @@ def hero_camera(
 
 
 def stands(points: np.ndarray) -> bool:
-    """Tell whether a thing of points ``(N, 3)`` in the object frame is too high to be seen from above."""
+    """Return whether an object with points ``(N, 3)`` in the object frame is too high to be seen from above."""
     extents = np.ptp(points, axis=0)
     return bool(extents[2] >= FLAT * extents[:2].max())
 
 
 def silhouette_area_px(points: np.ndarray, camera: Camera) -> float:
-    """Return the area of the convex outline of points ``(N, 3)`` in the picture, in pixels."""
+    """Return the area in pixels of the convex outline of points ``(N, 3)`` in the image."""
     return float(cv2.contourArea(cv2.convexHull(project(points, camera)[0].astype(np.float32))))
 
 
 def project(points: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     """Project points ``(N, 3)`` in the object frame.
 
-    Returns pixel coordinates ``(N, 2)`` and depths ``(N,)``, the distance along the viewing axis in the points' unit.
-    Points behind the camera have a negative depth, and their pixels mean nothing.
+    Returns pixel coordinates ``(N, 2)`` and depths ``(N,)``, the distance along the viewing axis in the points' unit. Points
+    behind the camera have a negative depth and meaningless pixel coordinates.
     """
     seen = transform_points(inverse(camera.camera_to_object), points)
     depth = -seen[:, 2]
@@ -229,7 +229,7 @@ def project(points: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]
 def pixel_rays(camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     """Return the rays through all pixel centres, row by row.
 
-    Origins ``(H*W, 3)`` and directions ``(H*W, 3)``, whose component along the viewing axis is 1: a ray parameter is a
+    Origins ``(H*W, 3)`` and directions ``(H*W, 3)``, with a component of 1 along the viewing axis, so that a ray parameter is a
     depth.
     """
     x, y = np.meshgrid(np.arange(camera.width_px) + 0.5, np.arange(camera.height_px) + 0.5)

@@ -1,4 +1,4 @@
-"""One picture of a twin: input | render | mesh and hulls | points and verified grasps, and the facts above.
+"""The card of a twin: input | render | mesh and hulls | points and verified grasps, with the facts above.
 
 Source: the four columns of the paper's "Dataset Examples".
 """
@@ -46,9 +46,9 @@ RED = (200, 24, 32)
 
 @dataclass(frozen=True)
 class CardText:
-    """The text of a card: a title, a sentence, facts as (name, value) from left to right, and a footer.
+    """The text of a card: title, sentence, facts as (name, value) from left to right, and footer.
 
-    ``stamp`` is a word across all pictures but the input.
+    ``stamp`` is a word printed across all images except the input.
     """
 
     title: str
@@ -72,13 +72,13 @@ def make_card(
 ) -> bytes:
     """Draw a twin's card and return it as PNG.
 
-    ``parts`` are the textured meshes, ``solid`` the repaired one, ``hulls`` the vertices ``(V, 3)`` of each collision hull, all
-    in the object frame in metres; ``mass`` is drawn over the hulls. What stands is seen from its front, which a mesh does not
-    tell. The first column shows ``photo (H, W, 3 or 4) uint8``, whose side the next two show, or ``prompt``; where
-    the input was a mesh it shows the bare shape. Raises RendererMissing where nothing renders.
+    ``parts`` are the textured meshes, ``solid`` the repaired mesh, ``hulls`` the vertices ``(V, 3)`` of each collision hull,
+    all in the object frame in metres; ``mass`` is drawn over the hulls. A standing object made from a photo or text is seen
+    from its front. The first column shows ``photo (H, W, 3 or 4) uint8``, whose side the next two columns show as well, or
+    ``prompt``; for a mesh input it shows the untextured shape. Raises RendererMissing if no renderer is available.
     """
     mesh = merged(list(parts))
-    outline = convex_corners(np.asarray(mesh.vertices))[0]  # all that a camera's choice depends on
+    outline = convex_corners(np.asarray(mesh.vertices))[0]  # sufficient for choosing the camera
     from_front = photo is not None or (prompt is not None and stands(outline))
     hero = hero_camera(outline, fov_y_deg=FOV_Y_DEG, width_px=PANEL, height_px=PANEL, from_front=from_front)
     if photo is not None:
@@ -101,7 +101,7 @@ def make_card(
         left = MARGIN + index * (PANEL + GAP)
         card.paste(Image.fromarray(picture), (left, TOP), _rounded_mask())
         draw.text((left + 2, TOP + PANEL + 18), caption, fill=INK, font=font_of(15), anchor="lm")
-        if text.stamp is not None and index > 0:  # the input is the input
+        if text.stamp is not None and index > 0:  # the input is not stamped
             _stamp(card, text.stamp, left, TOP)
     _legend(draw)
     room = 1400 if mass is None else _mass_legend(draw, MARGIN + 3 * PANEL + 2 * GAP, HEIGHT - 16) - MARGIN - GAP
@@ -112,7 +112,7 @@ def make_card(
 
 
 def _stamp(card: Image.Image, word: str, left: int, top: int) -> None:
-    """Put a word in a frame aslant over a panel; what is under it shows through."""
+    """Print a word in a tilted, semi-transparent frame across a panel."""
     font = font_of(46)
     width, height = round(font.getlength(word)) + 36, 74
     stamp = Image.new("RGBA", (width, height), (255, 255, 255, 150))
@@ -124,7 +124,7 @@ def _stamp(card: Image.Image, word: str, left: int, top: int) -> None:
 
 
 def _header(draw: ImageDraw.ImageDraw, text: CardText) -> None:
-    """Write the facts from the right edge, and the title in the room that is left."""
+    """Write the facts right-aligned, and the title in the remaining space."""
     right = WIDTH - MARGIN
     for name, value in reversed(text.facts):
         width = max(font_of(21).getlength(value), font_of(13).getlength(name))
@@ -139,7 +139,7 @@ def _header(draw: ImageDraw.ImageDraw, text: CardText) -> None:
 
 
 def _legend(draw: ImageDraw.ImageDraw) -> None:
-    """Explain the colours of the last column."""
+    """Draw the colour legend of the last column."""
     x, y = WIDTH - MARGIN, HEIGHT - 16
     for label, color in (("verified grasp", GRASP_COLORS[0]), ("grasp point", GRASP), ("functional point", FUNCTIONAL)):
         x -= round(font_of(12).getlength(label))
@@ -150,7 +150,7 @@ def _legend(draw: ImageDraw.ImageDraw) -> None:
 
 
 def _mass_legend(draw: ImageDraw.ImageDraw, right: int, y: int) -> int:
-    """Explain the quartered disc, and the ring around it, up to the right edge of the hulls; return where that begins."""
+    """Draw the legend of the centre of mass, right-aligned at ``right``; return its left edge."""
     words = "centre of mass; ring: how far it may be off"
     left = right - round(font_of(12).getlength(words))
     draw.text((left, y), words, fill=GREY, font=font_of(12), anchor="lm")
@@ -161,7 +161,7 @@ def _mass_legend(draw: ImageDraw.ImageDraw, right: int, y: int) -> int:
 
 
 def _prompt_panel(prompt: str) -> np.ndarray:
-    """Write the prompt in the middle of a panel."""
+    """Write the prompt centred in a panel."""
     panel = Image.new("RGB", (PANEL, PANEL), BACKDROP)
     lines = textwrap.wrap(f"“{prompt}”", 30)[:10]
     ImageDraw.Draw(panel).multiline_text(
@@ -171,12 +171,12 @@ def _prompt_panel(prompt: str) -> np.ndarray:
 
 
 def mesh_caption(triangles: int, hulls: int) -> str:
-    """Return what is written below the mesh and its hulls."""
+    """Return the caption of the mesh panel."""
     return f"{triangles:,} triangles, {hulls} convex collision {'hull' if hulls == 1 else 'hulls'}"
 
 
 def _shortened(text: str, room_px: float, size_px: int) -> str:
-    """Cut a line to the room that it has."""
+    """Truncate a line to a width."""
     font = font_of(size_px)
     if font.getlength(text) <= room_px:
         return text

@@ -1,4 +1,4 @@
-"""The pictures on a twin's card: what went in, the object as it looks, its collision hulls, and grasps drawn as slim forks."""
+"""The images of a twin's card: input, object, collision hulls, and grasps drawn as slim forks."""
 
 from __future__ import annotations
 
@@ -27,30 +27,29 @@ CLAY = (214, 210, 203)
 WIRE = np.array([40, 46, 58], dtype=np.float32)
 FUNCTIONAL, GRASP = (232, 112, 12), (28, 92, 210)
 GRASP_COLORS = ((22, 148, 116), (43, 172, 146), (12, 122, 128), (64, 178, 116), (20, 136, 92), (84, 190, 168))
-# Twelve soft hues, neighbours far apart: those of the categorical set "Set3" of ColorBrewer (Brewer 2003).
+# Twelve soft hues with distinct neighbours: the categorical set "Set3" of ColorBrewer (Brewer 2003).
 HULL_COLORS = (
     (141, 211, 199), (251, 128, 114), (128, 177, 211), (253, 180, 98), (190, 186, 218), (179, 222, 105),
     (252, 205, 229), (255, 237, 111), (188, 128, 189), (204, 235, 197), (217, 217, 217), (255, 255, 179),
 )  # fmt: skip
 DRAWN_GRASPS = 12
-INPUT_MARGIN = 0.12  # of the longer side of what is cut out of a photo: about what the thing as rendered has
-FRAME_SHARE = 0.16  # of the longest side: the length of a drawn frame's Z
+INPUT_MARGIN = 0.12  # of the longer side of a photo's cut-out: about the margin of the rendered object
+FRAME_SHARE = 0.16  # of the longest side: length of a drawn frame's Z axis
 
 Boxes = Sequence[tuple[np.ndarray, np.ndarray]]
-"""``(box_to_gripper (4, 4), half_extents_m (3,))`` of each box of palm and fingers, grasp frame: +Z approach, X
-closing."""
+"""``(box_to_gripper (4, 4), half_extents_m (3,))`` of each box of palm and fingers; grasp frame: +Z approach, X closing."""
 
 _unit_box = trimesh.creation.box(bounds=[[0, 0, 0], [1, 1, 1]])
-_UNIT_BOX = np.asarray(_unit_box.vertices), np.asarray(_unit_box.faces)  # made once: trimesh takes a millisecond for it
+_UNIT_BOX = np.asarray(_unit_box.vertices), np.asarray(_unit_box.faces)  # created once, as trimesh takes a millisecond
 
-STEM_SHARE = 0.5  # the stem's length, in that of the fingers
+STEM_SHARE = 0.5  # length of the stem relative to the fingers
 
 
 @dataclass(frozen=True)
 class CardPoint:
-    """A functional or grasp point: its place and outward normal in the object frame, and what to write beside it.
+    """A functional or grasp point: position and outward normal in the object frame, and label.
 
-    ``frame_to_object (4, 4)`` is the functional point's frame, of which Z and X are drawn; None: it has none.
+    ``frame_to_object (4, 4)`` is the functional frame, of which Z and X are drawn; None if there is none.
     """
 
     position_m: np.ndarray
@@ -62,32 +61,32 @@ class CardPoint:
 
 @dataclass(frozen=True)
 class CardGrasp:
-    """A verified grasp: ``gripper_to_object (4, 4)`` and the gripper's boxes at its opening, in the grasp frame."""
+    """A verified grasp: ``gripper_to_object (4, 4)``, and the gripper's boxes at its opening width in the grasp frame."""
 
     gripper_to_object: np.ndarray
     boxes: Boxes
 
 
 def render_panel(parts: Sequence[trimesh.Trimesh], mesh: trimesh.Trimesh, hero: Camera) -> np.ndarray:
-    """Draw the object as it looks, on the ground."""
+    """Draw the textured object on the ground."""
     return _grounded(list(parts), mesh, hero)
 
 
 def clay_panel(mesh: trimesh.Trimesh, hero: Camera) -> np.ndarray:
-    """Draw the bare shape, without colours, seen from the other side."""
+    """Draw the untextured shape, seen from the opposite side."""
     return _grounded([plain_part(mesh, CLAY)], mesh, _turned(hero, np.asarray(mesh.vertices), 180.0))
 
 
 def mesh_panel(
     solid: trimesh.Trimesh, hulls: Sequence[np.ndarray], hero: Camera, mass: MassCenter | None = None
 ) -> np.ndarray:
-    """Draw the convex collision hulls, each in its colour, under the edges of the solid mesh, and the centre of mass."""
+    """Draw the convex hulls in different colours, overlaid with the solid mesh's visible edges and the centre of mass."""
     camera = _turned(hero, np.concatenate([np.asarray(solid.vertices), *hulls]), 0.0)
     parts = _colored([hull_mesh(hull) for hull in hulls], HULL_COLORS, roughness=0.9)
     picture = shared_renderer().render(parts, [camera], with_backs=False)[0].rgb.astype(np.float32)
     depth, _, _ = cast_camera(RayCaster(solid), camera)
     cover = visible_edges(solid, camera, depth)
-    # A fine mesh would be black: its lines together take away at most a quarter of the light.
+    # The edges darken the image by at most a quarter, as a fine mesh would otherwise be black.
     strength = min(2.2, 0.25 * max(1, int((depth > 0).sum())) / max(1e-6, float(cover.sum())))
     alpha = np.minimum(cover * strength, 0.85)[..., None]
     drawn = np.rint(picture * (1 - alpha) + WIRE * alpha).astype(np.uint8)
@@ -101,7 +100,7 @@ def grasp_panel(
     grasps: Sequence[CardGrasp],
     hero: Camera,
 ) -> np.ndarray:
-    """Draw the object with its points and a dozen of its verified grasps, far apart from each other."""
+    """Draw the object with its points and up to twelve diverse verified grasps."""
     drawn = [
         grasps[i] for i in diverse(np.array([g.gripper_to_object for g in grasps]).reshape(-1, 4, 4), DRAWN_GRASPS)
     ]
@@ -121,7 +120,7 @@ def grasp_panel(
 
 
 def input_panel(picture: np.ndarray, size_px: int) -> np.ndarray:
-    """Fit a photo ``(H, W, 3 or 4) uint8`` into the panel over the backdrop: whole, or what of it is cut out and a margin."""
+    """Fit a photo ``(H, W, 3 or 4) uint8`` into the panel over the backdrop: the whole photo, or its cut-out with a margin."""
     if picture.shape[2] == 4 and (picture[..., 3] > 127).any():
         picture = picture[_around(picture[..., 3] > 127)]
     scale = size_px / max(picture.shape[:2])
@@ -138,7 +137,7 @@ def input_panel(picture: np.ndarray, size_px: int) -> np.ndarray:
 
 
 def _around(seen: np.ndarray) -> tuple[slice, slice]:
-    """Return the rows and columns of what is seen ``(H, W) bool``, with a margin as far as the picture goes."""
+    """Return the rows and columns of a mask ``(H, W) bool``, with a margin within the image."""
     spans = [np.flatnonzero(seen.any(axis=axis)) for axis in (1, 0)]
     margin = round(INPUT_MARGIN * max(int(span[-1] - span[0] + 1) for span in spans))
     rows, columns = (slice(max(0, int(span[0]) - margin), int(span[-1]) + 1 + margin) for span in spans)
@@ -146,7 +145,7 @@ def _around(seen: np.ndarray) -> tuple[slice, slice]:
 
 
 def diverse(gripper_to_object: np.ndarray, count: int) -> np.ndarray:
-    """Return indices of up to ``count`` grasps ``(N, 4, 4)`` far from each other in place and approach direction."""
+    """Return the indices of up to ``count`` grasps ``(N, 4, 4)``, diverse in position and approach direction."""
     if not len(gripper_to_object):
         return np.zeros(0, dtype=int)
     tips = gripper_to_object[:, :3, 3] + 0.1 * gripper_to_object[:, :3, 2]
@@ -157,13 +156,13 @@ def diverse(gripper_to_object: np.ndarray, count: int) -> np.ndarray:
 def _colored(
     shapes: Sequence[trimesh.Trimesh], colors: Sequence[tuple[int, int, int]], *, roughness: float
 ) -> list[trimesh.Trimesh]:
-    """Return a part for each of the colours, which the shapes take in turn."""
+    """Return one part per colour; the shapes are assigned to the colours in turn."""
     turns = [list(shapes[index :: len(colors)]) for index in range(min(len(colors), len(shapes)))]
     return [plain_part(merged(turn), color, roughness=roughness) for turn, color in zip(turns, colors, strict=False)]
 
 
 def _turned(hero: Camera, points: np.ndarray, turn_deg: float) -> Camera:
-    """Return the camera that frames ``points`` from the hero's elevation, turned about the vertical."""
+    """Return the camera that frames ``points`` from the hero camera's elevation, rotated about the vertical."""
     x, y, z = hero.camera_to_object[:3, 2]
     return framing_camera(
         points,
@@ -178,7 +177,9 @@ def _turned(hero: Camera, points: np.ndarray, turn_deg: float) -> Camera:
 def _telling_camera(
     mesh: trimesh.Trimesh, everything: np.ndarray, points: Sequence[CardPoint], hero: Camera
 ) -> tuple[Camera, np.ndarray]:
-    """Return the camera, of twelve around, that shows most points and shows them large, and which of them it sees."""
+    """Return the camera, among twelve around the object, that shows the most points at a large scale, and which points it
+    sees.
+    """
     caster = RayCaster(mesh)
     positions = np.array([point.position_m for point in points]).reshape(-1, 3)
     normals = np.array([point.normal for point in points]).reshape(-1, 3)
@@ -188,7 +189,7 @@ def _telling_camera(
     for turn in (0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6):
         camera = _turned(hero, everything, 30.0 * turn)
         seen = visible_points(positions, normals, camera, caster, tolerance_m)
-        # A point more is worth as much as a third of the panel.
+        # One more visible point weighs as much as a third of the panel's area.
         share = silhouette_area_px(outline, camera) / (hero.width_px * hero.height_px)
         score = float(seen.sum()) + 3 * share
         if best is None or score > best[0] + 1e-6:
@@ -198,7 +199,7 @@ def _telling_camera(
 
 
 def _grounded(parts: list[trimesh.Trimesh], mesh: trimesh.Trimesh, camera: Camera) -> np.ndarray:
-    """Draw parts, those of ``mesh`` and closed ones besides, over the shade that it throws on the ground."""
+    """Draw ``parts`` (those of ``mesh``, and further closed ones) over the shadow of ``mesh`` on the ground."""
     closed = kept(mesh, "closed and outward", lambda: is_closed_and_outward(mesh))
     frame = shared_renderer().render(parts, [camera], with_backs=not closed)[0]
     shade = ground_shadow(mesh, camera)
@@ -209,10 +210,10 @@ def _grounded(parts: list[trimesh.Trimesh], mesh: trimesh.Trimesh, camera: Camer
 
 
 def gripper_fork(boxes: Boxes, rod_m: float) -> trimesh.Trimesh:
-    """Return rods of ``rod_m`` thickness in the grasp frame: one along each finger's inner face, a crossbar, a stem.
+    """Return rods of thickness ``rod_m`` in the grasp frame: one along each finger's inner face, a crossbar and a stem.
 
-    Fingers are the boxes beside the middle plane x = 0; they reach from the palm's front to their tips. A gripper without
-    any, a suction cup, is its boxes.
+    Fingers are the boxes on either side of the plane x = 0; they reach from the palm's front to their tips. A gripper without
+    fingers, such as a suction cup, is drawn as its boxes.
     """
     sides: dict[int, list[np.ndarray]] = {1: [], -1: []}
     front = 0.0
@@ -238,11 +239,11 @@ def gripper_fork(boxes: Boxes, rod_m: float) -> trimesh.Trimesh:
 
 
 def gripper_body(boxes: Boxes) -> trimesh.Trimesh:
-    """Return the boxes themselves as one mesh in the grasp frame."""
+    """Return the gripper's boxes as one mesh in the grasp frame."""
     return merged([trimesh.creation.box(2 * half, box_to_gripper) for box_to_gripper, half in boxes])
 
 
 def _rod(start: Sequence[float], end: Sequence[float], thickness: float) -> trimesh.Trimesh:
-    """Return a square rod along an axis of the frame, closed around both ends."""
+    """Return a square rod along an axis of the frame, with closed ends."""
     low, high = np.minimum(start, end) - thickness / 2, np.maximum(start, end) + thickness / 2
     return trimesh.Trimesh(low + _UNIT_BOX[0] * (high - low), _UNIT_BOX[1], process=False)

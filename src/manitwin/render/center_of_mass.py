@@ -1,4 +1,4 @@
-"""The centre of mass in a picture: the usual quartered disc, and a ring as wide as it is uncertain."""
+"""The centre of mass drawn as a quartered disc, with a ring for its uncertainty."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ import numpy as np
 from manitwin.render.cameras import Camera, project
 
 DARK, LIGHT = (24, 28, 36), (255, 255, 255)
-RADIUS_SHARE = 0.022  # of the picture's height
+RADIUS_SHARE = 0.022  # of the image height
 _SUBPIXEL_BITS = 4
 
 
 @dataclass(frozen=True)
 class MassCenter:
-    """Where the mass is: ``position_m (3,)`` in the object frame, and how far (m) it may be off."""
+    """The centre of mass: ``position_m (3,)`` in the object frame, and its uncertainty (m)."""
 
     position_m: np.ndarray
     uncertainty_m: float
 
 
 def draw_mass_center(picture: np.ndarray, center: MassCenter, camera: Camera) -> np.ndarray:
-    """Return a picture ``(H, W, 3) uint8`` with the centre of mass drawn over all that hides it.
+    """Return an image ``(H, W, 3) uint8`` with the centre of mass drawn in front of everything.
 
-    The ring around the disc has the radius of the uncertainty, and is left out where it would lie within the disc.
+    The ring around the disc has the radius of the uncertainty; it is omitted if it would lie within the disc.
     """
-    drawn = np.ascontiguousarray(picture.copy())  # OpenCV's pixels have their middles at whole numbers
+    drawn = np.ascontiguousarray(picture.copy())  # OpenCV's pixel centres have integer coordinates
     pixels, depth = project(np.asarray(center.position_m, dtype=float)[None], camera)
     middle, radius_px = pixels[0] - 0.5, max(4.0, RADIUS_SHARE * camera.height_px)
     ring_px = camera.focal_px * center.uncertainty_m / float(depth[0])

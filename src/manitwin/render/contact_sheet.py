@@ -1,4 +1,4 @@
-"""Pictures side by side on one page."""
+"""Contact sheets: images arranged in a grid."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ TILE_PX, MOST_COLUMNS, CAPTION_PX, GAP_PX = 256, 8, 18, 4
 
 
 def contact_sheet(pictures: Sequence[tuple[str, np.ndarray]]) -> Image.Image:
-    """Return pictures ``(TILE_PX, TILE_PX, 3) uint8`` RGB row by row, each with its caption below it."""
+    """Return captioned images ``(TILE_PX, TILE_PX, 3) uint8`` RGB arranged row by row."""
     columns = min(MOST_COLUMNS, math.ceil(math.sqrt(1.5 * len(pictures))))
     rows = -(-len(pictures) // columns)
     width, height = TILE_PX + GAP_PX, TILE_PX + CAPTION_PX + GAP_PX

@@ -1,9 +1,8 @@
-"""The Vulkan device that SAPIEN renders with: a GPU where one works, otherwise the CPU through Mesa's lavapipe.
+"""Selection of SAPIEN's Vulkan device: a GPU if one works, otherwise the CPU through Mesa's lavapipe.
 
-SAPIEN asks the Vulkan loader for a device at its first RenderSystem; the loader reads its environment variables then.
-So ``require_renderer`` must be called before. Each way is tried in a process of its own: a driver that crashes or hangs
-is an answer (no), not the end of this process. What was found is kept in an environment variable for the processes
-started from here.
+SAPIEN requests a device from the Vulkan loader with its first RenderSystem, and the loader reads its environment variables
+then, so that ``require_renderer`` must be called before. Each candidate is tried in a separate process, because a driver may
+crash or hang. The result is stored in an environment variable for child processes.
 """
 
 from __future__ import annotations
@@ -28,14 +27,14 @@ from manitwin.formats.installation import left_out
 
 RUN = logging.getLogger("manitwin.run")
 SWITCH = "MANITWIN_RENDER_DEVICE"
-"""Set to ``cpu`` to leave GPUs alone (some hang: vla-evaluation-harness#112); ``auto`` otherwise."""
+"""Set to ``cpu`` to avoid GPUs (some hang: vla-evaluation-harness#112); default ``auto``."""
 
 FOUND = "MANITWIN_RENDER_DEVICE_FOUND"
 FOUND_AT = "MANITWIN_RENDER_DEVICE_FOUND_AT"
-"""Names the file in which the processes of a run leave each other what the first of them found."""
+"""Names the file through which the processes of a run share the device that the first of them found."""
 
 LOADER_VARIABLES = ("VK_DRIVER_FILES", "VK_ICD_FILENAMES")
-"""What the Vulkan loader reads: the first since 1.3.207, the second before (LoaderInterfaceArchitecture.md)."""
+"""Environment variables of the Vulkan loader: the first since 1.3.207, the second before (LoaderInterfaceArchitecture.md)."""
 
 ICD_FOLDERS = (
     "/usr/share/vulkan/icd.d",
@@ -43,12 +42,12 @@ ICD_FOLDERS = (
     "/usr/local/share/vulkan/icd.d",
     "/usr/local/etc/vulkan/icd.d",
 )
-PROBE_SECONDS = 120.0  # a device that takes longer to make one small picture hangs, or is of no use
+PROBE_SECONDS = 120.0  # a device that takes longer for a small image hangs or is useless
 
-# Creating a RenderSystem is where an unfit driver is refused. A GPU must also make a picture: without the right
-# libraries in a container it fails or hangs only there. Lavapipe is spared the picture: SAPIEN's own shaders, which this
-# takes, compile for 6 CPU-seconds. What SAPIEN imports for downloads and for kinematics, half of its imports' time, is not
-# asked for: it does without the latter by itself.
+# Creating a RenderSystem fails with an unsuitable driver. A GPU must also render an image, because without the right libraries
+# in a container it fails or hangs only then. Lavapipe is not asked for an image, as SAPIEN's own shaders compile for 6
+# CPU-seconds. The probe replaces SAPIEN's imports for downloads and kinematics, half of its import time; SAPIEN works without
+# the latter.
 _PROBE = """
 import sys, types
 sys.modules["requests"], sys.modules["pinocchio"] = types.ModuleType("requests"), None
@@ -69,22 +68,22 @@ print("it renders")
 
 @dataclass(frozen=True)
 class RenderDevice:
-    """A device that renders, named by its driver; ``driver_file`` is pinned for the loader (None: its own choice)."""
+    """A working device, by driver name; ``driver_file`` is pinned for the loader (None: the loader's choice)."""
 
     name: str
     driver_file: str | None
 
     @property
     def on_cpu(self) -> bool:
-        """Tell a software renderer from a GPU."""
+        """Return whether this is a software renderer rather than a GPU."""
         return "llvmpipe" in self.name or "SwiftShader" in self.name
 
 
 def render_scene(picture_formats: Mapping[str, str]) -> tuple[Any, Any]:
-    """Return SAPIEN's module and an empty scene of it that renders, its pictures in these formats; raises RendererMissing."""
+    """Return the SAPIEN module and an empty scene for rendering, with these image formats. Raises RendererMissing."""
     require_renderer()
-    with warnings.catch_warnings(), left_out("pinocchio"):  # 45 MB: SAPIEN has one of its own, which nothing here calls
-        warnings.simplefilter("ignore")  # SAPIEN warns of drivers that it looks for and does not need
+    with warnings.catch_warnings(), left_out("pinocchio"):  # 45 MB; SAPIEN has its own copy, which is not used here
+        warnings.simplefilter("ignore")  # SAPIEN warns about optional drivers
         import sapien
         import sapien.render
     sapien.render.set_log_level("error")
@@ -94,9 +93,9 @@ def render_scene(picture_formats: Mapping[str, str]) -> tuple[Any, Any]:
 
 
 def require_renderer() -> RenderDevice:
-    """Choose the device, set the Vulkan loader's environment for it, and return it.
+    """Select the device, set the Vulkan loader's environment for it, and return it.
 
-    Raises RendererMissing where nothing renders, and UsageError where MANITWIN_RENDER_DEVICE is neither auto nor cpu.
+    Raises RendererMissing if no device renders, and UsageError if MANITWIN_RENDER_DEVICE is neither auto nor cpu.
     """
     question = {"switch": _switch(), **{name: os.environ.get(name) for name in LOADER_VARIABLES}}
     known = json.loads(os.environ.get(FOUND, "null"))
@@ -112,7 +111,7 @@ def require_renderer() -> RenderDevice:
 
 
 def require_driver() -> None:
-    """Raise RendererMissing where no driver is there to be tried; one that is there is not tried, which takes a process."""
+    """Raise RendererMissing if no driver is installed; an installed driver is not tried, which would take a process."""
     named, ways = _ways(_switch() == "cpu")
     if not ways or (named is not None and not any(map(os.path.exists, named.split(os.pathsep)))):
         require_renderer()
@@ -120,9 +119,9 @@ def require_driver() -> None:
 
 @contextmanager
 def looked_for_once() -> Iterator[None]:
-    """Have one process alone look for the device, of this one and all that are started in the ``with`` statement.
+    """Make this process and those started within the ``with`` statement search for the device only once.
 
-    The first that needs it does; others that need it meanwhile wait.
+    The first process that needs it searches, and others wait for the result.
     """
     with tempfile.TemporaryDirectory(prefix="manitwin-") as folder:
         os.environ[FOUND_AT] = os.path.join(folder, "device.json")
@@ -133,15 +132,15 @@ def looked_for_once() -> Iterator[None]:
 
 
 def _found_together(question: dict[str, str | None]) -> RenderDevice:
-    """Return what another process of this run found for the same question, or look, and leave it to the others."""
+    """Return the device that another process of this run found for the same question, or search and share the result."""
     place = os.environ.get(FOUND_AT)
     if place is None:
         return _looked_for(question)
     with open(place, "a+", encoding="utf-8") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)  # until the file is closed, or its process ends
+        fcntl.flock(file, fcntl.LOCK_EX)  # released when the file is closed or the process ends
         file.seek(0)
         said = file.read()
-        known = json.loads(said) if said.endswith("}") else None  # a process was killed while it wrote
+        known = json.loads(said) if said.endswith("}") else None  # incomplete if a process was killed while writing
         if known is not None and known["question"] == question:
             return RenderDevice(**known["device"])
         device = _looked_for(question)
@@ -158,7 +157,7 @@ def _looked_for(question: dict[str, str | None]) -> RenderDevice:
 
 
 def renderer_summary() -> str:
-    """Describe the device that renders in one line; raises RendererMissing where nothing does."""
+    """Describe the rendering device in one line. Raises RendererMissing if there is none."""
     device = require_renderer()
     kind = "on the CPU" if device.on_cpu else "GPU"
     return f"{device.name}, {kind}, driver {device.driver_file or 'chosen by the loader'}"
@@ -172,12 +171,12 @@ def _switch() -> str:
 
 
 def _ways(cpu_only: bool) -> tuple[str | None, list[str | None]]:
-    """Return the driver files that the user named, and the drivers to be tried in turn (None: the loader's own choice)."""
+    """Return the driver files named by the user, and the drivers to try in order (None: the loader's choice)."""
     named = next((os.environ[name] for name in LOADER_VARIABLES if os.environ.get(name)), None)
     if cpu_only and named is not None and "lvp" not in named:
-        named = None  # the switch is the stronger word
+        named = None  # the switch takes precedence
     if named is not None:
-        return named, [None]  # no other is tried
+        return named, [None]  # no other driver is tried
     ways: list[str | None] = []
     if not cpu_only and (glob.glob("/dev/nvidia[0-9]*") or glob.glob("/dev/dri/renderD*") or glob.glob("/dev/dxg")):
         ways.append(None)
@@ -185,7 +184,7 @@ def _ways(cpu_only: bool) -> tuple[str | None, list[str | None]]:
 
 
 def _first_working(cpu_only: bool) -> RenderDevice:
-    """Probe the ways to a device in the order of preference and return the first that renders."""
+    """Try the devices in order of preference and return the first that renders."""
     named, ways = _ways(cpu_only)
     causes = []
     for driver_file in ways:
@@ -198,7 +197,7 @@ def _first_working(cpu_only: bool) -> RenderDevice:
 
 
 def _probe(driver_file: str | None, *, picture: bool) -> tuple[str | None, str]:
-    """Try a device in a process of its own; returns its name (None: it does not render) and what went wrong."""
+    """Try a device in a separate process; return its name (None: it does not render) and the cause of a failure."""
     environment = dict(os.environ)
     if driver_file is not None:
         environment.update(dict.fromkeys(LOADER_VARIABLES, driver_file))
@@ -215,13 +214,13 @@ def _probe(driver_file: str | None, *, picture: bool) -> tuple[str | None, str]:
 
 
 def _remedy(named: str | None) -> str:
-    """Say the one command that brings a renderer to this system."""
+    """Return the command that installs a renderer on this system."""
     if named is not None:
         return f"unset {' and '.join(LOADER_VARIABLES)}, or point them at a driver that works"
     release = platform.freedesktop_os_release() if os.path.exists("/etc/os-release") else {}
     family = {release.get("ID", ""), *release.get("ID_LIKE", "").split()}
     if release.get("VERSION_CODENAME") == "bookworm":
-        # Debian 12's own Mesa 22.3.6 is refused by SAPIEN 3.0.3; 25.0.7 of its backports works (measured).
+        # SAPIEN 3.0.3 rejects Debian 12's own Mesa 22.3.6; 25.0.7 from its backports works (measured).
         return (
             "run: echo \"deb $(apt-get indextargets --format '$(REPO_URI)' 'Codename: bookworm' | head -1)"
             ' bookworm-backports main"'
@@ -236,7 +235,7 @@ def _remedy(named: str | None) -> str:
 
 
 def main() -> int:
-    """Print the device that renders, or on stderr why none does; returns the exit status: 0 or 1."""
+    """Print the rendering device, or the reason why there is none to stderr; return the exit status 0 or 1."""
     try:
         print(renderer_summary())
     except ManiTwinError as error:

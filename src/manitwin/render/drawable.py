@@ -1,4 +1,4 @@
-"""A thing made ready to be drawn: its surfaces, from both sides where they are seen from behind, and what throws its shadow."""
+"""Preparation of an object for rendering: surfaces, two-sided where their backs are visible, and a shadow caster."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from manitwin.render.simplification import simplified
 from manitwin.render.surfaces import RenderSurface, front_faces, render_surface, shrunk
 from manitwin.render.visibility import faces_seen_from_outside
 
-SMALL_TEXTURE_PX = 1024  # of simplified things; the 2048 of a twin's take four times the memory and time to upload
+SMALL_TEXTURE_PX = 1024  # for simplified objects; a twin's 2048 take four times the memory and upload time
 SHADOW_TOLERANCE_M = 0.001
-"""How far what throws the shadow may be from what is seen: less than the bias of ``shaders/scene``."""
-_RAYS = 40  # each way, from each side
-_SEEN_FROM_BEHIND = 2e-4  # share of the hits: what grazing rays find between two triangles of a closed solid is less
+"""Largest deviation of the shadow caster from the visible surface: less than the bias of ``shaders/scene``."""
+_RAYS = 40  # per direction of the grid
+_SEEN_FROM_BEHIND = 2e-4  # share of hits; grazing rays between two triangles of a closed solid give less
 
 
 @dataclass(frozen=True, eq=False)
 class Drawable:
-    """``surfaces`` are what is seen; ``shadow``, unseen, throws the shadow. What is uploaded of it stays as long as it does.
+    """An object prepared for rendering: visible ``surfaces``, and an invisible ``shadow`` caster.
 
-    The latter's faces are turned over: SAPIEN leaves out those that face a light, and draws things by their far side, which
-    would say nothing of heights.
+    Uploads to the renderer live as long as the Drawable. The caster's faces are reversed, because SAPIEN culls faces towards
+    the light and so renders far sides into shadow maps, which would not give the height of the surface.
     """
 
     surfaces: tuple[RenderSurface, ...]
@@ -45,17 +45,17 @@ def drawable(
     most_texture_px: int | None = None,
     hidden_left_out: bool = False,
 ) -> Drawable:
-    """Prepare the visual parts of a thing; raises TypeError for a mesh without a PBRMaterial.
+    """Prepare an object's visual parts. Raises TypeError for a mesh without a PBRMaterial.
 
-    Textures get at most ``most_texture_px`` a side; None: ``SMALL_TEXTURE_PX`` where the surfaces are simplified, else as they
-    are. Faces that nobody sees from behind get one side only. With a ``tolerance_m`` the surfaces are simplified by about that
-    much, and those without textures and of one material are one; what throws the shadow is simplified more. With
-    ``hidden_left_out`` faces that cannot be seen from outside are left out too, as the inside of a robot's link.
+    ``most_texture_px``: largest texture side; None: ``SMALL_TEXTURE_PX`` for simplified surfaces, else unchanged. Faces whose
+    backs are not visible are one-sided. With a ``tolerance_m`` the surfaces are simplified by about that distance, and
+    untextured parts of one material are joined; the shadow caster is simplified more. ``hidden_left_out``: drop faces that are
+    not visible from outside, such as the inside of a robot's link.
     """
     both_sides = shows_back_faces(parts)
     if tolerance_m > 0:
         lean = [_simplified(part, tolerance_m) for part in _joined_by_material(parts)]
-        parts = [part for part in lean if len(part.faces)] or parts  # what is as small as the tolerance vanishes
+        parts = [part for part in lean if len(part.faces)] or parts  # objects smaller than the tolerance would vanish
         if most_texture_px is None:
             most_texture_px = SMALL_TEXTURE_PX
     surfaces = [render_surface(part) if both_sides else front_faces(render_surface(part)) for part in parts]
@@ -68,7 +68,7 @@ def drawable(
 
 
 def _joined_by_material(parts: Sequence[trimesh.Trimesh]) -> list[trimesh.Trimesh]:
-    """Return parts of which those without textures and of one material are one: each part costs as it is drawn."""
+    """Join untextured parts of one material, as each part costs a draw call."""
     alike: dict[object, list[trimesh.Trimesh]] = {}
     for part in parts:
         material = material_of(part)
@@ -95,8 +95,8 @@ def _is_textured(part: trimesh.Trimesh) -> bool:
 def _simplified(part: trimesh.Trimesh, tolerance_m: float) -> trimesh.Trimesh:
     """Return a part with fewer vertices.
 
-    One with textures has the seams and normals of its file. Others get one vertex for each point and their creases found
-    again, which need not stay where they are: many files have three vertices for each triangle.
+    Textured parts keep the seams and normals of their file. Other parts are welded, and their creases are recomputed, since
+    many files have three vertices per triangle.
     """
     rows, faces = np.asarray(part.vertices), np.asarray(part.faces)
     uv = uv_of(part) if _is_textured(part) else None
@@ -114,7 +114,7 @@ def _simplified(part: trimesh.Trimesh, tolerance_m: float) -> trimesh.Trimesh:
 
 
 def _used(faces: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the indices of those of ``count`` vertices that faces ``(F, 3)`` have, and the faces over these alone."""
+    """Return the indices of those of ``count`` vertices used by faces ``(F, 3)``, and the faces re-indexed."""
     there = np.zeros(count, bool)
     there[faces] = True
     return np.flatnonzero(there), (np.cumsum(there) - 1)[faces]
@@ -128,14 +128,14 @@ def _with_small_textures(s: RenderSurface, most_px: int) -> RenderSurface:
 
 
 def _sides_seen(mesh: trimesh.Trimesh, both_sides: bool) -> list[np.ndarray]:
-    """Return which faces are seen from their outward side, and with ``both_sides`` which from behind, ``(F,) bool`` each."""
+    """Return which faces are visible from their outward side, and with ``both_sides`` which from behind, ``(F,) bool`` each."""
     return [faces_seen_from_outside(mesh, from_behind=behind) for behind in ([False, True] if both_sides else [False])]
 
 
 def _seen_alone(
     surfaces: list[RenderSurface], front: np.ndarray, back: np.ndarray | None = None
 ) -> list[RenderSurface]:
-    """Return surfaces with those faces alone of which a side is seen: ``(F,) bool`` each over all of them, None: one side."""
+    """Keep the visible sides of faces only: ``(F,) bool`` masks over all surfaces, ``back`` None for one-sided surfaces."""
     lean, first = [], 0
     for surface in surfaces:
         count = len(surface.faces) if back is None else len(surface.faces) // 2  # the second half are the backs
@@ -170,7 +170,7 @@ def _shadow_caster(
 
 
 def _bare_surface(vertices: np.ndarray, faces: np.ndarray) -> RenderSurface:
-    """Return a bare mesh, ``(V, 3)`` and ``(F, 3)``, as a grey surface without shading normals."""
+    """Return a mesh, ``(V, 3)`` and ``(F, 3)``, as a grey surface without shading normals."""
     used, faces = _used(faces, len(vertices))
     return RenderSurface(
         vertices=vertices[used].astype(np.float32),
@@ -187,9 +187,9 @@ def _bare_surface(vertices: np.ndarray, faces: np.ndarray) -> RenderSurface:
 
 
 def shows_back_faces(parts: Sequence[trimesh.Trimesh]) -> bool:
-    """Tell whether faces of the parts, as one thing, are seen from behind from outside: open sheets, or a wrong winding.
+    """Return whether back faces are visible from outside: open sheets, or wrong winding.
 
-    Asked of parallel rays from the 26 directions of a cube's faces, edges and corners. Drawing both sides costs twice the
+    Parallel rays are cast from the 26 directions of a cube's faces, edges and corners. Two-sided rendering takes twice the
     time.
     """
     mesh = merged(list(parts))

@@ -1,4 +1,4 @@
-"""Drawables without textures as one file of arrays, so that what was simplified once is read the next time."""
+"""Storage of untextured drawables as one file of arrays, so that simplification is done only once."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from manitwin.render.drawable import Drawable
 from manitwin.render.surfaces import RenderSurface
 
 ARRAYS = {"vertices": (np.float32, 3), "faces": (np.uint32, 3), "normals": (np.float32, 3), "uv": (np.float32, 2)}
-"""Of a surface: the type of each and its columns."""
+"""Data type and number of columns of each array of a surface."""
 MOST_BYTES = 64 << 20
 NUMBERS = 5
-"""Of a surface: its linear colour (3), how metallic and how rough it is."""
+"""Scalars of a surface: linear colour (3), metallic, roughness."""
 
 
 def drawables_to_bytes(things: Mapping[str, Drawable]) -> bytes | None:
-    """Return the content of a NumPy archive (.npz) of things by name; None where one of them has a texture."""
+    """Return the content of a NumPy archive (.npz) with drawables by name; None if one of them has a texture."""
     arrays: dict[str, np.ndarray] = {}
     for place, thing in enumerate(things.values()):
-        surfaces = (*thing.surfaces, thing.shadow)  # the last one throws the shadow
+        surfaces = (*thing.surfaces, thing.shadow)  # the last one is the shadow caster
         for number, surface in enumerate(surfaces):
             if any(each is not None for each in (surface.color_map, surface.roughness_map, surface.metallic_map)):
                 return None
@@ -37,7 +37,7 @@ def drawables_to_bytes(things: Mapping[str, Drawable]) -> bytes | None:
 
 
 def drawables_from_bytes(content: bytes) -> dict[str, Drawable]:
-    """Return the things by name that ``drawables_to_bytes`` was given; raises ValueError where the content is damaged."""
+    """Return the drawables by name from ``drawables_to_bytes``. Raises ValueError for damaged content."""
     arrays, found = npz_arrays(content, MOST_BYTES), {}
     try:
         told = zip(arrays["names"].tolist(), arrays["counts"].tolist(), strict=True)
@@ -50,7 +50,7 @@ def drawables_from_bytes(content: bytes) -> dict[str, Drawable]:
 
 
 def _surface(arrays: Mapping[str, np.ndarray], name: str) -> RenderSurface:
-    """Return one surface; raises ValueError where its arrays do not belong together."""
+    """Return one surface. Raises ValueError if its arrays are inconsistent."""
     read = {kind: arrays[f"{name}.{kind}"] for kind in ARRAYS}
     for kind, (dtype, columns) in ARRAYS.items():
         array = read[kind]

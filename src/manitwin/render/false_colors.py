@@ -1,6 +1,6 @@
-"""Depth and ids in colours that a person tells apart, with what the colours mean written beside them.
+"""False-colour images of depth maps and id maps with legends, for display only.
 
-For looking only: the numbers are in the exact pictures. Same arrays, same bytes.
+Equal arrays give equal bytes.
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ from PIL import Image, ImageDraw
 from manitwin.render.markers import Font, font_of
 
 NOTHING_RGB = (40, 40, 40)
-"""Of what has no depth, and of the id 0: floor and backdrop."""
+"""Colour of pixels without depth and of the id 0 (floor and backdrop)."""
 
 DEPTH_TICKS = 6
 _GOLDEN_RATIO = (5**0.5 - 1) / 2
 _TONES = ((0.95, 1.0), (0.4, 1.0), (1.0, 0.5), (0.5, 0.75), (0.7, 0.95))
-"""Saturation and value by turns: five, so that hues of one tone come near only after 55 ids (a Fibonacci number)."""
+"""Saturation and value in turn; with five, hues of one tone become similar only after 55 ids (a Fibonacci number)."""
 
 _INK_RGB, _GROUND_RGB = (235, 235, 235), (20, 20, 20)
 
 
 def depth_range_m(depth_m: np.ndarray, ids: np.ndarray) -> tuple[float, float] | None:
-    """Return the least and the largest depth ``(H, W)`` of what has an id, None where nothing has one.
+    """Return the least and largest depth in ``(H, W)`` of pixels with an id; None if there are none.
 
-    The floor and the backdrop are left out: they are metres behind what one looks at.
+    Floor and backdrop are excluded, as they are metres behind the objects.
     """
     shown = depth_m[(ids > 0) & (depth_m > 0)]
     return (float(shown.min()), float(shown.max())) if len(shown) else None
 
 
 def depth_in_colors(depth_m: np.ndarray, range_m: tuple[float, float]) -> np.ndarray:
-    """Return ``(H, W, 3) uint8`` RGB of a depth map ``(H, W)``: red is near, blue is far or farther, dark grey is nothing."""
+    """Return a depth map ``(H, W)`` as ``(H, W, 3) uint8`` RGB: red is near, blue is far or beyond, dark grey is no depth."""
     near, far = range_m
     share = np.clip((depth_m - near) / max(far - near, 1e-6), 0, 1)
     colors = _turbo(np.rint(255 * (1 - share)).astype(np.uint8))
@@ -44,7 +44,7 @@ def depth_in_colors(depth_m: np.ndarray, range_m: tuple[float, float]) -> np.nda
 
 
 def id_color(number: int) -> tuple[int, int, int]:
-    """Return the colour (RGB) of an id: hues by the golden ratio, in five tones by turns; 0 is dark grey."""
+    """Return the colour (RGB) of an id: hues spaced by the golden ratio, in five tones in turn; 0 is dark grey."""
     if number == 0:
         return NOTHING_RGB
     saturation, value = _TONES[(number - 1) % len(_TONES)]
@@ -53,21 +53,21 @@ def id_color(number: int) -> tuple[int, int, int]:
 
 
 def ids_in_colors(ids: np.ndarray) -> np.ndarray:
-    """Return ``(H, W, 3) uint8`` RGB of a map of ids ``(H, W)``, each in its ``id_color``."""
+    """Return a map of ids ``(H, W)`` as ``(H, W, 3) uint8`` RGB, each in its ``id_color``."""
     palette = np.array([id_color(number) for number in range(int(ids.max()) + 1)], np.uint8)
     colors: np.ndarray = palette[ids]
     return colors
 
 
 def depth_picture(depth_m: np.ndarray, ids: np.ndarray) -> Image.Image:
-    """Return a depth map in colours with a scale in metres at its right; without a scale where nothing has an id."""
+    """Return a depth map in colours, with a scale in metres on its right unless no pixel has an id."""
     range_m = depth_range_m(depth_m, ids)
     if range_m is None:
         return Image.fromarray(np.full((*depth_m.shape, 3), NOTHING_RGB, np.uint8))
     near, far = range_m
     height = len(depth_m)
     marks = [f"{value:.3f} m" for value in np.linspace(near, far, DEPTH_TICKS)]
-    marks[-1] += " +"  # what is farther has this colour too
+    marks[-1] += " +"  # also the colour of anything farther
     font = font_of(max(8, height // 28))
     margin, bar = max(4, height // 32), max(6, height // 20)
     strip = _strip(height, 3 * margin + bar + _widest(marks, font))
@@ -81,7 +81,7 @@ def depth_picture(depth_m: np.ndarray, ids: np.ndarray) -> Image.Image:
 
 
 def ids_picture(ids: np.ndarray, names: Mapping[str, int]) -> Image.Image:
-    """Return a map of ids in colours, with the names of those that are seen in it at its right."""
+    """Return a map of ids in colours, with a legend of the visible ids' names on its right."""
     height = len(ids)
     seen = set(np.unique(ids).tolist())
     shown = [(name, number) for name, number in names.items() if number in seen]

@@ -1,4 +1,4 @@
-"""A picture of a gripper as its file has it, in the grasp frame: open and closed from the side, and from an oblique view."""
+"""Images of a gripper's definition in the grasp frame: open and closed from the side, and an oblique view."""
 
 from __future__ import annotations
 
@@ -21,15 +21,16 @@ PALM, THUMB, FINGER = (120, 128, 144), (196, 92, 60), (84, 134, 200)
 AXES = ((214, 48, 49), (39, 150, 70), (32, 98, 210))
 INK, WHITE = (24, 28, 36), (255, 255, 255)
 VIEWS = ((-90.0, 0.0), (-90.0, 0.0), (-35.0, 25.0))
-"""Azimuth and elevation (degrees) of the columns: along +Y, so that X is to the right and Z up; and oblique."""
+"""Azimuth and elevation (degrees) of the columns: along +Y, with X to the right and Z up; and oblique."""
 LIP_HEIGHT_M = 0.01
 
 
 def gripper_picture(gripper: Gripper) -> Image.Image:
-    """Draw a gripper: a row for each posture, one for others; open, closed, and half open from an oblique view (a cup twice).
+    """Draw a gripper: one row per posture of a hand, one row for others; open, closed, and half open obliquely (a cup: two
+    views).
 
-    The thumb, or the -X finger, is red, the other fingers blue. The arrows at the grasp frame's origin are X red, Y green and
-    Z blue, the black ball is ``tip_depth_m`` in front of it.
+    The thumb, or the -X finger, is red, other fingers are blue. Arrows at the grasp frame's origin: X red, Y green, Z blue; the
+    black ball is ``tip_depth_m`` in front of it.
     """
     rows = [_states(gripper)] if not isinstance(gripper, MultiFingerGripper) else _posture_states(gripper)
     corners = np.concatenate([part.vertices for row in rows for _, parts in row for part in parts])
@@ -55,7 +56,7 @@ def gripper_picture(gripper: Gripper) -> Image.Image:
 
 
 def _seen(parts: list[trimesh.Trimesh], marks: list[trimesh.Trimesh], camera: Camera) -> Image.Image:
-    """Draw parts, and over them the marks, which are seen through everything."""
+    """Draw parts, with the marks in front of everything."""
     under = shared_renderer().render(parts, [camera], background=WHITE)[0].rgb.astype(float)
     front = shared_renderer().render(marks, [camera], background=WHITE)[0]
     cover = front.coverage[..., None]
@@ -64,7 +65,7 @@ def _seen(parts: list[trimesh.Trimesh], marks: list[trimesh.Trimesh], camera: Ca
 
 
 def _states(gripper: Gripper) -> list[tuple[str, list[trimesh.Trimesh]]]:
-    """Return the labels and parts of jaws that are open, closed and half open, or of a cup from two sides."""
+    """Return labels and parts of open, closed and half-open jaws, or of a cup for two views."""
     if isinstance(gripper, SuctionGripper):
         lip = trimesh.creation.cylinder(gripper.lip_radius_m, LIP_HEIGHT_M, sections=64)
         lip.apply_translation([0, 0, gripper.tip_depth_m - LIP_HEIGHT_M / 2])
@@ -115,7 +116,7 @@ def _box(pose: np.ndarray, half_extents_m: np.ndarray) -> trimesh.Trimesh:
 
 
 def _marks(gripper: Gripper, size_m: float) -> list[trimesh.Trimesh]:
-    """Return the grasp frame's axes and the ball at the tips' depth, as large as suits a gripper of that size."""
+    """Return the grasp frame's axes and the ball at the tip depth, scaled to the gripper."""
     length_m, marks = 0.3 * size_m, []
     for axis, color in enumerate(AXES):
         shaft = trimesh.creation.cylinder(0.008 * size_m, 0.84 * length_m, sections=16)

@@ -1,4 +1,4 @@
-"""The plain ground behind an object and the colour of the markers on it: such that neither is like the object."""
+"""Choice of plain background and marker colours that contrast with the object."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ import numpy as np
 from manitwin.render.renderer import BACKDROP, Frame
 
 DARK_GROUND = (84, 88, 94)
-"""Behind light things: as far from white as the light ground is from black-brown, and no colour either."""
+"""Background for light objects: as far from white as the light background is from dark brown, and neutral as well."""
 
 _ALIKE_LIGHTNESS = 22.0
-"""Of CIELAB's 100: edges nearer than that to their ground are lost (looked at: white mugs on BACKDROP)."""
-_ALIKE_COLOR = 38.0  # CIELAB distance under which a dot is taken for a spot of the object
-_ALIKE_HUE_DEG, _COLORFUL = 25.0, 25.0  # a darker or paler shade of a colour has its name too, where it is no grey
-_GROUND_TOLERANCE = 6  # what lossy pictures move a plain colour by
-_SPARSE = 2  # and so are those of every second row and column
-_THINNED = 20_000  # pixels are enough to know an object's colours
+"""CIELAB lightness difference (of 100) below which edges disappear in the background (e.g. white mugs on BACKDROP)."""
+_ALIKE_COLOR = 38.0  # CIELAB distance below which a dot looks like a spot of the object
+_ALIKE_HUE_DEG, _COLORFUL = 25.0, 25.0  # darker and paler shades share a colour's name unless they are grey
+_GROUND_TOLERANCE = 6  # deviation of a plain colour due to lossy compression
+_SPARSE = 2  # step of rows and columns used
+_THINNED = 20_000  # pixels suffice to determine an object's colours
 
 
 @dataclass(frozen=True)
 class MarkerColor:
-    """A colour of markers, by the word that questions use for it."""
+    """A marker colour and its name in questions."""
 
     name: str
     rgb: tuple[int, int, int]
@@ -38,17 +38,17 @@ MARKER_COLORS = (
     MarkerColor("pink", (255, 60, 220)),
     MarkerColor("cyan", (0, 205, 230)),
 )
-"""The first that an object has little of is taken."""
+"""In order of preference."""
 
 
 def ground_for(frames: Sequence[Frame]) -> tuple[int, int, int]:
-    """Return the light ground, or the darker one where more of the object is as light as the light ground."""
+    """Return the background, light or dark, that fewer of the object's pixels resemble in lightness."""
     pixels = np.concatenate([frame.rgb[frame.coverage > 0.9] for frame in frames])
     return ground_of_pixels(pixels)
 
 
 def ground_of_pixels(pixels: np.ndarray) -> tuple[int, int, int]:
-    """Return the ground that fewer of an object's pixels ``(N, 3) uint8`` are as light as."""
+    """Return the background that fewer of an object's pixels ``(N, 3) uint8`` resemble in lightness."""
     if not len(pixels):
         return BACKDROP
     lightness = _lab(_thinned(pixels))[:, 0]
@@ -60,16 +60,16 @@ def ground_of_pixels(pixels: np.ndarray) -> tuple[int, int, int]:
 
 
 def shown_object(picture: np.ndarray) -> np.ndarray:
-    """Return where a picture ``(H, W, 3) uint8`` differs from its plain ground, the colour of its corner; ``(H, W) bool``."""
+    """Return where an image ``(H, W, 3) uint8`` differs from its plain background, the corner's colour; ``(H, W) bool``."""
     channels = [picture[..., channel].astype(np.int16) for channel in range(3)]
     far = [np.abs(channel - channel[0, 0]) > _GROUND_TOLERANCE for channel in channels]
     return np.asarray(far[0] | far[1] | far[2])
 
 
 def marker_color(pictures: Sequence[np.ndarray]) -> MarkerColor:
-    """Return the colour for markers on an object, from its pictures on plain ground: the one that it has least of.
+    """Return the marker colour least present on an object, from images on a plain background.
 
-    Colours of which it has less than a hundredth are equally good: the first of them is taken.
+    Colours with a share below one hundredth count as equal; the first of them is used.
     """
     sparse = [picture[::_SPARSE, ::_SPARSE] for picture in pictures]
     pixels = np.concatenate([picture[shown_object(picture)] for picture in sparse])

@@ -1,4 +1,4 @@
-"""A twin with joints, drawn at positions of these: side by side, by one camera that shows all of them."""
+"""Images of an articulated twin at several joint positions, side by side, with a common camera."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from manitwin.twin.loaded_twin import Twin
 PANEL_PX, MOST_PANELS = 384, 9
 _FOV_Y_DEG = 30.0
 _FULL_TURN = np.pi / 2
-"""As far as a joint without limits is drawn to either side."""
+"""Range drawn to either side for a joint without limits."""
 
 
 def telling_states(twin: Twin) -> list[dict[str, float]]:
-    """Return states that show how a twin moves: as it stands, then each joint at the ends of its way where it does not stand."""
+    """Return joint states that show a twin's motion: the reference state, then each joint at the ends of its range."""
     states: list[dict[str, float]] = [{}]
     for joint in joints_of(twin.record):
         low, high = joint.lower, joint.upper
@@ -34,9 +34,9 @@ def telling_states(twin: Twin) -> list[dict[str, float]]:
 
 
 def draw_joint_states(twin: Twin, states: Sequence[Mapping[str, float]], panel_px: int = PANEL_PX) -> bytes:
-    """Return a PNG with a panel a state: positions by the names of joints, those that are not named as the twin stands.
+    """Return a PNG with one panel per state: joint positions by name, with other joints in their reference position.
 
-    Raises UsageError as ``Twin.posed_visual``, RendererMissing where nothing renders.
+    Raises UsageError like ``Twin.posed_visual``, RendererMissing if no renderer is available.
     """
     posed = [twin.posed_visual(state) for state in states]
     points = np.concatenate([part.vertices for parts in posed for part in parts])

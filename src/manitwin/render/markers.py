@@ -1,4 +1,4 @@
-"""Numbered markers on a picture: a dot on each point, and its number beside it where there is room."""
+"""Numbered markers on images: a dot at each point, with a label beside it where there is room."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ INK = (18, 22, 30)
 PAPER = (255, 255, 255)
 X_AXIS, Z_AXIS = (214, 48, 49), (30, 80, 220)
 DIRECTIONS = 16
-RINGS = (1.0, 1.35, 1.8, 2.4, 3.2, 4.2, 5.5, 7.0)  # how far a number may move off its dot, in heights of its box
-DOT_SHARE = 0.36  # of a box's height: the radius of a dot with its edge, and a pixel
+RINGS = (1.0, 1.35, 1.8, 2.4, 3.2, 4.2, 5.5, 7.0)  # distances of a label from its dot, in heights of its box
+DOT_SHARE = 0.36  # of a box's height: radius of a dot including its edge and one pixel
 _SUBPIXEL = 4  # bits: OpenCV draws at sixteenths of a pixel
 
 
@@ -32,11 +32,11 @@ def draw_markers(
     dot: tuple[int, int, int] = DOT,
     font_px: int = 13,
 ) -> np.ndarray:
-    """Draw a dot at each of ``pixels (N, 2)`` and its label in a box beside it.
+    """Draw a dot at each of ``pixels (N, 2)``, with its label in a box beside it.
 
-    Returns the picture ``(H, W, 3) uint8``. Boxes keep clear of dots and of each other as far as there is room, with a
-    line to their dot; where there is a choice they leave ``occupied (H, W) bool``, the object, uncovered. ``colors``
-    are those of dots and boxes (None: dots of colour ``dot``, dark boxes). Equal input gives equal pixels.
+    Returns the image ``(H, W, 3) uint8``. Boxes avoid dots and each other as far as possible, and are connected to their dot by
+    a line; they preferably leave ``occupied (H, W) bool``, the object, uncovered. ``colors`` are those of dots and boxes (None:
+    dots of colour ``dot``, dark boxes). Equal input gives equal pixels.
     """
     dots, fills = colors or [dot] * len(labels), colors or [INK] * len(labels)
     sizes = np.array([_box_size(label, font_px) for label in labels], dtype=float).reshape(-1, 2)
@@ -61,7 +61,7 @@ def draw_markers(
 def draw_frames(
     picture: np.ndarray, frames_to_object: Sequence[np.ndarray], camera: Camera, length_m: float
 ) -> np.ndarray:
-    """Draw the Z (blue, ``length_m`` long) and X (red, half of it) of frames ``(4, 4)`` over a picture, seen through matter."""
+    """Draw the Z (blue, ``length_m`` long) and X axes (red, half as long) of frames ``(4, 4)`` in front of everything."""
     canvas = picture.copy()
     for frame in frames_to_object:
         for axis, share, color in ((0, 0.5, X_AXIS), (2, 1.0, Z_AXIS)):
@@ -78,17 +78,17 @@ def _whole(pixel: np.ndarray) -> tuple[int, int]:
 
 
 def font_px(width_px: int, height_px: int) -> int:
-    """Return the size of the numbers: 13 px on a picture of 512 x 512, read well by people and models."""
+    """Return the font size of labels: 13 px for an image of 512 x 512, legible for people and models."""
     return max(9, round((width_px * height_px) ** 0.5 * 13 / 512))
 
 
 def place_boxes(
     pixels: np.ndarray, sizes: np.ndarray, shape: tuple[int, int], occupied: np.ndarray | None = None
 ) -> np.ndarray:
-    """Return centres ``(N, 2)`` for boxes of ``sizes (N, 2)`` near their points, overlapping as little as may be.
+    """Return centres ``(N, 2)`` for boxes of ``sizes (N, 2)`` near their points, with little overlap.
 
-    Greedy, the most crowded point first: the cheapest of 16 directions on rings around the point, by overlap with boxes
-    that are already there, dots covered, lines under dots and boxes of others, distance, and object covered.
+    Greedy, most crowded point first: the cheapest of 16 directions on rings around the point, by overlap with placed boxes,
+    covered dots, lines crossing other dots and boxes, distance, and covered object.
     """
     count = len(pixels)
     if not count:
@@ -120,16 +120,16 @@ def place_boxes(
 
 
 def _overlap(options: np.ndarray, half: np.ndarray, others: np.ndarray, other_half: np.ndarray) -> np.ndarray:
-    """Return the share ``(O, M)`` of a box at each option that lies under each other box."""
+    """Return the share ``(O, M)`` of a box at each option that overlaps each other box."""
     reach = half + other_half + 1.0
-    wide, high = (  # axis by axis: NumPy is slow over a last axis of two
+    wide, high = (  # axis by axis, as NumPy is slow over a last axis of two
         np.minimum(np.maximum(reach[:, k] - np.abs(options[:, k, None] - others[:, k]), 0), 2 * half[k]) for k in (0, 1)
     )
     return wide * high / (4 * half.prod())
 
 
 def _crossings(start: np.ndarray, ends: np.ndarray, starts: np.ndarray, stops: np.ndarray) -> np.ndarray:
-    """Count the lines from ``starts`` to ``stops`` that the line from ``start`` to each of ``ends (O, 2)`` crosses."""
+    """Count the lines from ``starts`` to ``stops`` crossed by the line from ``start`` to each of ``ends (O, 2)``."""
 
     def side(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
         return (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (c[..., 0] - a[..., 0])
@@ -139,7 +139,7 @@ def _crossings(start: np.ndarray, ends: np.ndarray, starts: np.ndarray, stops: n
 
 
 def _from_lines(start: np.ndarray, ends: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return the distances ``(O, M)`` of points from the lines from ``start`` to each of ``ends (O, 2)``."""
+    """Return the distances ``(O, M)`` of points from the segments from ``start`` to each of ``ends (O, 2)``."""
     x, y = (points - start).T
     along_x, along_y = ((ends - start).T)[:, :, None]
     share = (x * along_x + y * along_y) / np.maximum(along_x**2 + along_y**2, 1e-9)
@@ -148,13 +148,13 @@ def _from_lines(start: np.ndarray, ends: np.ndarray, points: np.ndarray) -> np.n
 
 
 def _covered_share(occupied: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Return for each pixel the share of a box of ``size`` around it that is occupied."""
+    """Return the occupied share of a box of ``size`` around each pixel."""
     return cv2.blur(occupied.astype(np.float32), (max(1, int(size[0])), max(1, int(size[1]))))
 
 
 @cache
 def font_of(size_px: int) -> Font:
-    """Return the font of all pictures."""
+    """Return the font used in all images."""
     return ImageFont.load_default(size_px)
 
 
@@ -164,6 +164,6 @@ def _box_size(label: str, font_px: int) -> tuple[int, int]:
 
 
 def _fixed(point: np.ndarray) -> tuple[int, int]:
-    """Return a point in OpenCV's fixed-point pixels, whose integers are pixel centres."""
+    """Return a point in OpenCV's fixed-point pixel coordinates, in which pixel centres are integers."""
     x, y = np.rint((point - 0.5) * 2**_SUBPIXEL).astype(int)
     return int(x), int(y)

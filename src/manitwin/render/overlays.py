@@ -1,4 +1,4 @@
-"""Layers over and under a picture: the edges of a mesh that its camera sees, and the soft shade on the ground below it."""
+"""Image layers: visible edges of a mesh, and a soft shadow on the ground."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ import trimesh
 from manitwin.geometry.sampling import sample_surface
 from manitwin.render.cameras import Camera, pixel_rays, project
 
-_FINE = 3  # lines are put down on a raster this many times finer each way, one fine pixel wide
-_DEPTH_SLACK = 0.012  # of the mesh's diagonal: the depth picture is coarser than the lines
+_FINE = 3  # lines are rasterized at this resolution factor, one fine pixel wide
+_DEPTH_SLACK = 0.012  # of the mesh's diagonal: the depth image is coarser than the lines
 _GRID = 192
 _SAMPLES = 20_000
 _STRENGTH, _MOST = 0.38, 0.6
 
 
 def visible_edges(mesh: trimesh.Trimesh, camera: Camera, depth: np.ndarray) -> np.ndarray:
-    """Return how much of each pixel the mesh's visible edges cover, ``(H, W) float32``.
+    """Return the coverage of each pixel by the mesh's visible edges, ``(H, W) float32``.
 
-    ``depth (H, W)`` is the mesh's own, 0 where nothing is. An edge is drawn where one of its faces turns to the camera
-    and it lies no deeper than the depth picture says.
+    ``depth (H, W)`` is the mesh's depth image, 0 for no surface. An edge is drawn if one of its faces is front-facing and the
+    edge is no deeper than the depth image.
     """
     facing = ((mesh.triangles_center - camera.position) * mesh.face_normals).sum(1) < 0
     ends = np.sort(mesh.faces[facing][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    # one integer an edge sorts much faster than rows
+    # one integer per edge sorts much faster than rows
     edges = np.stack(np.divmod(np.unique(ends[:, 0] * len(mesh.vertices) + ends[:, 1]), len(mesh.vertices)), axis=1)
     pixels, z = project(np.asarray(mesh.vertices), camera)
     length = np.linalg.norm(pixels[edges[:, 0]] - pixels[edges[:, 1]], axis=1)
@@ -34,7 +34,7 @@ def visible_edges(mesh: trimesh.Trimesh, camera: Camera, depth: np.ndarray) -> n
     along = (step / count[edge])[:, None]
     a, b = edges[edge].T
     point = pixels[a] * (1 - along) + pixels[b] * along
-    point_depth = 1 / ((1 - along[:, 0]) / z[a] + along[:, 0] / z[b])  # 1/depth is linear along a picture's line
+    point_depth = 1 / ((1 - along[:, 0]) / z[a] + along[:, 0] / z[b])  # 1/depth is linear along a line in the image
     height, width = depth.shape
     inside = ((point >= 0) & (point < [width, height])).all(1)
     point, point_depth = point[inside], point_depth[inside]
@@ -48,9 +48,9 @@ def visible_edges(mesh: trimesh.Trimesh, camera: Camera, depth: np.ndarray) -> n
 
 
 def ground_shadow(mesh: trimesh.Trimesh, camera: Camera) -> np.ndarray:
-    """Return a factor ``(H, W) float32`` for the picture of the plane z = 0 under a mesh, lit by a wide sky.
+    """Return a factor ``(H, W) float32`` for the image of the plane z = 0 under a mesh lit by a wide sky.
 
-    The nearer a surface is to the ground, the sharper and darker its shade; 1 where the camera does not see the ground.
+    The shadow is sharper and darker where the surface is closer to the ground; 1 where the ground is not visible.
     """
     points, _, _ = sample_surface(mesh, _SAMPLES, np.random.default_rng(0))
     low, high = mesh.bounds
@@ -70,7 +70,7 @@ def ground_shadow(mesh: trimesh.Trimesh, camera: Camera) -> np.ndarray:
 
 
 def _blurred_footprint(x: np.ndarray, y: np.ndarray, blur: float) -> np.ndarray:
-    """Return the grid's cells that hold points, small gaps closed, blurred."""
+    """Return the occupied grid cells with small gaps closed, blurred."""
     layer = np.zeros((_GRID, _GRID), dtype=np.float32)
     layer[y, x] = 1
     layer = np.asarray(cv2.morphologyEx(layer, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8)))

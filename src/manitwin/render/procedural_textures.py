@@ -1,6 +1,6 @@
-"""Wood, metal, marble and cloth as images: seamless, of a seed, and boxes of furniture that have them, true to scale.
+"""Procedural textures of wood, metal, marble and cloth: seamless and seeded; and textured furniture boxes at true scale.
 
-All noise is made in the frequency domain, so a texture continues across its edges without a seam.
+All noise is generated in the frequency domain, which makes a texture continuous across its edges.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ TEXTURE_PX = 1024
 
 @dataclass(frozen=True)
 class ProceduralTexture:
-    """A square that repeats every ``size_m`` metres.
+    """A square texture that repeats every ``size_m`` metres.
 
-    ``color (H, W, 3) uint8`` sRGB and ``roughness (H, W) uint8`` (255: matt), as glTF 2.0 has them; the first row is the
-    top (v = 1). Grain runs along u. ``metallic`` is 0 or 1.
+    ``color (H, W, 3) uint8`` sRGB and ``roughness (H, W) uint8`` (255: matt) as in glTF 2.0; the first row is the top (v = 1).
+    The grain runs along u. ``metallic`` is 0 or 1.
     """
 
     color: np.ndarray
@@ -38,9 +38,9 @@ class ProceduralTexture:
 
 @lru_cache(maxsize=32)  # 4 MB each
 def procedural_texture(material: str, seed: int, *, size_px: int = TEXTURE_PX) -> ProceduralTexture:
-    """Make a texture of ``wood``, ``metal`` (brushed), ``marble`` or ``cloth``; tone, scale and pattern follow the seed.
+    """Generate a texture of ``wood``, ``metal`` (brushed), ``marble`` or ``cloth``; tone, scale and pattern depend on the seed.
 
-    Raises UsageError for another material. Same material, seed and size: same pixels.
+    Raises UsageError for another material. Equal material, seed and size give equal pixels.
     """
     if material not in _MAKERS:
         raise UsageError(choose_from("furniture material", material, _MAKERS))
@@ -50,9 +50,9 @@ def procedural_texture(material: str, seed: int, *, size_px: int = TEXTURE_PX) -
 def periodic_noise(
     rng: np.random.Generator, size_px: int, *, wavelengths: tuple[float, float], slope: float = 1.0
 ) -> np.ndarray:
-    """Return noise ``(size, size)`` of mean 0 and deviation 1 that repeats; amplitudes fall with frequency to the ``slope``.
+    """Return periodic noise ``(size, size)`` with mean 0 and deviation 1; amplitudes fall with frequency to the power ``slope``.
 
-    ``wavelengths`` are the longest ones along u and v, as shares of the square: unequal ones stretch the noise.
+    ``wavelengths`` are the longest along u and v, as shares of the square; unequal values stretch the noise.
     """
     u, v = (np.asarray(f(size_px, 1 / size_px), np.float32) for f in (scipy.fft.rfftfreq, scipy.fft.fftfreq))
     squared = (u * wavelengths[0]) ** 2 + ((v * wavelengths[1]) ** 2)[:, None]
@@ -65,7 +65,7 @@ def periodic_noise(
 
 
 def _wood(rng: np.random.Generator, size: int) -> ProceduralTexture:
-    """Boards side by side, each cut from its own log: growth rings, fine fibres, pores."""
+    """Boards side by side, each from another log: growth rings, fine fibres, pores."""
     dark, light = _WOODS[int(rng.integers(len(_WOODS)))]
     boards = int(rng.integers(6, 11))
     rings = float(rng.uniform(2.5, 5.0))  # across a board
@@ -81,7 +81,9 @@ def _wood(rng: np.random.Generator, size: int) -> ProceduralTexture:
         y = (across[inside] - low) / (high - low)
         depth = y * rings + 0.55 * np.roll(warp, shift, axis=1)[inside] + rng.uniform(0, 1)
         ring = depth % 1.0
-        grain[inside] = np.where(ring < 0.82, ring / 0.82, (1 - ring) / 0.18)  # slow in spring, ends sharply in autumn
+        grain[inside] = np.where(
+            ring < 0.82, ring / 0.82, (1 - ring) / 0.18
+        )  # gradual in spring, ending sharply in autumn
         tone[inside] = rng.normal(0.0, 0.10)
         joint[low] = 1.0
     gap = np.minimum(cv2.GaussianBlur(np.vstack([joint] * 3), (0, 0), size / 1024 * 0.9)[size : 2 * size] * 2.2, 1)
@@ -92,7 +94,7 @@ def _wood(rng: np.random.Generator, size: int) -> ProceduralTexture:
 
 
 def _metal(rng: np.random.Generator, size: int) -> ProceduralTexture:
-    """Sheet metal that was brushed along u: streaks, and clouds of wear."""
+    """Sheet metal brushed along u: streaks, and patches of wear."""
     base = _METALS[int(rng.integers(len(_METALS)))]
     streaks = periodic_noise(rng, size, wavelengths=(0.5, 0.002), slope=0.15)
     wear = periodic_noise(rng, size, wavelengths=(0.5, 0.5), slope=1.2)
@@ -102,7 +104,7 @@ def _metal(rng: np.random.Generator, size: int) -> ProceduralTexture:
 
 
 def _marble(rng: np.random.Generator, size: int) -> ProceduralTexture:
-    """Clouds under veins: lines along which a warped field passes through zero (after Perlin 1985, "An Image Synthesizer")."""
+    """Clouds with veins: lines where a warped field crosses zero (after Perlin 1985, "An Image Synthesizer")."""
     ground, cloud, vein = _MARBLES[int(rng.integers(len(_MARBLES)))]
     clouds = periodic_noise(rng, size, wavelengths=(0.5, 0.5), slope=1.1)
     veins = np.zeros((size, size))
@@ -117,12 +119,12 @@ def _marble(rng: np.random.Generator, size: int) -> ProceduralTexture:
 
 
 def _cloth(rng: np.random.Generator, size: int) -> ProceduralTexture:
-    """Plain weave of uneven yarns, in one colour or in stripes or checks of two (half of the seeds each)."""
+    """Plain weave of uneven yarns, in one colour (half of the seeds), or in stripes or checks of two."""
     first = _CLOTHS[int(rng.integers(len(_CLOTHS)))]
     second = first * 0.55 + 0.42 if first.max() < 0.55 else first * 0.72
-    threads = size // 8  # eight pixels for a period of two yarns
+    threads = size // 8  # eight pixels per period of two yarns
     across, along = np.meshgrid(*[(np.arange(size) + 0.5) * threads / size] * 2)
-    over = (np.floor(across * 2) + np.floor(along * 2)) % 2 < 1  # which of warp and weft lies on top
+    over = (np.floor(across * 2) + np.floor(along * 2)) % 2 < 1  # whether warp or weft is on top
     warp, weft = np.abs(np.sin(2 * np.pi * across)), np.abs(np.sin(2 * np.pi * along))
     height = np.where(over, weft * (0.6 + 0.4 * warp), warp * (0.6 + 0.4 * weft))
     yarn = np.where(
@@ -142,14 +144,14 @@ def _mixed(zero: np.ndarray, one: np.ndarray, share: np.ndarray) -> np.ndarray:
 
 
 def _tint(rng: np.random.Generator, spread: float) -> np.ndarray:
-    """Return factors ``(3,)`` that shift hue and lightness a little."""
+    """Return factors ``(3,)`` that shift hue and lightness slightly."""
     return np.exp(rng.normal(0, spread) + rng.normal(0, spread / 2, 3))
 
 
 def _texture(color: np.ndarray, roughness: np.ndarray, metallic: float, size_m: float) -> ProceduralTexture:
     def to_bytes(image: np.ndarray) -> np.ndarray:
         pixels = np.rint(np.clip(image, 0, 1) * 255).astype(np.uint8)
-        pixels.flags.writeable = False  # it is kept and given again
+        pixels.flags.writeable = False  # shared through the cache
         return pixels
 
     return ProceduralTexture(to_bytes(color), to_bytes(roughness), metallic, size_m)
@@ -159,7 +161,7 @@ def _srgb(*hexes: str) -> tuple[np.ndarray, ...]:
     return tuple(np.array([int(code[i : i + 2], 16) for i in (0, 2, 4)]) / 255 for code in hexes)
 
 
-# sRGB, picked by eye
+# sRGB, chosen by eye
 _WOODS = (  # autumn and spring wood of oak, beech, walnut, birch, cherry
     _srgb("8a6238", "c9a26b"),
     _srgb("a9744a", "dcb488"),
@@ -184,8 +186,8 @@ _MAKERS: dict[str, Callable[[np.random.Generator, int], ProceduralTexture]] = {
 }
 
 
-# Corners of the faces as seen from outside, from the lower left one counterclockwise, in half extents; the face's
-# horizontal and vertical axis in the picture. On top +X runs to the right and +Y up.
+# Corners of the faces seen from outside, counter-clockwise from the lower left, in half extents; then the face's horizontal and
+# vertical axis in the image. On the top face, +X is to the right and +Y up.
 _FACES = (
     (((1, -1, -1), (1, 1, -1), (1, 1, 1), (1, -1, 1)), 1, 2),
     (((-1, 1, -1), (-1, -1, -1), (-1, -1, 1), (-1, 1, 1)), 1, 2),
@@ -198,7 +200,7 @@ _FACES = (
 
 @dataclass(frozen=True)
 class TexturedBox:
-    """A box of half extents ``(3,)`` about ``center_m (3,)``, with the texture shifted by ``offset_m``."""
+    """A box with half extents ``(3,)`` about ``center_m (3,)``, with the texture shifted by ``offset_m``."""
 
     half_extents_m: np.ndarray
     center_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -208,7 +210,7 @@ class TexturedBox:
 def textured_box(
     half_extents_m: np.ndarray, texture: ProceduralTexture, *, offset_m: tuple[float, float] = (0.0, 0.0)
 ) -> trimesh.Trimesh:
-    """Return a box about its origin as a visual part; its grain runs along the longest side.
+    """Return a box about its origin as a visual part, with the grain along its longest side.
 
     ``offset_m`` shifts the texture, so that boards of one wood differ.
     """
@@ -216,7 +218,7 @@ def textured_box(
 
 
 def textured_boxes(boxes: Sequence[TexturedBox], texture: ProceduralTexture) -> trimesh.Trimesh:
-    """Return boxes of one texture as one visual part: each part has a texture of its own that is uploaded."""
+    """Return boxes with one texture as a single visual part, as every part uploads its own texture."""
     vertices, uv, normals = [], [], []
     for box in boxes:
         grain = int(box.half_extents_m.argmax())

@@ -1,4 +1,4 @@
-"""Pictures by rays: exact depth, normals and faces, and whether a point is hidden."""
+"""Ray-cast images: exact depth, normals and faces, and visibility of points."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import trimesh
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.render.cameras import Camera, pixel_rays
 
-ON_SURFACE_M = 0.001  # a candidate is on the surface that is seen, to a millimetre (half of what a twin may be off)
-ON_SURFACE_SHARE = 0.01  # and of small objects to this share of the longest side
-FACING_COSINE = 0.05  # a surface seen at less than 3 degrees is a line
+ON_SURFACE_M = 0.001  # tolerance for a candidate on the visible surface (half of a twin's tolerance)
+ON_SURFACE_SHARE = 0.01  # for small objects, this share of the longest side
+FACING_COSINE = 0.05  # a surface seen at less than 3 degrees appears as a line
 
 
 def cast_camera(caster: RayCaster, camera: Camera) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Cast a ray through the centre of every pixel.
 
-    Returns depth along the viewing axis ``(H, W)`` (0 where nothing is hit), the hit faces' unit normals in the object
-    frame ``(H, W, 3)`` and face indices ``(H, W)`` (-1 where nothing is hit).
+    Returns depth along the viewing axis ``(H, W)`` (0: no hit), unit normals of the hit faces in the object frame ``(H, W,
+    3)``, and face indices ``(H, W)`` (-1: no hit).
     """
     origins, directions = pixel_rays(camera)
     length = np.linalg.norm(directions, axis=1)
@@ -31,10 +31,10 @@ def cast_camera(caster: RayCaster, camera: Camera) -> tuple[np.ndarray, np.ndarr
 
 
 def cast_pixels(caster: RayCaster, camera: Camera, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cast a ray through the centres of some pixels ``(N, 2)`` int (row, column).
+    """Cast a ray through the centres of pixels ``(N, 2)`` int (row, column).
 
-    Returns the points that are met in the object frame ``(N, 3)`` (of no meaning where nothing is), the lengths of the rays (m)
-    and face indices ``(N,)`` (-1 where nothing is hit).
+    Returns hit points in the object frame ``(N, 3)`` (meaningless without a hit), ray lengths (m), and face indices ``(N,)``
+    (-1: no hit).
     """
     across = pixels[:, 1] + 0.5 - camera.width_px / 2
     down = pixels[:, 0] + 0.5 - camera.height_px / 2
@@ -47,7 +47,7 @@ def cast_pixels(caster: RayCaster, camera: Camera, pixels: np.ndarray) -> tuple[
 
 
 def silhouette(caster: RayCaster, camera: Camera) -> np.ndarray:
-    """Return where the object is in a picture, ``(H, W) bool``, to four pixels: enough to keep numbers off it."""
+    """Return the object's silhouette in an image, ``(H, W) bool``, at a resolution of four pixels, for placing labels."""
     _, _, face = cast_camera(caster, camera.resized(camera.width_px // 4, camera.height_px // 4))
     size = (camera.width_px, camera.height_px)
     return cv2.resize((face >= 0).astype(np.uint8), size, interpolation=cv2.INTER_NEAREST).astype(bool)
@@ -56,10 +56,10 @@ def silhouette(caster: RayCaster, camera: Camera) -> np.ndarray:
 def visible_points(
     points: np.ndarray, normals: np.ndarray, camera: Camera, caster: RayCaster, tolerance_m: float
 ) -> np.ndarray:
-    """Tell which surface points ``(N, 3)`` with outward ``normals (N, 3)`` a camera sees; returns ``(N,) bool``.
+    """Return which surface points ``(N, 3)`` with outward ``normals (N, 3)`` a camera sees, ``(N,) bool``.
 
-    A point is seen that lies in the picture and faces the camera, and at which the caster's mesh is the first thing on
-    the way: a hit within ``tolerance_m`` of the point. So a point off the mesh is not seen.
+    A point is visible if it is inside the image, faces the camera, and the first hit on the caster's mesh is within
+    ``tolerance_m`` of the point. A point off the mesh is therefore not visible.
     """
     toward = points - camera.position
     distance = np.linalg.norm(toward, axis=1)
@@ -73,11 +73,11 @@ def visible_points(
 
 
 def seen_tolerance_m(extents_m: np.ndarray) -> float:
-    """Return how far (m) a candidate may be off the surface that is seen, for an object of extents ``(3,)``."""
+    """Return the tolerance (m) for candidates on the visible surface, for an object with extents ``(3,)``."""
     return min(ON_SURFACE_M, ON_SURFACE_SHARE * float(extents_m.max()))
 
 
 def merged(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
-    """Return the bare geometry of visual parts as one mesh."""
+    """Return the geometry of visual parts as one mesh."""
     vertices, faces = trimesh.util.append_faces([part.vertices for part in parts], [part.faces for part in parts])
     return trimesh.Trimesh(vertices, faces, process=False)

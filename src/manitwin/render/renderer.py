@@ -1,9 +1,8 @@
-"""Pictures of meshes with SAPIEN: colour and depth, lit like an object on a turntable in a studio.
+"""Rendering of meshes with SAPIEN: colour and depth, with studio lighting fixed to the camera.
 
-The object turns, the lights do not: they hang on the camera, so every view is exposed alike. The studio is a shader of
-our own, ``shaders/gbuffer.frag``: a picture of a megapixel costs 0.02 CPU-s on lavapipe and the first one 0.2, where
-SAPIEN's ``minimal`` shaders cost 0.13 and 11 (measured). Normals and faces are not drawn: ``manitwin.render.raycast``
-gives exact ones.
+Since the lights move with the camera, all views are exposed alike. The custom shader ``shaders/gbuffer.frag`` takes 0.02 CPU-s
+per megapixel on lavapipe and 0.2 for the first image, where SAPIEN's ``minimal`` shaders take 0.13 and 11 (measured). Normals
+and faces are not rendered; ``manitwin.render.raycast`` computes them exactly.
 """
 
 from __future__ import annotations
@@ -24,11 +23,11 @@ from manitwin.render.cameras import Camera, sapien_axes
 from manitwin.render.device import RenderDevice, render_scene, require_renderer
 from manitwin.render.surfaces import RenderSurface, front_faces, render_surface, triangle_mesh_shape
 
-BACKDROP = (233, 235, 238)  # light enough to be no colour, dark enough that white things stand out
-SUPERSAMPLE = 2  # SAPIEN's edges are not antialiased; twice the size each way removes the steps that are seen
+BACKDROP = (233, 235, 238)  # light enough to be neutral, dark enough for white objects to stand out
+SUPERSAMPLE = 2  # SAPIEN does not antialias; rendering at twice the size removes visible steps
 TEXELS_A_PIXEL = 1.2
 SHADERS = Path(__file__).parent / "shaders"
-DARKENING_RADIUS = 0.035  # of the picture's height: how far a nearer surface throws its soft shade
+DARKENING_RADIUS = 0.035  # of the image height: radius of depth darkening
 DARKENING_STRENGTH = 2.6
 DARKENING_MOST = 0.55
 
@@ -36,9 +35,9 @@ _shared: tuple[int, Renderer] | None = None
 
 
 def shared_renderer() -> Renderer:
-    """Return this process's renderer, made at the first call; raises RendererMissing where nothing renders.
+    """Return this process's renderer, created on first use. Raises RendererMissing if no device renders.
 
-    Making one costs half a CPU-second, most of it for importing SAPIEN.
+    Creation takes half a CPU-second, most of it for importing SAPIEN.
     """
     global _shared
     if _shared is None or _shared[0] != os.getpid():
@@ -48,7 +47,7 @@ def shared_renderer() -> Renderer:
 
 
 def _release() -> None:
-    """Drop the renderer while the interpreter is whole: SAPIEN 3.0.3 crashes when it is dropped later."""
+    """Release the renderer before interpreter shutdown, as SAPIEN 3.0.3 crashes if it is released later."""
     global _shared
     if _shared is not None and _shared[0] == os.getpid():
         _shared[1].close()
@@ -56,7 +55,7 @@ def _release() -> None:
 
 
 class Renderer:
-    """A SAPIEN scene that is kept and filled anew for each object. Use ``shared_renderer``."""
+    """A reusable SAPIEN scene, filled anew for each object. Use ``shared_renderer``."""
 
     def __init__(self) -> None:
         self.device: RenderDevice = require_renderer()
@@ -74,23 +73,25 @@ class Renderer:
         supersample: int = SUPERSAMPLE,
         with_backs: bool = True,
     ) -> list[Frame]:
-        """Draw ``parts``, meshes in the object frame, from each camera, over a background colour.
+        """Render ``parts``, meshes in the object frame, from each camera over a background colour.
 
-        Without ``with_backs`` faces are not drawn from behind: a sixth of the time less, for what ``is_closed_and_outward``.
-
-        ``supersample`` smooths the edges of ``rgb``; with 1, ``depth`` is that of the rays through the pixels' centres
-        (measured: 1e-7 m on an object of 0.1 m), with 2 it is a little off at creases and edges.
+        Without ``with_backs`` back faces are culled, which takes a sixth less time; for meshes with ``is_closed_and_outward``.
+        ``supersample`` antialiases ``rgb``. With 1, ``depth`` is that of the rays through the pixel centres (measured error:
+        1e-7 m on an object of 0.1 m); with 2 it deviates slightly at creases and edges.
         """
         points = np.concatenate([np.asarray(part.vertices, np.float32) for part in parts])
         low, high = points.min(0), points.max(0)
-        center, scale = (low + high) / 2, 2 / float(np.linalg.norm(high - low))  # a sphere of radius 1 holds everything
+        center, scale = (
+            (low + high) / 2,
+            2 / float(np.linalg.norm(high - low)),
+        )  # the object is enclosed in a sphere of radius 1
         del points
         texels_a_unit = TEXELS_A_PIXEL * pixels_a_unit(cameras, center, 1 / scale)
         surfaces = [render_surface(part, texels_a_unit=texels_a_unit) for part in parts]
         if not with_backs:
             surfaces = [front_faces(surface) for surface in surfaces]
         entities, textured = [], any(surface.color_map is not None for surface in surfaces)
-        while surfaces:  # none is kept beside what SAPIEN makes of it: textures are large
+        while surfaces:  # removed one by one to save memory, as textures are large
             entities.append(self._entity(surfaces.pop(0), center, scale))
             self._scene.add_entity(entities[-1])
         try:
@@ -103,12 +104,12 @@ class Renderer:
                 self._let_go()
 
     def _let_go(self) -> None:
-        """Draw nothing for once: what the picture before was made of is held until the next, 40 MB of a scan."""
+        """Render an empty image, because the renderer holds the previous image's resources until then (40 MB for a scan)."""
         self._scene.update_render()
         self._camera.take_picture()
 
     def close(self) -> None:
-        """Give back what the driver holds."""
+        """Release the driver's resources."""
         self._camera = self._mount = None
         self._scene.clear()
         del self._scene
@@ -122,7 +123,7 @@ class Renderer:
         return entity
 
     def _camera_of(self, width: int, height: int) -> tuple[Any, Any]:
-        """Return a camera and what carries it; the one before stays where it has the same size. Each pixel takes 17 bytes."""
+        """Return a camera component and its entity, reused for the same image size. Each pixel takes 17 bytes."""
         if self._size != (width, height):
             if self._mount is not None:
                 self._scene.remove_entity(self._mount)
@@ -157,18 +158,17 @@ class Renderer:
 
 
 def pixels_a_unit(cameras: Sequence[Camera], center: np.ndarray, radius: float) -> float:
-    """Return the pixels that a unit of length has in an object's nearest picture; its sphere is ``center (3,)``, ``radius``."""
+    """Return the pixels per unit of length in an object's closest view; its sphere is ``center (3,)``, ``radius``."""
     distances = [max(float(np.linalg.norm(camera.position - center)), radius / 8) for camera in cameras]
     return max(camera.focal_px / far for camera, far in zip(cameras, distances, strict=True))
 
 
 @dataclass(frozen=True)
 class Frame:
-    """A picture of size (H, W).
+    """An image of size (H, W).
 
-    ``rgb (H, W, 3) uint8`` over the background; ``coverage (H, W) float32``, the share of each pixel that the object
-    covers; ``depth (H, W) float32``, that of the surface along the viewing axis in the object's unit, 0 where the object
-    covers less than half a pixel.
+    ``rgb (H, W, 3) uint8`` over the background; ``coverage (H, W) float32``, the share of each pixel covered by the object;
+    ``depth (H, W) float32`` along the viewing axis in the object's unit, 0 where the object covers less than half a pixel.
     """
 
     rgb: np.ndarray
@@ -176,7 +176,7 @@ class Frame:
     depth: np.ndarray
 
     def over(self, old: tuple[int, int, int], new: tuple[int, int, int]) -> np.ndarray:
-        """Return ``rgb`` over another background than the one that it was drawn over."""
+        """Return ``rgb`` composited over the background ``new`` instead of ``old``."""
         empty, picture = 1 - self.coverage, np.empty_like(self.rgb)
         for channel, step in enumerate(np.array(new, np.float32) - np.array(old, np.float32)):
             moved = self.rgb[..., channel] + empty * step
@@ -194,12 +194,12 @@ def reduced_frame(
     supersample: int,
     radius: float,
 ) -> Frame:
-    """Reduce a picture ``supersample`` times each way.
+    """Downsample an image by ``supersample`` in each direction.
 
-    ``color (H, W, 4) uint8`` is black and transparent where nothing is; ``buffer (H, W) float32`` is the depth buffer,
-    linear in 1/depth from 0 at ``nearest`` to 1 at ``farthest``, and 1 where nothing is; ``radius`` is that of the
-    object. Colours are averaged over the background; 1/depth is linear over the picture of a plane, so its mean over
-    what is covered is the inverse depth at the pixel's centre.
+    ``color (H, W, 4) uint8`` is black and transparent where there is no object; ``buffer (H, W) float32`` is the depth buffer,
+    linear in 1/depth from 0 at ``nearest`` to 1 at ``farthest``, and 1 without an object; ``radius`` is the object's. Colours
+    are averaged over the background. As 1/depth is linear in the image of a plane, its mean over the covered samples is the
+    inverse depth at the pixel centre.
     """
     size = (color.shape[1] // supersample, color.shape[0] // supersample)
     coverage = _averaged(cv2.extractChannel(color, 3).astype(np.float32), size) / np.float32(255)
@@ -221,15 +221,14 @@ def _averaged(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
 
 
 def depth_shade(depth: np.ndarray, seen: np.ndarray, radius: float) -> np.ndarray:
-    """Return a factor ``(H, W) float32`` that darkens what lies behind its surroundings: cavities, contacts, overlaps.
+    """Return a factor ``(H, W) float32`` that darkens surfaces behind their surroundings: cavities, contacts, overlaps.
 
-    Stands for the occluded ambient light that a rasteriser lacks. Source: Luft, Colditz, Deussen 2006, "Image
-    enhancement by unsharp masking the depth buffer", eq. 1-3 (depth darkening); the background takes no part in the
-    blur.
+    It approximates ambient occlusion, which a rasterizer lacks. Source: Luft, Colditz, Deussen 2006, "Image enhancement by
+    unsharp masking the depth buffer", eq. 1-3 (depth darkening); the background is excluded from the blur.
     """
     sigma = DARKENING_RADIUS * depth.shape[0]
     weight = seen.astype(np.float32)
-    # A quarter of the size: the blur is wide, and this costs a sixteenth.
+    # At a quarter of the size the wide blur costs a sixteenth.
     size = (max(1, depth.shape[1] // 4), max(1, depth.shape[0] // 4))
     small = [cv2.resize(image, size, interpolation=cv2.INTER_AREA) for image in (depth * weight, weight)]
     blurred, share = (cv2.GaussianBlur(image, (0, 0), sigma / 4) for image in small)

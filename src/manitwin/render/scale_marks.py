@@ -1,4 +1,4 @@
-"""How large a thing is, drawn into a picture of it: a dimension line along its longest extent, and a scale bar."""
+"""Size annotations on images: a dimension line along the longest extent, and a scale bar."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from manitwin.render.cameras import Camera, project
 from manitwin.render.markers import INK, PAPER, font_of, font_px
 
 BAR_SHARE = 0.3
-"""Of the picture's width: the longest that a scale bar gets."""
+"""Of the image width: largest length of a scale bar."""
 ROUND_LENGTHS_M = tuple(digit * 10.0**power for power in (-3, -2, -1, 0) for digit in (1, 2, 5))
 _TICK_PX, _MARGIN_SHARE = 7.0, 0.03
 
 
 def best_camera(segments_m: np.ndarray, cameras: Sequence[Camera]) -> tuple[int, int]:
-    """Return which camera, and which of the parallel segments ``(S, 2, 3)`` in it, shows the length best.
+    """Return the camera, and the index of the parallel segment ``(S, 2, 3)``, that show the length best.
 
-    That is the camera in which a segment is longest beside the width of the picture, and there the segment farthest from the
-    middle of all, where the object hides least of it.
+    The camera is the one in which a segment is longest relative to the image; the segment is the one farthest from the
+    segments' centre, where the object hides least of it.
     """
     lengths = []
     for camera in cameras:
@@ -37,9 +37,10 @@ def best_camera(segments_m: np.ndarray, cameras: Sequence[Camera]) -> tuple[int,
 def draw_dimension(
     picture: np.ndarray, ends_m: np.ndarray, camera: Camera, label: str, color: tuple[int, int, int]
 ) -> np.ndarray:
-    """Return a picture ``(H, W, 3) uint8`` with a line between two ends ``(2, 3)``, ticks at both, and a label at its middle.
+    """Return an image ``(H, W, 3) uint8`` with a line between two points ``(2, 3)``, ticks at both ends, and a label in the
+    middle.
 
-    Where the line leaves the picture, the picture grows by as much of the plain ground, the colour of its corner.
+    If the line leaves the image, the image is extended with its plain background, the colour of its corner.
     """
     ends = project(np.asarray(ends_m, dtype=float), camera)[0]
     height, width = picture.shape[:2]
@@ -60,9 +61,9 @@ def draw_dimension(
 
 
 def draw_scale_bar(picture: np.ndarray, camera: Camera, middle_m: np.ndarray) -> np.ndarray:
-    """Return a picture ``(H, W, 3) uint8`` with a bar of a round length at the lower left, as long as at ``middle_m (3,)``.
+    """Return an image ``(H, W, 3) uint8`` with a scale bar of a round length at the lower left, to scale at ``middle_m (3,)``.
 
-    The picture is a perspective one: what lies nearer than the middle looks larger.
+    The image is in perspective: nearer objects appear larger.
     """
     depth_m = float(project(np.asarray(middle_m, dtype=float)[None], camera)[1][0])
     px_per_m = camera.focal_px / depth_m
@@ -81,7 +82,7 @@ def draw_scale_bar(picture: np.ndarray, camera: Camera, middle_m: np.ndarray) ->
 
 
 def length_words(length_m: float) -> str:
-    """Return '5 mm', '20 cm' or '1 m': a round length."""
+    """Return a round length as '5 mm', '20 cm' or '1 m'."""
     if length_m < 0.01:
         return f"{1000 * length_m:.0f} mm"
     return f"{100 * length_m:.0f} cm" if length_m < 1 else f"{length_m:.0f} m"

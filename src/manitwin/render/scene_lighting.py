@@ -1,4 +1,4 @@
-"""The lights of a scene, and the exposure that a camera would choose under them."""
+"""Scene lighting, and automatic exposure."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 WHITE_PAPER = 0.86
-"""Share of the picture's white that a perfectly white, level surface in full light gets; what faces a light gets more."""
+"""Share of the image's white for a level white surface in full light; surfaces facing a light are brighter."""
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # linear sRGB (IEC 61966-2-1)
 
 
 @dataclass(frozen=True)
 class DirectionalLight:
-    """Light that falls along ``direction (3,)``, world frame; ``color (3,)`` is its linear RGB irradiance, in any one unit."""
+    """Light along ``direction (3,)`` in the world frame; ``color (3,)`` is its linear RGB irradiance, in an arbitrary common
+    unit.
+    """
 
     direction: np.ndarray
     color: np.ndarray
@@ -23,16 +25,16 @@ class DirectionalLight:
 
 @dataclass(frozen=True)
 class Lighting:
-    """Directional lights, and ``ambient (3,)``, what even surroundings would make a white surface send out (linear RGB)."""
+    """Directional lights, and ``ambient (3,)``, the radiance of a white surface under uniform surroundings (linear RGB)."""
 
     ambient: np.ndarray
     lights: tuple[DirectionalLight, ...]
 
     def exposed(self) -> Lighting:
-        """Return these lights, all by one factor brighter or dimmer, so that level white paper becomes ``WHITE_PAPER``.
+        """Return the lights scaled by a common factor so that level white paper has the brightness ``WHITE_PAPER``.
 
-        Lambert's law: a white surface under irradiance E at an angle a sends out E cos(a) / pi. Lights from below count
-        nothing. Where no light reaches a level surface, they are returned as they are.
+        Lambert's law: a white surface under irradiance E at an angle a has the radiance E cos(a) / pi. Lights from below are
+        ignored. If no light reaches a level surface, the lights are unchanged.
         """
         level = np.asarray(self.ambient, float).copy()
         for light in self.lights:

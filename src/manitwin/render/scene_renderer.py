@@ -1,10 +1,10 @@
-"""Pictures of scenes of many rigid things: colour, depth, normals and ids, from several cameras at once.
+"""Rendering of scenes with many rigid objects: colour, depth, normals and ids, from several cameras at once.
 
-Things are uploaded once; from frame to frame only their poses change, and a ``Drawable`` that is shown again, also by another
-renderer, is not uploaded again. Colour is drawn by ``shaders/scene``: surfaces with twice the pixels each way, which are lit
-once a pixel where they are smooth and at each of its four samples elsewhere, with one shadow map a light and a map of heights
-for ambient occlusion. Depth, normals and ids are drawn by ``shaders/geometry`` with one sample a pixel, at its centre: they are
-those of the rays through the pixels' centres, and no mean of two things.
+Objects are uploaded once, and only their poses change between frames; a ``Drawable`` that is shown again, even by another
+renderer, is not uploaded again. Colour is rendered by ``shaders/scene`` at twice the resolution: shading is evaluated once per
+pixel on smooth surfaces and at each of its four samples elsewhere, with one shadow map per light and a height map for ambient
+occlusion. Depth, normals and ids are rendered by ``shaders/geometry`` with one sample at each pixel's centre, so that no pixel
+mixes two objects.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from manitwin.render.scene_lighting import STUDIO, Lighting
 from manitwin.render.surfaces import plain_part, render_surface, scene_shape
 
 SHADERS = Path(__file__).parent / "shaders"
-SUPERSAMPLE = 2  # shaders/scene lights blocks of 2 x 2
+SUPERSAMPLE = 2  # shaders/scene shades blocks of 2 x 2
 NEAR_M, FAR_M = 0.01, 30.0
-MAX_LIGHTS = 5  # shaders/scene has room for six, of which one looks down for the sky
+MAX_LIGHTS = 5  # shaders/scene supports six, of which one looks down for the sky
 SHADOW_MAP_PX = 1024
-"""A side of the map of shadows at most; that of heights has half as many."""
+"""Largest side of the shadow map; the height map has half as many texels."""
 SHADOW_TEXELS_A_PIXEL = 2.5
-"""So many a side of the map of shadows for each of a picture's: what is seen across a picture is a good third of the region."""
+"""Texels of the shadow map's side per image pixel: an image spans about a third of the shadow region."""
 PICTURE_FORMATS = {
     "Color": "R8G8B8A8Unorm",
     "Albedo": "R8G8B8A8Unorm",
@@ -47,7 +47,7 @@ PICTURE_FORMATS = {
 
 @dataclass(frozen=True)
 class Surroundings:
-    """A level floor below a scene that fades into an even backdrop. sRGB; ``floor_z_m`` in the world frame."""
+    """A level floor below a scene that fades into a uniform backdrop; colours in sRGB, ``floor_z_m`` in the world frame."""
 
     floor_z_m: float = -0.75
     floor: tuple[int, int, int] = (172, 170, 166)
@@ -56,24 +56,24 @@ class Surroundings:
 
 @dataclass(frozen=True)
 class ShadowRegion:
-    """The ball in which shadows are drawn; the smaller, the sharper. World frame, metres. ``map_px``: a side of their map."""
+    """The sphere in which shadows are rendered (world frame, metres); smaller is sharper. ``map_px``: side of the shadow map."""
 
     center_m: tuple[float, float, float] = (0.3, 0.0, 0.3)
     radius_m: float = 1.3
     map_px: int = SHADOW_MAP_PX
 
     def for_pictures_of(self, picture_px: int) -> ShadowRegion:
-        """Return this region with as many texels as pictures of ``picture_px`` a side show."""
+        """Return this region with as many texels as images with a side of ``picture_px`` can show."""
         return replace(self, map_px=min(round(SHADOW_TEXELS_A_PIXEL * picture_px), SHADOW_MAP_PX))
 
 
 @dataclass(frozen=True)
 class SceneFrame:
-    """A picture of size (H, W) from one camera; all but ``rgb`` are None where they were not asked for.
+    """An image of size (H, W) from one camera; all fields but ``rgb`` are None unless requested.
 
-    ``rgb (H, W, 3) uint8`` sRGB. Of the surface at each pixel's centre: ``depth_m (H, W) float32`` along the viewing axis
-    (0: the camera sees none), ``normals (H, W, 3) float32``, the unit shading normal in the world frame, towards the
-    camera's side, and ``ids (H, W) uint16``, 0 for floor and backdrop.
+    ``rgb (H, W, 3) uint8`` sRGB. For the surface at each pixel's centre: ``depth_m (H, W) float32`` along the viewing axis (0:
+    no surface), ``normals (H, W, 3) float32``, the unit shading normal in the world frame facing the camera, and ``ids (H, W)
+    uint16``, 0 for floor and backdrop.
     """
 
     rgb: np.ndarray
@@ -83,9 +83,9 @@ class SceneFrame:
 
 
 class SceneRenderer:
-    """A scene that is kept and drawn many times. Close it at the end, or use it in a ``with`` statement.
+    """A scene that is rendered repeatedly. Call ``close`` at the end, or use it in a ``with`` statement.
 
-    Raises RendererMissing where no device renders.
+    Raises RendererMissing if no device renders.
     """
 
     def __init__(
@@ -113,7 +113,7 @@ class SceneRenderer:
         self.close()
 
     def close(self) -> None:
-        """Give back what the driver holds."""
+        """Release the driver's resources."""
         _open_renderers.discard(self)
         self._cameras.clear()
         self._entities.clear()
@@ -124,13 +124,13 @@ class SceneRenderer:
 
     @property
     def ids(self) -> dict[str, int]:
-        """The ids of the things by name, from 1 in the order in which they were added."""
+        """The ids of the objects by name, from 1 in the order in which they were added."""
         return {name: number for name, (number, _) in self._entities.items()}
 
     def add(self, name: str, thing: Drawable | Sequence[trimesh.Trimesh], pose: np.ndarray | None = None) -> int:
-        """Add a thing, or its visual parts in its own frame, at ``thing_to_world (4, 4)``; returns its id.
+        """Add an object, or visual parts in their own frame, at ``thing_to_world (4, 4)``; return its id.
 
-        Raises UsageError for a name that is taken.
+        Raises UsageError for a name in use.
         """
         if name in self._entities:
             raise UsageError(f"the scene has a thing {name!r} already; give each its own name")
@@ -146,23 +146,27 @@ class SceneRenderer:
         return number
 
     def _shadow_caster(self, shape: Any, pose: Any) -> Any:
-        """Add something that is not seen but throws a shadow."""
+        """Add an invisible object that casts a shadow."""
         body = self._sapien.render.RenderBodyComponent()
         body.attach(shape.clone())
         entity = self._placed(body, np.eye(4))
         entity.set_pose(pose)
-        body.shading_mode = 1  # drawn by a second G-buffer shader, which shaders/scene has not, and into shadow maps
+        body.shading_mode = (
+            1  # rendered only by a second G-buffer pass, which shaders/scene lacks, and into shadow maps
+        )
         return entity
 
     def set_pose(self, name: str, pose: np.ndarray) -> None:
-        """Move a thing to ``thing_to_world (4, 4)``."""
+        """Move an object to ``thing_to_world (4, 4)``."""
         placed = self._sapien.Pose(pose)
         self._entities[name][1].set_pose(placed)
         self._casters[name].set_pose(placed)
 
     def render(self, cameras: Sequence[Camera], *, geometry: bool = False) -> list[SceneFrame]:
-        """Draw the scene from each camera (``camera_to_object`` is its pose in the world), with ``geometry`` all of a frame."""
-        if self._floor_to_add is not None:  # after what hides it: it is shaded only where it is seen
+        """Render the scene from each camera (``camera_to_object`` is its pose in the world); with ``geometry``, all fields of a
+        frame.
+        """
+        if self._floor_to_add is not None:  # added last, so that only its visible part is shaded
             self._add_floor(self._floor_to_add)
             self._floor_to_add = None
         color = [self._camera("scene", i, camera, SUPERSAMPLE) for i, camera in enumerate(cameras)]
@@ -178,7 +182,7 @@ class SceneRenderer:
         ]
 
     def _rgb(self, component: Any, camera: Camera) -> np.ndarray:
-        picture = component.get_picture("Color")[: camera.height_px, : camera.width_px]  # the rest of it is not drawn
+        picture = component.get_picture("Color")[: camera.height_px, : camera.width_px]  # the rest is not rendered
         opacity, rgb = cv2.extractChannel(picture, 3), cv2.cvtColor(picture, cv2.COLOR_RGBA2RGB)
         if opacity.min() == 255:
             return np.asarray(rgb)
@@ -220,7 +224,7 @@ class SceneRenderer:
             raise UsageError("of a scene's directional lights one at most casts shadows; switch it off for the others")
         lighting = lighting.exposed()
         self._scene.set_ambient_light(lighting.ambient.tolist())
-        # the order is the shader's: one that looks down, one with shadows, the others
+        # the order expected by the shader: the one looking down, the one with shadows, the others
         self._add_shadowed(np.array([0.0, 0.0, -1.0]), np.zeros(3), region, region.map_px // 2)
         for light in sorted(lighting.lights, key=lambda light: not light.casts_shadow):
             if light.casts_shadow:
@@ -258,8 +262,8 @@ class SceneRenderer:
 
 
 def _throw_no_shadow(body: Any) -> None:
-    """Leave a body that is in a scene out of the maps of shadows and heights."""
-    for part in body._internal_node.children:  # the only way to it in SAPIEN 3.0.3
+    """Exclude a body in a scene from the shadow and height maps."""
+    for part in body._internal_node.children:  # the only access in SAPIEN 3.0.3
         part.cast_shadow = False
 
 
@@ -284,7 +288,7 @@ _open_renderers: weakref.WeakSet[SceneRenderer] = weakref.WeakSet()
 
 @atexit.register
 def _close_all() -> None:
-    """Drop renderers and shapes while the interpreter is whole: SAPIEN 3.0.3 crashes when they are dropped later."""
+    """Release renderers and shapes before interpreter shutdown, as SAPIEN 3.0.3 crashes if they are released later."""
     for renderer in list(_open_renderers):
         renderer.close()
     _shapes.clear()

@@ -1,6 +1,6 @@
-"""Fewer triangles for the same picture: vertices that a surface can do without, taken out.
+"""Mesh simplification by vertex removal, for meshes drawn small and thousands of times.
 
-For meshes that are drawn small and thousands of times: on lavapipe a triangle costs more than the pixels it covers.
+On lavapipe a triangle costs more than the pixels it covers.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from itertools import permutations
 import numpy as np
 
 _ROUNDS = 30
-_LEAST_GAIN = 0.02  # share of the vertices that a round must take out for another one to follow
-_LEAST_COSINE = 0.5  # between a triangle's normal before and after: none turns by more than 60 degrees
-_FLATTEST = 0.01  # of twice a triangle's area in the sum of its sides' squares: slivers shade badly
-_TRIES = 3  # neighbours that a vertex may move into, the cheapest first
-_CHEAP = 0.05  # of the squared tolerance: what costs less than that counts as nothing
+_LEAST_GAIN = 0.02  # least share of vertices removed in a round for another one to follow
+_LEAST_COSINE = 0.5  # between a triangle's normal before and after: no normal turns by more than 60 degrees
+_FLATTEST = 0.01  # least ratio of twice a triangle's area to the sum of its squared sides, as slivers shade badly
+_TRIES = 3  # neighbours into which a vertex may be collapsed, cheapest first
+_CHEAP = 0.05  # of the squared tolerance: costs below it count as zero
 _GOLDEN = (5**0.5 - 1) / 2
 _ROW, _COLUMN = np.triu_indices(4)
 
@@ -28,15 +28,15 @@ def simplified(
     places: np.ndarray | None = None,
     keep_open_edges: bool = True,
 ) -> np.ndarray:
-    """Return faces ``(G, 3)`` over the same vertices ``(V, 3)``, with as many vertices left out as the tolerance allows.
+    """Return faces ``(G, 3)`` over the same vertices ``(V, 3)``, using as few vertices as the tolerance allows.
 
-    A vertex goes by moving into a neighbour, where the root of its quadric error stays below ``tolerance_m``: roughly the
-    distance from the planes of all triangles that it stands for. Vertices of open edges stay, or move without
-    ``keep_open_edges`` where the edge stays within the tolerance. ``places (V,)`` number the points at which vertices are:
-    several at one, as at the seam of a texture, move together, along the seam.
-    In each round all vertices go that cost less than their neighbours.
-    Source: Garland and Heckbert 1997, "Surface Simplification Using Quadric Error Metrics", with subset placement and
-    planes across open edges (section 6).
+    A vertex is collapsed into a neighbour if the root of its quadric error is below ``tolerance_m``: roughly the distance from
+    the planes of all triangles that it represents. Vertices of open edges are kept; without ``keep_open_edges`` they may move
+    if the edge stays within the tolerance. ``places (V,)`` are point indices of the vertices: vertices at one point, as at a
+    texture seam, move together along the seam. Each round collapses all vertices that cost less than their neighbours.
+
+    Source: Garland and Heckbert 1997, "Surface Simplification Using Quadric Error Metrics", with subset placement and planes
+    across open edges (section 6).
     """
     vertices, faces = np.asarray(vertices, float), np.asarray(faces, np.int64)
     if not len(faces):
@@ -50,7 +50,9 @@ def simplified(
         shuffle = (np.arange(1, len(points) + 1) * (number + 1) * _GOLDEN) % 1.0
         moves = _possible_moves(faces, places, len(points), keep_open_edges)
         chosen = _round(points, places[faces], quadrics, products, moves, tolerance_m**2, shuffle)
-        np.add.at(quadrics, moves.end[chosen], quadrics[moves.start[chosen]])  # several may move into one
+        np.add.at(
+            quadrics, moves.end[chosen], quadrics[moves.start[chosen]]
+        )  # several vertices may be collapsed into one
         there = np.zeros(len(points), bool)
         there[places[faces]] = True
         faces = moves.applied(chosen, len(vertices))[faces]
@@ -63,9 +65,9 @@ def simplified(
 
 @dataclass(frozen=True)
 class _Moves:
-    """Places ``start (M,)`` that may move into ``end (M,)``; on either side of the edge a vertex goes into another one.
+    """Collapses of points ``start (M,)`` into ``end (M,)``, with the vertices on both sides of the edge.
 
-    ``vertices (2, 2, M)``: by side, from and to; the same where the edge is none of a seam, or has one side.
+    ``vertices (2, 2, M)``: by side, from and to; equal for both sides unless the edge is on a seam.
     """
 
     start: np.ndarray
@@ -73,7 +75,7 @@ class _Moves:
     vertices: np.ndarray
 
     def applied(self, chosen: np.ndarray, count: int) -> np.ndarray:
-        """Return the vertex ``(count,)`` that each one goes into with the chosen moves, most into themselves."""
+        """Return the vertex ``(count,)`` into which each vertex is collapsed by the chosen moves (most: itself)."""
         into = np.arange(count)
         for first, last in self.vertices[:, :, chosen]:
             into[first] = last
@@ -82,9 +84,10 @@ class _Moves:
 
 @dataclass(frozen=True)
 class _HalfEdges:
-    """Of faces ``(F, 3)``, three each: vertices ``start`` and ``end (3F,)``, and those of the other side's face.
+    """The half-edges of faces ``(F, 3)``: vertices ``start`` and ``end (3F,)``, and those on the adjacent face's side.
 
-    ``open``: without another side, where these are its own. ``doubled``: another one runs the same way.
+    ``open``: without an adjacent face, in which case these are its own. ``doubled``: on a non-manifold or inconsistently wound
+    edge.
     """
 
     start: np.ndarray
@@ -96,7 +99,7 @@ class _HalfEdges:
 
     @classmethod
     def of(cls, faces: np.ndarray, places: np.ndarray, count: int) -> _HalfEdges:
-        """Find the other sides; ``count`` places."""
+        """Find the adjacent sides; ``count`` is the number of points."""
         start, end = faces.ravel(), faces[:, [1, 2, 0]].ravel()
         first, last = places[start], places[end]
         key = np.minimum(first, last) * count + np.maximum(first, last)
@@ -115,7 +118,7 @@ class _HalfEdges:
 
 
 def _possible_moves(faces: np.ndarray, places: np.ndarray, count: int, keep_open_edges: bool) -> _Moves:
-    """Return the moves along edges that leave surface, open edges and seams whole, of ``count`` places."""
+    """Return the edge collapses that preserve surface, open edges and seams; ``count`` is the number of points."""
     e = _HalfEdges.of(faces, places, count)
     used = np.zeros(len(places), bool)
     used[faces] = True
@@ -127,7 +130,7 @@ def _possible_moves(faces: np.ndarray, places: np.ndarray, count: int, keep_open
     start, end, is_open = places[e.start], places[e.end], e.open
     if keep_open_edges:
         kept |= rim
-    elif is_open.any():  # the other way along open edges, which no face has
+    elif is_open.any():  # the reverse direction along open edges, which no face has
         sides = np.concatenate([sides, sides[:, ::-1, is_open]], axis=2)
         start, end = np.append(start, end[is_open]), np.append(end, start[is_open])
         is_open = np.append(is_open, np.ones(len(start) - len(is_open), bool))
@@ -140,7 +143,7 @@ def _possible_moves(faces: np.ndarray, places: np.ndarray, count: int, keep_open
 def _add_planes_across_seams(
     quadrics: np.ndarray, points: np.ndarray, faces: np.ndarray, places: np.ndarray, keep_open_edges: bool
 ) -> None:
-    """Add planes through seams and open edges, upright on their faces: what moves along an edge leaves its line no further."""
+    """Add planes through seams and open edges, perpendicular to their faces, to penalize moving off the edge."""
     e = _HalfEdges.of(faces, places, len(points))
     held = (e.start != e.other_start) | (e.end != e.other_end)
     if not keep_open_edges:
@@ -157,7 +160,7 @@ def _add_planes_across_seams(
 
 
 def _quadrics(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Return the sum of squared distances from the planes of each point's triangles as quadratic forms ``(P, 10)``.
+    """Return the quadric error forms ``(P, 10)``: sums of squared distances from the planes of each point's triangles.
 
     They are the upper triangles of symmetric 4 x 4 matrices, row by row.
     """
@@ -171,7 +174,7 @@ def _quadrics(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def _forms(normals: np.ndarray, through: np.ndarray) -> np.ndarray:
-    """Return the squared distances from planes as quadratic forms ``(N, 10)``; normals ``(N, 3)`` of any length."""
+    """Return squared distances from planes as quadratic forms ``(N, 10)``; normals ``(N, 3)`` of any length."""
     lengths = np.linalg.norm(normals, axis=1)
     normals = normals / np.where(lengths > 0, lengths, 1)[:, None]
     planes = np.column_stack([normals, -(normals * through).sum(1)])
@@ -179,7 +182,7 @@ def _forms(normals: np.ndarray, through: np.ndarray) -> np.ndarray:
 
 
 def _products(points: np.ndarray) -> np.ndarray:
-    """Return what the quadratic forms of ``_quadrics`` are multiplied with at each point ``(P, 10)``."""
+    """Return the factors by which the forms of ``_quadrics`` are evaluated at each point ``(P, 10)``."""
     homogeneous = np.column_stack([points, np.ones(len(points))])
     return np.asarray(homogeneous[:, _ROW] * homogeneous[:, _COLUMN] * np.where(_ROW == _COLUMN, 1, 2))
 
@@ -193,16 +196,16 @@ def _round(
     most: float,
     shuffle: np.ndarray,
 ) -> np.ndarray:
-    """Return the indices of the moves of a round, one a point at most; no two neighbours move. ``faces`` are of points.
+    """Return the indices of a round's moves, at most one per point and none for two neighbours; ``faces`` are point indices.
 
-    Where all costs are small ``shuffle (P,)``, between 0 and 1, decides who goes first: in a row of growing costs only the
-    first one could (Luby 1986, maximal independent sets).
+    Where all costs are small, ``shuffle (P,)`` in [0, 1] decides the order: in a chain of increasing costs only the first could
+    move (Luby 1986, maximal independent sets).
     """
     cost = (np.take(quadrics, moves.start, axis=0) * np.take(products, moves.end, axis=0)).sum(1)
     number = np.flatnonzero(cost < most)
     start, end, cost = moves.start[number], moves.end[number], cost[number]
     length = ((points[end] - points[start]) ** 2).sum(1)
-    order = np.lexsort((end, cost + 1e-4 * length, start))  # of equal ones the nearest
+    order = np.lexsort((end, cost + 1e-4 * length, start))  # on ties the nearest
     number, start, end, cost = number[order], start[order], end[order], cost[order]
     taken, price = np.full(len(points), -1), np.full(len(points), np.inf)
     for _ in range(_TRIES):
@@ -221,15 +224,15 @@ def _round(
 
 
 def _keeps_shape(points: np.ndarray, faces: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Tell for each point and the one it would move into whether no triangle turns over or becomes a sliver."""
+    """Return for each collapse whether no triangle flips or becomes a sliver."""
     goal = np.full(len(points), -1)
     goal[start] = end
     to = goal[faces]
     face, corner = np.nonzero(to >= 0)
     to = to[face, corner]
-    stays = (faces[face] != to[:, None]).all(1)  # those with both ends fall away
+    stays = (faces[face] != to[:, None]).all(1)  # triangles with both ends vanish
     face, corner, to = face[stays], corner[stays], to[stays]
-    now = np.take(points.T, faces[face].T, axis=1)  # (3, 3, M): of each coordinate the corners
+    now = np.take(points.T, faces[face].T, axis=1)  # (3, 3, M): coordinates by corners
     then = now.copy()
     then[:, corner, np.arange(len(face))] = np.take(points.T, to, axis=1)
     before, after = _doubled_normals(now), _doubled_normals(then)
@@ -243,7 +246,7 @@ def _keeps_shape(points: np.ndarray, faces: np.ndarray, start: np.ndarray, end: 
 
 
 def _doubled_normals(corners: np.ndarray) -> np.ndarray:
-    """Return the normals ``(3, M)`` of triangles ``(3 coordinates, 3 corners, M)``, twice as long as their areas are large."""
+    """Return the normals ``(3, M)`` of triangles ``(3 coordinates, 3 corners, M)``, with twice their area as length."""
     (a, b, c), (d, e, f) = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     return np.stack([b * f - c * e, c * d - a * f, a * e - b * d])
 

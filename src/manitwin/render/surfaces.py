@@ -1,7 +1,7 @@
-"""Visual parts as arrays that a rasteriser takes, and their upload into SAPIEN.
+"""Conversion of visual parts to arrays for rasterization, and their upload to SAPIEN.
 
-The model is glTF 2.0's (section 3.9.2). Colour textures are sRGB, colour factors linear; texture coordinates are V-down.
-Normal maps are left out: SAPIEN takes no tangents with arrays.
+The material model is that of glTF 2.0 (section 3.9.2): colour textures are sRGB, colour factors linear; texture coordinates are
+V-down. Normal maps are ignored, as SAPIEN does not accept tangents with arrays.
 """
 
 from __future__ import annotations
@@ -18,17 +18,16 @@ from PIL import Image
 from manitwin.formats.meshes.textures import make_part, material_of, pbr_material, uv_of
 from manitwin.formats.meshes.triangles import with_creased_normals
 
-MAX_TEXTURE_PX = 2048  # more only costs time and aliases
-SPECULAR = 0.5  # reflectance of a dielectric at 0.5 * 0.08 = 4 %, the default of glTF 2.0 (index of refraction 1.5)
+MAX_TEXTURE_PX = 2048  # larger textures only cost time and cause aliasing
+SPECULAR = 0.5  # dielectric reflectance of 0.5 * 0.08 = 4 %, the default of glTF 2.0 (index of refraction 1.5)
 
 
 @dataclass(frozen=True)
 class RenderSurface:
-    """One mesh with one material, ready for upload.
+    """A mesh with a single material, ready for upload.
 
-    ``vertices``, ``normals (V, 3) float32``, ``faces (F, 3) uint32``, ``uv (V, 2) float32`` V-down. ``color_map`` is
-    ``(H, W, 4) uint8`` sRGB, or None for ``color (3,)`` linear; ``roughness_map`` and ``metallic_map`` are ``(H, W)
-    uint8``.
+    ``vertices``, ``normals (V, 3) float32``, ``faces (F, 3) uint32``, ``uv (V, 2) float32`` V-down. ``color_map`` is ``(H, W,
+    4) uint8`` sRGB, or None for ``color (3,)`` linear; ``roughness_map`` and ``metallic_map`` are ``(H, W) uint8``.
     """
 
     vertices: np.ndarray
@@ -44,10 +43,10 @@ class RenderSurface:
 
 
 def render_surface(part: trimesh.Trimesh, *, texels_a_unit: float = math.inf) -> RenderSurface:
-    """Read a visual part as ``formats.glb.read_glb`` gives it; raises TypeError for a mesh without a PBRMaterial.
+    """Convert a visual part from ``formats.glb.read_glb``. Raises TypeError for a mesh without a PBRMaterial.
 
-    Textures are averaged to about ``texels_a_unit`` of the surface's length, see ``texture_px``. Every face comes twice, from
-    either side: SAPIEN culls back faces, and open sheets would vanish from behind.
+    Textures are downsampled to about ``texels_a_unit`` per unit of length on the surface, see ``texture_px``. Every face is
+    included from both sides: SAPIEN culls back faces, and open sheets would vanish from behind.
     """
     material, uv = material_of(part), uv_of(part)
     factor = np.asarray(material.baseColorFactor)[:3] / 255
@@ -75,9 +74,9 @@ def render_surface(part: trimesh.Trimesh, *, texels_a_unit: float = math.inf) ->
 
 
 def texture_px(part: trimesh.Trimesh, uv: np.ndarray, texels_a_unit: float) -> int:
-    """Return the side of a texture that has ``texels_a_unit`` in the mean of a surface with coordinates ``uv (V, 2)``.
+    """Return the texture side with ``texels_a_unit`` on average on a surface with coordinates ``uv (V, 2)``.
 
-    A thing may take a small share of a large texture, and a palette a point for each face: these are left as they are.
+    Textures of which the surface uses a small share, and palettes with one point per face, are kept at full size.
     """
     if math.isinf(texels_a_unit):
         return MAX_TEXTURE_PX
@@ -89,13 +88,13 @@ def texture_px(part: trimesh.Trimesh, uv: np.ndarray, texels_a_unit: float) -> i
 
 
 def plain_part(mesh: trimesh.Trimesh, color: tuple[int, int, int], *, roughness: float = 0.6) -> trimesh.Trimesh:
-    """Return the mesh as a visual part of one sRGB colour, smooth but for its creases."""
+    """Return the mesh as a visual part with one sRGB colour, smooth except for creases."""
     material = pbr_material(base_color=srgb_to_linear(np.array(color) / 255).tolist(), roughness=roughness)
     return with_creased_normals(make_part(mesh.vertices, mesh.faces, material=material, name="plain"))
 
 
 def shrunk(image: np.ndarray, most_px: int) -> np.ndarray:
-    """Return an image of at most ``most_px`` a side, by averaging."""
+    """Downsample an image to at most ``most_px`` per side, by averaging."""
     scale = most_px / max(image.shape[:2])
     if scale >= 1:
         return image
@@ -114,11 +113,11 @@ def linear_to_srgb(value: np.ndarray) -> np.ndarray:
 
 
 def _rgb(image: Image.Image) -> np.ndarray:
-    return np.asarray(image if image.mode == "RGB" else image.convert("RGB"))  # of which Pillow makes another copy
+    return np.asarray(image if image.mode == "RGB" else image.convert("RGB"))  # convert() would make another copy
 
 
 def _tinted(image: np.ndarray, factor: np.ndarray) -> np.ndarray:
-    """Multiply an sRGB image ``(H, W, 3) uint8`` by a linear factor; returns ``(H, W, 4) uint8`` sRGB, opaque."""
+    """Multiply an sRGB image ``(H, W, 3) uint8`` by a linear factor; return ``(H, W, 4) uint8`` sRGB, opaque."""
     if not np.allclose(factor, 1.0, rtol=0, atol=1 / 512):
         table = np.rint(linear_to_srgb(srgb_to_linear(np.linspace(0, 1, 256))[:, None] * factor) * 255).astype(np.uint8)
         image = np.asarray(cv2.LUT(image, table[None]))
@@ -138,10 +137,11 @@ def triangle_mesh_shape(render: Any, s: RenderSurface) -> Any:
 
 
 def scene_shape(render: Any, s: RenderSurface) -> Any:
-    """Return a surface as a shape of the module ``sapien.render`` for ``shaders/scene``, with textures as that reads them.
+    """Return a surface as a shape of the module ``sapien.render`` for ``shaders/scene``, with textures in that shader's encoding.
 
-    Textures have mipmaps, since they are much finer than the pixels. lavapipe averages sRGB slowly: colours are square roots of
-    linear ones, and their averages a little darker than those of light. Where there are colours, the roughness is their alpha.
+    Textures have mipmaps, since they are much finer than the pixels. As lavapipe averages sRGB slowly, colours are stored as
+    square roots of linear values; their averages are slightly darker than those of light. With a colour texture, roughness is
+    its alpha channel.
     """
     material, roughness, metallic = _material(render, s)
     if s.color_map is not None:
@@ -151,7 +151,7 @@ def scene_shape(render: Any, s: RenderSurface) -> Any:
         if roughness is not None:
             size = colors.shape[1::-1]
             colors[..., 3] = roughness if roughness.shape == size[::-1] else cv2.resize(roughness, size)
-            material.set_emission([1.0, 0.0, 0.0, 0.0])  # tells the shader of it
+            material.set_emission([1.0, 0.0, 0.0, 0.0])  # tells the shader about the alpha channel
         material.base_color_texture = _texture(render, colors, "R8G8B8A8Unorm", mipmaps=True)
     elif roughness is not None:
         material.roughness_texture = _texture(render, roughness, "R8Unorm", mipmaps=True)
@@ -164,7 +164,7 @@ _ROOTS = np.rint(np.sqrt(srgb_to_linear(np.arange(256) / 255)) * 255).astype(np.
 
 
 def _material(render: Any, s: RenderSurface) -> tuple[Any, np.ndarray | None, np.ndarray | None]:
-    """Return a surface's material without textures, and its maps of roughness and metallic where they are not even."""
+    """Return a surface's material without textures, and its roughness and metallic maps unless they are constant."""
     material = render.RenderMaterial()
     material.base_color = [*s.color, 1.0]
     material.specular = SPECULAR
@@ -174,7 +174,7 @@ def _material(render: Any, s: RenderSurface) -> tuple[Any, np.ndarray | None, np
 
 
 def front_faces(s: RenderSurface) -> RenderSurface:
-    """Return a surface without the copies of its faces that are seen from behind (``render_surface``)."""
+    """Return a surface without the reversed copies of its faces (see ``render_surface``)."""
     vertices, faces = len(s.vertices) // 2, len(s.faces) // 2
     return replace(
         s, vertices=s.vertices[:vertices], normals=s.normals[:vertices], uv=s.uv[:vertices], faces=s.faces[:faces]
@@ -182,7 +182,7 @@ def front_faces(s: RenderSurface) -> RenderSurface:
 
 
 def _map_or_value(image: np.ndarray | None, value: float) -> tuple[np.ndarray | None, float]:
-    """Return an even map as its value: many are, and looking them up for every pixel costs."""
+    """Replace a constant map by its value, as many are and per-pixel lookups cost time."""
     if image is not None and image.min() == image.max():
         return None, float(image.flat[0]) / 255
     return image, value

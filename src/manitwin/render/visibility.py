@@ -1,4 +1,4 @@
-"""Which faces of a thing can be seen from outside it, and from which side: the others need not be drawn."""
+"""Visibility of a mesh's faces from outside, per side; invisible faces need not be rendered."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from manitwin.geometry.repair.welding import weld_equal
 
 DIRECTIONS = 128
 SPACING_M = 0.008
-_FEWEST, _MOST = 1, 24  # parts of a triangle's longest side between places
-_INWARD = 0.02  # of the way to the triangle's middle: no place is on its border
-_OFF_SURFACE_M = 2e-5  # above it, where rays begin
-_GRAZING = 0.02  # cosine to the normal, below which a ray would run along its own face
+_FEWEST, _MOST = 1, 24  # subdivisions of a triangle's longest side
+_INWARD = 0.02  # of the way to the triangle's centre, so that no point is on its border
+_OFF_SURFACE_M = 2e-5  # offset of the ray origins
+_GRAZING = 0.02  # cosine to the normal, below which a ray would graze its own face
 
 
 def is_closed_and_outward(mesh: trimesh.Trimesh) -> bool:
-    """Tell whether a mesh, its seams welded, is closed and all its pieces face outward: from outside no face shows its back."""
+    """Return whether a mesh with welded seams is closed and all its components face outward, so that no back face is visible."""
     vertices, faces = weld_equal(np.asarray(mesh.vertices), np.asarray(mesh.faces))
     if not is_closed_and_consistent(faces, len(vertices)):
         return False
@@ -27,15 +27,15 @@ def is_closed_and_outward(mesh: trimesh.Trimesh) -> bool:
     piece = label_components(len(vertices), links[:, 0], links[:, 1])[faces[:, 0]]
     a, b, c = np.swapaxes((vertices - vertices.mean(0))[faces], 0, 1)
     volumes = np.bincount(piece, np.einsum("fi,fi->f", a, np.cross(b, c)))
-    return bool((volumes[np.unique(piece)] > 0).all())  # vertices that no face has are pieces of their own
+    return bool((volumes[np.unique(piece)] > 0).all())  # unused vertices are components of their own
 
 
 def faces_seen_from_outside(mesh: trimesh.Trimesh, *, from_behind: bool = False) -> np.ndarray:
-    """Tell of each face ``(F,) bool`` whether its outward side, or its back, is seen from outside the thing.
+    """Return for each face ``(F,) bool`` whether its outward side, or its back, is visible from outside.
 
-    Rays go in 128 directions, 14 degrees apart, from places of each side that are 8 mm apart (or a 24th of its length where it
-    is longer than 19 cm); a side is seen where one of them leaves the thing. What is only seen through a narrower gap, as the
-    ground of a deep hole, counts as not seen.
+    Rays are cast in 128 directions, 14 degrees apart, from points 8 mm apart on each side (or a 24th of its length if longer
+    than 19 cm); a side is visible if a ray escapes. Surfaces seen only through narrower gaps, such as the bottom of a deep
+    hole, count as invisible.
     """
     caster, side = RayCaster(mesh), -1.0 if from_behind else 1.0
     normals = side * caster.face_normals
@@ -50,7 +50,7 @@ def faces_seen_from_outside(mesh: trimesh.Trimesh, *, from_behind: bool = False)
 
 
 def _places(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return points ``(P, 3)`` of triangles ``(F, 3, 3)``, on a grid with its corners on theirs, and of which one each is."""
+    """Return grid points ``(P, 3)`` on triangles ``(F, 3, 3)``, including near their corners, and the triangle of each."""
     longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(1)
     parts = np.clip(np.ceil(longest / SPACING_M), _FEWEST, _MOST).astype(int)
     points, of_face = [], []
