@@ -57,9 +57,8 @@ def _cause(error: ErrorDetails) -> str:
     if error["type"] == "value_error":
         return printable_line(error["msg"].removeprefix("Value error, "), max_characters=_SHOWN_CHARACTERS)
     value = error["input"]
-    huge = (
-        isinstance(value, int) and abs(value) > LARGEST_SEED
-    )  # Python does not print integers of many thousand digits
+    # Python does not print integers of many thousand digits
+    huge = isinstance(value, int) and abs(value) > LARGEST_SEED
     shown = "a larger integer" if huge else printable_line(repr(value), max_characters=_SHOWN_CHARACTERS)
     return f"{error['msg']} (it is {shown})"
 

@@ -109,9 +109,8 @@ class Failure:
     trace: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self, "message", encodable(self.message)
-        )  # messages of other libraries quote file names unencoded
+        # messages of other libraries quote file names unencoded
+        object.__setattr__(self, "message", encodable(self.message))
 
 
 Job = Survey | RunStage | Finish | WriteTables

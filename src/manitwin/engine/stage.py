@@ -148,7 +148,7 @@ _hear: ContextVar[Callable[[StagePart], None] | None] = ContextVar("hear_stage_p
 
 
 def tell_part(done: int, total: int, unit: str) -> None:
-    """Report the progress of the stage that runs in this context; cheap if nobody listens."""
+    """Report the progress of the stage that runs in this context; cheap without a listener."""
     hear = _hear.get()
     if hear is not None:
         hear(StagePart(done, total, unit))

@@ -12,7 +12,7 @@ from manitwin.geometry.poses import transform
 
 ASKEW_SHARE = 0.9
 """A smallest rectangle with less than this share of the axis-aligned area means that the object is not aligned with the axes."""
-_MIRRORED = 0.02  # of the larger side: tolerated deviation of an outline from its mirror image
+_MIRRORED = 0.02  # fraction of the larger side: tolerated deviation of an outline from its mirror image
 _MIRRORED_DIRECTIONS = 72
 
 

@@ -15,7 +15,8 @@ _SAME_UP = 0.8  # cosine of 37 degrees: up directions farther apart contradict e
 _ROUNDS = 10
 _LEAST_ON_EDGE = 8  # cameras: with fewer, some direction is level with a side of each image by chance
 _EDGE_ROLL_DEG = 6.0  # chance alone does not reach a roll this small
-_LEAST_DOWN = 0.15  # of the mean viewing direction against up: objects are seen from above, which gives the sign
+# component of the mean viewing direction against up: objects are seen from above, which gives the sign
+_LEAST_DOWN = 0.15
 _LEAST_AHEAD = 0.2  # horizontal component below which a viewing direction has no reliable azimuth
 _AXES = {
     "z": (0, 0, 1.0),

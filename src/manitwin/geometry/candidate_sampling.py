@@ -15,12 +15,12 @@ _BEND = 0.06  # 1 minus the length of the mean normal; a right-angled edge has 0
 _WEIGHT = 1.0  # relative increase of the sampling distance at an edge
 _MIDDLES, _BUMPS, _ENDS = 7, 4, 6  # the largest number of each among the candidates
 _FLAT = 0.985  # length of the mean normal; a quarter of a cylinder has 0.90, a dome of 20 degrees to each side 0.97
-_SMALL_SHARE = 0.06  # of the longest side: largest half width of a button
-_APART_SHARE = 0.06  # of the longest side: centres and extremities closer together are merged
-_RESTING_SHARE, _RESTING_COSINE = 0.015, -0.8  # of the longest side above the lowest point; a downward normal
-_FLOOR_DEPTH, _FLOOR_COSINE = 0.5, 0.5  # of the depth below the rim; normal along the opening's axis
+_SMALL_SHARE = 0.06  # fraction of the longest side: largest half width of a button
+_APART_SHARE = 0.06  # fraction of the longest side: centres and extremities closer together are merged
+_RESTING_SHARE, _RESTING_COSINE = 0.015, -0.8  # fraction of the longest side above the lowest point; a downward normal
+_FLOOR_DEPTH, _FLOOR_COSINE = 0.5, 0.5  # fraction of the depth below the rim; normal along the opening's axis
 _UPWARD = 0.9  # cosine; the hollow of a lid has no floor to place things on
-_FLOOR_SHARE = 0.5  # of the rim's radius; no view shows the very centre of a deep vessel
+_FLOOR_SHARE = 0.5  # fraction of the rim's radius; no view shows the very centre of a deep vessel
 MOST_RESTING = 0.2
 """The largest share of candidates on the resting underside."""
 

@@ -24,9 +24,8 @@ _FORMAT_TO_Z_UP = {
     "y": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
     "x": np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]]),
 }
-_NEAR_DEG = (
-    10.0  # scans stand up to 3 degrees off their base (pan, crock); a pose within this angle is the intended one
-)
+# scans stand up to 3 degrees off their base (pan, crock); a pose within this angle is the intended one
+_NEAR_DEG = 10.0
 _TILTED_DEG = 35.0  # generators keep part of the photo's view from above
 _LEAST_PROBABILITY = 0.01  # an upright bottle has 0.04, a fork on its tines less than 0.001
 _SAME_SIDE_DEG = 20.0  # poses of a round or facetted object that rolls a little count as one side
@@ -41,7 +40,7 @@ _EXACTLY_DEG = 1.0  # an object tilted by a generator rests this exactly on an a
 _ROUND = 0.1  # relative difference of the two moments of inertia across the axis
 _TALL = 0.9  # height over width; a lower vessel round about a horizontal axis may be a flask on its edge
 _AS_WIDE = 0.05  # relative difference of a round object's widths across its axis
-_ROUND_SHARE = 0.6  # of the directions across the axis; the tab of a can widens it in the others
+_ROUND_SHARE = 0.6  # fraction of the directions across the axis; the tab of a can widens it in the others
 _WIDTHS = 36
 
 

@@ -19,7 +19,8 @@ from manitwin.geometry.poses import rotation_between
 _MIN_DEPTH_SHARE = 0.04
 _MIN_VOLUME_SHARE = 0.05
 _MIN_VOLUME_SHARE_SIDEWAYS = 0.10
-_LARGEST_DRAIN_SHARE = 0.02  # of the outline's rectangle: the drain of a pot, but not the hole of a ring or a nut
+# fraction of the outline's rectangle: the drain of a pot, but not the hole of a ring or a nut
+_LARGEST_DRAIN_SHARE = 0.02
 _CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], dtype=np.uint8)  # a cell and its four neighbours
 
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-_DIGITS = (
-    5  # of distances between unit vectors, so that rounding differences between processors do not change the result
-)
+# Decimals of distances between unit vectors, so that rounding differences between processors do not change the result
+_DIGITS = 5
 
 
 def evenly_spread(directions: np.ndarray, count: int) -> np.ndarray:

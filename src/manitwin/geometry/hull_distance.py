@@ -23,7 +23,7 @@ _FIRST_PAIRS = 16  # tried first: bodies that touch mostly do so in one of the p
 SAME_NORMAL = 1e-4  # normals that differ by less in each coordinate belong to one flat face
 
 MAX_ITERATIONS = 60
-TOLERANCE_M = 1e-7  # of the distance, far below all gaps and overlaps of interest
+TOLERANCE_M = 1e-7  # error of the distance, far below all gaps and overlaps of interest
 _EDGES = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
 _FACES = np.array([(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)])
 _OPPOSITE = np.array([3, 2, 1, 0])  # the corner opposite to each face

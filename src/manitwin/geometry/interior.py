@@ -11,7 +11,7 @@ from manitwin.geometry.ray_caster import RayCaster
 COLUMNS = 96
 """Columns along each of the shorter sides of the box; a hammer's centre of mass is exact to 1.5 mm (tested in closed form)."""
 _MOST_WALLS = 40
-_PAST_HIT = 1e-7  # of the solid's size
+_PAST_HIT = 1e-7  # fraction of the solid's size
 
 
 def columns_of(solid: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:

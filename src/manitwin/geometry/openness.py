@@ -9,7 +9,7 @@ from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.repair.thickening import fibonacci_sphere
 
 DIRECTIONS = 24
-_OFF_SURFACE = 1e-4  # of the body's size: offset of the ray origins
+_OFF_SURFACE = 1e-4  # fraction of the body's size: offset of the ray origins
 
 
 def open_share(mesh: trimesh.Trimesh, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:

@@ -67,9 +67,8 @@ def easiest_tilt(
     centre of mass above the plane is the hull's support function.
     """
     coarse = np.linspace(0, 2 * np.pi, _TILT_DIRECTIONS, endpoint=False)
-    fine = np.linspace(-1, 1, _TILT_DIRECTIONS + 1) * (
-        coarse[1] - coarse[0]
-    )  # an elongated object rolls in one direction only
+    # an elongated object rolls in one direction only
+    fine = np.linspace(-1, 1, _TILT_DIRECTIONS + 1) * (coarse[1] - coarse[0])
     offsets = points - center_of_mass
     rises, tilted = np.empty(len(rotations)), np.empty_like(rotations)
     for index, rotation in enumerate(rotations):

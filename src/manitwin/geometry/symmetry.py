@@ -13,7 +13,7 @@ from manitwin.geometry.boxes import oriented_bounding_box
 from manitwin.geometry.sampling import sample_surface
 
 _TESTED, _SURFACE = 1500, 30_000  # number of samples that are transformed, and of samples they are compared with
-_OFF_SHARE = 0.015  # of the box's diagonal: tolerated distance of the transformed surface
+_OFF_SHARE = 0.015  # fraction of the box's diagonal: tolerated distance of the transformed surface
 _KEPT_SHARE = 0.99
 _MOST_SIDES, _MOST_TEETH = 8, 36  # a prism with more sides is round within ``_OFF_SHARE``; a gear is not
 _EVEN = 0.05  # relative anisotropy of the spread across an axis that high-order rotational symmetry still allows

@@ -12,7 +12,7 @@ from manitwin.twin.import_record import ImportRecord
 ROUNDING = 1e-4
 """Relative to the largest moment; files often have six digits."""
 OUTSIDE_SHARE = 1e-3
-"""Of the longest side: tolerated distance of a centre of mass outside the convex hull, for rounding."""
+"""Fraction of the longest side: tolerated distance of a centre of mass outside the convex hull, for rounding."""
 FACTOR = 3.0
 """Tolerated factor beyond the moments of a solid and of a thin-walled body, as in audit rule INE005."""
 

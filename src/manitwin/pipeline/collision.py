@@ -62,16 +62,15 @@ class CollisionStage:
         error = hull_error(solid, found.hulls, opening, np.random.default_rng(draft.seed), settings.error_samples)
         keeps_opening, notes = None, list(found.notes)
         if opening is not None and error.cavity_kept is not None:
-            from manitwin.physics.sapien.settle import (
-                ball_stays_inside,
-            )  # imported here, as it loads the physics engine
+            # imported here, as it loads the physics engine
+            from manitwin.physics.sapien.settle import ball_stays_inside
 
             ball_in = ball_stays_inside(found.hulls, opening)
             keeps_opening = ball_in and error.cavity_kept >= settings.least_cavity_kept
             if not keeps_opening:
                 notes.append(f"opening: {error.cavity_kept:.0%} of its volume kept, ball stays inside: {ball_in}")
         arrays = {f"hull_{index:02d}": hull for index, hull in enumerate(found.hulls)}
-        np.savez(folder / HULLS, **arrays)  # numpy's stub takes the names for its own flags
+        np.savez(folder / HULLS, **arrays)  # type: ignore[arg-type]  # numpy's stub takes the names for its own flags
         return {
             "collision": {
                 "count": len(found.hulls),

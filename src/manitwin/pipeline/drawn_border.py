@@ -10,13 +10,11 @@ import numpy as np
 from manitwin.formats.image_file import MIN_SIDE_PX
 
 THIN = 0.04
-"""Of a picture's side: largest width of a line; anything wider may be the background of an object."""
+"""Fraction of an image's side: largest width of a line; anything wider may be the background of an object."""
 WIDE = 0.45
-"""Of a picture's side: largest width of a bar, which must have a similar one on the opposite side."""
+"""Fraction of an image's side: largest width of a bar, which must have a similar one on the opposite side."""
 LEAST_ALONG = 0.95
-"""Of a side's length: least share over which a border has one colour and ends in one row of pixels; the rest is corners and
-noise.
-"""
+"""Least fraction of a side's length over which a border has one colour and ends in one row; the rest is corners and noise."""
 LEAST_OF_BAR = 0.9
 """The same for a wide bar, which may contain text."""
 ALIKE, STEP = 16, 24
@@ -25,9 +23,7 @@ MIXED_PX = 2
 """Rows between border and content that JPEG and scaling may mix."""
 LEAST_SIDES = 2
 OF_GROUND = 0.75
-"""Of the outermost pixels of the content: share of one colour from which they count as background, with the object in front of
-it.
-"""
+"""Least fraction of one colour among the outermost pixels of the content for which they count as background."""
 BORDERED = "a border drawn around the picture was cut off"
 
 

@@ -92,9 +92,9 @@ def why_no_outline(mask: np.ndarray) -> str | None:
 
 
 def as_drawn(given: Given, drawn: DrawnOutline, name: str) -> Given:
-    """Return a picture cut out by a drawn outline, regardless of its own alpha channel.
+    """Return an image cut out by a drawn outline, regardless of its own alpha channel.
 
-    Raises Rejected if the outline has another aspect ratio, is empty, or covers the whole picture.
+    Raises Rejected if the outline has another aspect ratio, is empty, or covers the whole image.
     """
     height, width = given.pixels.shape[:2]
     if not drawn.is_of((height, width)):

@@ -13,7 +13,7 @@ from manitwin.twin.record_values import Estimate
 
 SHARES = (0.0, 0.5, 1.0)
 HEAVIEST_EMPTY = 0.75
-"""Of the stated mass: if an empty vessel would be heavier, the stated mass is hardly that of a full one."""
+"""Fraction of the stated mass: if an empty vessel would be heavier, the stated mass is hardly that of a full one."""
 KNOWN = ("measured", "user", "human:", "imported:")
 """Sources of a mass that holds for one object in an unknown fill state."""
 UNEVEN_WALL = 0.2

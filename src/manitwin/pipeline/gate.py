@@ -31,7 +31,7 @@ _LITTLE_LARGER = 1.25
 class GateStage:
     """Reject meshes that by geometry are not a single solid object, then have the annotator judge the views.
 
-    Field ``gate``: ``checks`` in the order they were made. A check that nobody judged has ``passed`` None, never True.
+    Field ``gate``: ``checks`` in the order they were made. A check that was not judged has ``passed`` None, never True.
     """
 
     name: ClassVar[str] = "gate"

@@ -1,4 +1,4 @@
-"""Interpretation of a picture's own alpha channel: a cut-out, a faint cut-out, or an opaque picture with transparent bars."""
+"""Interpretation of an image's own alpha channel: a cut-out, a faint cut-out, or an opaque image with transparent bars."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FRAMED = "its alpha channel frames an upright rectangle, a picture with transpar
 
 @dataclass(frozen=True)
 class Given:
-    """The picture to be cut out: ``pixels (H, W, 3 or 4) uint8``, findings, and whether its alpha channel is doubtful."""
+    """The image to be cut out: ``pixels (H, W, 3 or 4) uint8``, findings, and whether its alpha channel is doubtful."""
 
     pixels: np.ndarray
     findings: tuple[str, ...] = ()
@@ -35,10 +35,10 @@ class Given:
 
 
 def as_given(pixels: np.ndarray, name: str | None) -> Given:
-    """Interpret a picture ``(H, W, 3 or 4) uint8`` of an object that the user calls ``name``.
+    """Interpret an image ``(H, W, 3 or 4) uint8`` of an object that the user calls ``name``.
 
     If the opaque region is an upright rectangle with bars around it, the name decides whether that is the object (a book, a
-    box) or a picture of it, which is then cropped to. It is doubtful without a known name. A border drawn around a photo is cut
+    box) or an image of it, which is then cropped to. It is doubtful without a known name. A border drawn around a photo is cut
     off (``drawn_border``).
     """
     pixels, findings = usable(pixels)
@@ -55,7 +55,7 @@ def as_given(pixels: np.ndarray, name: str | None) -> Given:
 
 
 def as_masked(pixels: np.ndarray, mask: Path, orientation: int) -> Given:
-    """Return a picture ``(H, W, 3 or 4) uint8`` cut out by the mask file, combined with its own alpha channel.
+    """Return an image ``(H, W, 3 or 4) uint8`` cut out by the mask file, combined with its own alpha channel.
 
     ``orientation`` is the photo's EXIF orientation. Raises InputError like ``read_mask``.
     """
@@ -67,7 +67,7 @@ def as_masked(pixels: np.ndarray, mask: Path, orientation: int) -> Given:
 
 
 def usable(pixels: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Return a picture ``(H, W, 3 or 4) uint8`` with a usable alpha channel or without one, and findings.
+    """Return an image ``(H, W, 3 or 4) uint8`` with a usable alpha channel or without one, and findings.
 
     A constant channel is dropped. A channel that is opaque nowhere belongs to a faint cut-out (e.g. a glass drawn translucent):
     it is stretched so that its highest value is opaque.
@@ -87,7 +87,7 @@ def usable(pixels: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
 
 
 def framed_picture(pixels: np.ndarray) -> np.ndarray | None:
-    """Return the picture ``(H, W, 3) uint8`` inside, if the opaque region of ``pixels`` is an upright rectangle with bars; else
+    """Return the image ``(H, W, 3) uint8`` inside, if the opaque region of ``pixels`` is an upright rectangle with bars; else
     None.
 
     Rounded corners as small as a window's are tolerated, and pixels outside that are not opaque, such as a window's shadow.

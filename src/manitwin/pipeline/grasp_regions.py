@@ -46,7 +46,7 @@ _ALL_OVER_PAD_M = np.array(
 )
 """A denser set of ray starts, 1.5 mm apart and out to the pad's border ``(78, 2)``, for thin objects."""
 _NARROW, _BESIDE = 0.5, 0.25
-"""Of the nearby surface: below the first share a part is narrower than a fingertip; above the second a neighbour counts."""
+"""Fractions of the nearby surface: below the first, a part is narrower than a fingertip; above the second, a neighbour counts."""
 _SAMPLES = 20_000
 _TIE = 1e-6  # smaller than the resolution of shares (a ninth of a fingertip), over all 255 parts
 NOBODY = ""

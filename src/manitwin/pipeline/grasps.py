@@ -39,9 +39,9 @@ GRASP_POINTS = "grasp_points"
 """The grasp points after the first gripper's trials: ``{grasp, withdrawn}``."""
 UNFILTERED = ":unfiltered"
 QUOTA_MARGIN = 1.3
-"""How many more grasps are tried per point than should hold there."""
+"""Ratio of the grasps tried per point to the requested successful ones."""
 Quota = tuple[np.ndarray, int]
-"""A mask ``(N,) bool`` of grasps, and how many of them are requested."""
+"""A mask ``(N,) bool`` of grasps, and the number of them that are requested."""
 
 
 class GraspsStage:

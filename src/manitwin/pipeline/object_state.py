@@ -26,7 +26,7 @@ from manitwin.render.cameras import Camera
 from manitwin.twin.grasp_table import JOINTS
 from manitwin.twin.import_record import ImportRecord, read_import_record
 
-_ROUNDING = 1e-9  # of a scale factor of one
+_ROUNDING = 1e-9  # tolerated deviation of a scale factor from 1
 
 KEPT = 3
 """Number of loaded meshes kept per worker. With two workers, the stages of two items alternate in each of them, with one more

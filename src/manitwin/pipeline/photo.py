@@ -170,7 +170,7 @@ class PhotosStage(PhotoStage):
 
 
 def refused(doubted: DoubtedCutOut) -> Matte:
-    """Raise the doubt about a cut-out that nobody can confirm."""
+    """Raise the doubt about a cut-out that no reviewer can confirm."""
     raise doubted
 
 

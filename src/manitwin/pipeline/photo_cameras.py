@@ -16,7 +16,7 @@ from manitwin.formats.image_file import full_size
 from manitwin.formats.outline_mask import require_mask
 from manitwin.formats.printable import printable_line
 
-_ROUNDED_PX, _ROUNDED_SHARE = 1.0, 0.005  # tolerances of the aspect ratio of a scaled picture
+_ROUNDED_PX, _ROUNDED_SHARE = 1.0, 0.005  # tolerances of the aspect ratio of a scaled image
 _UPRIGHT, _TURNED = 1, (6, 8)  # EXIF orientations
 _SHOWN = 6
 _DIGITS = 9  # of numbers in an identity, as the last digits differ between processors
@@ -97,7 +97,7 @@ def cameras_of_photos(photos: Sequence[Path], found: CameraPoses) -> list[PosedC
 
 
 def _require_own(photo: Path, camera: PosedCamera | None, found: CameraPoses) -> None:
-    """Raise InputError if the named picture exists below the file's folder and differs: splits of a data set reuse file names.
+    """Raise InputError if the named image exists below the file's folder and differs: splits of a data set reuse file names.
 
     Only its existence and size are checked, and only inside the folder.
     """
@@ -122,9 +122,9 @@ def _require_own(photo: Path, camera: PosedCamera | None, found: CameraPoses) ->
 
 
 def _of_upright(photo: Path, camera: PosedCamera, found: CameraPoses) -> PosedCamera:
-    """Return the camera for the upright photo. Raises InputError if the pose is for a picture of another aspect ratio.
+    """Return the camera for the upright photo. Raises InputError if the pose is for an image of another aspect ratio.
 
-    Pose estimation programs use the picture as stored, or as rotated by its EXIF orientation; the aspect ratio tells which.
+    Pose estimation programs use the image as stored, or as rotated by its EXIF orientation; the aspect ratio tells which.
     """
     width, height, orientation = full_size(photo)
     file = called(found)

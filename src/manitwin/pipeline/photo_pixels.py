@@ -21,7 +21,7 @@ CROPPED = "looked at within the box that was stated of it"
 
 @dataclass(frozen=True)
 class PhotoPixels:
-    """The picture to be cut out, ``given``, its focal length (35 mm equivalent), and the object's box in its pixels.
+    """The image to be cut out, ``given``, its focal length (35 mm equivalent), and the object's box in its pixels.
 
     ``window_px`` is the shown region in pixels of the whole photo; None if a border was cut off.
     """

@@ -29,7 +29,7 @@ UP = np.array([0.0, 0.0, 1.0])
 SAME_POSE_DEG = 5.0
 SNAP_DEG = 3.0
 NUDGE_DEG = 4.0
-MOST_POSES = 500  # of thousands for a ball; enough to cover all directions to within 12 degrees
+MOST_POSES = 500  # a ball has thousands; enough to cover all directions to within 12 degrees
 # Of 371 quasi-static poses of 25 objects, 7 of the 52 with a rise of 0.5 to 1 tilt_rise_m turned by more than 5 degrees when
 # released in MuJoCo, but none of the 17 that also pass the trial of loose poses; below one half, 110 of 189 turned.
 LOOSE_SHARE = 0.5

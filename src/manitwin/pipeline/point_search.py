@@ -22,9 +22,9 @@ FIRST_POINT_SEED = 100_000
 """The first seed of rounds at points, apart from those of the rounds for the whole object and for supports."""
 POINT_ROUNDS = 3
 RAW_SHARE = 0.5
-"""Of a round's proposals for the whole object, as a round at a point covers a small part of it."""
+"""Fraction of a round's proposals for the whole object, as a round at a point covers a small part of it."""
 HOPELESS_TRIES, HOPELESS_SHARE = 8, 0.5
-"""The search at a point ends after so many tries if a smaller share than this has held."""
+"""The search at a point ends after this many tries if a smaller share than this has succeeded."""
 
 Try = Callable[[GraspProposals], list[TrialResult]]
 

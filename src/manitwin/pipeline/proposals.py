@@ -221,9 +221,8 @@ def _at_contact(
     """
     z = np.array(approach)
     x = np.array(closing) - (np.array(closing) @ z) * z
-    if (
-        np.linalg.norm(x) < 1e-6
-    ):  # closing along the approach is invalid; any perpendicular direction lets the filters reject it
+    # closing along the approach is invalid; any perpendicular direction lets the filters reject it
+    if np.linalg.norm(x) < 1e-6:
         x = np.eye(3)[int(np.abs(z).argmin())] - z * z[int(np.abs(z).argmin())]
     x = x / np.linalg.norm(x)
     pose = np.eye(4)

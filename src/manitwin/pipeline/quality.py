@@ -28,7 +28,7 @@ AGREEMENT_LIMIT = 0.9
 """Least share of the verified grasps confirmed by a second engine; below it the engines disagree on the object as a whole."""
 
 CENTER_OF_MASS_LIMIT = 0.1
-"""Of the longest side: uncertainty beyond which the centre of mass may decide whether a grasp holds."""
+"""Fraction of the longest side: uncertainty beyond which the centre of mass may decide whether a grasp holds."""
 
 REHEARSAL = "rehearsal"
 """Name of the check that is present, and failed, only if a rehearsal server replaced a model."""

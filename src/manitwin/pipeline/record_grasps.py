@@ -203,7 +203,7 @@ def _summary(
 
 
 def _outcomes_by(rows: GripperRows, column: str, names: dict[str, str], which: np.ndarray) -> dict[str, dict[str, int]]:
-    """Count the outcomes of the rows ``which`` by the name of what they hold."""
+    """Count the outcomes of the rows ``which`` by the name of the part or point held."""
     counts: dict[str, Counter[str]] = defaultdict(Counter)
     for point, outcome in zip(rows.proposals[column][which].tolist(), rows.outcome[which].tolist(), strict=True):
         counts[names[point]][outcome] += 1

@@ -18,7 +18,7 @@ from manitwin.geometry.pixel_boxes import PixelBox
 MASK, BOX = "mask", "box_px"
 """Columns of a manifest."""
 MARGIN = 0.15
-"""Of the box's longer side: margin of the photo around the box that is used too, for background and edges of the object."""
+"""Fraction of the box's longer side: margin of the photo that is used around the box, for background and object edges."""
 LEAST_MARGIN_PX = 8.0
 OUTSIDE_PX = 1.0
 """Tolerance for boxes outside their photo, as programs count pixels from 0 or 1."""

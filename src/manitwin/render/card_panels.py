@@ -33,8 +33,8 @@ HULL_COLORS = (
     (252, 205, 229), (255, 237, 111), (188, 128, 189), (204, 235, 197), (217, 217, 217), (255, 255, 179),
 )  # fmt: skip
 DRAWN_GRASPS = 12
-INPUT_MARGIN = 0.12  # of the longer side of a photo's cut-out: about the margin of the rendered object
-FRAME_SHARE = 0.16  # of the longest side: length of a drawn frame's Z axis
+INPUT_MARGIN = 0.12  # fraction of the longer side of a photo's cut-out: about the margin of the rendered object
+FRAME_SHARE = 0.16  # fraction of the longest side: length of a drawn frame's Z axis
 
 Boxes = Sequence[tuple[np.ndarray, np.ndarray]]
 """``(box_to_gripper (4, 4), half_extents_m (3,))`` of each box of palm and fingers; grasp frame: +Z approach, X closing."""

@@ -10,7 +10,7 @@ import numpy as np
 from manitwin.render.cameras import Camera, project
 
 DARK, LIGHT = (24, 28, 36), (255, 255, 255)
-RADIUS_SHARE = 0.022  # of the image height
+RADIUS_SHARE = 0.022  # fraction of the image height
 _SUBPIXEL_BITS = 4
 
 

@@ -38,7 +38,7 @@ MARKER_COLORS = (
     MarkerColor("pink", (255, 60, 220)),
     MarkerColor("cyan", (0, 205, 230)),
 )
-"""In order of preference."""
+"""Colours of markers, in order of preference."""
 
 
 def ground_for(frames: Sequence[Frame]) -> tuple[int, int, int]:

@@ -18,7 +18,7 @@ PAPER = (255, 255, 255)
 X_AXIS, Z_AXIS = (214, 48, 49), (30, 80, 220)
 DIRECTIONS = 16
 RINGS = (1.0, 1.35, 1.8, 2.4, 3.2, 4.2, 5.5, 7.0)  # distances of a label from its dot, in heights of its box
-DOT_SHARE = 0.36  # of a box's height: radius of a dot including its edge and one pixel
+DOT_SHARE = 0.36  # fraction of a box's height: radius of a dot including its edge and one pixel
 _SUBPIXEL = 4  # bits: OpenCV draws at sixteenths of a pixel
 
 

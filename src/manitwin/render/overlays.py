@@ -10,7 +10,7 @@ from manitwin.geometry.sampling import sample_surface
 from manitwin.render.cameras import Camera, pixel_rays, project
 
 _FINE = 3  # lines are rasterized at this resolution factor, one fine pixel wide
-_DEPTH_SLACK = 0.012  # of the mesh's diagonal: the depth image is coarser than the lines
+_DEPTH_SLACK = 0.012  # fraction of the mesh's diagonal: the depth image is coarser than the lines
 _GRID = 192
 _SAMPLES = 20_000
 _STRENGTH, _MOST = 0.38, 0.6

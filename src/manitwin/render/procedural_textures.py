@@ -81,9 +81,8 @@ def _wood(rng: np.random.Generator, size: int) -> ProceduralTexture:
         y = (across[inside] - low) / (high - low)
         depth = y * rings + 0.55 * np.roll(warp, shift, axis=1)[inside] + rng.uniform(0, 1)
         ring = depth % 1.0
-        grain[inside] = np.where(
-            ring < 0.82, ring / 0.82, (1 - ring) / 0.18
-        )  # gradual in spring, ending sharply in autumn
+        # gradual in spring, ending sharply in autumn
+        grain[inside] = np.where(ring < 0.82, ring / 0.82, (1 - ring) / 0.18)
         tone[inside] = rng.normal(0.0, 0.10)
         joint[low] = 1.0
     gap = np.minimum(cv2.GaussianBlur(np.vstack([joint] * 3), (0, 0), size / 1024 * 0.9)[size : 2 * size] * 2.2, 1)

@@ -27,7 +27,7 @@ BACKDROP = (233, 235, 238)  # light enough to be neutral, dark enough for white 
 SUPERSAMPLE = 2  # SAPIEN does not antialias; rendering at twice the size removes visible steps
 TEXELS_A_PIXEL = 1.2
 SHADERS = Path(__file__).parent / "shaders"
-DARKENING_RADIUS = 0.035  # of the image height: radius of depth darkening
+DARKENING_RADIUS = 0.035  # fraction of the image height: radius of depth darkening
 DARKENING_STRENGTH = 2.6
 DARKENING_MOST = 0.55
 
@@ -81,10 +81,8 @@ class Renderer:
         """
         points = np.concatenate([np.asarray(part.vertices, np.float32) for part in parts])
         low, high = points.min(0), points.max(0)
-        center, scale = (
-            (low + high) / 2,
-            2 / float(np.linalg.norm(high - low)),
-        )  # the object is enclosed in a sphere of radius 1
+        # the object is enclosed in a sphere of radius 1
+        center, scale = (low + high) / 2, 2 / float(np.linalg.norm(high - low))
         del points
         texels_a_unit = TEXELS_A_PIXEL * pixels_a_unit(cameras, center, 1 / scale)
         surfaces = [render_surface(part, texels_a_unit=texels_a_unit) for part in parts]

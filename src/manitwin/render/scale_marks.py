@@ -12,7 +12,7 @@ from manitwin.render.cameras import Camera, project
 from manitwin.render.markers import INK, PAPER, font_of, font_px
 
 BAR_SHARE = 0.3
-"""Of the image width: largest length of a scale bar."""
+"""Fraction of the image width: largest length of a scale bar."""
 ROUND_LENGTHS_M = tuple(digit * 10.0**power for power in (-3, -2, -1, 0) for digit in (1, 2, 5))
 _TICK_PX, _MARGIN_SHARE = 7.0, 0.03
 

@@ -151,9 +151,8 @@ class SceneRenderer:
         body.attach(shape.clone())
         entity = self._placed(body, np.eye(4))
         entity.set_pose(pose)
-        body.shading_mode = (
-            1  # rendered only by a second G-buffer pass, which shaders/scene lacks, and into shadow maps
-        )
+        # rendered only by a second G-buffer pass, which shaders/scene lacks, and into shadow maps
+        body.shading_mode = 1
         return entity
 
     def set_pose(self, name: str, pose: np.ndarray) -> None:

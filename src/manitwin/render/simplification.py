@@ -15,7 +15,7 @@ _LEAST_GAIN = 0.02  # least share of vertices removed in a round for another one
 _LEAST_COSINE = 0.5  # between a triangle's normal before and after: no normal turns by more than 60 degrees
 _FLATTEST = 0.01  # least ratio of twice a triangle's area to the sum of its squared sides, as slivers shade badly
 _TRIES = 3  # neighbours into which a vertex may be collapsed, cheapest first
-_CHEAP = 0.05  # of the squared tolerance: costs below it count as zero
+_CHEAP = 0.05  # fraction of the squared tolerance: costs below it count as zero
 _GOLDEN = (5**0.5 - 1) / 2
 _ROW, _COLUMN = np.triu_indices(4)
 
@@ -50,9 +50,8 @@ def simplified(
         shuffle = (np.arange(1, len(points) + 1) * (number + 1) * _GOLDEN) % 1.0
         moves = _possible_moves(faces, places, len(points), keep_open_edges)
         chosen = _round(points, places[faces], quadrics, products, moves, tolerance_m**2, shuffle)
-        np.add.at(
-            quadrics, moves.end[chosen], quadrics[moves.start[chosen]]
-        )  # several vertices may be collapsed into one
+        # several vertices may be collapsed into one
+        np.add.at(quadrics, moves.end[chosen], quadrics[moves.start[chosen]])
         there = np.zeros(len(points), bool)
         there[places[faces]] = True
         faces = moves.applied(chosen, len(vertices))[faces]

@@ -13,7 +13,7 @@ from manitwin.geometry.repair.welding import weld_equal
 DIRECTIONS = 128
 SPACING_M = 0.008
 _FEWEST, _MOST = 1, 24  # subdivisions of a triangle's longest side
-_INWARD = 0.02  # of the way to the triangle's centre, so that no point is on its border
+_INWARD = 0.02  # fraction of the way to the triangle's centre, so that no point is on its border
 _OFF_SURFACE_M = 2e-5  # offset of the ray origins
 _GRAZING = 0.02  # cosine to the normal, below which a ray would graze its own face
 

@@ -12,9 +12,8 @@ from manitwin.twin.record_values import Finite, Quaternion, Record, Unit, Vector
 GraspType = Literal["parallel_jaw", "pinch", "power", "three_finger", "enveloping"]  # the paper's five
 FrameKind = Literal["opening", "face", "tip", "edge", "hole", "axis", "button", "surface"]
 """The kind of feature that a functional frame describes."""
-_UNIT_TOLERANCE = (
-    1e-3  # of a quaternion's length: our frames have full precision, those of other tools often four digits
-)
+# Tolerated error of a quaternion's length: our frames have full precision, those of other tools often four digits
+_UNIT_TOLERANCE = 1e-3
 
 
 class RefinedCandidate(Record):

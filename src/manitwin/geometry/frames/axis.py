@@ -6,10 +6,10 @@ import numpy as np
 
 from manitwin.geometry.frames.feature import UP, FeatureFrame, Found, FramedMesh, Unclear, rotation_of
 
-_STEP_SHARE = 0.025  # of the longest side: distance between slices
+_STEP_SHARE = 0.025  # fraction of the longest side: distance between slices
 _WIDER, _THINNER = 1.7, 0.45  # times the median radius of the slices so far; beyond these another part begins
 _SLENDER = 2.2  # least ratio of length to width of a part that has an axis
-_BENT_SHARE = 0.1  # of the length: tolerated deviation of slice centres from the line
+_BENT_SHARE = 0.1  # fraction of the length: tolerated deviation of slice centres from the line
 _LEAST_SAMPLES = 5
 
 

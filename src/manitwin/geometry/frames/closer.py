@@ -6,7 +6,7 @@ import numpy as np
 
 from manitwin.geometry.frames.feature import FramedMesh
 
-REACH_SHARE = 0.15  # of the longest side: search radius
+REACH_SHARE = 0.15  # fraction of the longest side: search radius
 _SAME_PLACE_M = 0.01  # within this distance a sample may face another way, as an edge belongs to both of its sides
 
 

@@ -14,10 +14,10 @@ _ANGLE_COSINE = np.cos(np.radians(40))  # outline normals this close to a side's
 _CELLS = 96  # along the longer side of the plate's outline
 _FLAT = 0.28  # largest ratio of thickness to second spread (standard deviations) of a plate
 _THIN_FACTOR = 1.6  # times the thickness of the plate at the point; thicker material is another part
-_STRAIGHT_SHARE = 0.12  # of the length: tolerated deviation of an edge from its chord
+_STRAIGHT_SHARE = 0.12  # fraction of the length: tolerated deviation of an edge from its chord
 _CLEAR = 1.08  # least ratio of the best side's score to the next
 _REACH_SHARES = (0.6, 0.3, 0.18, 0.1)
-"""Of the longest side: radii within which a plate is sought around the point; a wedge is flat only nearby."""
+"""Fractions of the longest side: radii within which a plate is sought around the point; a wedge is flat only nearby."""
 
 
 def edge_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> Found:

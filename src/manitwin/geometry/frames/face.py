@@ -9,21 +9,23 @@ from manitwin.geometry.frames.feature import UP, FeatureFrame, Found, FramedMesh
 from manitwin.geometry.frames.on_feature import ON_FEATURE_M
 from manitwin.geometry.frames.patch import Patch, flat_patch
 
-_ANGLE_RAD = np.radians(20.0)  # of the patch's normal; the face of a scanned mallet, flat to 0.9 mm, stays within it
-_SLAB_SHARE, _LEAST_SLAB_M = 0.012, 0.0008  # of the longest side: half the thickness of the slab that contains a patch
-_SEARCH_SHARE = 0.12  # of the longest side: a candidate may lie next to the face, at its border
-_WIDE_SHARE = 0.35  # of the longest side, for labels that state the side of the face
-_RECESS = 0.12  # of the extent in the label's direction: deeper patches are interior, not a base or top
+# deviation from the patch's normal; the face of a scanned mallet, flat to 0.9 mm, stays within it
+_ANGLE_RAD = np.radians(20.0)
+# fraction of the longest side: half the thickness of the slab that contains a patch
+_SLAB_SHARE, _LEAST_SLAB_M = 0.012, 0.0008
+_SEARCH_SHARE = 0.12  # fraction of the longest side: a candidate may lie next to the face, at its border
+_WIDE_SHARE = 0.35  # fraction of the longest side, for labels that state the side of the face
+_RECESS = 0.12  # fraction of the extent in the label's direction: deeper patches are interior, not a base or top
 _ROUGH_SHARE = 0.12  # RMS distance from the plane over the patch's radius; the cap of a ball is rounder
-_LEAST_RADIUS_SHARE = 0.012  # of the longest side: a smaller flat patch is a facet of a round object
+_LEAST_RADIUS_SHARE = 0.012  # fraction of the longest side: a smaller flat patch is a facet of a round object
 _OBLONG = 1.15  # aspect ratio from which a face's roll is determined
 _RAISED_M = 0.0002  # least height or depth of a button relative to its surroundings
 _END_ON = 1.1  # least ratio of material depth behind an end face to its width
-_BUTTON_SEARCH = 0.05  # of the longest side
+_BUTTON_SEARCH = 0.05  # fraction of the longest side: search radius
 _FACING_COSINE = 0.85  # cosine between a button's top and the normal at the point; excludes the bevel beside it
-_ON_BUTTON = 0.012  # of the longest side: largest distance from the point to the patch
+_ON_BUTTON = 0.012  # fraction of the longest side: largest distance from the point to the patch
 _BUTTON_SHARE = 0.1
-"""Of the longest side: patches with a larger radius are faces (at most 0.057 among the templates of the tuning half)."""
+"""Fraction of the longest side: patches with a larger radius are faces (at most 0.057 among the templates of the tuning half)."""
 _BUTTON_ROUGH = 0.05
 """RMS distance from the plane over the radius: rounder patches are bumps without a defined centre (0.005)."""
 
@@ -76,11 +78,9 @@ def button_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -
     return FeatureFrame("button", best.center_m, rotation_of(best.normal, x), _radius(best), best.elongation <= _OBLONG)
 
 
-_NEARER = (1.0, 0.5, 0.25)  # of the search radius: neighbourhoods in which a uniform normal is sought
-_STEADY, _STEADY_COSINE = (
-    0.85,
-    0.7,
-)  # least length of the mean unit normal, and least cosine with the point's own normal
+_NEARER = (1.0, 0.5, 0.25)  # fractions of the search radius: neighbourhoods in which a uniform normal is sought
+# least length of the mean unit normal, and least cosine with the point's own normal
+_STEADY, _STEADY_COSINE = 0.85, 0.7
 
 
 def _is_steady(mean: np.ndarray, normal: np.ndarray) -> bool:

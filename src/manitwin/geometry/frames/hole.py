@@ -8,21 +8,20 @@ import numpy as np
 from manitwin.geometry.frames.feature import FeatureFrame, Found, FramedMesh, Unclear, rotation_of
 
 _TURNS = 48  # rays around the axis
-_CLOSED_SHARE = 0.9  # of the rays that must hit a wall; otherwise it is a notch or a jaw
+_CLOSED_SHARE = 0.9  # fraction of the rays that must hit a wall; otherwise it is a notch or a jaw
 _ROUNDS = 6
 _EVEN = 4.5  # largest ratio of the wall's far to near distances; loops and slots may be oblong
-_SLOT = 0.9  # of the largest circle's radius: the clearance that the centre of a slot must have
+_SLOT = 0.9  # fraction of the largest circle's radius: the clearance that the centre of a slot must have
 _LEAST_RADIUS_M = 0.0008
-_SEARCH_SHARE, _SEEDS = 0.2, 60  # of the longest side around the point, and number of samples tried there
-_LEVEL = (
-    0.01  # penalty per metre along the axis when seeking the narrowest place, as a bore is equally narrow everywhere
-)
+_SEARCH_SHARE, _SEEDS = 0.2, 60  # fraction of the longest side around the point, and number of samples tried there
+# penalty per metre along the axis when seeking the narrowest place, as a bore is equally narrow everywhere
+_LEVEL = 0.01
 _BESIDE_RADII = 1.5
-"""Of the radius: points farther from the wall belong to another feature, such as the mouth beside a handle's loop."""
+"""Multiple of the radius: points farther from the wall belong to another feature, such as the mouth beside a handle's loop."""
 _FEW = 2  # number of starts near the point above which the object's centre is not tried
-_ON_WALL = 0.3  # of the radius: a point this close to a hole's wall refers to that hole
+_ON_WALL = 0.3  # fraction of the radius: a point this close to a hole's wall refers to that hole
 _FAN_RAD = np.radians(12)
-_FAR = 0.6  # of the longest side: farther walls do not belong to a hole
+_FAR = 0.6  # fraction of the longest side: farther walls do not belong to a hole
 
 
 def hole_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, through: bool = False) -> Found:
@@ -59,9 +58,8 @@ def _starts(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> lis
     around = surface.near(point_m, _SEARCH_SHARE * surface.size_m)
     around = around[np.argsort(np.linalg.norm(positions[around] - point_m, axis=1), kind="stable")]
     alike = around[: len(around) // 3]
-    alike = alike[
-        normals[alike] @ normal > 0.5
-    ]  # the wall of a ring is curved in section too; its mean normal faces the axis
+    # the wall of a ring is curved in section too; its mean normal faces the axis
+    alike = alike[normals[alike] @ normal > 0.5]
     mean = normals[alike].mean(0) if len(alike) else normal
     spread = around[:: max(1, len(around) // _SEEDS)]
     seeds = np.concatenate([point_m[None], point_m[None], positions[spread]])

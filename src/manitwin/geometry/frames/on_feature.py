@@ -12,7 +12,7 @@ ON_FEATURE_M = 0.005
 """Tolerance: the origin of a frame is this close to the surface; for an opening or hole, its plane to the walls."""
 _SECTORS, _LEAST_SECTORS = 8, 5  # around an opening or hole, and the number of them that must contain walls
 _NEAR, _FAR = 0.5, 3.0  # times the radius: range of distances of the walls of an opening or hole, including oblong ones
-_INSIDE_SHARE = 0.25  # of an axis' length: a part that is thicker is not slender enough to have one
+_INSIDE_SHARE = 0.25  # fraction of an axis' length: a part that is thicker is not slender enough to have one
 
 
 def off_feature_m(

@@ -9,10 +9,11 @@ from manitwin.geometry.frames.feature import FeatureFrame, Found, FramedMesh, Un
 
 _TURNS = 72
 _LAYERS = 16
-_SPOUT_BULGE = 0.08  # of the rim's radius, one-sided; the lip of a jug exceeds it, the rim of a scanned mug does not
+# fraction of the rim's radius, one-sided; the lip of a jug exceeds it, the rim of a scanned mug does not
+_SPOUT_BULGE = 0.08
 _HANDLE_SECTOR_RAD = np.radians(50)  # rim sector excluded around a handle, as a pan's handle resembles a spout
 _OBLONG = 1.15  # aspect ratio of a rim from which its roll is determined
-_MOST_TILT_RAD = np.radians(20)  # of the rim's plane from the direction in which the cavity was found
+_MOST_TILT_RAD = np.radians(20)  # tilt of the rim's plane against the direction in which the cavity was found
 _NEAR_RADII = 1.6  # a point beyond this many rim radii from the centre belongs to another feature
 _BESIDE, _JUMP = 4, 1.3
 """Neighbours among 72 azimuths: a wall this many times farther away than theirs is a handle behind a low rim."""

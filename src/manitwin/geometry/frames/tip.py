@@ -7,14 +7,11 @@ import numpy as np
 from manitwin.geometry.frames.feature import UP, FeatureFrame, Found, FramedMesh, Unclear, rotation_of
 from manitwin.geometry.frames.opening import opening_frame, rim_points
 
-_REACH_SHARES = (
-    0.12,
-    0.2,
-    0.35,
-)  # of the longest side: neighbourhoods of the point in which an elongated direction is sought
+# Fractions of the longest side: neighbourhoods of the point in which an elongated direction is sought
+_REACH_SHARES = (0.12, 0.2, 0.35)
 _LONG = 1.5  # least ratio of the largest to the second variance of an elongated neighbourhood
-_END_SHARE = 0.012  # of the longest side: points this close to the outermost one form the end
-_FAR_SHARE = 0.25  # of the longest side: farther ends are not the one at the point
+_END_SHARE = 0.012  # fraction of the longest side: points this close to the outermost one form the end
+_FAR_SHARE = 0.25  # fraction of the longest side: farther ends are not the one at the point
 _RIVAL = (1.5, 0.02)
 """An end in another direction with a score below this multiple of the best, plus a share of the longest side, is a rival."""
 _SAME_WAY = np.cos(np.radians(25.0))  # directions of two ends that count as one

@@ -9,8 +9,8 @@ import numpy as np
 
 from manitwin.geometry.cavity import Opening
 
-_COARSE_SHARE = 7e-3  # of a part's longest side: finer detail does not affect the choice of plane
-_POSITIONS = (0.2, 0.5, 0.8)  # of a part's width along a cutting normal
+_COARSE_SHARE = 7e-3  # fraction of a part's longest side: finer detail does not affect the choice of plane
+_POSITIONS = (0.2, 0.5, 0.8)  # fractions of a part's width along a cutting normal
 _MORE_POSITIONS = (0.1, 0.35, 0.65, 0.9)  # along the two normals with the best first positions
 
 

@@ -27,19 +27,19 @@ from manitwin.geometry.hulls.cutting_planes import (
 )
 from manitwin.geometry.hulls.reduction import DECIMALS, convex_corners, hull_volume, reduced_hull
 
-_SIMPLIFY_SHARE = (
-    1e-3  # of the longest side: detail irrelevant to collision; 2e-3 already opened the 4 mm wall of a mug
-)
+# Fraction of the longest side: detail irrelevant to collision; 2e-3 already opened the 4 mm wall of a mug
+_SIMPLIFY_SHARE = 1e-3
 _REDUCTION_TOLERANCE_M = 2e-4
-_CRUMB_SHARE = 1e-6  # of the mesh's volume: smaller pieces of a cut are dropped
-_CONVEX_SHARE = 1e-3  # of the mesh's volume: a part whose hull exceeds it by less is not cut further
-_FREE_MERGE_SHARE = 2.5e-4  # of the mesh's volume: merges that add less are made even if there are few enough hulls
+_CRUMB_SHARE = 1e-6  # fraction of the mesh's volume: smaller pieces of a cut are dropped
+_CONVEX_SHARE = 1e-3  # fraction of the mesh's volume: a part whose hull exceeds it by less is not cut further
+# fraction of the mesh's volume: merges that add less are made even if there are few enough hulls
+_FREE_MERGE_SHARE = 2.5e-4
 _SECTORS = 8  # first cuts of a vessel through its axis; without them the search leaves it filled, 12 and 16 were worse
 # Required gain of the three cuts crosswise through a hole, as a multiple of the best plane's gain.
 _CROSS_GAIN = 4.5
 _INNER_SHARE = 1 - 1e-9
 """Lower bound of a hull's volume as a share of manifold3d's hull, which may omit corners but adds none, up to rounding."""
-_TOUCH_SHARE = 1e-3  # of the longest side: parts farther apart are not merged
+_TOUCH_SHARE = 1e-3  # fraction of the longest side: parts farther apart are not merged
 
 
 @dataclass(frozen=True)

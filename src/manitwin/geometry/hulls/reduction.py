@@ -7,7 +7,7 @@ import trimesh
 from scipy.spatial import ConvexHull, QhullError
 
 DECIMALS = 6  # micrometres, so that an OBJ file contains exactly the numbers that were checked
-_FOLD_SHARE = 2e-6  # of the hull's size; trimesh.convex.is_convex tolerates 1e-5
+_FOLD_SHARE = 2e-6  # fraction of the hull's size; trimesh.convex.is_convex tolerates 1e-5
 _LEAST_AREA_M2 = 1e-14  # trimesh.convex.is_convex ignores facets below 1e-13
 
 

@@ -10,7 +10,7 @@ import trimesh
 
 from manitwin.geometry.hulls.cutting_planes import own_and_principal_axes
 
-_LEAST_SHARE = 0.01  # of the outline's area; smaller holes are scan defects or irrelevant
+_LEAST_SHARE = 0.01  # fraction of the outline's area; smaller holes are scan defects or irrelevant
 
 
 def holes_kept(mesh: trimesh.Trimesh, hulls: Sequence[np.ndarray]) -> float | None:
@@ -37,9 +37,8 @@ def _kept_along(solid: manifold3d.Manifold, hulls: Sequence[np.ndarray], axis: n
     flat = [manifold3d.CrossSection.hull_points(np.ascontiguousarray((hull @ frame.T)[:, :2])) for hull in hulls]
     filled = manifold3d.CrossSection.batch_boolean(flat, manifold3d.OpType.Add)
     outlines = [np.asarray(ring) for ring in seen.to_polygons()]
-    holes = [
-        manifold3d.CrossSection([ring[::-1]]) for ring in outlines if _area(ring) < 0
-    ]  # outlines of holes are clockwise
+    # outlines of holes are clockwise
+    holes = [manifold3d.CrossSection([ring[::-1]]) for ring in outlines if _area(ring) < 0]
     return [1 - (hole ^ filled).area() / hole.area() for hole in holes if hole.area() >= least]
 
 

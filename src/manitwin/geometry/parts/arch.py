@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_LOPSIDED = 0.03  # of the length: least offset of the centre of mass from the box centre, towards the ends
+_LOPSIDED = 0.03  # fraction of the length: least offset of the centre of mass from the box centre, towards the ends
 
 
 @dataclass(frozen=True)

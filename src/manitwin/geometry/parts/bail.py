@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_LEAST_RISE = 0.3  # of the body's largest radius: least rise above its top
+_LEAST_RISE = 0.3  # fraction of the body's largest radius: least rise above its top
 _BEYOND = 1.1  # times that radius: farther out is a spout
 _LEGS = 0.45  # of it: least distance of the legs from the axis, which excludes the loop of a lid
 _OVER_AXIS = 0.35  # of it: largest distance of the highest stretch's centre from the axis
 _WIDEST = 0.25  # of it: largest half width of the bar; flowers and brushes spread wider
 _BETWEEN = 0.3  # of it: region between the legs that must be empty
 _FEET = 0.5  # of its rise: depth to which its legs reach down beside a lid
-_STRAY = 0.1  # of the samples at the height of its legs
+_STRAY = 0.1  # fraction of the samples at the height of its legs
 _KNOB = 0.3  # of its rise: height up to which a lid's knob is excluded
 
 

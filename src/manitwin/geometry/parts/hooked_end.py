@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 _SLICES = 32
-_HOOK_SHARE = 0.15  # of the length: region of an end that may be a hook
-_MIDDLE_SHARE = 0.2  # of the length: the shaft to either side of the middle
+_HOOK_SHARE = 0.15  # fraction of the length: region of an end that may be a hook
+_MIDDLE_SHARE = 0.2  # fraction of the length: the shaft to either side of the middle
 _BENT = 0.25  # of its width: offset of a hook's centre from the line of the shaft, which enters one side of it
 
 

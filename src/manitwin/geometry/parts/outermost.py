@@ -9,7 +9,7 @@ import numpy as np
 from manitwin.geometry.parts.scores import near, share_of_height
 from manitwin.geometry.parts.shape import Shape, SurfacePoints
 
-_OUTLETS_FROM = 0.85  # of the height: outlets of pumps and triggers are above, triggers below
+_OUTLETS_FROM = 0.85  # fraction of the height: outlets of pumps and triggers are above, triggers below
 _SLICES = 16
 _MIRRORED, _UNLIKE = 0.5, 0.1
 """Asymmetry under mirroring: largest ratio to the other axis, and least value."""

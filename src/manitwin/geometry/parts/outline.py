@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 SLICES = 48
-LEAST_EXPLAINED = 0.35  # of the outline's variance, by sections of constant width and thickness
+LEAST_EXPLAINED = 0.35  # fraction of the outline's variance, by sections of constant width and thickness
 THIRD_GAIN = 0.2  # additional share that a third section must explain
 LEAST_STRETCH = 3  # slices
-_ENDS = (0.05, 0.85)  # of the length: range in which a head may end
+_ENDS = (0.05, 0.85)  # fraction of the length: range in which a head may end
 
 
 def slices_along(share: np.ndarray, across_m: np.ndarray) -> list[np.ndarray]:

@@ -12,8 +12,8 @@ from manitwin.geometry.sampling import sample_surface
 
 _SAMPLES = 4000
 _LONG, _FLAT = 2.2, 3.0  # ratio of longest to second, and of second to shortest side of the box
-_BOX_FILL = 0.85  # of the box: a box fills 1, an aligned cylinder 0.785, a ball 0.524
-_ROUND_RESIDUAL = 0.05  # of the radius, from a body of revolution
+_BOX_FILL = 0.85  # fraction of the box: a box fills 1, an aligned cylinder 0.785, a ball 0.524
+_ROUND_RESIDUAL = 0.05  # fraction of the radius: deviation from a body of revolution
 
 
 @dataclass(frozen=True)

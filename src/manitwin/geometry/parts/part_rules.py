@@ -71,15 +71,15 @@ def _reach_confidence(shape: Shape, handle: Protrusion) -> float:
 _LEVELS = 72
 _SECTORS = 12
 _STEP_LEVELS = 2  # levels within which a step occurs
-_LEAST_STEP = 0.045  # of the largest radius, beyond what the slopes on both sides explain
-_CAP_ABOVE, _CAP_BELOW = 0.35, 0.95  # of the height: range in which a cap may begin
-_STEP_BAND = 0.03  # of the longest side: the position of a step is known more precisely than other borders
-_CAP_RADIUS = 0.3  # of the largest radius: anything thinner is a wick or pole, not a cap
+_LEAST_STEP = 0.045  # fraction of the largest radius, beyond what the slopes on both sides explain
+_CAP_ABOVE, _CAP_BELOW = 0.35, 0.95  # fraction of the height: range in which a cap may begin
+_STEP_BAND = 0.03  # fraction of the longest side: the position of a step is known more precisely than other borders
+_CAP_RADIUS = 0.3  # fraction of the largest radius: anything thinner is a wick or pole, not a cap
 _PUT_ON = 0.8
-"""Of the largest radius: a part that widens above a neck to at most this is a cap, and the neck is not part of it."""
-_NECK = 0.35  # of the largest radius: a neck is wider, the stem of a pump is not
+"""Fraction of the largest radius: a part that widens above a neck to at most this is a cap, and the neck is not part of it."""
+_NECK = 0.35  # fraction of the largest radius: a neck is wider, the stem of a pump is not
 _NEXT_STEP, _SURE_STEP = 0.5, 0.12
-"""Of the sharpest step, and of the radius: the lowest such step is where the cap begins."""
+"""Fractions of the sharpest step and of the radius: a cap begins at the lowest step that large."""
 
 
 def _outline(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
@@ -136,7 +136,7 @@ def _capped(shape: Shape, points_m: np.ndarray) -> Membership | None:
     return Membership(("body", "cap"), (share > border).astype(int), confidence, _STEP_BAND)
 
 
-_STEM_SHARE = 0.45  # of the radii of foot and bowl: largest radius of a stem
+_STEM_SHARE = 0.45  # fraction of the radii of foot and bowl: largest radius of a stem
 
 
 def _stemmed(shape: Shape, points_m: np.ndarray) -> Membership | None:
@@ -164,7 +164,7 @@ def _pistol(shape: Shape, points_m: np.ndarray) -> Membership | None:
     return Membership(("housing", "grip"), (down > 1.0).astype(int), 0.75)
 
 
-_ARCH_TOP = 0.5  # of the way from the centre to the apex: above it the legs of an arch meet
+_ARCH_TOP = 0.5  # fraction of the way from the centre to the apex: above it the legs of an arch meet
 
 
 def _arched(shape: Shape, points_m: np.ndarray) -> Membership | None:

@@ -12,17 +12,17 @@ _FITS = 10  # iterations of that fit
 _LIKE_BOX = 0.97  # cosine between the plane's normal and a box axis above which the box axis is used
 _STEPS = 72  # directions per turn in which the grip is sought
 _ALONG_BOX = 1.1  # preference for the box's own directions
-_BARREL_ROW = 0.7  # of the longest row: rows this long cross the barrel
-_GRIP_ROW = 0.55  # of the longest row: largest median length of the rows beyond the barrel
+_BARREL_ROW = 0.7  # fraction of the longest row: rows this long cross the barrel
+_GRIP_ROW = 0.55  # fraction of the longest row: largest median length of the rows beyond the barrel
 _LEAST_GRIP = 0.25  # least share of the outline's rows beyond the barrel
 # Share of the grip's upper rows that must be a single bar; the lever of a caulking gun is a second one beside its handle.
 _ONE_RUN = 0.4
 _GAP = 3  # cells that may be missing within a bar
 _BACK = 2  # cells by which a straight back may be uneven
 _LEAST_STRAIGHT = 0.55  # least straightness of a barrel
-_OVERHANG = 0.1  # of the barrel's length: overhang beyond the grip at its back
+_OVERHANG = 0.1  # fraction of the barrel's length: overhang beyond the grip at its back
 _PLACED, _BLUNT = 0.2, 0.3  # penalties for a grip at the very end, and for one that tapers to nothing
-_END = 0.2  # of the barrel's length: end regions compared for taper
+_END = 0.2  # fraction of the barrel's length: end regions compared for taper
 _PLACE_WEIGHT, _TAPER_WEIGHT = 2.0, 1.0
 
 
@@ -124,9 +124,8 @@ def _plane(surface_m: np.ndarray, box_axes: np.ndarray) -> tuple[np.ndarray, boo
 
 def _rows(flat_m: np.ndarray, cell_m: float) -> np.ndarray:
     """Return an occupancy grid of points ``(N, 2)``, with one row per step of the second coordinate."""
-    index = ((flat_m - flat_m.min(0)) / (cell_m * (1 + 1e-9))).astype(
-        int
-    )  # so that the farthest point falls into the last cell
+    # so that the farthest point falls into the last cell
+    index = ((flat_m - flat_m.min(0)) / (cell_m * (1 + 1e-9))).astype(int)
     taken = np.zeros(index.max(0)[::-1] + 1, dtype=bool)
     taken[index[:, 1], index[:, 0]] = True
     return taken

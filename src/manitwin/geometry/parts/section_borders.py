@@ -23,17 +23,15 @@ from manitwin.geometry.parts.outline import (
 Borders = tuple[tuple[int, ...], float]
 """The slices, out of 48, at which one or two further sections begin, and the confidence."""
 _SECTION_ENDS = (0.04, 0.96)
-"""Of the length: range in which a section may begin; shorter end sections cannot be told apart."""
+"""Fractions of the length: range in which a section may begin; shorter end sections cannot be told apart."""
 _SHARP_CONTRAST = 1.06  # ratio of width and thickness (together) across a sharp border
-_SHARP, _SHARP_SLICES = (
-    0.5,
-    2,
-)  # of the difference between two sections, within so many slices of their border; less is a taper
-_LEAST_SECTION = 0.05  # of the area: a smaller section (a pole or plug) yields to a groove
+_SHARP, _SHARP_SLICES = 0.5, 2
+"""Least fraction of the difference between two sections that occurs within this many slices of the border; less is a taper."""
+_LEAST_SECTION = 0.05  # fraction of the area: a smaller section (a pole or plug) yields to a groove
 _GROOVE = np.log(1.05)  # below the chord over a groove: mean of log width and log thickness
 _GROOVE_SLICES = 5  # on either side of a groove
-_NEXT_GROOVE = 0.6  # of the deepest
-_GAP_SHARE = 0.25  # of a slice's width: a larger gap separates two pieces, such as the legs of a lever
+_NEXT_GROOVE = 0.6  # fraction of the depth of the deepest groove
+_GAP_SHARE = 0.25  # fraction of a slice's width: a larger gap separates two pieces, such as the legs of a lever
 _JOINT_CONFIDENCE = 0.8
 _LEAST_SAMPLES = 24  # per slice, to distinguish a gap from chance
 

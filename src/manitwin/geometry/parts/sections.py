@@ -17,7 +17,7 @@ from manitwin.geometry.parts.outline import (
 from manitwin.geometry.parts.section_borders import section_borders
 from manitwin.geometry.parts.shape import Shape
 
-_NECK_NARROW = 0.8  # of the handle's width and thickness (geometric mean): largest value for a neck
+_NECK_NARROW = 0.8  # fraction of the handle's width and thickness (geometric mean): largest value for a neck
 LEAST_CONTRAST = 1.2  # ratio of width and thickness across a border
 
 
@@ -47,7 +47,7 @@ def _samples(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
     return shape.axis.along(shape.surface_m), (shape.surface_m - shape.axis.origin_m) @ shape.axis.across.T
 
 
-_SECTION_BAND = 0.05  # of the longest side: these borders are known more precisely than that of a handle
+_SECTION_BAND = 0.05  # fraction of the longest side: these borders are known more precisely than that of a handle
 
 
 def sectioned(shape: Shape, points_m: np.ndarray) -> Membership | None:

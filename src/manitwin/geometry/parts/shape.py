@@ -24,7 +24,7 @@ from manitwin.geometry.sampling import sample_surface
 
 _SLICES = 32
 _DIRECTIONS = 12
-_END_SHARE = 0.3  # of the length: end regions that are compared
+_END_SHARE = 0.3  # fraction of the length: end regions that are compared
 _DEFAULT_HEAD_SHARE = 0.25  # used if the outline has no step between head and handle
 _STEP_CONTRAST = 1.25  # ratio of the wider to the narrower end for a step that can be located
 
@@ -142,18 +142,16 @@ def _head_share(width: np.ndarray) -> float:
 
 
 _SAMPLES = 6000
-_IN_LINE_DEG = (
-    15.0  # tolerance within which the smallest box is used, for objects that lean or have a slightly oblique handle
-)
-_MIRRORED_BOX = (
-    1.5  # times the smallest box's volume: above it, the box along the mirror axis is not used (leaning objects)
-)
-_AT_THE_FOOT = 0.05  # of the body's height
-_LOW_BULGE = 0.25  # of the body's radius: least reach for fingers behind a handle
+# tolerance within which the smallest box is used, for objects that lean or have a slightly oblique handle
+_IN_LINE_DEG = 15.0
+# Multiple of the smallest box's volume: above it, the box along the mirror axis is not used (leaning objects)
+_MIRRORED_BOX = 1.5
+_AT_THE_FOOT = 0.05  # fraction of the body's height
+_LOW_BULGE = 0.25  # fraction of the body's radius: least reach for fingers behind a handle
 _SIXTH_RAD = np.pi / 6  # to each side of its centre
 _OPPOSITE_RAD = np.pi / 6
-_AS_FAR = 0.6  # of the opposite one's reach: the axis of a body with two bulges lies between them
-LEAST_HANDLE_REACH = 0.08  # of the body's radius, beyond the outline's own margin; less is relief
+_AS_FAR = 0.6  # fraction of the opposite one's reach: the axis of a body with two bulges lies between them
+LEAST_HANDLE_REACH = 0.08  # fraction of the body's radius, beyond the outline's own margin; less is relief
 _TALLER, _STEEPER = 1.1, 2.0  # ratios for a handle beside a long spout: height, height over reach
 _ELONGATED, _ELONGATED_LYING = 1.6, 1.15  # ratio of length to width from which an object has ends rather than sides
 

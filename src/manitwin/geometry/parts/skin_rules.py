@@ -18,7 +18,7 @@ from manitwin.geometry.parts.shape import Shape
 from manitwin.geometry.parts.surface_graph import SurfaceGraph
 from manitwin.geometry.ray_caster import RayCaster
 
-_BAND = 0.01  # of the longest side: precision of these borders, about one piece of the surface
+_BAND = 0.01  # fraction of the longest side: precision of these borders, about one piece of the surface
 
 
 def skin_membership(rule: PartRule, shape: Shape, graph: SurfaceGraph, mesh: trimesh.Trimesh) -> Membership | None:
@@ -28,19 +28,18 @@ def skin_membership(rule: PartRule, shape: Shape, graph: SurfaceGraph, mesh: tri
 
 
 _RIM_M = 0.018  # the width of a finger pad of a common gripper
-_RIM_SHARE = 0.4  # of the larger of depth and radius: largest width of a rim
+_RIM_SHARE = 0.4  # fraction of the larger of depth and radius: largest width of a rim
 _UP = 0.9  # cosine, for an opening that faces up
 _SECTORS = 72
-_LEAST_SECTORS = 0.6  # of the sectors that a rim must cover
+_LEAST_SECTORS = 0.6  # fraction of the sectors that a rim must cover
 _CREST_M = 0.0015  # points this close to the highest in their sector belong to the crest
 _LOOKOUTS = 6  # viewpoints on the opening's axis for the visibility of the inside
-_LEAST_INSIDE = 0.05  # of the area
+_LEAST_INSIDE = 0.05  # fraction of the area
 _DOWN, _LOW, _LOW_M = -0.6, 0.1, 0.003  # z of the normal, share of the height, m: criteria of the supporting base
-_FOOT_SHARE, _FOOT_M = 0.02, 0.001  # of the height, m: points this close to the ground touch it
+_FOOT_SHARE, _FOOT_M = 0.02, 0.001  # fraction of the height, m: points this close to the ground touch it
 _FOOT_MARGIN = 1.05  # margin for the fillet at the bottom's edge
-_VAULT = (
-    -0.1
-)  # z of the normal: a vault between the feet belongs to the base, however steep, where it faces the object itself
+# z of the normal: a vault between the feet belongs to the base, however steep, where it faces the object itself
+_VAULT = -0.1
 _OFF_M = 1e-5  # offset of ray origins from the surface
 
 
@@ -148,13 +147,13 @@ def _shown_by_faces(rim: np.ndarray, graph: SurfaceGraph) -> bool:
 
 
 _FLAT, _ROUNDED = 0.8, 0.35  # component of a normal along the axis: limits for vertical and sideways faces
-_MOST_ROUNDED = 0.2  # of the area, in between; with more, the object has no faces bounded by edges
-_LEAST_FACE = 0.03  # of the area
+_MOST_ROUNDED = 0.2  # fraction of the area, in between; with more, the object has no faces bounded by edges
+_LEAST_FACE = 0.03  # fraction of the area
 _UPPER, _LOWER = 0.6, 0.4  # shares of the height
 _LID_SHARE, _LID_LEVELS, _LID_WINDOW = 0.12, 48, 8
-"""Of the height at either end; number of levels there; levels on either side of a concavity."""
+"""Fraction of the height at either end; number of levels there; levels on either side of a concavity."""
 _LID_DIRECTIONS = 24
-_LID_HOLLOW = 0.012  # of the radius, below the chord over the concavity
+_LID_HOLLOW = 0.012  # fraction of the radius, below the chord over the concavity
 _INWARD = -0.5  # radial component of a normal; the wall of a sunken lid faces the axis
 
 
@@ -176,8 +175,8 @@ def _closed(shape: Shape, graph: SurfaceGraph, mesh: trimesh.Trimesh) -> Members
     return Membership(("body", "top", "base"), np.where(top, 1, np.where(base, 2, 0)), confidence, _BAND)
 
 
-_LEAST_LARGE_FACE = 0.15  # of the area, for each of the two
-_OUTER = 0.25  # of the thickness, from the outermost point; deeper grooves do not belong to the face
+_LEAST_LARGE_FACE = 0.15  # fraction of the area, for each of the two
+_OUTER = 0.25  # fraction of the thickness, from the outermost point; deeper grooves do not belong to the face
 
 
 def _faced(shape: Shape, graph: SurfaceGraph, mesh: trimesh.Trimesh) -> Membership | None:

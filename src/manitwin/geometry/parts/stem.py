@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 _ROUNDS = 4
-_SMOOTH = 1.06  # of the smooth body's radius; samples beyond are not used for the fit
-_STICKS_OUT = 0.10  # of the smooth body's radius, beyond it
+_SMOOTH = 1.06  # fraction of the smooth body's radius; samples beyond are not used for the fit
+_STICKS_OUT = 0.10  # fraction of the smooth body's radius, beyond it
 _LEAST_SAMPLES, _MOST_SHARE = 4, 0.25  # the neck of a pear counts as a stem
 _SPREAD_RAD = np.radians(50)  # about the farthest sample
-_RIVAL = 0.7  # of the farthest excess: a similar one elsewhere rules out a stem, but roots opposite may stick out less
+_RIVAL = 0.7  # fraction of the farthest excess: a similar one elsewhere rules out a stem, but roots opposite may stick out less
 _LEAST_EXTENTS = 0.5  # ratio of the shortest to the longest box side; more elongated objects are not round
 
 

@@ -7,11 +7,10 @@ import numpy as np
 from manitwin.geometry.parts.shape import Shape, SurfacePoints
 
 _BALANCED_HEAD = 0.6  # ratio of the shorter to the longer reach of a head from which either side may strike
-_HEAD_END = 0.8  # of a head's reach; beyond is its end
-_TALLER = (
-    1.3  # ratio of the shorter end's extent along the handle to the longer end's, above which the longer is a claw
-)
-_BEYOND_HANDLE = 1.5  # of the handle's half width; farther points belong to the head
+_HEAD_END = 0.8  # fraction of a head's reach; beyond is its end
+# ratio of the shorter end's extent along the handle to the longer end's, above which the longer is a claw
+_TALLER = 1.3
+_BEYOND_HANDLE = 1.5  # fraction of the handle's half width; farther points belong to the head
 
 
 def striking_face(shape: Shape, points: SurfacePoints) -> np.ndarray:

@@ -14,10 +14,11 @@ from scipy.sparse.csgraph import dijkstra
 
 from manitwin.geometry.parts.cut_up import cut_up
 
-EDGE_SHARE = 1 / 40  # of the longest side: longer edges are subdivided
-_SMOOTH_SHARE = 0.012  # of the longest side: scale at which creases and concavities are detected, above the noise
+EDGE_SHARE = 1 / 40  # fraction of the longest side: longer edges are subdivided
+# fraction of the longest side: scale at which creases and concavities are detected, above the noise
+_SMOOTH_SHARE = 0.012
 _MOST_ROUNDS = 60  # of averaging; a dense scan needs more
-_CONCAVE_SHARE = 0.35  # of the longest side: extra path length per radian of concave bend
+_CONCAVE_SHARE = 0.35  # fraction of the longest side: extra path length per radian of concave bend
 _LEAST_TURN_RAD = 0.03  # smaller bends are noise left by averaging
 
 

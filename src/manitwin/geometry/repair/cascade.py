@@ -21,7 +21,8 @@ from manitwin.geometry.repair.thickening import lids_of_openings, thicken
 
 _STRAY_AREA_SHARE = 2e-3  # open pieces below this share of the area are debris
 _HANGING_AREA_SHARE = 0.05  # the same for open pieces attached at an edge with more than two faces
-_MEMBRANE_SHARE = 0.2  # of a piece's area: vector area needed to close it, below which it is a body and not a membrane
+# fraction of a piece's area: vector area needed to close it, below which it is a body and not a membrane
+_MEMBRANE_SHARE = 0.2
 _FLAT_SHARE = 1e-5  # mean thickness over the square root of the area; a sheet of A4 paper has 3e-4
 _MOST_ROUNDS = 20  # of dropping fins or strays, as each round may expose others
 

@@ -18,7 +18,7 @@ from manitwin.geometry.repair.halfedges import (
 from manitwin.geometry.repair.surface import NEW, Surface, face_normals
 
 _LARGEST_EXACT_LOOP = 120  # edges; the dynamic programme is O(n^3), so longer loops are first divided
-_BENDING_WEIGHT = 0.25  # of an edge's squared length, times 1 - cos of its dihedral bend, relative to area
+_BENDING_WEIGHT = 0.25  # weight of an edge's squared length times 1 - cos of its dihedral angle, relative to area
 
 _SAME_FAN_PENALTY = 4.0  # exceeds any 1 - cosine, to prefer crossing the gap between two fans at a vertex
 

@@ -12,18 +12,17 @@ from manitwin.geometry.repair.halfedges import BOUNDARY, halfedge_vertices
 from manitwin.geometry.repair.surface import NEW, Surface, face_cross_products, face_normals
 from manitwin.geometry.sampling import sample_surface
 
-_MOST_STRETCH = (
-    2.0  # largest displacement of a corner in thicknesses; sharper corners would intersect the opposite side
-)
+# largest displacement of a corner in thicknesses; sharper corners would intersect the opposite side
+_MOST_STRETCH = 2.0
 _DAMPING = 1e-2  # keeps vertices of flat neighbourhoods from sliding tangentially
-_SHARE_OF_ROOM = 0.4  # of the free distance inward, so that opposite walls do not meet
+_SHARE_OF_ROOM = 0.4  # fraction of the free distance inward, so that opposite walls do not meet
 
 _SAMPLES = 32  # points per closing surface
 _DIRECTIONS = 128  # rays per point
 _FOLD_COSINE = 0.7
 """A lid deviates by 45 degrees or more on average from the wall around it; a patch continues its surface."""
-_BAND = 0.25  # of a patch's size: width of the surrounding band that is compared
-_OPENNESS = 0.5  # of the half space before a lid; a patch deep in a crevice sees less of the outside
+_BAND = 0.25  # fraction of a patch's size: width of the surrounding band that is compared
+_OPENNESS = 0.5  # fraction of the half space before a lid; a patch deep in a crevice sees less of the outside
 
 
 def thicken(surface: Surface, thickness_m: float) -> Surface:

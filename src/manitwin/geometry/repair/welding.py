@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from manitwin.geometry.repair.halfedges import edge_keys, group_edges, halfedge_vertices, label_components
 
-_STEPS = (0.1, 0.3, 1.0)  # of the tolerance; the smallest step with the fewest open edges is used
+_STEPS = (0.1, 0.3, 1.0)  # fractions of the tolerance; the smallest step with the fewest open edges is used
 
 
 def weld_equal(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

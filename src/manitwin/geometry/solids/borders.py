@@ -9,7 +9,7 @@ import numpy as np
 STEPS = 40
 """Bisection steps for the crossing of an edge: accurate to 1e-12 of its length."""
 SNAP = 0.005
-"""Of an edge: a crossing this close to an end is snapped to it, which avoids slivers."""
+"""Fraction of an edge: a crossing this close to an end is snapped to it, which avoids slivers."""
 
 
 def with_border(
