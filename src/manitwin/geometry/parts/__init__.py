@@ -1,0 +1,1 @@
+"""Parts and named features of an object (handle, rim, tip) found from its shape by rules."""

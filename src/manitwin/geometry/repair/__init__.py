@@ -1,0 +1,1 @@
+"""Repair of triangle soups to watertight, outward-oriented solids."""
