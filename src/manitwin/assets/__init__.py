@@ -1,1 +1,1 @@
-"""Assets of other tools: read as they are, written, audited."""
+"""Object assets of other tools: reading without changes, import, audit and export."""

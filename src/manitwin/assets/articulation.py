@@ -1,4 +1,4 @@
-"""What an asset's joints hold together: rigid links, and the joints between them that a twin can have."""
+"""Links and joints of an asset: reduction of a file's body tree to rigid links joined by supported joints."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from manitwin.twin.link_records import MAX_LINKS
 
 @dataclass(frozen=True)
 class AssetLink:
-    """A rigid link; what fixed joints hold together is one. ``inertial`` is in the asset's axes, as the links stand."""
+    """A rigid link, with all bodies that fixed joints connect merged into it.
+
+    ``inertial`` is in the asset's axes, with the links in the pose of the file.
+    """
 
     name: str
     inertial: Inertial
@@ -20,9 +23,9 @@ class AssetLink:
 
 @dataclass(frozen=True)
 class Articulation:
-    """The links of an asset, the root first, and the joints between them, in the asset's axes.
+    """The links of an asset, root first, and the joints between them, in the asset's axes.
 
-    ``link_of_visual`` is the link of each of the asset's visual parts.
+    ``link_of_visual`` gives the index of the link for each visual part of the asset.
     """
 
     links: tuple[AssetLink, ...]
@@ -32,10 +35,11 @@ class Articulation:
 
 @dataclass(frozen=True)
 class Node:
-    """One body of a file's tree: ``holder`` is its place in the order, None of the first.
+    """One body in the tree of a file.
 
-    ``joint`` is what lets it move (its ends are not said yet), None where nothing does or it cannot be kept; ``cause`` then says
-    why, empty for what is fixed.
+    ``holder`` is the index of the parent body in the node order, None for the root. ``shaped`` says whether the body has a
+    shape. ``joint`` is the joint to the parent, with parent and child links not yet set. It is None where the body is fixed to
+    its parent or where its joint is not supported; ``cause`` then gives the reason, and is empty for a fixed body.
     """
 
     name: str
@@ -47,7 +51,11 @@ class Node:
 
 @dataclass(frozen=True)
 class Tree:
-    """``link_of (N,)`` is the link of each node, ``heads`` the first node of each link, ``remarks`` what was not kept and why."""
+    """The links and joints of a node tree.
+
+    ``link_of (N,)`` is the link index of each node, ``heads`` the first node of each link, and ``remarks`` one line for each
+    joint that was not kept, with the reason.
+    """
 
     link_of: tuple[int, ...]
     heads: tuple[int, ...]
@@ -56,10 +64,11 @@ class Tree:
 
 
 def rigid_links(nodes: Sequence[Node]) -> Tree:
-    """Return the links that nodes, holders first, make: each with a shape, all but the first held by a joint that is kept.
+    """Merge nodes, parents first, into links: each link has a shape, and each but the first hangs from a joint that is kept.
 
-    A joint that cannot be kept is locked as it stands, and said so: those of other kinds, of links without a shape, of more
-    than ``MAX_LINKS`` links. What holds a single link and has no shape is part of it, and its joint is left out.
+    A joint that cannot be kept is locked in the pose of the file, with a remark. This applies to unsupported kinds, to joints
+    whose child has no shape, and to all joints where there would be more than ``MAX_LINKS`` links. If the root has no shape, a
+    single joint to it is dropped and the child merged into the root; several are locked.
     """
     remarks = [
         f"joint {node.cause}: it is locked as the file stands" for node in nodes if node.joint is None and node.cause

@@ -1,7 +1,7 @@
-"""An object asset as some tool ships it: what its files say, nothing added and nothing mended.
+"""Object assets as their files describe them, without additions or repairs.
 
-All geometry is in the asset's own axes, in metres by the unit and scale that the files declare. What the files do not say is
-None or empty; what they say wrongly is kept as it stands.
+All geometry is in the asset's own axes, in metres according to the unit and scale that the files declare. Values that the files
+do not state are None or empty. Values that they state wrongly are kept unchanged, so that an audit can find them.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ FrameKind = Literal["contact", "functional", "target", "orientation"]
 
 @dataclass(frozen=True)
 class CollisionShape:
-    """One collision geometry: ``vertices (V, 3)`` m and ``faces (F, 3)``; primitives come as their meshes.
+    """One collision geometry: ``vertices (V, 3)`` in metres and ``faces (F, 3)``; a primitive is given as a mesh.
 
-    ``convex``: the simulator takes its convex hull, whatever the faces say. ``primitive``: it is a box, sphere or the like by its
-    format. ``groups`` are vertices and faces of what its file keeps apart, where that is more than one.
-    ``as_drawn``: the file asks for the triangles themselves, as a distance field, say.
+    ``convex``: the simulator uses the convex hull of the vertices and ignores the faces. ``primitive``: the format declares a
+    box, sphere or similar solid. ``groups``: vertices and faces of each group that the file separates, where there is more than
+    one. ``as_drawn``: the file asks for the triangles themselves, for example as a signed distance field.
     """
 
     name: str
@@ -42,10 +42,10 @@ class CollisionShape:
 
 @dataclass(frozen=True)
 class Contact:
-    """Surface properties as declared; ``material`` is a word for it.
+    """Surface properties as declared; ``material`` is the name of the material.
 
-    ``of_others``: bodies of the file that were left out declare a friction, and this one does not. ``friction_range`` is the
-    least and the most of its surfaces, where they differ.
+    ``of_others``: this body declares no friction, but bodies of the same file that were left out do. ``friction_range`` is the
+    smallest and largest friction of the body's surfaces, where they differ.
     """
 
     friction_static: float | None = None
@@ -58,10 +58,10 @@ class Contact:
 
 @dataclass(frozen=True)
 class AnnotatedFrame:
-    """A frame that somebody annotated: ``frame_to_asset (4, 4)`` as written, but with its translation in metres.
+    """An annotated frame: ``frame_to_asset (4, 4)`` as written, with its translation in metres.
 
-    ``approach (3,)`` and ``closing (3,)`` are unit vectors in the asset's axes for frames that say how to grasp; the point
-    between the fingertips is the frame's origin.
+    A grasp frame also has ``approach (3,)`` and ``closing (3,)``, unit vectors in the asset's axes; its origin is the point
+    between the fingertips.
     """
 
     kind: FrameKind
@@ -74,9 +74,10 @@ class AnnotatedFrame:
 
 @dataclass(frozen=True)
 class AnnotatedGrasps:
-    """Grasps of one gripper in the grasp frame of twins: ``gripper_to_asset (N, 4, 4)``, ``depth_m (N,)``, ``width_m (N,)``.
+    """Grasps of one gripper, in the grasp frame of twins.
 
-    ``held (N,)``: what whoever made them says of each.
+    ``gripper_to_asset (N, 4, 4)`` are poses, ``depth_m (N,)`` and ``width_m (N,)`` depths and opening widths in metres.
+    ``held (N,)`` says whether the source of the annotation reports that the grasp held.
     """
 
     gripper: str
@@ -88,16 +89,21 @@ class AnnotatedGrasps:
 
 @dataclass(frozen=True)
 class Asset:
-    """One asset; ``path`` is the file or folder that was given, ``files`` all that belong to it, sorted.
+    """One object asset.
 
-    ``up`` is the axis that stands up by the format's rule or the file's word; ``unit_m`` the length of a file's unit, None
-    where it declares none. ``missing_files`` are named and not there; ``remarks`` are what the reader had to note, one line
-    each; ``lenient`` those of them that a loader which goes by the letter of the format would refuse, or not find. ``joints``
-    are all of the file, those of bodies that were left out too. ``rests`` are declared resting poses, asset to plane ``(4,
-    4)``. ``static``: it is said to stand fast, as buildings do, and is no object that moves. ``partial``: other bodies of the
-    file, such as a robot's links, were left out; its name is of them all. ``soft``: it deforms; what is asked of rigid bodies
-    is not asked of it. ``articulation``: the links that were read with the joints between them; the rest of the asset is of all
-    of them as they stand.
+    - ``path``: the file or folder that was given; ``files``: all files that belong to it, sorted.
+    - ``up``: the vertical axis, by the rule of the format or as declared by the file.
+    - ``unit_m``: the length of the file's unit in metres, None if it declares none.
+    - ``missing_files``: files that are named and do not exist.
+    - ``remarks``: what the reader noted, one line each; ``lenient``: the remarks on content that a strict loader would refuse
+      or not find.
+    - ``joints``: all joints of the file, including those of bodies that were left out.
+    - ``rests``: declared resting poses, asset to support plane ``(4, 4)``.
+    - ``static``: the file declares the asset immovable, as buildings are.
+    - ``partial``: other bodies of the file, such as the links of a robot, were left out; ``name`` is that of the whole file.
+    - ``soft``: the body deforms, so checks for rigid bodies do not apply.
+    - ``articulation``: the links that were read and the joints between them; all other fields describe the links together, in
+      the pose of the file.
     """
 
     format: Format
@@ -128,7 +134,10 @@ class Asset:
 
 
 def combined_inertial(bodies: list[Inertial]) -> Inertial:
-    """Return rigidly joined bodies, all with mass and centre, as one (the parallel axis theorem)."""
+    """Combine rigidly joined bodies, all with mass, into one by the parallel axis theorem.
+
+    The result has no centre where a centre is unknown or the total mass is 0, and no inertia tensor where one is unknown.
+    """
     if len(bodies) == 1:
         return bodies[0]
     masses = np.array([body.mass_kg for body in bodies], float)

@@ -1,4 +1,4 @@
-"""The files of an asset: read only below one folder, each once, with what is missing noted."""
+"""File lookup of an asset: reads each file once, only below a root folder, and records missing and misplaced files."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from manitwin.formats.meshes.source import MeshLimits
 
 MESH_LIMITS = MeshLimits(max_bytes=1 << 29, max_faces=2_000_000)
 SHAPE_LIMITS = replace(MESH_LIMITS, decode_textures=False, shading=False)
-"""For who measures: textures have a size and no pixels, and parts without normals stay so."""
+"""Limits for measuring only: textures keep their size but no pixels, and parts without normals get none."""
 MAX_SHAPES = 4096
-MAX_FACES = 8_000_000  # of all shapes together: one mesh may be named by many of them
+MAX_FACES = 8_000_000  # of all shapes together: many of them may name one mesh
 UNREAD_FORMATS = frozenset({".vtk", ".vtu", ".wrl", ".iv", ".x3d", ".3ds", ".fbx", ".off", ".ac", ".bin", ".mesh"})
-"""Of meshes that descriptions name: for some engines, or for none but the one that they were made for."""
+"""Mesh formats that descriptions name and that are not read: they serve certain engines, or only the tool that wrote them."""
 MESHES = frozenset({".obj", ".stl", ".dae", ".msh", ".glb", ".gltf", ".ply", ".usd", ".usda", ".usdc", ".usdz"})
 OUTSIDE = " lies outside the folder above which nothing is read"
 MOST_NAMED = 3
-"""Of the parts that are left out: of a robot's or a building's, a person reads the count."""
+"""Largest number of left-out parts or locked joints to name; for a robot or a building, a count is more readable."""
 _MOST_VAIN_SEARCHES, _MOST_TRIED = 8, 8
 _NOT_THERE = re.compile(r"^(?:texture|material library) '(.+)' (is not there|lies outside )")
 
 
 @dataclass
 class AssetFiles:
-    """The files that an asset names, looked up below ``root`` and nowhere else, links resolved.
+    """The files that an asset names, looked up only below ``root`` with symbolic links resolved.
 
-    ``own`` is the folder of the asset itself; what is read from above it is remarked. ``used`` are the files that were found,
-    ``missing`` the names that were not, ``remarks`` one line each, of which ``lenient`` are those of ``took_leniently``.
-    ``partial``: bodies were left out. ``limits`` are those of each mesh, and say whether its looks are wanted.
+    ``own`` is the folder of the asset; files read from above it cause a remark. ``used`` holds the files that were found,
+    ``missing`` the names that were not. ``remarks`` has one line each; ``lenient`` is the subset added by ``took_leniently``.
+    ``partial`` is set when bodies were left out. ``limits`` apply to each mesh and say whether textures and normals are needed.
     """
 
     root: Path
@@ -55,37 +55,40 @@ class AssetFiles:
     _faces: int = 0
 
     def remark(self, sentence: str) -> None:
-        """Note a sentence for who reads about the asset; the same one counts once."""
+        """Add a remark about the asset, unless it was added before."""
         if sentence not in self.remarks:
             self.remarks.append(sentence)
 
     def took_leniently(self, sentence: str) -> None:
-        """Remark something that is read here, and that a loader which goes by the letter refuses or does not find."""
+        """Remark on something that is read here but that a strict loader would refuse or not find."""
         self.remark(sentence)
         if sentence not in self.lenient:
             self.lenient.append(sentence)
 
     @property
     def lacks_a_mesh(self) -> bool:
-        """Tell whether a file that is missing is a mesh."""
+        """Whether a missing file is a mesh."""
         return any(Path(name).suffix.lower() in MESHES for name in self.missing)
 
     def remark_left_out(self, parts: Sequence[str], what: str) -> None:
-        """Note parts that are not of the rigid object that is read: each by what is said of it, or many as their count."""
+        """Remark on parts that do not belong to the rigid object being read: each separately, or their count where there are
+        many.
+        """
         self.partial = self.partial or bool(parts)
         for sentence in of_left_out(parts, what):
             self.remark(sentence)
 
     def remark_locked(self, joints: Sequence[str]) -> None:
-        """Note joints that move and are held as the file stands."""
+        """Remark on movable joints that were locked in the pose of the file."""
         for sentence in of_locked(joints):
             self.remark(sentence)
 
     def find(self, name: str, candidates: Iterable[Path], below: str | None = None) -> Path | None:
-        """Return the first candidate that is a file below the root; None, and noted as missing, where there is none.
+        """Return the first candidate that is a file below the root, or None after adding ``name`` to ``missing``.
 
-        ``name`` is what the asset calls it, ``below`` more of its path where the asset says that elsewhere. Where no candidate
-        is there, its path is looked up elsewhere below the root (``with_the_path``).
+        ``name`` is the file's name in the asset, ``below`` a longer path for it where the asset states one elsewhere. If no
+        candidate exists, the file is also sought under a different letter case, below a renamed root and elsewhere below the
+        root (``with_the_path``); a file found so is remarked as lenient.
         """
         outside: Path | None = None
         tried: list[Path] = []
@@ -108,7 +111,9 @@ class AssetFiles:
         return None
 
     def _folder_of_both(self, candidate: Path) -> str:
-        """Return in words where a file outside of the root may be: the folder of both named, unless it is a whole home."""
+        """Describe where a file outside the root may be: in the common folder of both, unless that is a home folder or above
+        it.
+        """
         root, place = self.root.resolve(), candidate.resolve()
         both = Path(os.path.commonpath([root, place]))
         if both in private_folders():
@@ -116,7 +121,7 @@ class AssetFiles:
         return f", {root}; where it is there, import with --root {both}"
 
     def _below(self, candidate: Path) -> tuple[Path | None, bool]:
-        """Return a file below the root with its links resolved, else None, and whether its place would be below."""
+        """Return the resolved file if it exists below the root, else None; and whether its path lies below the root."""
         try:
             resolved = candidate.resolve()
             inside = resolved.is_relative_to(self.root.resolve())
@@ -125,7 +130,7 @@ class AssetFiles:
             return None, True
 
     def _in_other_letters(self, name: str, tried: Sequence[Path]) -> Path | None:
-        """Return the file whose name differs in capital letters alone, which is remarked; None where there is none."""
+        """Return the file whose name differs only in letter case, with a remark; None if there is none."""
         if self._vain_searches >= _MOST_VAIN_SEARCHES:
             return None
         for candidate in tried[:_MOST_TRIED]:
@@ -139,7 +144,7 @@ class AssetFiles:
                 continue
             found = self._below(alike[0])[0] if len(alike) == 1 else None
             if found is not None:
-                if not any("the case of letters" in each for each in self.lenient):  # once, of many meshes
+                if not any("the case of letters" in each for each in self.lenient):  # once, even if many meshes differ
                     self.took_leniently(
                         f"the case of letters in {_short(name)} is not that of the file {_short(found.name)}"
                     )
@@ -149,7 +154,7 @@ class AssetFiles:
         return None
 
     def _elsewhere(self, name: str) -> Path | None:
-        """Return the file of a name that is not where the asset says, which is remarked; None where there is none."""
+        """Return a file that is elsewhere below the root than the asset says, with a remark; None if there is none."""
         if name in self._strayed:
             return self._strayed[name]
         if self.own is None or self._vain_searches >= _MOST_VAIN_SEARCHES:
@@ -162,7 +167,10 @@ class AssetFiles:
         return None
 
     def _in_renamed_root(self, name: str, tried: Sequence[Path]) -> Path | None:
-        """Return the file of a path that leaves the root and comes back by a name that no folder beside it has: its old one."""
+        """Return the file of a path that leaves the root and returns to it by its former name; None if there is none.
+
+        The former name is one that no folder beside the root has: the root folder was renamed.
+        """
         root = self.root.resolve()
         for candidate in tried[:_MOST_TRIED]:
             try:
@@ -179,7 +187,7 @@ class AssetFiles:
         return None
 
     def _stray(self, name: str, found: Path) -> Path:
-        """Note a file that is elsewhere below the root than the asset says, and return it."""
+        """Remark on a file that is elsewhere below the root than the asset says, and return it."""
         if not any("were read from elsewhere" in each for each in self.lenient):
             place = _short(str(found.relative_to(self.root.resolve())))
             self.took_leniently(
@@ -190,7 +198,7 @@ class AssetFiles:
         return found
 
     def used_one(self, name: str, candidates: Iterable[Path]) -> Path | None:
-        """Return the file of a name that ``find`` has found before; None where it has not."""
+        """Return the file that ``find`` returned for a name before, or None."""
         if name in self._strayed:
             return self._strayed[name]
         for candidate in candidates:
@@ -203,7 +211,7 @@ class AssetFiles:
         return None
 
     def is_of_unread_format(self, path: Path) -> bool:
-        """Tell whether a mesh is of a format that is known and not read (``UNREAD_FORMATS``); it is remarked."""
+        """Return whether a mesh has a format of ``UNREAD_FORMATS``; if so, add a remark."""
         unread = path.suffix.lower() in UNREAD_FORMATS
         if unread:
             self.remark(f"{path.name} is a {path.suffix.lower()} file, which is not read: its shape was left out")
@@ -214,9 +222,9 @@ class AssetFiles:
             self.remark(f"files were read from above its own folder, below the root {self.root.resolve().name!r}")
 
     def mesh(self, path: Path, *, hull_of_points: bool = False) -> MeshFile:
-        """Read a mesh that ``find`` returned, ``hull_of_points`` as ``read_mesh`` has it.
+        """Read a mesh that ``find`` returned; ``hull_of_points`` is passed to ``read_mesh``.
 
-        Raises AssetError naming it where it cannot be read, or the asset is too large.
+        Raises AssetError, naming the mesh, if it cannot be read or the asset is too large.
         """
         if path not in self._meshes:
             try:
@@ -240,12 +248,12 @@ class AssetFiles:
         return self._meshes[path]
 
     def _texture_folders(self, mesh: Path) -> tuple[Path, ...]:
-        """Return where Gazebo keeps the pictures of a model: ``materials/textures`` in a folder above the mesh."""
+        """Return the texture folders of Gazebo models: ``materials/textures`` in the mesh's folder or in one above it."""
         folders = (folder / "materials" / "textures" for folder in upward(mesh.parent, self.root))
         return tuple(folder for folder in folders if folder.is_dir())
 
     def count(self, faces: int) -> None:
-        """Count a shape of so many faces; raises AssetError where the asset asks for more than is read."""
+        """Count a shape with this many faces; raise AssetError where the asset exceeds ``MAX_SHAPES`` or ``MAX_FACES``."""
         self._shapes += 1
         self._faces += faces
         if self._shapes > MAX_SHAPES or self._faces > MAX_FACES:
@@ -258,19 +266,19 @@ class AssetFiles:
         return tuple(sorted(self.used))
 
     def missing_names(self) -> tuple[str, ...]:
-        """Return what is named and not there, each once."""
+        """Return the names of missing files, without duplicates."""
         return tuple(dict.fromkeys(self.missing))
 
 
 def of_left_out(parts: Sequence[str], what: str) -> list[str]:
-    """Return the remarks on parts that were left out: each by what is said of it, or many as their count."""
+    """Return the remarks on parts that were left out: one for each part, or one with their count where there are many."""
     if len(parts) > MOST_NAMED:
         return [f"{parts[0]}, and with it {len(parts) - 1} more {what} were left out: one rigid object is read"]
     return [f"{part} and was left out: one rigid object is read" for part in parts]
 
 
 def of_locked(joints: Sequence[str]) -> list[str]:
-    """Return the remark on joints that move and are held as the file stands; none where there are none."""
+    """Return the remark on movable joints that were locked in the pose of the file; an empty list if there are none."""
     if not joints:
         return []
     more = f" and {len(joints) - MOST_NAMED} more" if len(joints) > MOST_NAMED else ""
@@ -279,7 +287,7 @@ def of_locked(joints: Sequence[str]) -> list[str]:
 
 
 def joined(parts: Iterable[trimesh.Trimesh]) -> tuple[np.ndarray, np.ndarray]:
-    """Return parts as one set of vertices ``(V, 3)`` and faces ``(F, 3)``."""
+    """Concatenate parts into one array of vertices ``(V, 3)`` and one of faces ``(F, 3)``."""
     parts = list(parts)
     vertices, faces = trimesh.util.append_faces([p.vertices for p in parts], [p.faces for p in parts])
     return np.asarray(vertices, float).reshape(-1, 3), np.asarray(faces, np.int64).reshape(-1, 3)

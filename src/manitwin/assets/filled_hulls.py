@@ -1,4 +1,4 @@
-"""The mass properties that densities give the convex hulls of collision shapes."""
+"""Mass properties of convex hulls of collision shapes, filled with given densities."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from manitwin.geometry.mass_properties import solid_mass_properties
 
 
 def filled_hulls(shapes: Iterable[tuple[np.ndarray, float]]) -> Inertial:
-    """Return the inertial of hulls of vertices ``(V, 3)`` m, each filled with its density in kg/m3, as ``computed``.
+    """Return the inertial, marked ``computed``, of convex hulls of vertices ``(V, 3)`` m, each filled with a density in kg/m3.
 
-    Flat shapes have no volume and count nothing; without another the inertial is empty.
+    Flat shapes have no volume and are skipped; if all are flat, the inertial is empty.
     """
     bodies = []
     for vertices, density_kg_m3 in shapes:

@@ -1,4 +1,4 @@
-"""The mass properties that an asset declares."""
+"""Mass properties that an asset declares."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Inertial:
-    """The declared mass properties: the centre of mass and ``inertia_kg_m2 (3, 3)`` about it, both along the asset's axes.
+    """Declared mass, centre of mass and inertia tensor ``inertia_kg_m2 (3, 3)`` about the centre of mass, in the asset's axes.
 
-    ``computed``: centre and inertia are what the format's engine computes of masses or densities of shapes, and not written.
-    ``engine_kg`` is what that engine weighs, where it weighs more than the file declares; None where it does not.
+    ``computed``: centre and inertia are not written in the file, but computed by the format's engine from masses or densities
+    of the shapes. ``engine_kg``: the mass that this engine uses, where it is larger than the declared mass; else None.
     """
 
     mass_kg: float | None = None

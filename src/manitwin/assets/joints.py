@@ -1,4 +1,4 @@
-"""The joints that an asset's file declares, of the body that is read and of all others in it."""
+"""Joints that an asset's file declares, including those of bodies that are not read."""
 
 from __future__ import annotations
 
@@ -8,21 +8,26 @@ from typing import Literal
 import numpy as np
 
 Joints = Literal["part", "lock", "keep"]
-"""What a reader does where links move: it takes the first rigid part, all as one rigid body, or all with the joints."""
+"""How a reader treats moving links.
+
+- ``part``: it reads only the first rigid part.
+- ``lock``: it reads all links as one rigid body.
+- ``keep``: it reads all links and their joints.
+"""
 
 ABOUT_AN_AXIS = ("revolute", "continuous", "prismatic", "screw", "hinge", "slide")
 TURNS = ("revolute", "hinge")
-"""Between two limits, that is; a continuous joint has none."""
+"""Joint kinds that turn between two limits; a continuous joint has no limits."""
 LIMITED = ("revolute", "prismatic")
-"""Which the URDF specification asks for a <limit>."""
+"""Joint kinds for which the URDF specification requires a <limit>."""
 
 
 @dataclass(frozen=True)
 class DeclaredJoint:
-    """One joint, ``kind`` in the words of its format; None is what the file does not say.
+    """One declared joint, with ``kind`` in the terms of its format; None marks what the file does not state.
 
-    ``axis (3,)`` is in the joint's frame as written, NaN where it is no three numbers. ``lower`` and ``upper`` are radians or
-    metres, infinite where the file says that there is none. ``follows`` is the joint that it copies.
+    ``axis (3,)`` is in the joint's frame as written, NaN where the text is not three numbers. ``lower`` and ``upper`` are in
+    radians or metres, infinite where the file declares the joint unlimited. ``follows`` names the joint that this one mimics.
     """
 
     name: str

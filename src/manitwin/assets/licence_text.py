@@ -1,4 +1,4 @@
-"""Licences and attributions that are stated in free text."""
+"""Parsing of licences and attributions that are stated in free text."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _WRITTEN_OUT = (
     (r"creative\s+commons\s+attribution\s+4\.0(?:\s+international)?\b", "CC-BY-4.0"),
     (r"creative\s+commons\s+zero\b(?:\s+v?1\.0)?(?:\s+universal)?", "CC0-1.0"),
 )
-"""How licences are called where their SPDX names are not written."""
+"""Patterns of licence names written in words, with their SPDX identifiers."""
 _NAMED = tuple(
     (
         re.compile(
@@ -31,9 +31,9 @@ _UNSAID = frozenset({"", "unknown", "none", "todo"})
 
 
 def stated_licence(texts: Iterable[str]) -> tuple[str | None, str | None]:
-    """Return the licence and the attribution that texts state as ``licence: ...`` and ``attribution: ...``, or None.
+    """Return the licence and the attribution stated as ``licence: ...`` and ``attribution: ...`` in texts, or None for each.
 
-    Statements are lines, or follow a semicolon: one inside of an attribution ends nothing.
+    A statement starts a line or follows a semicolon; a semicolon inside an attribution does not end it.
     """
     licence = attribution = None
     for text in texts:
@@ -50,20 +50,20 @@ def stated_licence(texts: Iterable[str]) -> tuple[str | None, str | None]:
 
 
 def short_licence(text: str) -> str:
-    """Return the SPDX name of a licence with whose name in words a text begins, as ``under Apache License, Version 2.0 (...)``.
+    """Return the SPDX identifier if a text begins with a licence in words, such as ``under Apache License, Version 2.0 (...)``.
 
-    A text that names more than one, and any other, is returned as it is.
+    Any other text, including one that names several licences, is returned unchanged.
     """
     return next((spdx for name, spdx in _NAMED if name.match(text)), text)
 
 
 def stated_or_none(text: str | None) -> str | None:
-    """Return what stands where a licence or an author should, or None for words that say nothing."""
+    """Return the stripped text of a licence or author field, or None for a placeholder such as ``unknown`` or ``todo``."""
     return None if text is None or text.strip().lower() in _UNSAID else text.strip()
 
 
 def _without_marks(value: str) -> str:
-    """Return a licence without the punctuation that sentences put after it."""
+    """Strip punctuation from the end of a licence."""
     while value and not (value[-1].isalnum() or value[-1] in "+_"):
         value = value[:-1]
     return value

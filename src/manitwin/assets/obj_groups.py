@@ -1,4 +1,4 @@
-"""The groups of an OBJ file: engines that make one convex hull of each take a decomposition out of one file."""
+"""Groups of an OBJ file: some engines build one convex hull for each group, so that one file can hold a decomposition."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ MOST_GROUPS = 1024
 
 
 def obj_groups(path: Path) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return vertices ``(V, 3)``, in the file's unit, and faces ``(F, 3)`` of each ``o`` or ``g`` of an OBJ that has faces.
+    """Return vertices ``(V, 3)``, in the file's unit, and faces ``(F, 3)`` of each ``o`` or ``g`` group that has faces.
 
-    Empty for a file of one group, of more than ``MOST_GROUPS``, and for one that is no OBJ. It must have been read as a mesh
-    before, which checks it.
+    Returns an empty list for a file with one group or more than ``MOST_GROUPS``, and for other formats. The file must have been
+    read as a mesh before, which validates it.
     """
     if path.suffix.lower() != ".obj":
         return []
     try:
         return _parsed(path)
-    except (ValueError, IndexError):  # lines that go on in the next one, say: then it counts as one group
+    except (ValueError, IndexError):  # such as continued lines: the file then counts as one group
         return []
 
 

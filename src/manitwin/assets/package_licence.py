@@ -1,4 +1,4 @@
-"""The licence of the ROS package that an asset lies in, for assets that state none themselves."""
+"""Licence of the ROS package that contains an asset, for assets that state none themselves."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ PACKAGE = "package.xml"
 
 
 def with_package_licence(asset: Asset, root: Path, *, say: bool) -> Asset:
-    """Return an asset with the licence and the authors of the nearest package up to ``root``, where it states no licence itself.
+    """Return an asset with the licence and authors of the nearest package up to ``root``, if it states no licence itself.
 
-    Several licences of a package are joined by ``AND``: they hold for what is in it. ``say``: a remark names the package, which
-    nobody needs to read of each asset of a folder that is measured.
+    Several licences of a package are joined by ``AND``, because all apply to its content. With ``say``, a remark names the
+    package; bulk measurements leave it out.
+
     Source: REP 149, package manifest format three.
     """
     if stated_or_none(asset.license) is not None:

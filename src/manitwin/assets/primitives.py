@@ -1,4 +1,4 @@
-"""Spheres, cylinders and capsules as meshes, in metres, centred on their origin, along Z."""
+"""Meshes of spheres, cylinders, capsules and ellipsoids, in metres, centred on the origin, with their axis along Z."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 
 _END_COSINE, _AT_POLE = 0.9, 1e-9
-_SECTIONS = 48  # a cylinder's volume is 0.3 % short of the round one's
+_SECTIONS = 48  # a cylinder's volume is 0.3 % below the exact value
 
 
 def sphere(radius_m: float) -> trimesh.Trimesh:
@@ -20,25 +20,27 @@ def cylinder(radius_m: float, length_m: float) -> trimesh.Trimesh:
 
 
 def capsule(radius_m: float, length_m: float) -> trimesh.Trimesh:
-    """Return a capsule along Z about the origin; ``length_m`` is that of its cylinder, without the caps."""
+    """Return a capsule along Z about the origin; ``length_m`` is the length of the cylinder without the caps."""
     mesh = trimesh.creation.capsule(height=length_m, radius=radius_m, count=[_SECTIONS, 24])
     mesh.apply_translation(-mesh.bounds.mean(0))
     return mesh
 
 
 def ellipsoid(radii_m: np.ndarray) -> trimesh.Trimesh:
-    """Return an ellipsoid about the origin with these half axes ``(3,)``."""
+    """Return an ellipsoid about the origin with semi-axes ``radii_m (3,)``."""
     mesh = sphere(1.0)
     mesh.apply_scale(np.asarray(radii_m, float))
     return mesh
 
 
 def unwrapped(solid: trimesh.Trimesh, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return vertices ``(V, 3)``, faces ``(F, 3)`` and texture coordinates ``(V, 2)`` of a plain solid.
+    """Return vertices ``(V, 3)``, faces ``(F, 3)`` and texture coordinates ``(V, 2)``, origin at the lower left, of a
+    primitive.
 
-    The origin of the coordinates is at the lower left. A ``cylinder`` has the picture around it as Gazebo lays it: from +Y on
-    clockwise, seen from above, its lower edge at the top; and the whole on each end. A ``sphere``, ``ellipsoid`` or ``capsule``
-    has it as a globe its map; of anything else each side has the whole picture, upright.
+    - ``cylinder``: the picture wraps around the side as in Gazebo, clockwise from +Y seen from above, with its lower edge at
+      the top; each end shows the whole picture.
+    - ``sphere``, ``ellipsoid``, ``capsule``: longitude and latitude, as a globe shows a map.
+    - any other kind: each side of the bounding box shows the whole picture, upright.
     """
     triangles = np.asarray(solid.vertices, float)[solid.faces]
     corners = triangles - solid.bounds.mean(0)
@@ -62,7 +64,10 @@ def unwrapped(solid: trimesh.Trimesh, kind: str) -> tuple[np.ndarray, np.ndarray
 
 
 def _turns(angle_rad: np.ndarray, free: np.ndarray | None = None) -> np.ndarray:
-    """Return angles ``(F, 3)`` in turns, those of a triangle on one side of the seam; ``free`` are at a pole, of no angle."""
+    """Convert angles ``(F, 3)`` to turns, with the corners of each triangle on one side of the seam.
+
+    Corners marked ``free`` lie at a pole, where the angle is undefined; they take the mean of the other corners.
+    """
     turns = angle_rad / (2 * np.pi) % 1.0
     held = np.ones_like(turns, dtype=bool) if free is None else ~free
     low, high = np.where(held, turns, 1.0).min(1), np.where(held, turns, 0.0).max(1)
@@ -72,7 +77,7 @@ def _turns(angle_rad: np.ndarray, free: np.ndarray | None = None) -> np.ndarray:
 
 
 def _on_each_side(corners: np.ndarray, normals: np.ndarray, half: np.ndarray) -> np.ndarray:
-    """Return ``(F, 3, 2)`` places of corners ``(F, 3, 3)`` in a picture on the side of the box that each face looks to."""
+    """Return coordinates ``(F, 3, 2)`` of corners ``(F, 3, 3)`` in the picture on the box side that each face points to."""
     axis = np.abs(normals).argmax(1)
     outward = np.where(np.take_along_axis(normals, axis[:, None], 1)[:, 0] < 0, -1.0, 1.0)
     x, y, z = (corners[..., k] / half[k] for k in range(3))

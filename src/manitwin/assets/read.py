@@ -1,4 +1,4 @@
-"""Find and read assets of any tool; a format is told by content, not by names."""
+"""Detection and reading of assets of any supported tool; formats are recognized by content rather than by name."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from manitwin.assets.joints import Joints
 
 SCAN_METADATA = "metadata.pbtxt"
-"""Which Google Scanned Objects have, and other models of Gazebo have not."""
+"""A file that Google Scanned Objects have and other Gazebo models do not."""
 _HEAD_BYTES, _FRAGMENT_BYTES = 1 << 16, 1 << 23
 _FIRST_TAG = re.compile(rb"<([A-Za-z][\w.:-]*)[\s/>]")
 _SHAPES = (b"<geom", b"<visual", b"<collision", b"<include", b"<replicate", b"<composite", b"<flexcomp", b"<attach")
-"""Elements of MJCF, URDF and SDF that are shapes, or bring some in."""
+"""Elements of MJCF, URDF and SDF that declare shapes or include files that may."""
 _MODEL = re.compile(rb"<model\s")
-"""Plug-ins name models in elements without a name of their own."""
+"""A model with a name: plug-ins name models in elements that have no name attribute themselves."""
 _WORLD_BODY = re.compile(rb"<worldbody[\s>].*?</worldbody>", re.DOTALL)
 _PLANE = re.compile(rb"<geom\b[^>]*\btype\s*=\s*[\"']plane[\"'][^>]*>")
 _ENDS = (b"</mujoco>", b"</robot>", b"</sdf>")
@@ -36,12 +36,12 @@ _USD_SHAPE = re.compile(
 )
 _USD_ROOT = re.compile(rb"^def\b", re.MULTILINE)
 _COMPOSED = (b"references", b"payload", b"subLayers")
-"""Composition arcs that bring prims of other layers into one that has none."""
+"""Composition arcs that bring prims of other layers into a layer that defines none."""
 _NUMBERS = re.compile(rb"""\b(?:xyz|rpy|rgba|size|scale|radius|length|value|pos|quat)=["']([^"'<>]*)["']""")
 _TO_FILL_IN = re.compile(
     rb"(?<![\w.])(?!NAN\b|INF\b|INFINITY\b)[A-Z][A-Z_]{2,}[0-9]*(?![\w.])|\{\{?\s*[A-Za-z_]\w*\s*\}|\$[({]"
 )
-"""Words and brackets in the place of numbers: a template that a program fills in."""
+"""Words and brackets in place of numbers: the file is a template that a program fills in."""
 _MARKS = re.compile(rb"<extra_info[\s/>]|<custom_data[\s/>]")
 _ROBOTWIN_DATA = re.compile(r"model_data\d*\.json")
 
@@ -49,9 +49,9 @@ VALID_ASSETS = (
     "valid are twin folders, RoboTwin, ManiTwin-100K, EmbodiedGen and Google Scanned Objects folders, .urdf, .sdf, MJCF"
     " .xml and USD files; a plain mesh goes to `manitwin build`"
 )
-"""The end of a message to a person who gave something else."""
+"""The end of an error message about a path that holds no supported asset."""
 _NAME_FILES = ("urdf", "mjcf", "sdf", "gso", "embodiedgen", "usd")
-"""Descriptions that name meshes of other folders."""
+"""Formats whose descriptions may name meshes in other folders."""
 WITH_JOINTS = ("urdf", "mjcf", "sdf", "usd")
 FORMATS: tuple[Format, ...] = ("twin", "urdf", "mjcf", "sdf", "usd", "robotwin", "manitwin100k", "embodiedgen", "gso")
 
@@ -59,7 +59,7 @@ FORMATS: tuple[Format, ...] = ("twin", "urdf", "mjcf", "sdf", "usd", "robotwin",
 def detect(path: Path) -> Format:
     """Return the format of the asset in a file or folder.
 
-    Raises AssetError where there is none, or a folder holds more than one.
+    Raises AssetError if there is no asset, or a folder holds more than one.
     """
     _require_there(path)
     found = folder_format(path) if path.is_dir() else file_format(path)
@@ -71,7 +71,7 @@ def detect(path: Path) -> Format:
 
 
 def folder_format(folder: Path) -> Format | None:
-    """Return the format of a folder that is one asset as a whole, None where it is none."""
+    """Return the format of a folder that is one asset as a whole, or None."""
     names = {entry.name for entry in folder.iterdir() if is_file_below(entry, folder)}
     if "twin.json" in names:
         return "twin"
@@ -85,7 +85,7 @@ def folder_format(folder: Path) -> Format | None:
 
 
 def file_format(file: Path) -> Format | None:
-    """Return the format of a file that is the main file of an asset, None where it is none."""
+    """Return the format of a file that is the main file of an asset, or None."""
     suffix = file.suffix.lower()
     if file.name == "twin.json":
         return "twin"
@@ -99,9 +99,9 @@ def file_format(file: Path) -> Format | None:
 
 
 def only_file(folder: Path) -> Path:
-    """Return the one main file in a folder or the folders directly in it; raises AssetError where there is not one.
+    """Return the only main file in a folder or directly in its subfolders; raise AssetError if there is none or more than one.
 
-    Where a folder holds the same asset in several formats, URDF is taken before MJCF, SDF and USD.
+    If a folder holds several formats, URDF has priority over MJCF, SDF and USD.
     """
     for depth in ("*", "*/*"):
         files = [
@@ -119,7 +119,7 @@ def only_file(folder: Path) -> Path:
 
 
 def robotwin_data(folder: Path) -> list[Path]:
-    """Return a RoboTwin folder's model_data files, one a variant, in the order of their numbers."""
+    """Return the model_data files of a RoboTwin folder, one for each variant, in numerical order."""
     found = [f for f in folder.iterdir() if _ROBOTWIN_DATA.fullmatch(f.name) and is_file_below(f, folder)]
     return sorted(found, key=lambda file: (int("".join(filter(str.isdigit, file.stem)) or -1), file.name))
 
@@ -144,14 +144,17 @@ def _xml_format(file: Path) -> Format | None:
 
 @dataclass(frozen=True)
 class _Aside:
-    """The descriptions that were found and are no assets by themselves."""
+    """Collects descriptions that are not assets by themselves: fragments, templates, and layers of USD stages."""
 
     fragments: list[Path]
     templates: list[Path]
     layers: set[Path] = field(default_factory=set)
 
     def takes(self, file: Path) -> bool:
-        """Tell whether a description is no asset, and keep it: no shape, words where numbers should be, a layer of another."""
+        """Return whether a description is not an asset by itself, and record it if so.
+
+        This holds for a description without shapes, one with words in place of numbers, and a layer of another USD stage.
+        """
         suffix = file.suffix.lower()
         usd = suffix in USD_SUFFIXES
         if usd and file.resolve() in self.layers:
@@ -175,23 +178,23 @@ class _Aside:
 
 
 def _is_layer(content: bytes) -> bool:
-    """Tell whether a USD text shows nothing by itself: materials, overrides and bodies for other layers."""
-    if _USD_ROOT.search(content) is None:  # overrides alone, of what other layers define
+    """Return whether a USD text shows nothing by itself: it holds only materials, overrides or bodies for other layers."""
+    if _USD_ROOT.search(content) is None:  # only overrides of prims that other layers define
         return b"subLayers" not in content
     return _USD_SHAPE.search(content) is None and not any(word in content for word in _COMPOSED)
 
 
 def _has_no_shape(content: bytes) -> bool:
-    """Tell whether an XML description holds no shape, and is there for others to include, or is a world of included models."""
+    """Return whether an XML description has no shape of its own: it is meant for inclusion, or is a world of included models."""
     if content.rstrip().endswith(b"</mujoco>") and b"<include" not in content:
-        bodies = b"".join(_WORLD_BODY.findall(content))  # defaults name shapes, and make none
-        content = _PLANE.sub(b"", bodies) + b"</mujoco>"  # nor is a floor a thing
+        bodies = b"".join(_WORLD_BODY.findall(content))  # defaults name shape types without creating shapes
+        content = _PLANE.sub(b"", bodies) + b"</mujoco>"  # nor is a floor an object
     if content.rstrip().endswith(b"</sdf>"):
-        if _MODEL.search(content) is None and b"<include" in content:  # whose models are assets of their own
+        if _MODEL.search(content) is None and b"<include" in content:  # the included models are assets by themselves
             return True
         if b"<world" in content:
             return b"<visual" not in content and b"<collision" not in content
-    ends = any(content.rstrip().endswith(end) for end in _ENDS)  # what is cut short is a broken asset, not a fragment
+    ends = any(content.rstrip().endswith(end) for end in _ENDS)  # a truncated file is a broken asset, not a fragment
     return ends and (not any(tag in content for tag in _SHAPES) or b"<xacro:macro" in content)
 
 
@@ -217,14 +220,13 @@ def read_asset(
     joints: Joints = "part",
     number: int | None = None,
 ) -> Asset:
-    """Read the asset at a path, ``auto``: of the format that ``detect`` tells; raises AssetError.
+    """Read the asset at a path; ``format="auto"`` uses the format that ``detect`` finds. Raises AssetError.
 
-    ``root``: the folder above which no file is read for a description that names some (``root_of`` the path by default).
-    ``joints``: "part" reads the first rigid part of what moves, "lock" all of it as one rigid body as the file stands (of
-    ``WITH_JOINTS`` alone), "keep" the same with its links and joints; the first rigid part of formats without joints.
-    ``number``: of an MJCF file with several objects that are free to move, which one (``mjcf.count_objects``).
-    ``shape_only``: textures are not decoded and normals not made where that costs time, which is enough to measure it. A
-    format's reader, and the engine that it may need, are loaded only when they are used.
+    ``root``: the folder above which no file is read, for descriptions that name files (default: ``root_of`` the path).
+    ``joints``: "part" reads the first rigid part; "lock" reads all links as one rigid body in the pose of the file (formats in
+    ``WITH_JOINTS`` only); "keep" also keeps links and joints, and reads formats without joints like "part". ``number``: which
+    object of an MJCF file with several freely movable ones (``mjcf.count_objects``). ``shape_only``: skips texture decoding and,
+    where it is costly, normals. The reader of a format and the engine it needs are imported only when used.
     """
     if format != "auto" and format not in FORMATS:
         raise AssetError(choose_from("format", format, ("auto", *FORMATS)))
@@ -252,12 +254,13 @@ def read_asset(
 
 
 def find_assets(path: Path, fragments: list[Path] | None = None, templates: list[Path] | None = None) -> Iterator[Path]:
-    """Yield every asset at or below a path, in the order of their names; hidden folders are left out.
+    """Yield every asset at or below a path, in the order of names, skipping hidden folders.
 
-    A folder that is one asset as a whole is not looked into; links to folders, and to files out of the folder, are not
-    followed. A RoboTwin folder gives its model_data files. Descriptions without a shape, which others include, and layers of
-    other stages are no assets and go to ``fragments``; those with words for numbers, which programs fill in, to ``templates``.
-    Raises AssetError where the path is not there.
+    A folder that is one asset as a whole is not searched. Links to folders, and to files outside the folder, are not followed.
+    A RoboTwin folder yields its model_data files. Descriptions without a shape and layers of other USD stages are appended to
+    ``fragments``, and templates with words in place of numbers to ``templates``.
+
+    Raises AssetError if the path does not exist.
     """
     _require_there(path)
     if not path.is_dir():
@@ -268,10 +271,10 @@ def find_assets(path: Path, fragments: list[Path] | None = None, templates: list
 
 
 def is_file_below(file: Path, folder: Path) -> bool:
-    """Tell whether a path is a regular file, no link that leads out of a folder, in a circle or nowhere."""
+    """Return whether a path is a regular file that no symbolic link leads out of a folder."""
     try:
         return file.is_file() and (not file.is_symlink() or file.resolve().is_relative_to(folder.resolve()))
-    except (OSError, RuntimeError, ValueError):  # a circle of links: RuntimeError until 3.12
+    except (OSError, RuntimeError, ValueError):  # a loop of links: RuntimeError until Python 3.12
         return False
 
 
@@ -287,7 +290,7 @@ def _assets_below(path: Path, root: Path, aside: _Aside) -> Iterator[Path]:
     if form == "robotwin":
         yield from robotwin_data(path)
         return
-    if form == "sdf" and aside.takes(path / "model.sdf"):  # a light, say
+    if form == "sdf" and aside.takes(path / "model.sdf"):  # a light, for example
         return
     if form is not None:
         yield path

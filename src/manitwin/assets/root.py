@@ -1,4 +1,4 @@
-"""The root of an asset: the folder above which nothing is read for it."""
+"""Root folder of an asset: the folder above which none of its files are read."""
 
 from __future__ import annotations
 
@@ -7,18 +7,19 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 PACKAGE_MARKS = ("package.xml", "model.config")
-"""A package of ROS, and a model of Gazebo: their folders are self-contained."""
+"""Files that mark a ROS package and a Gazebo model, whose folders are self-contained."""
 LEAST_COMMON_PARTS = 3
-"""So much of a path says which file is meant: meshes/base_link.stl is in every second robot's folder."""
+"""Number of trailing path parts that identify a file; shorter paths such as meshes/base_link.stl occur in many robots."""
 _MOST_PARTS, _MOST_FOLDERS = 32, 256
 REPOSITORY_MARK = ".git"
 
 
 def root_of(path: Path, named: Iterable[Path] = ()) -> Path:
-    """Return the root of an asset in a file or folder, links resolved.
+    """Return the root folder of the asset in a file or folder, with symbolic links resolved.
 
-    It is the folder that the user ``named``, where the asset lies in one; else the repository that it lies in, or the package
-    or model (``PACKAGE_MARKS``), or its own folder. A home folder is no repository, nor are those above it.
+    This is the innermost folder of ``named``, the folders that the user gave, that contains the asset; otherwise the enclosing
+    repository, otherwise the enclosing package or model (``PACKAGE_MARKS``), otherwise the asset's own folder. Home folders and
+    those above them never count as a repository or package.
     """
     own = path.resolve() if path.is_dir() else path.resolve().parent
     within = [folder.resolve() for folder in named if folder.is_dir()]
@@ -35,13 +36,13 @@ def root_of(path: Path, named: Iterable[Path] = ()) -> Path:
 
 
 def private_folders() -> frozenset[Path]:
-    """Return the user's home folder and those above it, which hold far more than an asset."""
+    """Return the user's home folder and its parents, which hold far more than an asset."""
     home = Path.home().resolve()
     return frozenset({home, *home.parents})
 
 
 def upward(folder: Path, root: Path) -> Iterator[Path]:
-    """Yield a folder and those above it up to the root, which comes last; the folder alone where it is not below the root."""
+    """Yield a folder and its parents up to and including the root; only the folder if it is not below the root."""
     folder, root = folder.resolve(), root.resolve()
     yield folder
     if folder.is_relative_to(root):
@@ -51,11 +52,11 @@ def upward(folder: Path, root: Path) -> Iterator[Path]:
 
 
 def with_the_path(name: str, folder: Path, root: Path) -> Iterator[Path]:
-    """Yield where a file may lie that is not where a description says: what programs load from folders that only they know.
+    """Yield candidate paths of a file that is not where a description says, because programs search folders of their own.
 
-    That is a path of ``LEAST_COMMON_PARTS`` or more of the name's last parts below a folder or one above it up to the root, or
-    all of them below a folder directly in one of these. A path from the file system's root may be meant
-    from the folder, as PyBullet takes it.
+    Candidates are the last ``LEAST_COMMON_PARTS`` or more parts of the name below a folder or a parent up to the root, and all
+    parts below any folder directly inside one of these. An absolute path is also tried relative to the folder, as PyBullet
+    does.
     """
     parts = [
         part for part in name.partition("://")[2 if "://" in name else 0].split("/") if part not in ("", ".", "..")

@@ -1,4 +1,4 @@
-"""Files that are known and no assets: what a person is told who gave one."""
+"""Recognition of known file formats that are not supported as assets."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _WORLD = re.compile(rb"<world[\s>]")
 
 
 def why_not_read(file: Path) -> str | None:
-    """Return what a file of a known format is that is not read, and what to give for it; None of any other. Raises AssetError."""
+    """Return what a file of a known but unsupported format is, and what to give instead; None for others. Raises AssetError."""
     if file.suffix.lower() not in (".world", ".xml", ".mjcf", ".sdf", ".urdf"):
         return None
     with open_regular(file, AssetError) as opened:

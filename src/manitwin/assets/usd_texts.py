@@ -1,4 +1,4 @@
-"""Which USD files of a folder are layers of others by what their texts say, without the USD library."""
+"""Layer dependencies of USD text files, found without the USD library."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ USD_TEXT = b"#usda"
 _TEXT_BYTES = 1 << 23
 _SUBLAYERS = re.compile(rb"^\s*subLayers\s*=\s*\[([^\]]*)\]", re.MULTILINE)
 _ROOT_PRIM = re.compile(rb"^def\b[^\n(]*\((.*?)^\)", re.MULTILINE | re.DOTALL)
-"""What is said of a prim at the root, as USD writes it: until a bracket that begins a line."""
+"""The metadata of a root prim, which USD writes up to a bracket that begins a line."""
 _PAYLOAD = re.compile(rb"\bpayload\s*=\s*(\[[^\]]*\]|@[^@\n]*@)")
 _NAMED = re.compile(rb"@([^@\n]+)@")
 
 
 def layers_of(files: Iterable[Path], root: Path) -> set[Path]:
-    """Return the files below a ``root`` that are layers of some of these, resolved: parts of an asset, and none by themselves.
+    """Return the resolved files below ``root`` that are layers of the given files, hence parts of an asset and no assets.
 
-    Those are the sublayers of a text, the payloads of its prims at the root, and all that such a layer names. What prims below
-    the root refer to are assets that a scene is made of.
+    These are the sublayers of a USD text, the payloads of its root prims, and every file that such a layer names. References of
+    prims below the root prims are not followed: they are assets of which a scene is composed.
     """
     inside, found = root.resolve(), set[Path]()
     waiting = [each for file in files for each in _named_by(file, layer=False)]
@@ -36,7 +36,7 @@ def layers_of(files: Iterable[Path], root: Path) -> set[Path]:
 
 
 def _named_by(file: Path, *, layer: bool) -> Iterator[Path]:
-    """Yield the USD files that a text names as layers of its own; of a ``layer`` all that it names."""
+    """Yield the USD files that a text names as its own layers; for a ``layer``, all files that it names."""
     if file.suffix.lower() not in USD_SUFFIXES or not file.is_file():
         return
     with open_regular(file, AssetError) as stream:
@@ -53,7 +53,7 @@ def _named_by(file: Path, *, layer: bool) -> Iterator[Path]:
         if path.suffix.lower() in USD_SUFFIXES and not path.is_absolute() and "\0" not in str(path):
             try:
                 target = (file.parent / path).resolve()
-            except (OSError, RuntimeError, ValueError):  # a loop of links; a name that no file system can hold
+            except (OSError, RuntimeError, ValueError):  # a loop of links, or a name that no file system can hold
                 continue
             if target != file.resolve():
                 yield target

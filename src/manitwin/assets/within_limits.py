@@ -1,4 +1,4 @@
-"""What is done with one asset of others is done in a process with limits: it may hang, swell or crash, and costs itself alone."""
+"""Processing of one untrusted asset in an isolated process, so that a hang, crash or memory blow-up affects it alone."""
 
 from __future__ import annotations
 
@@ -9,11 +9,14 @@ from manitwin.errors import AssetError
 from manitwin.formats.isolated import Limits, ProcessCrashed, TookTooLong, run_isolated
 
 LIMITS = Limits(seconds=120.0, memory_bytes=8 << 30)
-"""Of one asset, whatever is done with it: reading, measuring, writing what is imported."""
+"""Limits of any single operation on one asset: reading, measuring or importing it."""
 
 
 def within_limits(function: str, path: Path, *arguments: Any) -> Any:
-    """Return what ``package.module:function`` returns for an asset; AssetError too where it does not end as it should."""
+    """Run ``package.module:function`` on an asset in an isolated process and return its result.
+
+    Raises AssetError also where the process exceeds its limits or crashes.
+    """
     try:
         return run_isolated(function, path, *arguments, limits=LIMITS)
     except (ProcessCrashed, MemoryError) as error:
@@ -21,7 +24,7 @@ def within_limits(function: str, path: Path, *arguments: Any) -> Any:
 
 
 def why_ended(error: Exception) -> str:
-    """Return in words why the work on an asset has not ended as it should."""
+    """Describe why the processing of an asset ended abnormally, with a remedy."""
     if isinstance(error, TookTooLong | TimeoutError):
         return f"reading it takes longer than {LIMITS.seconds:g} s; simplify it, or leave it out"
     if isinstance(error, MemoryError):

@@ -1,1 +1,1 @@
-"""Assets of other tools become inputs of the pipeline, with all that is known of them."""
+"""Import of assets of other tools as inputs of a build, with all declared properties that are usable."""

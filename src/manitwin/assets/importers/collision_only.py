@@ -1,4 +1,4 @@
-"""The look of an asset that has none: simulators show what collides of a body without a visual shape."""
+"""Visual geometry for assets without any: simulators draw the collision shapes of such bodies."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ SAID = "nothing of it is seen: its collision shapes were taken for what it looks
 
 
 def shown_by_what_collides(asset: Asset) -> Asset:
-    """Return an asset of which nothing is seen with its collision shapes as its look, and a remark; any other as it is.
+    """Return an asset without visual geometry with grey copies of its collision shapes, and a remark; others unchanged.
 
-    PyBullet and MuJoCo draw such bodies so. An asset whose meshes are missing, or in which something moves, stays as it is: which
-    link a shape is of is not known.
+    PyBullet and MuJoCo draw such bodies this way. Assets with missing meshes or with an articulation also stay unchanged: the
+    link of each collision shape is unknown.
     """
     seen = any(len(part.faces) for part in asset.visual)
     shapes = [shape for shape in asset.collision if len(shape.faces)]

@@ -1,4 +1,4 @@
-"""What is imported of an asset: a mesh in metres and a record, as bytes."""
+"""Conversion of an asset to the content of an import: a mesh in metres and a record, as bytes."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from manitwin.formats.meshes.triangles import shaded
 from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH, ImportRecord
 
 MAX_TEXTURE_SIZE = 8192
-"""Textures are kept as they are: none of the collections has larger ones."""
+"""Texture size limit that leaves textures unchanged: none of the known collections has larger ones."""
 
 
 def imported_files(asset: Asset) -> tuple[dict[str, bytes], ImportRecord]:
-    """Return the files of an imported asset, by name, and its record; raises AssetError where it has no visual mesh.
+    """Return the files of an imported asset, by name, and its record; raise AssetError if it has no visual mesh.
 
-    ``asset.glb`` has the visual meshes in metres, Y up as glTF is; the same asset gives the same bytes.
+    ``asset.glb`` has the visual meshes in metres, Y up as glTF requires. The output is deterministic.
     """
     asset = shown_by_what_collides(asset)
     to_object = asset_to_object(asset)
     record = import_record(asset, to_object)
-    # boxes and cylinders of a description have edges, and no normals that say so
+    # boxes and cylinders of a description have sharp edges and no normals that mark them
     parts = [shaded(bake_transform(part, to_object)) for part in shown_parts(asset)]
-    # as before anything could move, or had several frictions
+    # absent fields are not written, so that the bytes equal those of earlier record versions
     unsaid = {name for name in ("articulation", "friction_range") if getattr(record, name) is None}
     text = json.dumps(record.model_dump(mode="json", exclude=unsaid), indent=1, sort_keys=True, allow_nan=False) + "\n"
     files = {IMPORTED_MESH: write_glb(parts, max_texture_size=MAX_TEXTURE_SIZE), IMPORT_RECORD: text.encode()}
@@ -45,13 +45,13 @@ def read_for_import(
     joints: Joints = "keep",
     number: int | None = None,
 ) -> tuple[dict[str, bytes], ImportRecord]:
-    """Read an asset below a ``root`` and return what is imported of it; for a process with limits. Raises AssetError."""
+    """Read an asset below a ``root`` and return what to import, for use in an isolated process. Raises AssetError."""
     return imported_files(read_asset(place, format, root=root, joints=joints, number=number))
 
 
 def count_for_import(place: Path, format: Format | Literal["auto"], root: Path | None = None) -> int:
-    """Return how many objects of an MJCF file are free to move; 0 of other formats.
+    """Return the number of freely movable objects in an MJCF file; 0 for other formats.
 
-    It is for a process with limits. Raises AssetError.
+    For use in an isolated process. Raises AssetError.
     """
     return count_objects(place, root) if "mjcf" in (format, detect(place) if format == "auto" else format) else 0

@@ -1,4 +1,4 @@
-"""What an asset declares and an import does not take over, each with its reason."""
+"""Declared properties that an import drops, with a reason for each."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from manitwin.pipeline.annotated_mass import OUTSIDE_SHARE
 
 CENTER, INERTIA = "centre of mass", "inertia"
 
-_LEAST_DENSITY_KG_M3 = 0.1  # of the hull: a tenth of the air in it
+_LEAST_DENSITY_KG_M3 = 0.1  # of the convex hull: a tenth of the density of air
 _CENTER_RULES = (center_of_mass.outside, center_of_mass.left_at_origin)
 _INERTIA_RULES = (inertia.not_positive_definite, inertia.triangle, inertia.placeholder, inertia.magnitude)
 
 
 def impossible_mass_properties(asset: Asset) -> dict[str, str]:
-    """Return why the declared centre of mass or inertia cannot be that of the object, by ``CENTER`` and ``INERTIA``.
+    """Return why the declared centre of mass or inertia is impossible for the object, keyed by ``CENTER`` and ``INERTIA``.
 
-    These are the rules of the audit (INE002 to INE005, COM002 and COM003): what they complain of, engines refuse or get wrong.
+    Applies the audit rules INE002 to INE005, COM002 and COM003, which find values that engines refuse or simulate wrongly.
     """
     measured = MeasuredAsset(asset)
     found = {}
@@ -38,9 +38,10 @@ def impossible_mass_properties(asset: Asset) -> dict[str, str]:
 
 
 def inertia_without_a_mass(inertial: Inertial) -> dict[str, str]:
-    """Return why an inertia is not kept, as ``impossible_mass_properties`` does, where no mass stands behind it.
+    """Return why an inertia is dropped if there is no positive mass, in the form of ``impossible_mass_properties``.
 
-    A body of 0 kg is how PyBullet says that it is fixed, and its inertia a template's; without a mass, nothing scales one.
+    PyBullet uses a mass of 0 kg for fixed bodies, whose inertia is then that of a template; without a mass, an inertia cannot
+    be scaled.
     """
     mass_kg = inertial.mass_kg
     if inertial.inertia_kg_m2 is None or (mass_kg is not None and mass_kg > 0):
@@ -49,9 +50,10 @@ def inertia_without_a_mass(inertial: Inertial) -> dict[str, str]:
 
 
 def center_off_what_is_seen(center_m: np.ndarray, points_m: np.ndarray) -> str | None:
-    """Return why a centre of mass ``(3,)`` cannot be that of the points ``(N, 3)`` that are seen; None where it can.
+    """Return why a centre of mass ``(3,)`` is impossible for the visual points ``(N, 3)``, in metres; None if it is possible.
 
-    COM002 allows what hulls are rounded by; a build refuses a centre that is farther outside of its solid than for rounding.
+    COM002 tolerates the rounding of collision hulls, but a build refuses a centre outside the solid by more than
+    ``OUTSIDE_SHARE`` of its largest extent.
     """
     try:
         hull = trimesh.convex.convex_hull(points_m)
@@ -65,9 +67,10 @@ def center_off_what_is_seen(center_m: np.ndarray, points_m: np.ndarray) -> str |
 
 
 def without_placeholder_mass(asset: Asset) -> tuple[Asset, list[str]]:
-    """Return the asset without a mass that says only that there is one, and why; as it is where its mass may be meant.
+    """Return the asset without a placeholder mass, and the reason; the asset unchanged if the mass may be real.
 
-    Simulators refuse a mass of 0, so that bodies without one get 1e-9 kg: with it go centre, inertia and the masses of links.
+    Simulators refuse a mass of 0, so bodies without a known mass often declare a tiny one such as 1e-9 kg. Centre, inertia and
+    the masses of links are dropped with it.
     """
     mass_kg, volume_m3 = asset.inertial.mass_kg, float(MeasuredAsset(asset).hull.volumes_m3.sum())
     if mass_kg is None or not 0 < mass_kg < _LEAST_DENSITY_KG_M3 * volume_m3:
@@ -80,7 +83,7 @@ def without_placeholder_mass(asset: Asset) -> tuple[Asset, list[str]]:
 
 
 def left_out(asset: Asset) -> list[str]:
-    """Return in words what else a build has no place for."""
+    """Return descriptions of further content of an asset that a build does not use."""
     words = []
     if asset.collision:
         count = len(asset.collision)

@@ -1,4 +1,4 @@
-"""Bring an asset of any tool to the folder that ``manitwin build`` takes."""
+"""Import of assets of any tool into folders that ``manitwin build`` takes."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ COUNT = "manitwin.assets.importers.conversion:count_for_import"
 _SUFFIXES = (".urdf", ".sdf", ".xml", ".usd", ".usda", ".usdc", ".usdz", ".json")
 _MOST_LETTERS = 60
 DIGEST_DIGITS = 8
-"""32 bits tell apart the few assets that share a name."""
+"""32 bits suffice to distinguish the few assets that share a name."""
 
 
 @dataclass(frozen=True)
 class Imported:
-    """The outcome for one asset: the folder and its record, or the one line that says why there is none.
+    """The outcome for one asset: its folder and record, or a one-line error.
 
-    ``there_already``: the folder holds this very asset from before and was left as it is.
+    ``there_already``: the folder held this very asset before and was left unchanged.
     """
 
     path: Path
@@ -57,15 +57,17 @@ def import_assets(
     each_object: bool = False,
     root: Path | None = None,
 ) -> Iterator[Imported]:
-    """Import all assets at and below paths into ``out``, each into a folder of its name; yield what became of each.
+    """Import all assets at and below paths into ``out``, each into a folder of its name; yield the outcome of each.
 
-    What moves by joints is kept with its links and joints where the format's reader keeps them, with ``lock_joints`` taken as one
-    rigid body, as ``read_asset`` has it. ``each_object``: all objects of an MJCF file that are free to move, and not its first.
-    ``root``: the folder above which nothing is read, of each asset that of ``root_of`` where it is not given.
-    An asset that cannot be read, or not within limits of time and memory, is said and left out. Nothing is written over: an
-    asset that is there already is left as it is, and another one of the same name gets a folder with the name of its file, or
-    else with a digest of what was imported. Raises UsageError for a path that is not there or not below ``root``, and where a
-    folder of another kind has the name.
+    - ``lock_joints``: articulated assets are imported as one rigid body; by default links and joints are kept where the reader
+      of the format supports it (``read_asset``).
+    - ``each_object``: import every freely movable object of an MJCF file, not only the first.
+    - ``root``: the folder above which nothing is read (default: ``root_of`` each asset).
+
+    An asset that cannot be read within limits of time and memory yields an error and is skipped. Nothing is overwritten: an
+    asset that was imported before is left unchanged, and a different one of the same name gets a folder name extended by the
+    name of its file, or else by a digest of the imported content. Raises UsageError for a path that does not exist or is not
+    below ``root``, and where a folder of another kind occupies the name.
     """
     joints: Joints = "lock" if lock_joints else "keep"
     for path in paths:
@@ -87,7 +89,7 @@ def import_assets(
 def _import(
     place: Path, out: Path, format: Format | Literal["auto"], root: Path, joints: Joints, number: int | None
 ) -> Imported:
-    """Import one asset, or the object of a ``number`` in it."""
+    """Import one asset, or the object ``number`` in it."""
     try:
         files, record = within_limits(READ, place, format, root, joints, number)
     except AssetError as error:
@@ -99,7 +101,7 @@ def _import(
 
 
 def kept_words(record: ImportRecord) -> list[str]:
-    """Return in words what an import kept, besides the mesh."""
+    """Return descriptions of what an import kept besides the mesh."""
     kept = [] if record.category is None else [record.category]
     kept += [] if record.mass_kg is None else [f"mass {record.mass_kg:.4g} kg"]
     kept += [] if record.center_of_mass_m is None else ["centre of mass"]
@@ -120,7 +122,7 @@ def kept_words(record: ImportRecord) -> list[str]:
 
 
 def folder_name(record: ImportRecord) -> str:
-    """Return a folder's name for an imported asset: letters, digits and underscores."""
+    """Return the folder name of an imported asset: lower-case letters, digits and underscores."""
     stem = Path(record.file).stem if record.format in ("robotwin", "gso", "manitwin100k") else ""
     words = f"{record.name} {stem}" if stem.lower() not in record.name.lower() else record.name
     return _slug(words) or "object"
@@ -131,7 +133,7 @@ def _slug(words: str) -> str:
 
 
 def _fuller_name(name: str, file: str) -> str:
-    """Return a folder's name with that of the asset's file, which tells apart what has one name: chair_02, kettle_kitchen1."""
+    """Extend a folder name by the name of the asset's file to distinguish assets of one name: chair_02, kettle_kitchen1."""
     own = _slug(Path(file).stem if Path(file).suffix.lower() in _SUFFIXES else file)
     return own if own.startswith(name) else _slug(f"{name[: _MOST_LETTERS - 1 - len(own)]}_{own}")
 
@@ -142,13 +144,13 @@ def _places(path: Path, format: Format | Literal["auto"]) -> list[Path]:
     if format == "robotwin":
         return robotwin_data(path) or list(find_assets(path))
     found = list(find_assets(path))
-    return found or [path]  # then the reader says what the folder lacks
+    return found or [path]  # the reader then reports what the folder lacks
 
 
 def _folder_for(files: dict[str, bytes], out: Path, name: str, file: str) -> tuple[Path, bool]:
-    """Return the folder of an imported asset, and whether the same asset is there already.
+    """Return the folder for an imported asset, and whether it holds the same asset already.
 
-    Another one of its name gets the name of its file too, and a third one a digest of what was imported.
+    If the name is taken by another asset, the name of the asset's file is appended, and failing that a digest of the content.
     """
     digest = hashlib.sha256(b"".join(hashlib.sha256(files[file]).digest() for file in sorted(files))).hexdigest()
     for folder in (out / name, out / _fuller_name(name, file), out / f"{name}_{digest[:DIGEST_DIGITS]}"):
@@ -162,7 +164,7 @@ def _folder_for(files: dict[str, bytes], out: Path, name: str, file: str) -> tup
 
 
 def _holds(folder: Path, name: str, content: bytes) -> bool:
-    """Tell whether a file of a folder has this content: more of it is not read."""
+    """Return whether a file in a folder has this content; no more than its length is read."""
     file = folder / name
     if not is_file_below(file, folder) or file.stat().st_size != len(content):
         return False
@@ -170,7 +172,7 @@ def _holds(folder: Path, name: str, content: bytes) -> bool:
 
 
 def _write(files: dict[str, bytes], folder: Path) -> None:
-    """Write a folder under another name first, so that none is ever half there."""
+    """Write a folder under a temporary name first, so that it appears atomically."""
     folder.parent.mkdir(parents=True, exist_ok=True)
     fresh = folder.with_name(f".{folder.name}.new")
     shutil.rmtree(fresh, ignore_errors=True)

@@ -1,4 +1,4 @@
-"""The links and joints of an asset as an import keeps them."""
+"""Links and joints of an imported asset, with checks of their mass properties."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from manitwin.errors import AssetError
 from manitwin.geometry.poses import transform_points
 from manitwin.twin.link_records import Articulation, GivenLink, Joint
 
-_ROUNDING = 1e-4  # of the largest moment, as of a whole asset: files often hold six digits
-_UNSEEN = 4.0  # over the most that the mass has within its visual mesh: unseen matter may lie twice as far out
+_ROUNDING = 1e-4  # of the largest moment, as for a whole asset: files often hold six digits
+_UNSEEN = 4.0  # times the maximum of the mass within its visual mesh: unseen matter may lie twice as far out
 
 
 def given_articulation(asset: Asset, to_object: np.ndarray) -> tuple[Articulation | None, list[str]]:
-    """Return the links and joints in the object frame (None where nothing moves), and what was dropped, each with its cause.
+    """Return links and joints in the object frame (None for a rigid asset), and what was dropped, each with its reason.
 
-    A link keeps mass, centre of mass and inertia where a rigid body can have all three; an inertia far larger than its mass could
-    have within its visual mesh is dropped. Raises AssetError for a link that shows nothing, as where its mesh is missing.
+    A link keeps mass, centre of mass and inertia only if all three are declared and possible for a rigid body. An inertia that
+    its mass could not have within the visual mesh is dropped. Raises AssetError for a link without visual geometry, for example
+    because its mesh is missing.
     """
     found = asset.articulation
     if found is None:
@@ -55,7 +56,7 @@ def given_articulation(asset: Asset, to_object: np.ndarray) -> tuple[Articulatio
 
 
 def _too_large(link: GivenLink, points_m: np.ndarray) -> str | None:
-    """Return why an inertia is too large: its mass cannot have it within the visual points ``(N, 3)`` m; None where it can."""
+    """Return why an inertia is too large for its mass within the visual points ``(N, 3)`` m; None if it is possible."""
     if link.mass_kg is None or link.center_of_mass_m is None or link.inertia_kg_m2 is None:
         return None
     reach_m = float(np.linalg.norm(points_m - link.center_of_mass_m, axis=1).max())
@@ -87,7 +88,7 @@ def _link(name: str, link: AssetLink, to_object: np.ndarray) -> GivenLink:
 
 
 def _distinct(names: list[str]) -> list[str]:
-    """Return names none of which is empty or there twice: in MJCF bodies and joints may be unnamed."""
+    """Make names unique and non-empty: MJCF bodies and joints may be unnamed."""
     found: list[str] = []
     for name in names:
         kept, number = name or "unnamed", 1

@@ -1,4 +1,4 @@
-"""The import record of an asset: what it declares in the object frame of twins, and in words what it does not."""
+"""Import record of an asset: its declared properties in the object frame of twins, what is missing, and what was dropped."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ from manitwin.geometry.poses import GLTF_TO_OBJECT, inverse, transform_points
 from manitwin.twin.import_record import MISSING_FILE, GivenGrasps, GivenPoint, ImportRecord
 
 MAX_FRICTION = 10.0
-"""Above any coefficient of dry friction: clean metals that seize have about 5."""
+"""Above any coefficient of dry friction: clean metals that seize reach about 5."""
 
 _UP_TO_Z = {"z": np.eye(3), "y": GLTF_TO_OBJECT[:3, :3]}
 _OF_TOOLS = frozenset({"vhacd", "coacd", "textured"})
-"""Ends of names that programs write, which decompose a mesh into hulls or paint it."""
+"""Words that programs append to names when they decompose a mesh into hulls or texture it."""
 _HEXADECIMAL = frozenset("0123456789abcdef")
 _MAX_TEXTS, _MAX_LETTERS, _MAX_POINTS = 64, 500, 64
 _MOST_ABOVE = 16
-_OFF_M = 1e-3  # a millimetre above the table an object falls, below it a simulator throws it out
+_OFF_M = 1e-3  # above the support plane an object drops by this much; below it, a simulator ejects it
 
 
 def shown_parts(asset: Asset) -> tuple[trimesh.Trimesh, ...]:
-    """Return the visual parts that have faces; raises AssetError where there are none."""
+    """Return the visual parts that have faces; raise AssetError if there are none."""
     parts = tuple(part for part in asset.visual if len(part.faces))
     if not parts:
         raise AssetError(f"{asset.path.name}: no visual mesh to make a twin of{_why(asset)}")
@@ -51,7 +51,7 @@ def shown_parts(asset: Asset) -> tuple[trimesh.Trimesh, ...]:
 
 
 def asset_to_object(asset: Asset) -> np.ndarray:
-    """Return the rigid transform ``(4, 4)`` of the asset's axes into the object frame of its visual meshes."""
+    """Return the rigid transform ``(4, 4)`` from the asset's axes to the object frame of its visual meshes."""
     return object_frame(_shown_points(asset), _UP_TO_Z[asset.up])
 
 
@@ -60,7 +60,7 @@ def _shown_points(asset: Asset) -> np.ndarray:
 
 
 def import_record(asset: Asset, to_object: np.ndarray) -> ImportRecord:
-    """Return the import record of an asset; what cannot be true is not kept, and named among what is missing."""
+    """Return the import record of an asset; impossible values are dropped and listed as missing."""
     remarks = list(asset.remarks)
     if asset.static:
         remarks.append("its file says that it stands fast: its twin is a thing that moves")
@@ -142,7 +142,7 @@ def _validated(asset: Asset, fields: dict[str, Any]) -> ImportRecord:
 
 
 def _numbers(asset: Asset) -> tuple[dict[str, float | None], list[str], list[str]]:
-    """Return mass, friction and restitution where they can be true, what is missing of them, and what was dropped and why."""
+    """Return mass, friction and restitution where possible, the names of missing values, and the reasons for dropped ones."""
     contact = asset.contact
     given = {
         "mass_kg": ("mass", asset.inertial.mass_kg, 0.0, np.inf),
@@ -169,7 +169,10 @@ def _numbers(asset: Asset) -> tuple[dict[str, float | None], list[str], list[str
 
 
 def _friction_range(asset: Asset, static: float | None) -> tuple[float, float] | None:
-    """Return the frictions of the asset's surfaces where they differ and its own can be true; one that cannot bounds nothing."""
+    """Return the range of the surfaces' friction, or None if there is none or the friction of the asset itself is impossible.
+
+    A bound that is impossible is replaced by the friction of the asset itself.
+    """
     if static is None or asset.contact.friction_range is None:
         return None
     low, high = asset.contact.friction_range
@@ -182,7 +185,9 @@ def _point(frame: AnnotatedFrame, to_object: np.ndarray) -> GivenPoint:
     if frame.kind == "contact":
         normal = None
     else:
-        normal = _unit(rotation @ frame.frame_to_asset[:3, 2])  # functional frames: +Z is the way out (twins, RoboTwin)
+        normal = _unit(
+            rotation @ frame.frame_to_asset[:3, 2]
+        )  # the +Z axis of a functional frame points out of the object (twins, RoboTwin)
     return GivenPoint(
         position_m=position.tolist(),
         normal=normal,
@@ -208,9 +213,9 @@ def _unit(vector: np.ndarray) -> list[float] | None:
 
 
 def _words(name: str) -> str:
-    """Return a file's or an element's name as words: no underscores or capitals between them, and no numbers around it.
+    """Split the name of a file or element into words, without leading and trailing numbers and digests.
 
-    Nor do the names of the tools count that a file was made by, such as V-HACD of ``duck_vhacd``.
+    Trailing names of tools, such as V-HACD in ``duck_vhacd``, are removed too.
     """
     words = split_words(name).replace("_", " ").replace("-", " ").split()
     first, last = 0, len(words)
@@ -246,22 +251,22 @@ def _why(asset: Asset) -> str:
 
 
 def _where_a_package_is(asset: Asset) -> str:
-    """Return in words the nearest folder above an asset that holds a package, which may have another name than its folder."""
+    """Return a phrase naming the closest package folder above an asset, whose folder may be named differently; or ""."""
     folders = itertools.islice(asset.path.resolve().parents, _MOST_ABOVE)
     found = next((folder for folder in folders if any((folder / mark).is_file() for mark in PACKAGE_MARKS)), None)
     return "" if found is None else f"; the package around it is {found}"
 
 
 def _package(name: str) -> str:
-    """Return the package or model that a name with a scheme is of: ``cup`` of model://cup/meshes/cup.dae."""
+    """Return the package or model in a name with a scheme: ``cup`` of model://cup/meshes/cup.dae."""
     return name.partition("://")[2].lstrip("/").partition("/")[0]
 
 
 def settled_rests(asset: Asset, asset_to_object: np.ndarray) -> tuple[list[np.ndarray], list[str]]:
-    """Return the resting poses, object frame to plane ``(4, 4)``, each with the lowest point on z = 0; and remarks.
+    """Return the resting poses, object frame to plane ``(4, 4)``, each with the lowest point on z = 0, and remarks.
 
-    Published annotations are off the true lowest point, so that their users lift objects by hand; the turn is kept, the
-    height is that of the mesh.
+    Published annotations often miss the true lowest point, so that their users lift objects by hand. The rotation is kept, and
+    the height follows from the mesh.
     """
     points = [part.vertices[np.unique(part.faces)] for part in asset.visual if len(part.faces)]
     if not points or not asset.rests:

@@ -1,4 +1,4 @@
-"""What became of every asset that was to be imported, for a program."""
+"""Machine-readable report of an import."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from manitwin.formats.installation import installed_version
 
 
 def report_of(every: Sequence[Imported]) -> str:
-    """Return as JSON, of each asset in its order: the folder, what was kept, what is missing, what was dropped and why."""
+    """Return JSON with, for each asset in order, its folder, what was kept, what is missing, and what was dropped and why."""
     content = {
         "manitwin_version": installed_version(),
         "summary": {

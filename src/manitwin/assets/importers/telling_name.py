@@ -1,4 +1,4 @@
-"""What an imported asset is called: the name in its file, or that of the file or folder where the one inside says nothing."""
+"""Name of an imported asset: from its file's content, or from the file or folder if that name is generic or copied."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ _SAYS_NOTHING = frozenset({
     "meshes", "mjcf", "model", "mujoco", "myfirst", "obj", "object", "physics", "robot", "root", "scene", "sdf", "sim",
     "simulation", "stage", "textured", "unnamed", "untitled", "urdf", "usd", "visual", "world", "xform", "xml",
 })  # fmt: skip
-"""Words that tools write where nobody named anything: USD's World, obj2mjcf's textured, MuJoCo's default, ROS's tutorials."""
+"""Generic words that tools write for unnamed objects: USD's World, obj2mjcf's textured, MuJoCo's default, ROS tutorials."""
 _BETWEEN_WORDS = re.compile(r"(?<=[a-z]{2})(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z]{2})")
 _FOLDERS_UP = 1
 _OF_A_FILE = re.compile(r"(.+)\.(?:urdf|sdf|xml|mjcf|obj|stl|dae|usda?)", re.IGNORECASE)
-"""A name inside that ends as a file's does. Authors copy files and leave it there: CLIPort's pallet.urdf says cube.urdf."""
+"""A declared name that ends like a file name. Authors copy files and leave it unchanged: CLIPort's pallet.urdf says cube.urdf."""
 
 
 def telling_name(name: str, path: Path) -> str:
-    """Return what an asset at ``path`` is called: the ``name`` inside, where that says what it is.
+    """Return the name of an asset at ``path``: the declared ``name``, if it is informative.
 
-    Else the name of the file, else of its folder, whichever first says anything; where none does, the ``name`` inside. A name
-    that was copied with another file counts for nothing: one that ends as a file's does (``_OF_A_FILE``), or that is the name of
-    a file beside this one (PyBullet's plate.urdf says cube, and cube.urdf lies beside it).
+    Otherwise it is the first informative name of the file and its folder, or else the declared ``name``. A declared name that
+    was copied from another file is ignored: one that ends like a file name (``_OF_A_FILE``), or that is the name of a file
+    beside this one (PyBullet's plate.urdf says cube, and cube.urdf lies beside it).
     """
     place = path.resolve()
     if _is_of_another_file(name, place):
@@ -40,7 +40,7 @@ def telling_name(name: str, path: Path) -> str:
 
 
 def _is_of_another_file(name: str, place: Path) -> bool:
-    """Tell whether a name is that of a file beside ``place`` or in the folder above, and has no word of its own file's name."""
+    """Return whether a name is that of a file in the same or parent folder and shares no word with the name of its own file."""
     own, named = set(_words(place.stem)), set(_words(name))
     if not place.suffix or not named or own & named or not _says_something(place.stem) or Path(name).name != name:
         return False
@@ -49,7 +49,7 @@ def _is_of_another_file(name: str, place: Path) -> bool:
 
 
 def split_words(name: str) -> str:
-    """Return a name with spaces between words that only capitals divide: CoffeeTable, TVCabinet, YcbBanana."""
+    """Insert spaces between words that only capitals separate: CoffeeTable, TVCabinet, YcbBanana."""
     return _BETWEEN_WORDS.sub(" ", name)
 
 

@@ -1,1 +1,1 @@
-"""One reader a format."""
+"""Readers of asset formats, one module with a ``read`` function for each."""

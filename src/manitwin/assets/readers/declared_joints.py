@@ -1,4 +1,4 @@
-"""What URDF and SDF say of a joint in the same words: its kind, the direction of its axis, and why a twin cannot have it."""
+"""Joint properties that URDF and SDF declare alike: kind, axis direction, limits, and reasons why a joint is not supported."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy as np
 from manitwin.geometry.articulation import JointKind
 
 JOINT_KINDS: dict[str, JointKind] = {"revolute": "revolute", "continuous": "continuous", "prismatic": "prismatic"}
-"""The joints that twins have, by their ``type``."""
+"""Joint kinds that twins support, by their ``type`` attribute."""
 Limits = tuple[float | None, float | None] | None
-"""The lowest and the highest position, rad or m, (None, None) where there are none; None where no position lies between them."""
+"""Lowest and highest position in rad or m, (None, None) for an unlimited joint; None for an empty range."""
 _LONGEST_NAME = 60
 _SHORTEST_AXIS = 1e-9
 
 
 def unit_direction(text: str) -> np.ndarray | None:
-    """Return the three numbers of an ``xyz`` as a vector ``(3,)`` of length one; None where they have no direction."""
+    """Return an ``xyz`` attribute as a unit vector ``(3,)``; None if it is not three numbers or has no direction."""
     try:
         axis = np.array([float(word) for word in text.replace(",", " ").split()])
     except ValueError:
@@ -27,7 +27,7 @@ def unit_direction(text: str) -> np.ndarray | None:
 
 
 def why_no_joint_of_a_twin(name: str, written: str, *, mimics: bool) -> str:
-    """Return why twins have no joint of the type ``written``, or that ``mimics`` another one; empty where they have."""
+    """Return why twins do not support a joint of type ``written``, or one that ``mimics`` another; empty if they do."""
     if written not in JOINT_KINDS:
         return f"{name[:_LONGEST_NAME]!r} is {written}, which twins do not have"
     if mimics:
@@ -36,7 +36,7 @@ def why_no_joint_of_a_twin(name: str, written: str, *, mimics: bool) -> str:
 
 
 def why_it_cannot_move(name: str, axis: np.ndarray | None, limits: Limits) -> str:
-    """Return why a joint of this axis and these limits cannot move; empty where it can."""
+    """Return why a joint with this axis and these limits cannot move; empty if it can."""
     if axis is not None and limits is not None:
         return ""
     what = "axis has no direction" if axis is None else "limits leave it no way"

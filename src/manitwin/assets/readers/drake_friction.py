@@ -1,4 +1,4 @@
-"""The friction that Drake's elements of collision shapes say, in URDF and SDF."""
+"""Friction in Drake's extension elements of collision shapes, in URDF and SDF."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ _STATIC, _DYNAMIC = "mu_static", "mu_dynamic"
 
 
 def drake_contact(links: Iterable[etree._Element], files: AssetFiles, name: str) -> Contact | None:
-    """Return the friction of the first collision of links that says any, with the range of all; None where none does.
+    """Return the first friction that a collision of the links declares, with the range over all of them; None without any.
 
-    One of the two alone is both. Source: Drake, parsing of ``drake:proximity_properties`` (``drake:mu_static``,
-    ``drake:mu_dynamic``), which go before what else a file says. ``name`` is the file's, for errors.
+    If only one of the two coefficients is declared, it is used for both. Source: Drake, parsing of
+    ``drake:proximity_properties`` (``drake:mu_static``, ``drake:mu_dynamic``), which have priority over other friction
+    elements. ``name`` is the name of the file, for errors.
     """
     found: list[tuple[float, float]] = []
     for collision in (shape for link in links for shape in link.findall("collision")):

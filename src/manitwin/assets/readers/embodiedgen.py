@@ -1,4 +1,4 @@
-"""EmbodiedGen's assets: a URDF with what its annotator answered in <extra_info> and <custom_data>."""
+"""Reader of EmbodiedGen assets: a URDF with the answers of its annotator in <extra_info> and <custom_data>."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from manitwin.formats.xml_file import number, text_of
 from manitwin.robots.urdf import origin_of
 
 _RANGES = (("mass", "kg"), ("height", "m"))
-_FAILED = (1.0, 1.0, 1.0, 1.0)  # what URDFGenerator writes for mass and height where its model did not answer
+_FAILED = (1.0, 1.0, 1.0, 1.0)  # what URDFGenerator writes for mass and height if its model did not answer
 _UNSAID = ("unknown", "-1", "")
-_HEIGHT_OFF = 0.05  # of the height that the file says: a tilted or wrongly scaled mesh is off by more
+_HEIGHT_OFF = 0.05  # relative to the declared height: a tilted or wrongly scaled mesh deviates by more
 
 
 def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS) -> Asset:
-    """Read EmbodiedGen's URDF, or the one in a folder (result/NAME.urdf); raises AssetError as the URDF reader does.
+    """Read EmbodiedGen's URDF, or the one in a folder (result/NAME.urdf); raises AssetError like the URDF reader.
 
-    Its mu1 and mu2 are the static and the dynamic friction that its annotator was asked for. Without a rotation in the
-    visual's origin (older versions) the mesh's Y axis is up.
-    Source: embodied_gen/validators/urdf_convertor.py of HorizonRobotics/EmbodiedGen.
+    mu1 and mu2 are the static and dynamic friction that its annotator was asked for. If the visual's origin has no rotation
+    (older versions), the Y axis of the mesh is up. Source: embodied_gen/validators/urdf_convertor.py of
+    HorizonRobotics/EmbodiedGen.
     """
     found = open_urdf(path, root, limits)
     asset = asset_of(found, path, contact=_contact(found))
@@ -59,7 +59,7 @@ def _is_turned(found: UrdfObject) -> bool:
 
 
 def _ranges(found: UrdfObject, info: etree._Element) -> list[str]:
-    """Return what the annotator answered as intervals; a failed answer leaves one metre and one kilogram."""
+    """Return remarks with the annotator's intervals; a failed answer leaves one metre and one kilogram."""
     remarks, values = [], []
     for quantity, unit in _RANGES:
         low, high = (info.find(f"{bound}_{quantity}") for bound in ("min", "max"))

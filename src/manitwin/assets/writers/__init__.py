@@ -1,1 +1,1 @@
-"""A twin in the files of other tools: one truth, written out in each of them."""
+"""Exporters of twins to the formats of simulators and other tools."""

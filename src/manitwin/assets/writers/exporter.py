@@ -1,4 +1,4 @@
-"""The interface of exporters: pure functions from a twin in memory to files in memory."""
+"""Exporter interface: a pure function from a twin in memory to files in memory."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.record import Physical, TwinRecord
 
 VIEW = "views/rgb_00.webp"
-"""The view that stands for a twin where a format has one picture."""
+"""The view that represents the twin in formats with one picture."""
 
 
 @dataclass(frozen=True)
@@ -44,14 +44,14 @@ class TwinContent:
         return self.record.physical
 
     def as_one_body(self) -> TwinContent:
-        """Return it without links and joints, one rigid body as it stands, for what has no place for them."""
+        """Return the twin without links and joints, as one rigid body in its present pose, for formats without joints."""
         return replace(self, record=self.record.model_copy(update={"links": [], "joints": []}), link_of_visual=())
 
     @classmethod
     def of(cls, twin: Twin) -> TwinContent:
-        """Read a twin's folder; raises TwinError for a rejected twin."""
+        """Read the content of a twin; raise TwinError for a rejected one."""
         record = twin.record
-        twin.physical  # noqa: B018  a rejected twin has nothing to export: say so
+        twin.physical  # raises TwinError for a rejected twin
         by_link = parts_by_link(twin.visual, twin.face_links(), len(record.links)) if record.links else [twin.visual]
         return cls(
             name=export_name(record),
@@ -67,7 +67,9 @@ class TwinContent:
 
 
 def export_name(record: TwinRecord) -> str:
-    """Return a name that every format takes: letters, digits and underscores, the category first, then the twin's id."""
+    """Return a name valid in every format: lower-case letters, digits and underscores, the category and the start of the twin's
+    id.
+    """
     category = record.language.category if record.language is not None else record.name or "object"
     word = re.sub(r"[^a-z0-9]+", "_", category.lower()).strip("_")[:40] or "object"
     return f"{'o_' if word[0].isdigit() else ''}{word}_{record.twin_id[:8]}"
@@ -75,11 +77,12 @@ def export_name(record: TwinRecord) -> str:
 
 @dataclass(frozen=True)
 class Exported:
-    """Files by name below the export's folder, and what the format cannot say, one line each, for its README.
+    """Exported files by name relative to the export folder.
 
-    ``main`` is the file that a person opens. ``notes``: where the files say what, and how they are loaded, for the README; None:
-    those that ``format_notes`` has of a built-in format. ``joints``: of a twin with links and joints the files have these; in
-    others it is one rigid body, which is said.
+    ``main`` is the file that a user opens. ``cannot_say`` lists what the format cannot express, one line each, for the README.
+    ``notes`` say where the files hold each quantity and how to load them; None selects the built-in notes of the format.
+    ``joints`` says that the files contain the links and joints of an articulated twin; otherwise the twin is exported as one
+    rigid body, which the README states.
     """
 
     files: dict[str, bytes]
@@ -90,8 +93,8 @@ class Exported:
 
 
 class Exporter(Protocol):
-    """Write a twin in one format. Same twin: same bytes. Raises ExportError where the twin has not what the format needs."""
+    """Writes a twin in one format, deterministically. Raises ExportError if the twin lacks what the format needs."""
 
     def __call__(self, twin: TwinContent) -> Exported:
-        """Return the files."""
+        """Return the exported files."""
         ...

@@ -1,4 +1,4 @@
-"""Facts on each format for the README of an export: what it says of a twin, where, and how its files are loaded."""
+"""README notes on each export format: where it stores each quantity, its frame, and how to load its files."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class FormatNotes:
 
     @classmethod
     def of(cls, format_name: str) -> FormatNotes:
-        """Return the notes of a built-in format; of another package's, that it does not tell."""
+        """Return the notes of a built-in format, or placeholder notes for the format of another package."""
         return NOTES.get(format_name) or cls(format_name, UNTOLD, dict.fromkeys(QUANTITIES, UNTOLD))
 
     def where(self, quantity: str) -> str:
-        """Return where a quantity is said."""
+        """Return where the files hold a quantity."""
         return self.frame if quantity == "frame" else self.says.get(quantity, NOWHERE)
 
 

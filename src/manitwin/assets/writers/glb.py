@@ -1,7 +1,7 @@
-"""GLB: the visual mesh as the twin has it, and the hulls as a second file whose ``asset.extras`` hold the physics.
+"""GLB export: the visual mesh of the twin, and its hulls in a second file with the physical properties in ``asset.extras``.
 
-glTF 2.0 has no ratified extension for rigid bodies (KHR_physics_rigid_bodies is a draft): extras are what it leaves to
-applications (section 3.3), and ``asset.copyright`` is its own field for the licence (section 5.9).
+glTF 2.0 has no ratified extension for rigid bodies (KHR_physics_rigid_bodies is a draft). It leaves extras to applications
+(section 3.3), and provides ``asset.copyright`` for the licence (section 5.9).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ FRAME = (
 
 
 def export(twin: TwinContent) -> Exported:
-    """Write a twin as two Y-up GLB files. Raises ExportError for mass properties that no rigid body has."""
+    """Write a twin as two Y-up GLB files. Raises ExportError for mass properties that are impossible for a rigid body."""
     grey = pbr_material("hull", base_color=(0.5, 0.5, 0.5))
     hulls = [
         make_part(vertices, faces, material=grey, name=f"{twin.name}_hull_{i:02d}")

@@ -1,4 +1,4 @@
-"""Grasps of a twin's table by gripper, as arrays."""
+"""Grasps of a twin as arrays, selected by gripper."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.twin.grasp_table import JITTERED, JOINTS
 
 CONTROLS = (":unfiltered", JITTERED)
-"""How the proposers of grasps end that count in no summary: a sample without filters, and held ones jittered on purpose."""
+"""Suffixes of proposers whose grasps are controls, excluded from summaries: an unfiltered sample, and jittered held grasps."""
 
 
 _HALF = 0.5**0.5
@@ -42,7 +42,7 @@ class GraspRows:
         return len(self.ids)
 
     def take(self, index: np.ndarray) -> GraspRows:
-        """Return the rows ``index``."""
+        """Select the rows ``index``."""
         chosen = [int(i) for i in index]
         return GraspRows(
             self.gripper,
@@ -57,13 +57,13 @@ class GraspRows:
 
 
 def grippers_of(twin: TwinContent) -> list[str]:
-    """Return the grippers that the table has grasps of, the one that the twin was verified with first."""
+    """Return the grippers in the grasp table, first the one with which the twin was verified."""
     first = twin.record.grasps.gripper if twin.record.grasps is not None else ""
     return sorted(set(twin.grasps["gripper"]), key=lambda name: (name != first, name))
 
 
 def parallel_grippers_of(twin: TwinContent) -> list[str]:
-    """Return those of the grippers that close two fingers along a line: others have joints in the table, or no width."""
+    """Return the parallel grippers: other kinds have joint values in the table, or no width."""
     table = twin.grasps
     others = {
         name
@@ -74,9 +74,9 @@ def parallel_grippers_of(twin: TwinContent) -> list[str]:
 
 
 def grasp_rows(twin: TwinContent, gripper: str, *, controls: bool) -> GraspRows:
-    """Return a gripper's grasps, held and failed, but those that are retired.
+    """Return the grasps of a gripper that are not retired, both held and failed.
 
-    With ``controls`` also the unfiltered sample and the jittered ones: their verdicts are as true as the others'.
+    With ``controls``, also the unfiltered and the jittered sample, whose trial outcomes are equally valid.
     """
     table = twin.grasps
     rows = [
@@ -107,9 +107,10 @@ def grasp_rows(twin: TwinContent, gripper: str, *, controls: bool) -> GraspRows:
 
 
 def best_and_diverse(rows: GraspRows, count: int) -> GraspRows:
-    """Return at most ``count`` of the grasps that held, the best first.
+    """Return at most ``count`` held grasps, best first.
 
-    Of the best four times as many, those that lie farthest from each other: an arm that cannot reach one may reach another.
+    They are chosen by farthest point sampling among the best four times ``count``, since an arm that cannot reach one grasp may
+    reach another.
     """
     held = np.flatnonzero(rows.held)
     best = held[np.argsort(-rows.quality[held], kind="stable")][: 4 * count]
@@ -140,7 +141,7 @@ class GripperAsset:
     def grasp_to_base(self) -> np.ndarray:
         """The pose ``(4, 4)`` of the base link in the grasp frame."""
         x, y, z, w = self.base_to_grasp_xyzw
-        angle = -2 * np.arctan2(z, w)  # all of them are turns about the approach direction
+        angle = -2 * np.arctan2(z, w)  # all of them are rotations about the approach direction
         assert x == y == 0
         cosine, sine = np.round([np.cos(angle), np.sin(angle)], 15)
         return transform(np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]]))
@@ -163,9 +164,9 @@ ASSETS: dict[str, GripperAsset] = {
 
 
 def parallel_gripper(name: str) -> ParallelGripper | None:
-    """Return the dimensions of a gripper that comes with the package; None for another, or one of another kind."""
+    """Return the dimensions of a parallel gripper that comes with the package; None for others."""
     try:
         gripper = load_gripper(name) if not name.endswith(".toml") else None
-    except UsageError:  # a person's own: the table has its name, not its file
+    except UsageError:  # a gripper defined by the user: the table has its name, but not its file
         return None
     return gripper if isinstance(gripper, ParallelGripper) else None

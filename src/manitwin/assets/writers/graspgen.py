@@ -1,10 +1,10 @@
-"""GraspGen's training data: the object, every grasp that was tried with its verdict, and the lists that its loader reads.
+"""GraspGen training data: the object, all tried grasps with their outcome, and the lists that its loader reads.
 
 Sources: GraspGen docs/GRASP_DATASET_FORMAT.md, docs/GRIPPER_DESCRIPTION.md and grasp_gen/dataset/dataset_utils.py:
-``GraspJsonDatasetReader`` (which file by which name) and ``load_object_grasp_data``, which multiplies each transform by the
-``transform_offset_from_asset_to_graspgen_convention`` of its own configuration of the gripper. That of ``franka_panda``
-(config/grippers) is the identity, its hand's fingers are apart along X (``GripperModel``): the file holds poses of the grasp
-frame, +Z approach and X closing, and not of the URDF's ``panda_hand``, which closes along Y.
+``GraspJsonDatasetReader`` (file names) and ``load_object_grasp_data``, which multiplies each transform by the
+``transform_offset_from_asset_to_graspgen_convention`` of GraspGen's own gripper configuration. For ``franka_panda``
+(config/grippers) this offset is the identity, and the fingers of its hand are apart along X (``GripperModel``). The file
+therefore holds poses of the grasp frame, +Z approach and X closing, and not of the URDF's ``panda_hand``, which closes along Y.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ FRAME = (
     "transforms: poses of the gripper's base link, +Z approach and X closing, in the frame of the object file (metres, +Z up),"
     " at its scale"
 )
-VALID_SHARE = 0.2  # GraspDataGen's default share of objects to validate with
-FEWEST = 5  # of those that held: GraspGen passes over an object with less (and, for its discriminator, with less that failed)
+VALID_SHARE = 0.2  # GraspDataGen's default share of validation objects
+FEWEST = 5  # held grasps: GraspGen skips objects with fewer (its discriminator also those with fewer failed ones)
 
 
 def export(twin: TwinContent) -> Exported:
     """Write a twin as one object of a GraspGen data set, with a grasp file for each of its parallel grippers.
 
-    The object root is ``objects/``, the grasp root ``grasp_data/<gripper>/``, the splits' ``splits/<gripper>/``. Which split
-    an object is in follows from the twin's id. The mesh is the visual one in the object frame, +Z up. Grasps that failed
-    are in it, with ``object_in_gripper`` false; those that are retired are not. Raises ExportError for a twin with
-    grasps of no parallel gripper.
+    The object root is ``objects/``, the grasp root ``grasp_data/<gripper>/``, and the split root ``splits/<gripper>/``. The
+    split of an object follows from the twin's id. The mesh is the visual one in the object frame, +Z up. Failed grasps are
+    included with ``object_in_gripper`` false, retired ones are not. Raises ExportError for a twin without grasps of a parallel
+    gripper.
     """
     grippers = parallel_grippers_of(twin)
     if not grippers:
@@ -78,7 +78,7 @@ def _content(twin: TwinContent, object_file: str, gripper: dict[str, Any], rows:
 
 
 def _gripper(name: str, rows: GraspRows) -> tuple[dict[str, Any], list[str]]:
-    """Return the gripper's block, and what a reader has to know of it."""
+    """Return the gripper's JSON block, and remarks for users of the file."""
     asset, gripper = ASSETS.get(name), parallel_gripper(name)
     depths = sorted(set(rows.depth_m.tolist()))
     block: dict[str, Any] = {

@@ -1,8 +1,8 @@
-"""isaac_grasp: the YAML of grasps that Isaac Sim's grasp editor, GraspDataGen's grasp_sim and GraspGen's tools read.
+"""isaac_grasp export: the YAML of grasps that Isaac Sim's grasp editor, GraspDataGen's grasp_sim and GraspGen's tools read.
 
-Sources: the Grasp Editor's page in Isaac Sim's documentation (format_version, object_frame_link), GraspDataGen
+Sources: the Grasp Editor page of the Isaac Sim documentation (format_version, object_frame_link), GraspDataGen
 docs/components/grasp-sim.md and ``GraspGuessBuffer.create_isaac_grasp_data`` (the full form), GraspGen
-grasp_gen/dataset/eval_utils.py (the short one, a part of it).
+grasp_gen/dataset/eval_utils.py (the short form, a subset).
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from manitwin.assets.writers.mesh_files import object_mesh
 from manitwin.errors import ExportError
 from manitwin.geometry.poses import quaternion_wxyz
 
-LEAST_CONFIDENCE = 0.001  # of a grasp that held: 0.0 says that it failed, and readers leave it out
+LEAST_CONFIDENCE = 0.001  # of a held grasp: readers take 0.0 as failed and skip it
 
 
 def export(twin: TwinContent) -> Exported:
-    """Write a file of grasps for each parallel gripper, and the object's mesh in the object frame, +Z up.
+    """Write a grasp file for each parallel gripper, and the object's mesh in the object frame, +Z up.
 
-    Confidence is the robustness where it was measured, else the proposer's score; 0.0 for grasps that failed. Poses are those
-    of the link that ``gripper_frame_link`` names, in the frame of ``object_frame_link``: which prim that is, readers leave to the
-    user. Raises ExportError for a twin with grasps of no parallel gripper.
+    Confidence is the measured robustness, or the proposer's score where robustness was not measured; it is 0.0 for failed
+    grasps. Poses are those of the link ``gripper_frame_link`` in the frame ``object_frame_link``; readers leave it to the user
+    which prim that is. Raises ExportError for a twin without grasps of a parallel gripper.
     """
     grippers = parallel_grippers_of(twin)
     if not grippers:
@@ -71,7 +71,7 @@ def export(twin: TwinContent) -> Exported:
 
 
 def _lines(twin: TwinContent, object_file: str, rows: GraspRows) -> Iterator[str]:
-    """Yield the file's lines, those that held first: readers take the first grasp for the names of the joints."""
+    """Yield the lines of the file, held grasps first: readers take the joint names from the first grasp."""
     asset, dimensions = ASSETS.get(rows.gripper), parallel_gripper(rows.gripper)
     yield from (f"# {line}\n" for line in provenance_lines(twin.record))
     yield from _header(object_file, twin.name)
@@ -105,7 +105,9 @@ def _header(object_file: str, name: str) -> Iterator[str]:
 
 
 def _prim_name(name: str) -> str:
-    """Return a name that a USD prim can have (USD glossary, identifiers): letters, digits and underscores, no digit first."""
+    """Return a valid name of a USD prim: letters, digits and underscores, not starting with a digit (USD glossary,
+    identifiers).
+    """
     plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
     return plain if plain and not plain[0].isdigit() else f"_{plain}"
 
@@ -122,7 +124,7 @@ def _gripper_lines(asset: GripperAsset, opening_m: float, tip_depth_m: float) ->
 
 
 def _bite_point(asset: GripperAsset, way_m: float, depth_m: float) -> np.ndarray:
-    """Return the middle of the first finger's pad (m) in the base link's frame, that finger's way being ``way_m``."""
+    """Return the centre of the first finger's pad (m) in the frame of the base link, for a finger travel of ``way_m``."""
     return way_m * np.array(asset.bite_axis) + depth_m * np.array([0.0, 0.0, 1.0])
 
 
@@ -131,11 +133,11 @@ def _row(values: Any) -> str:
 
 
 def _number(value: float) -> str:
-    """Return a float as YAML 1.1 has it: ``1e-05`` without a point would be read as text (yaml.org/type/float.html)."""
+    """Format a float for YAML 1.1: ``1e-05`` without a point would be read as text (yaml.org/type/float.html)."""
     text = repr(value + 0.0)
     return text if "e" not in text or "." in text else text.replace("e", ".0e")
 
 
 def _text(value: str) -> str:
-    """Return a double-quoted scalar: no name is taken for a number or a truth value."""
+    """Return a double-quoted scalar, so that no name is read as a number or a truth value."""
     return '"' + "".join(f"\\{c}" if c in '"\\' else c for c in value) + '"'

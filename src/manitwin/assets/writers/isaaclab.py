@@ -1,4 +1,4 @@
-"""Isaac Lab: the USD export, and a module with the RigidObjectCfg that spawns it."""
+"""Isaac Lab export: the USD export and a module with the RigidObjectCfg that spawns it."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ from isaaclab.assets import RigidObjectCfg
 def export(twin: TwinContent) -> Exported:
     """Return the USD export with ``<name>_cfg.py`` beside it.
 
-    Source: Isaac Lab 2.x and 3.0, isaaclab.assets.RigidObjectCfg and isaaclab.sim.UsdFileCfg. No pose is written: its
-    quaternions are wxyz up to 2.x and xyzw from 3.0.
+    No initial pose is written, because quaternions are wxyz up to Isaac Lab 2.x and xyzw from 3.0. Source: Isaac Lab 2.x and
+    3.0, isaaclab.assets.RigidObjectCfg and isaaclab.sim.UsdFileCfg.
     """
     stage = usd.export(twin.as_one_body())
     module, source = f"{twin.name}_cfg", twin.record.source
@@ -65,5 +65,5 @@ def export(twin: TwinContent) -> Exported:
 
 
 def _quoted(text: str) -> str:
-    """Return free text as one line that cannot end a comment."""
+    """Quote free text as one line that cannot end a comment."""
     return json.dumps(text, ensure_ascii=False)

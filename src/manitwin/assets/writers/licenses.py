@@ -1,4 +1,4 @@
-"""Licences of exports: the check against an allowed list, and the texts of licence, source and attribution."""
+"""Licences of exports: check against an allow-list, and the texts that state licence, source and attribution."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ def license_of(record: TwinRecord) -> str:
 
 
 def allowed_licenses(names: Iterable[str] | None) -> frozenset[str] | None:
-    """Return the licences that may go out, in lower case; None where nothing is said, which allows all.
+    """Return the allowed licences in lower case, or None without a list, which allows all.
 
-    Raises UsageError where a list is given that names none.
+    Raises UsageError for a list that names no licence.
     """
     if names is None:
         return None
@@ -31,10 +31,10 @@ def allowed_licenses(names: Iterable[str] | None) -> frozenset[str] | None:
 
 
 def check_license(record: TwinRecord, allow: Iterable[str] | None) -> None:
-    """Raise ExportError where a list of licences is given and the twin's is not on it.
+    """Raise ExportError if a list of licences is given and the twin's licence is not in it.
 
-    Identifiers are compared in any case (SPDX specification 2.3, annex D.2); an expression such as ``MIT OR CC0-1.0`` as a
-    whole. ``unknown`` goes out only where it is named.
+    Identifiers are compared without regard to case (SPDX specification 2.3, annex D.2); an expression such as
+    ``MIT OR CC0-1.0`` is compared as a whole. ``unknown`` is exported only if the list names it.
     """
     allowed = allowed_licenses(allow)
     licence = license_of(record)
@@ -47,9 +47,9 @@ def check_license(record: TwinRecord, allow: Iterable[str] | None) -> None:
 
 
 def provenance_lines(record: TwinRecord) -> tuple[str, ...]:
-    """Return what a file says of its origin, one line each: ``twin``, ``source``, ``license`` and, where known, ``attribution``.
+    """Return the lines that state a file's origin: ``twin``, ``source``, ``license`` and, where known, ``attribution``.
 
-    Each is ``key: value``, for comments and metadata fields; nothing in them depends on the machine or the time.
+    Each is ``key: value``, for comments and metadata fields. They do not depend on the machine or the time.
     """
     source = record.source
     prompt = f", from the words: {one_line(source.prompt)}" if source.prompt else ""
@@ -63,7 +63,7 @@ def provenance_lines(record: TwinRecord) -> tuple[str, ...]:
 
 
 def license_text(record: TwinRecord) -> str:
-    """Return LICENSE.txt: the licence, whom to credit, the source, and what was changed (CC BY 4.0, section 3(a)(1)(B))."""
+    """Return LICENSE.txt: licence, attribution, source, and the changes made (CC BY 4.0, section 3(a)(1)(B))."""
     licence = license_of(record)
     lines = [*provenance_lines(record), ""]
     if licence.lower() == UNKNOWN:

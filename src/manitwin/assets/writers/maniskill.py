@@ -1,8 +1,8 @@
-"""ManiSkill 3: models and info in the layout of its YCB objects, and a loader that sets the true physics.
+"""ManiSkill 3 export: models and info in the layout of its YCB objects, and a loader that sets the true physics.
 
 Source: ManiSkill's mani_skill/utils/building/actors/ycb.py: ``info_raw.json`` with ``bbox``, ``scales`` and ``density`` by
-name, ``models/<name>/collision.ply`` read by ``add_multiple_convex_collisions_from_file``, +Z up. Its loader makes the mass
-of the density alone, and knows no friction.
+name, ``models/<name>/collision.ply`` read by ``add_multiple_convex_collisions_from_file``, +Z up. ManiSkill's own loader
+derives the mass from the density alone and ignores friction.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from manitwin.twin.store import canonical_json
 
 
 def export(twin: TwinContent) -> Exported:
-    """Write a twin as one object of ``info_raw.json``, with ``load.py`` that builds it.
+    """Write a twin as one object of ``info_raw.json``, with a ``load.py`` that builds it.
 
-    Raises ExportError for mass properties that no rigid body has.
+    Raises ExportError for mass properties that are impossible for a rigid body.
     """
     folder = f"models/{twin.name}"
     return Exported(
@@ -42,9 +42,10 @@ def export(twin: TwinContent) -> Exported:
 
 
 def _collision_ply(twin: TwinContent) -> bytes:
-    """Return all hulls as one file: SAPIEN makes a convex shape of each part that is not connected to another.
+    """Return all hulls as one PLY file: SAPIEN builds a convex shape from each connected component.
 
-    As text: of binary PLY whose first number begins with the byte of a line break, assimp skips that byte and SAPIEN crashes.
+    The file is ASCII: in a binary PLY whose first number begins with the byte of a line break, assimp skips that byte and
+    SAPIEN crashes.
     """
     vertices, faces = trimesh.util.append_faces([v for v, _ in twin.hulls], [f for _, f in twin.hulls])
     lines = [
@@ -64,7 +65,7 @@ def _collision_ply(twin: TwinContent) -> bytes:
 def _info(twin: TwinContent) -> dict[str, Any]:
     physical, inertial = twin.physical, inertial_of(twin)
     corners = np.concatenate([vertices for vertices, _ in twin.hulls])
-    # engines add the hulls' volumes up, overlaps and all: so does the density that gives the mass
+    # engines sum the volumes of the hulls including overlaps, so the density that yields the mass uses the same sum
     volume_m3 = sum(trimesh.Trimesh(v, f, process=False).convex_hull.volume for v, f in twin.hulls)
     return {
         "bbox": {"min": corners.min(axis=0).tolist(), "max": corners.max(axis=0).tolist()},

@@ -4,8 +4,8 @@
     builder = object_builder(scene, object_names()[0])
     actor = builder.build(name="object")
 
-``scene`` is a ManiSkillScene (``self.scene`` in a task's ``_load_scene``) or a sapien.Scene. ManiSkill's own loaders take
-one density for all shapes; these objects have a measured or estimated mass, centre of mass and inertia instead.
+``scene`` is a ManiSkillScene (``self.scene`` in a task's ``_load_scene``) or a sapien.Scene. ManiSkill's own loaders use one
+density for all shapes; these objects have a measured or estimated mass, centre of mass and inertia instead.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ def object_names() -> list[str]:
 
 
 def object_builder(scene: Any, name: str, *, visual: bool = True) -> Any:
-    """Return the actor builder of an object whose frame is +Z up with the origin at the bottom centre.
+    """Return the actor builder of an object, whose frame is +Z up with the origin at the bottom centre.
 
-    Its initial pose stands upright on z = 0; move it with ``builder.initial_pose`` before ``build``. ``visual`` needs a
-    render system.
+    The initial pose is upright on z = 0; change it with ``builder.initial_pose`` before ``build``. ``visual`` requires a render
+    system.
     """
     info = _info()[name]
     folder = FOLDER / "models" / name
@@ -49,7 +49,7 @@ def object_builder(scene: Any, name: str, *, visual: bool = True) -> Any:
 
 
 def resting_poses(name: str) -> list[sapien.Pose]:
-    """Return poses on the plane z = 0 in which the object stays, the likeliest first."""
+    """Return the stable poses on the plane z = 0, most probable first."""
     return [sapien.Pose(rest["position_m"], rest["quaternion_wxyz"]) for rest in _info()[name]["resting_poses"]]
 
 

@@ -1,4 +1,4 @@
-"""The mass properties of a twin as every format takes them, refused where no rigid body can have them."""
+"""Mass properties of a twin for export, validated so that they are possible for a rigid body."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from manitwin.twin.link_records import Link
 from manitwin.twin.store import canonical_json
 
 TRIANGLE_TOLERANCE = 1e-9
-"""By how much, of the largest moment, the other two may fall short of it: rounding of thin plates, no more."""
-_SWEEPS = 30  # it converges quadratically: four or five are what any tensor needs
+"""Largest shortfall in the triangle inequality of moments, relative to the largest moment: allows for rounding of thin plates."""
+_SWEEPS = 30  # convergence is quadratic: four or five sweeps suffice for any tensor
 PHYSICS_FILE = "physics.json"
 
 
@@ -37,17 +37,17 @@ class TwinInertial:
 
 
 def inertial_of(twin: TwinContent) -> TwinInertial:
-    """Return a twin's mass properties.
+    """Return the mass properties of a twin.
 
-    Raises ExportError for a mass that is not positive, and for a tensor that is not symmetric, not positive definite or
-    against the triangle inequality of moments, which engines refuse or change in silence.
+    Raises ExportError for a mass that is not positive, and for a tensor that is not symmetric, not positive definite, or
+    violates the triangle inequality of moments: engines refuse such values or change them silently.
     """
     physical = twin.physical
     return _inertial(twin.name, physical.mass_kg.value, physical.center_of_mass_m, physical.inertia_kg_m2)
 
 
 def inertial_of_link(twin: TwinContent, link: Link) -> TwinInertial:
-    """Return the mass properties of one of a twin's links, as the twin stands; raises ExportError as ``inertial_of``."""
+    """Return the mass properties of one link, in the present pose of the twin; raises ExportError like ``inertial_of``."""
     return _inertial(f"{twin.name}, link {link.name}", link.mass_kg, link.center_of_mass_m, link.inertia_kg_m2)
 
 
@@ -66,17 +66,18 @@ def _inertial(name: str, mass_kg: float, center_of_mass_m: list[float], inertia:
             f"{name}: no rigid body has the principal moments {', '.join(f'{m:.3g}' for m in moments)} kg m^2 "
             "(each is positive, and none exceeds the sum of the others); build the twin again"
         )
-    if slack < TRIANGLE_TOLERANCE * most:  # MuJoCo allows for no rounding of A + B >= C
+    if slack < TRIANGLE_TOLERANCE * most:  # MuJoCo tolerates no rounding in A + B >= C
         extra = TRIANGLE_TOLERANCE * most - slack
         tensor, moments = tensor + extra * np.eye(3), moments + extra
     return TwinInertial(mass_kg, np.array(center_of_mass_m), tensor, moments, axes_wxyz)
 
 
 def principal_axes(inertia_kg_m2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the moments ``(3,)`` kg m^2 and the quaternion wxyz ``(4,)`` that turns principal axes into the object's.
+    """Return the moments ``(3,)`` kg m^2 and the quaternion wxyz ``(4,)`` from the principal axes to the object frame.
 
-    ``inertia = R diag(moments) R^T`` with ``R`` the quaternion's rotation. A tensor that is diagonal keeps its axes, and
-    the result is the same on every machine: LAPACK's would turn freely where two moments are equal.
+    ``inertia = R diag(moments) R^T`` with ``R`` the rotation of the quaternion. A diagonal tensor keeps its axes, and the
+    result is the same on every machine; LAPACK would choose arbitrary axes where two moments are equal.
+
     Source: cyclic Jacobi rotations (Golub and Van Loan, Matrix Computations, section 8.5.3).
     """
     tensor = np.array(inertia_kg_m2, dtype=np.float64)
@@ -89,13 +90,15 @@ def principal_axes(inertia_kg_m2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _zero_element(tensor: np.ndarray, axes: np.ndarray, p: int, q: int) -> bool:
-    """Rotate in the plane of axes p and q so that their product of inertia is zero; False where it is nothing already."""
+    """Rotate in the plane of axes p and q to make their product of inertia zero; return False if it is negligible already."""
     off = float(tensor[p, q])
     if abs(off) <= 1e-16 * math.sqrt(abs(float(tensor[p, p] * tensor[q, q]))):
         tensor[p, q] = tensor[q, p] = 0.0
         return False
     ratio = float(tensor[q, q] - tensor[p, p]) / (2 * off)
-    tangent = math.copysign(1.0, ratio) / (abs(ratio) + math.hypot(ratio, 1.0))  # the smaller of both angles
+    tangent = math.copysign(1.0, ratio) / (
+        abs(ratio) + math.hypot(ratio, 1.0)
+    )  # the smaller of the two possible angles
     cosine = 1 / math.hypot(tangent, 1.0)
     turn = np.eye(3)
     turn[p, p] = turn[q, q] = cosine
@@ -108,7 +111,7 @@ def _zero_element(tensor: np.ndarray, axes: np.ndarray, p: int, q: int) -> bool:
 def physics_of(twin: TwinContent) -> dict[str, Any]:
     """Return the physical properties as JSON values: SI units, object frame, each estimate with its interval and source.
 
-    Raises ExportError as ``inertial_of``.
+    Raises ExportError like ``inertial_of``.
     """
     physical, inertial = twin.physical, inertial_of(twin)
     return {
@@ -138,7 +141,7 @@ def physics_of(twin: TwinContent) -> dict[str, Any]:
 
 
 def _moving(twin: TwinContent) -> dict[str, Any]:
-    """Return links and joints as twin.json has them; nothing of what is one rigid body."""
+    """Return links and joints as in twin.json; an empty dict for a rigid twin."""
     record = twin.record
     if not record.links:
         return {}
@@ -147,5 +150,5 @@ def _moving(twin: TwinContent) -> dict[str, Any]:
 
 
 def physics_file(twin: TwinContent) -> bytes:
-    """Return physics.json. Raises ExportError as ``inertial_of``."""
+    """Return physics.json. Raises ExportError like ``inertial_of``."""
     return canonical_json(physics_of(twin)).encode()

@@ -1,4 +1,4 @@
-"""The meshes of a twin as the files that XML formats name: visual parts as OBJ, MTL and PNG, hulls as OBJ."""
+"""Mesh files of a twin for XML formats: visual parts as OBJ, MTL and PNG, hulls as OBJ."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from manitwin.formats.meshes.textures import linear_to_srgb, material_of, normal
 
 @dataclass(frozen=True)
 class VisualPart:
-    """A textured mesh: its files by name, all in one folder, and what its material is.
+    """A textured mesh with its files by name, all in one folder, and its material.
 
-    ``mesh`` and ``texture`` are names in ``files``; ``rgba`` is sRGB and multiplies the texture. ``places`` counts its
-    distinct vertices.
+    ``mesh`` and ``texture`` are names in ``files``. ``rgba`` is in sRGB and multiplies the texture. ``places`` is the number of
+    distinct vertex positions.
     """
 
     name: str
@@ -33,21 +33,21 @@ class VisualPart:
 
 
 def visual_parts(twin: TwinContent, folder: str) -> tuple[VisualPart, ...]:
-    """Return the visual parts below ``folder``, in the object frame, with names that no other twin has."""
+    """Return the visual parts below ``folder``, in the object frame, with names unique to the twin."""
     return tuple(_visual_part(part, f"{twin.name}_visual_{i:02d}", folder) for i, part in enumerate(twin.visual))
 
 
 def hulls_of(twin: TwinContent) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
-    """Return the hulls of a twin. Raises ExportError where there is none: such a body falls through the floor."""
+    """Return the hulls of a twin. Raises ExportError if it has none, since such a body falls through the floor."""
     if not twin.hulls:
         raise ExportError(f"{twin.name}: it has no collision hulls; build the twin again")
     return twin.hulls
 
 
 def hull_files(twin: TwinContent, folder: str) -> dict[str, bytes]:
-    """Return the collision hulls below ``folder``: one OBJ file each, in the object frame, by name, in the twin's order.
+    """Return the collision hulls below ``folder``: one OBJ file each, in the object frame, by name, in the order of the twin.
 
-    Raises ExportError where there is none.
+    Raises ExportError if there are none.
     """
     return {
         f"{folder}/{twin.name}_hull_{i:02d}.obj": obj_file(vertices, faces)
@@ -56,7 +56,7 @@ def hull_files(twin: TwinContent, folder: str) -> dict[str, bytes]:
 
 
 def lost_maps(twin: TwinContent) -> tuple[str, ...]:
-    """Say which textures OBJ's material does not have, as lines for a README."""
+    """Return README lines on the textures that an OBJ material cannot hold."""
     materials = [material_of(part) for part in twin.visual]
     lost = []
     if any(m.normalTexture is not None for m in materials):
@@ -74,11 +74,11 @@ def _visual_part(part: trimesh.Trimesh, name: str, folder: str) -> VisualPart:
     red, green, blue, alpha = (np.asarray(material.baseColorFactor) / 255).tolist()
     factor = linear_to_srgb(
         np.array([red, green, blue])
-    )  # factors are linear (glTF 2.0, section 3.9.2), these formats sRGB
+    )  # factors are linear (glTF 2.0, section 3.9.2); these formats use sRGB
     rgba = (*(round(float(c), 6) for c in factor), round(alpha, 6))
     roughness, metallic = float(material.roughnessFactor), float(material.metallicFactor)
     normals = normals_of(part)
-    vertices = np.asarray(part.vertices, np.float32)  # a GLB has no more than these digits
+    vertices = np.asarray(part.vertices, np.float32)  # a GLB stores single precision
     files = {
         f"{folder}/{name}.obj": obj_file(
             vertices,
@@ -115,9 +115,9 @@ def obj_file(
 ) -> bytes:
     """Return an OBJ file with one object.
 
-    ``vertices (V, 3)`` m, ``faces (F, 3)``, ``uv (V, 2)`` with the origin at the lower left, as OBJ has it, ``normals (V, 3)``.
-    Vertices at one place are written once: a solid with texture seams stays closed for tools that look at indices. Numbers
-    are the shortest that read back as the same ones, in the precision of the arrays.
+    ``vertices (V, 3)`` are in metres; ``faces (F, 3)``; ``uv (V, 2)`` has its origin at the lower left as in OBJ;
+    ``normals (V, 3)``. Coincident vertices are written once, so that a solid with texture seams stays closed for tools that
+    compare indices. Numbers have the fewest digits that restore them exactly in the precision of the arrays.
     """
     lines = [f"mtllib {library}"] if library is not None else []
     corners: list[np.ndarray | None] = []
@@ -137,9 +137,9 @@ def obj_file(
 def mtl_file(
     name: str, *, rgba: tuple[float, float, float, float], roughness: float, metallic: float, texture: str | None
 ) -> bytes:
-    """Return a material library of one material; ``rgba`` in sRGB, ``texture`` a file beside it.
+    """Return a material library with one material; ``rgba`` is in sRGB, ``texture`` the name of a file beside it.
 
-    ``Pr`` and ``Pm`` are the roughness and metalness of the PBR extension that Blender and assimp read.
+    ``Pr`` and ``Pm`` are roughness and metalness in the PBR extension that Blender and assimp read.
     """
     red, green, blue, alpha = rgba
     lines = [
@@ -156,7 +156,7 @@ def mtl_file(
 
 
 def _joined(place: np.ndarray | None, uv: np.ndarray | None, normal: np.ndarray | None) -> np.ndarray:
-    """Return the corners of faces ``(F, 3)`` as words: ``v``, ``v/vt``, ``v//vn`` or ``v/vt/vn``."""
+    """Format the corners of faces ``(F, 3)`` as ``v``, ``v/vt``, ``v//vn`` or ``v/vt/vn``."""
     assert place is not None
     words = place
     if uv is not None or normal is not None:
@@ -171,4 +171,4 @@ def _joined(place: np.ndarray | None, uv: np.ndarray | None, normal: np.ndarray 
 def object_mesh(twin: TwinContent) -> bytes:
     """Return all visual parts as one OBJ file without materials: metres, +Z up, origin at the bottom centre."""
     vertices, faces = trimesh.util.append_faces([p.vertices for p in twin.visual], [p.faces for p in twin.visual])
-    return obj_file(np.asarray(vertices, np.float32), np.asarray(faces))  # a GLB has no more than these digits
+    return obj_file(np.asarray(vertices, np.float32), np.asarray(faces))  # a GLB stores single precision

@@ -1,7 +1,7 @@
-"""MJCF: one body with a free joint, with those of its links below it, that loads alone in MuJoCo and attaches to any scene.
+"""MJCF export: a body with a free joint, and its links below it, that loads alone in MuJoCo and can be attached to any scene.
 
-Written after the XML reference of MuJoCo (mujoco.readthedocs.io, XMLreference). No compiler, option or default element: they
-would act on the whole scene that the body is attached to.
+Follows MuJoCo's XML reference (mujoco.readthedocs.io, XMLreference). The file has no compiler, option or default element,
+because these would affect the whole scene that the body is attached to.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ MIN_VERTICES = 4  # MuJoCo's compiler: "at least 4 vertices required"
 
 
 def export(twin: TwinContent) -> Exported:
-    """Write a twin as MJCF with meshes beside it. Raises ExportError for mass properties that no rigid body has."""
+    """Write a twin as MJCF with meshes beside it. Raises ExportError for mass properties that are impossible for a rigid body."""
     parts = visual_parts(twin, ASSETS)
     kept = [part for part in parts if part.places >= MIN_VERTICES]
     hulls = hull_files(twin, ASSETS)
@@ -76,14 +76,14 @@ def _add_assets(root: etree._Element, parts: list[VisualPart], hulls: list[str])
             add(asset, "texture", type="2d", name=part.name, file=part.texture)
             material["texture"] = part.name
         add(asset, "material", name=part.name, **material)
-        # an open sheet has no volume, and the mass is the body's own
+        # an open sheet has no volume, and the body states the mass
         add(asset, "mesh", name=part.name, file=part.mesh, inertia="shell")
     for hull in hulls:
         add(asset, "mesh", name=PurePosixPath(hull).stem, file=hull, inertia="convex")
 
 
 def _add_body(root: etree._Element, twin: TwinContent, parts: list[VisualPart], hulls: list[str]) -> None:
-    """Add the twin's body, of one with links the first link's; the others are below the links that hold them."""
+    """Add the body of the twin, or the bodies of its links, each below the body of its parent link."""
     body = add(add(root, "worldbody"), "body", name=twin.name)
     add(body, "freejoint", name=twin.name)
     if not twin.record.links:
@@ -105,7 +105,7 @@ def _add_body(root: etree._Element, twin: TwinContent, parts: list[VisualPart], 
 
 
 def _add_joint(body: etree._Element, joint: ArticulatedJoint) -> None:
-    """Add a joint at its body's origin; where nothing else is said, MJCF's angles are degrees."""
+    """Add a joint at the origin of its body; MJCF angles are in degrees by default."""
     unit = 1.0 if joint.kind == "prismatic" else math.degrees(1.0)
     said = {"type": "slide" if joint.kind == "prismatic" else "hinge", "axis": number_text(*joint.axis)}
     if joint.lower is not None and joint.upper is not None:
@@ -126,7 +126,7 @@ def _fill(
     hulls: Iterable[str],
     origin_m: np.ndarray,
 ) -> None:
-    """Give a body, whose frame has its origin at ``origin_m`` in the object frame, its mass and its meshes."""
+    """Add mass properties and meshes to a body whose frame has its origin at ``origin_m`` in the object frame."""
     tensor = inertial.inertia_kg_m2
     add(
         body,

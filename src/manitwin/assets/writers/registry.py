@@ -1,6 +1,7 @@
-"""The formats that a twin can be written in: exporters are backends of the kind ``exporter``, imported when they are asked for.
+"""Registry of export formats: exporters are backends of the kind ``exporter``, imported when first used.
 
-A package adds one like any backend (``models.registry``): ``BACKENDS = {"exporter": {"my_format": "my_package.export:export"}}``.
+A package registers one like any backend (``models.registry``):
+``BACKENDS = {"exporter": {"my_format": "my_package.export:export"}}``.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from manitwin.models.registry import backends, target
 
 
 def formats() -> tuple[str, ...]:
-    """Return the names of all formats: the built-in ones in their order, then those of other packages."""
+    """Return the names of all formats: the built-in ones in their order, then those of other packages, sorted."""
     from manitwin.models.builtin import BACKENDS
 
     built_in = BACKENDS["exporter"]
@@ -22,7 +23,7 @@ def formats() -> tuple[str, ...]:
 
 
 def exporter(name: str) -> Exporter:
-    """Return the exporter of a format. Raises UsageError for an unknown one, or where its package cannot be imported."""
+    """Return the exporter of a format. Raises UsageError if it is unknown or its package cannot be imported."""
     if name not in formats():
         raise UsageError(choose_from("format", name, formats()))
     module, _, function = target("exporter", name).partition(":")
@@ -36,9 +37,9 @@ def exporter(name: str) -> Exporter:
 
 
 def chosen_formats(names: Iterable[str] | None) -> tuple[str, ...]:
-    """Return the formats that are meant, each once, in the order of ``formats()``; all of them for None or ``all``.
+    """Return the selected formats without duplicates, in the order of ``formats()``; all of them for None or ``all``.
 
-    Raises UsageError for an unknown one, or where none is named.
+    Raises UsageError for an unknown format or an empty selection.
     """
     wanted = {name.strip().lower() for name in names if name.strip()} if names is not None else {"all"}
     for name in sorted(wanted - {"all"}):

@@ -1,9 +1,9 @@
-"""RoboTwin 2.0: an object folder with visual and collision GLB, model_data and descriptions.
+"""RoboTwin 2.0 export: an object folder with visual and collision GLB, model_data and descriptions.
 
-Sources: RoboTwin's envs/utils/create_actor.py (which files), envs/utils/actor_utils.py (frames: the scale goes onto their
-translations), envs/_base_task.py ``get_grasp_pose`` (contact frame to gripper frame), envs/robot/robot.py
-``_trans_from_gripper_to_endlink`` and the manual's page on new embodiments (the gripper frame's X approaches, its Y is the
-direction in which the fingers move).
+Sources: RoboTwin's envs/utils/create_actor.py (file names), envs/utils/actor_utils.py (frames, whose translations are
+multiplied by the scale), envs/_base_task.py ``get_grasp_pose`` (contact frame to gripper frame), envs/robot/robot.py
+``_trans_from_gripper_to_endlink`` and the manual's page on new embodiments (X of the gripper frame is the approach direction, Y
+the direction in which the fingers move).
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from manitwin.twin.record import Language, Placement
 from manitwin.twin.store import canonical_json
 
 MAX_GRASPS = 16
-"""RoboTwin plans a path to every contact frame each time it chooses one: two frames a grasp are 32 plans."""
-SEEN, UNSEEN = 12, 3  # phrases of a description, as in RoboTwin's own
-STABLE_TILT_RAD = math.radians(3)  # RoboTwin's check_stable throws a scene away in which an object turned by more
-_FIRST_NUMBER, _NUMBERS = 200, 800  # below are RoboTwin's own objects
+"""RoboTwin plans a path to every contact frame at each choice: two frames for each grasp make 32 plans."""
+SEEN, UNSEEN = 12, 3  # phrases in a description, as in RoboTwin's own objects
+STABLE_TILT_RAD = math.radians(3)  # RoboTwin's check_stable discards a scene in which an object rotated by more
+_FIRST_NUMBER, _NUMBERS = 200, 800  # lower numbers belong to RoboTwin's own objects
 FRANKA_GRIPPER_BIAS_M = 0.08  # of its franka-panda embodiment, by the manual's page on new embodiments
 _MAX_WORDS = 20
 _ARTICLE = re.compile(r"^(?:an?|the)\s+", re.IGNORECASE)
 _KNOWN_CLAUSE = re.compile(r"^(?:to|for|used)\s", re.IGNORECASE)
-# a caption with one of these is a sentence about the object and not a name for it
+# a caption with one of these verbs is a sentence about the object, not a noun phrase
 _FINITE_VERB = re.compile(
     r"\b(?:is|are|was|has|have|sits|stands|lies|can|features|shows|appears|looks)\b", re.IGNORECASE
 )
@@ -47,8 +47,8 @@ _FINITE_VERB = re.compile(
 def export(twin: TwinContent) -> Exported:
     """Write a twin as object ``base0`` of a RoboTwin object folder: metres, Y up, scale 1.
 
-    Each of the best grasps that held is written as two contact frames, half a turn about the approach direction apart: the
-    two ways in which a hand of two fingers can be held. Raises ExportError where the descriptions cannot be made.
+    Each of the best held grasps is written as two contact frames, half a turn about the approach direction apart, for the two
+    orientations of a two-finger hand. Raises ExportError if the descriptions cannot be composed.
     """
     name = object_name(twin)
     folder = f"assets/objects/{name}"
@@ -66,22 +66,23 @@ def export(twin: TwinContent) -> Exported:
 
 
 def _from_above(rows: GraspRows) -> GraspRows:
-    """Return the grasps that a hand can take of an object that stands on a table; all of them where there is none."""
+    """Return the grasps from above, which a hand can reach when the object stands on a table; all grasps if there are none."""
     above = np.flatnonzero(rows.gripper_to_object[:, 2, 3] >= 0.0)
     return rows.take(above) if len(above) else rows
 
 
 def object_name(twin: TwinContent) -> str:
-    """Return ``NNN_name``: a number by the twin's id, as RoboTwin asks of objects for clutter; the name is what is unique."""
+    """Return ``NNN_name``: a number from the twin's id, which RoboTwin requires of clutter objects, and the unique twin name."""
     return f"{_FIRST_NUMBER + int(twin.record.twin_id, 16) % _NUMBERS}_{twin.name}"
 
 
 def contact_frames(gripper_to_object: np.ndarray, depth_m: np.ndarray) -> np.ndarray:
     """Return RoboTwin's two contact frames ``(N, 2, 4, 4)``, Y up, of grasps ``(N, 4, 4)`` in the object frame.
 
-    The origin lies between the fingertips, Y points against the approach, Z along the closing direction; the second frame is
-    the first after half a turn about Y. RoboTwin's gripper frame is ``C_R [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]`` and lies
-    0.12 m behind C along its X: that X is the approach direction, its Y the closing one.
+    The origin lies between the fingertips, Y points against the approach direction, Z along the closing direction. The second
+    frame is the first one rotated by half a turn about Y. RoboTwin's gripper frame is
+    ``C_R [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]``, 0.12 m behind C along its own X, which is the approach direction; its Y is the
+    closing direction.
     """
     closing, side, approach = (gripper_to_object[:, :3, i] for i in range(3))
     frames = np.tile(np.eye(4), (len(gripper_to_object), 2, 1, 1))
@@ -99,7 +100,7 @@ def _model_data(twin: TwinContent, grasps: GraspRows) -> dict[str, Any]:
     words = {point.id: f"{point.type.replace('_', ' ')}: {point.scenario}" for point in points.grasp} if points else {}
     return {
         "scale": [1.0, 1.0, 1.0],
-        # along the axes and not of an oriented box: RoboTwin's clutter reads index 1 as the height
+        # along the axes, not those of an oriented box: RoboTwin's clutter code reads index 1 as the height
         "center": ((low + high) / 2).tolist(),
         "extents": (high - low).tolist(),
         "transform_matrix": np.eye(4).tolist(),
@@ -121,9 +122,9 @@ def _model_data(twin: TwinContent, grasps: GraspRows) -> dict[str, Any]:
 
 
 def _functional_frame(point: FunctionalPoint) -> np.ndarray:
-    """Return a functional point's frame, Y up: its Z points out of the object, where the interaction comes from.
+    """Return the frame of a functional point, Y up; its Z axis points out of the object, to where an interaction comes from.
 
-    It is that of the feature where the twin has one, else that of the point with its normal.
+    It is the frame of the feature if the point has one, otherwise a frame at the point along its normal.
     """
     if point.frame is not None:
         rotation = rotation_from_quaternion_wxyz(np.array(point.frame.quaternion_wxyz))
@@ -133,19 +134,19 @@ def _functional_frame(point: FunctionalPoint) -> np.ndarray:
 
 
 def _bounds(twin: TwinContent) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lowest and highest corner ``(3,)`` m of the hulls along RoboTwin's axes."""
+    """Return the lowest and the highest corner ``(3,)`` m of the hulls in RoboTwin's axes."""
     corners = np.concatenate([vertices for vertices, _ in twin.hulls]) @ OBJECT_TO_GLTF[:3, :3].T
     return corners.min(axis=0), corners.max(axis=0)
 
 
 def _stands(placement: Placement) -> bool:
-    """Tell whether the object rests as RoboTwin sets it down: with the object frame's +Z up."""
+    """Return whether the object is stable as RoboTwin places it, with the object frame's +Z up."""
     up = rotation_from_quaternion_wxyz(np.array(placement.quaternion_wxyz))[2, 2]
     return placement.settled and math.acos(min(1.0, float(up))) <= STABLE_TILT_RAD
 
 
 def _collision_glb(twin: TwinContent) -> bytes:
-    """Return the hulls as separate meshes: SAPIEN's ``load_multiple`` makes one convex shape of each."""
+    """Return the hulls as separate meshes: SAPIEN's ``load_multiple`` builds one convex shape from each."""
     grey = pbr_material("hull", base_color=(0.5, 0.5, 0.5))
     return write_glb(
         [
@@ -157,7 +158,7 @@ def _collision_glb(twin: TwinContent) -> bytes:
 
 def _description(twin: TwinContent) -> dict[str, Any]:
     language = twin.record.language
-    assert language is not None  # an accepted twin has it
+    assert language is not None  # an accepted twin has language
     seen, unseen = seen_and_unseen(language, SEEN, UNSEEN)
     return {"raw_description": language.category, "seen": seen, "unseen": unseen}
 
@@ -192,10 +193,10 @@ def _depth_of(grasps: GraspRows) -> str:
 
 
 def noun_phrases(language: Language, count: int) -> list[str]:
-    """Return ``count`` different phrases without an article, those of the captions first.
+    """Return ``count`` distinct noun phrases without an article, those from captions first.
 
-    They stand behind "the" in an instruction: captions that are whole sentences or commands are left out. Raises ExportError
-    where so many cannot be made.
+    Instructions use them after "the", so captions that are whole sentences or commands are skipped. Raises ExportError if too
+    few phrases are available.
     """
     captions = (phrase for text in (language.caption, *language.captions) if (phrase := _of_caption(text)))
     phrases = _distinct([*captions, *_of_attributes(language)])
@@ -207,7 +208,7 @@ def noun_phrases(language: Language, count: int) -> list[str]:
 
 
 def seen_and_unseen(language: Language, seen: int, unseen: int) -> tuple[list[str], list[str]]:
-    """Return phrases for training and disjoint ones to test with, the latter spread evenly over all kinds."""
+    """Return training phrases and disjoint test phrases, the latter spread evenly over all kinds of phrases."""
     phrases = noun_phrases(language, seen + unseen)
     step = (seen + unseen) // unseen
     held_out = phrases[step - 1 :: step][:unseen]
@@ -215,7 +216,7 @@ def seen_and_unseen(language: Language, seen: int, unseen: int) -> tuple[list[st
 
 
 def _of_caption(text: str) -> str | None:
-    """Return a caption's noun phrase, None where it is no such thing."""
+    """Return the noun phrase of a caption, or None if the caption is not a noun phrase."""
     line = one_line(text).rstrip(".")
     if not _ARTICLE.match(line) or ". " in line or _FINITE_VERB.search(line) or len(line.split()) > _MAX_WORDS:
         return None
@@ -257,7 +258,7 @@ def _of_attributes(language: Language) -> Iterator[str]:
 
 
 def _distinct(phrases: Iterable[str]) -> list[str]:
-    """Return each phrase once, whatever its capitals, where it comes first."""
+    """Remove phrases that repeat an earlier one up to letter case."""
     distinct: dict[str, str] = {}
     for phrase in phrases:
         distinct.setdefault(phrase.lower(), phrase)

@@ -1,7 +1,8 @@
-"""SDFormat 1.9: a model folder as Gazebo's resource path takes it, with ``model.config``; the links and joints of a twin too.
+"""SDFormat 1.9 export: a model folder for Gazebo's resource path, with ``model.config``, including the links and joints of a
+twin.
 
-Written after the specification (sdformat.org/spec, version 1.9). Paths of meshes are relative to the file: ``model://`` would
-need the resource path also where only the file is loaded.
+Follows the specification (sdformat.org/spec, version 1.9). Mesh paths are relative to the file, because ``model://`` would
+require the resource path even for loading the file alone.
 """
 
 from __future__ import annotations
@@ -31,16 +32,16 @@ from manitwin.twin.loaded_links import joints_of
 VERSION = "1.9"
 MESHES = "meshes"
 STILL = "0 0 0 0 0 0"
-BOUNCE_THRESHOLD_M_S = 0.0  # the specification's default, 100 km/s, would keep restitution from ever acting
+BOUNCE_THRESHOLD_M_S = 0.0  # the specification's default of 100 km/s would disable restitution altogether
 CANNOT_SAY = (
     "how the friction of two bodies is combined: ODE and DART take the smaller of the two, Bullet the product.",
     "that a collision mesh is convex: the attribute for it came with SDFormat 1.11; every one here is.",
 )
-FRICTION = {"ode": ("mu", "mu2"), "bullet": ("friction", "friction2")}  # DART takes ODE's
+FRICTION = {"ode": ("mu", "mu2"), "bullet": ("friction", "friction2")}  # DART reads ODE's
 
 
 def export(twin: TwinContent) -> Exported:
-    """Write a twin as a Gazebo model. Raises ExportError for mass properties that no rigid body has."""
+    """Write a twin as a Gazebo model. Raises ExportError for mass properties that are impossible for a rigid body."""
     parts, hulls = visual_parts(twin, MESHES), hull_files(twin, MESHES)
     root = new_element("sdf", version=VERSION)
     model = add(root, "model", name=twin.name)
@@ -69,15 +70,15 @@ def export(twin: TwinContent) -> Exported:
 
 
 def add_body(model: etree._Element, twin: TwinContent, parts: Iterable[VisualPart], hulls: Iterable[str]) -> None:
-    """Add a twin as one rigid body to a model, with the meshes of ``parts`` and ``hulls``; raises ExportError as ``export``."""
+    """Add a twin as one rigid body to a model, with the meshes ``parts`` and ``hulls``; raises ExportError like ``export``."""
     link = add(model, "link", name=twin.name)
     _fill_link(link, twin, inertial_of(twin), parts, hulls, np.zeros(3))
 
 
 def _add_links(model: etree._Element, twin: TwinContent, parts: tuple[VisualPart, ...], hulls: list[str]) -> None:
-    """Add every link in the frame of the joint that holds it, which has its origin and the axes of the object frame.
+    """Add every link in a frame at the joint to its parent, with the axes of the object frame.
 
-    A link's pose is the one with all joints at 0, relative to the link that holds it.
+    The pose of a link is relative to its parent link, with all joints at position 0.
     """
     record, joints = twin.record, joints_of(twin.record)
     origins = [np.zeros(3), *(joint.origin_m for joint in joints)]
@@ -107,7 +108,7 @@ def _renamed(twin: TwinContent) -> list[str]:
 
 
 def joint_names(twin: TwinContent) -> list[str]:
-    """Return the names of a twin's joints; one that a link has too ends in ``_joint``: SDFormat has one scope for both."""
+    """Return the joint names; ``_joint`` is appended to a name that a link has too, since SDFormat has one scope for both."""
     links = {link.name for link in twin.record.links}
     taken, names = links | {joint.name for joint in twin.record.joints}, []
     for joint in twin.record.joints:
@@ -120,7 +121,7 @@ def joint_names(twin: TwinContent) -> list[str]:
 
 
 def _add_joint(model: etree._Element, joint: ArticulatedJoint, name: str, parent: str, child: str) -> None:
-    """Add a joint in its child's frame, which is where a joint without a pose is."""
+    """Add a joint in the frame of its child, which is the default for a joint without a pose."""
     element = add(model, "joint", name=name, type=joint.kind)
     add(element, "parent", parent)
     add(element, "child", child)
@@ -184,7 +185,7 @@ def _add_surface(collision: etree._Element, twin: TwinContent) -> None:
 
 
 def add_friction(collision: etree._Element, friction: float) -> etree._Element:
-    """Add a surface of one coefficient of friction to a collision, for ODE, DART and Bullet; returns it."""
+    """Add a surface with one coefficient of friction, for ODE, DART and Bullet, to a collision, and return the surface."""
     surface = add(collision, "surface")
     engines = add(surface, "friction")
     for engine, tags in FRICTION.items():

@@ -1,4 +1,4 @@
-"""What NVIDIA's SimReady profile of a rigid prop asks of a stage besides its physics: labels, provenance, grasps, a thumbnail.
+"""Content of NVIDIA's SimReady profile for rigid props beyond physics: labels, provenance, grasp lines and a thumbnail.
 
 Source: SimReady Foundation 2026.8 (PyPI ``simready-foundation-tier-core``), profile Robotics-Prop 4.0.0: SL.001, SL.MAT.001,
 SL.QCODE.001 (labels by UsdSemantics), SR.001, SR.002, SR.004 (metadata, thumbnail), GSP.001 (grasp lines), DISP.001.
@@ -22,12 +22,12 @@ ASSET_TYPE = "Prop"
 WITHOUT_DATE = "not recorded: equal twins give equal files"
 MOST_GRASP_LINES = 32
 BESIDE_PAD_M = 0.01
-"""How far a grasp line begins outside of what the fingers touch: a ray along it then meets the surface from without."""
+"""Distance from the finger contacts to the ends of a grasp line, so that a ray along it hits the surface from outside."""
 THUMBNAIL_PX = 256
 
 
 def describe_asset(stage: Usd.Stage, twin: TwinContent) -> None:
-    """Say what the asset is, where it is from and how large and heavy it is, in the root layer's custom data."""
+    """Write identity, source, size and mass of the asset to the custom data of the root layer."""
     record, physical = twin.record, twin.physical
     category = category_of(twin)
     said = {
@@ -48,13 +48,13 @@ def describe_asset(stage: Usd.Stage, twin: TwinContent) -> None:
 
 
 def category_of(twin: TwinContent) -> str:
-    """Return the twin's category, or what it was called."""
+    """Return the twin's category, or else its name."""
     language = twin.record.language
     return language.category if language is not None else twin.record.name or "object"
 
 
 def label_prims(stage: Usd.Stage, root: Usd.Prim, twin: TwinContent) -> None:
-    """Label the body with its category and Wikidata item, and every material below it with what it is made of."""
+    """Label the body with its category and Wikidata item, and every material below it with the name of the material."""
     category = category_of(twin)
     _label(root, "class", category)
     _label(root, "wikidata_qcode", item_of(category))
@@ -68,10 +68,10 @@ def _label(prim: Usd.Prim, instance: str, value: str) -> None:
 
 
 def define_grasp_lines(stage: Usd.Stage, scope: Sdf.Path, twin: TwinContent) -> int:
-    """Define a line for each of the best and most different verified grasps of the first parallel gripper; returns how many.
+    """Define a line for each of the best and most diverse held grasps of the first parallel gripper; return their number.
 
-    A line lies along the closing direction through the middle of the fingertips, from beside one to beside the other; it is
-    a guide, not rendered. Its Xform and its curve both bear the name that readers look for.
+    A line runs along the closing direction through the point between the fingertips, from outside one contact to outside the
+    other. It is a guide and is not rendered. Both its Xform and its curve have the name that readers look for.
     """
     grippers = parallel_grippers_of(twin)
     if not grippers:
@@ -101,7 +101,7 @@ def define_grasp_lines(stage: Usd.Stage, scope: Sdf.Path, twin: TwinContent) -> 
 
 
 def set_display_color(scope: UsdGeom.Imageable, parts: tuple[trimesh.Trimesh, ...]) -> None:
-    """Give all that is seen one colour for viewers without materials: the surface's mean, linear Rec. 709, by area."""
+    """Set one display colour for viewers without materials: the area-weighted mean of the surface, linear Rec. 709."""
     areas = np.array([float(part.area) for part in parts])
     colors = np.array([_mean_color(part) for part in parts])
     mean = np.average(colors, axis=0, weights=areas if areas.sum() > 0 else None)
@@ -118,13 +118,16 @@ def _mean_color(part: trimesh.Trimesh) -> np.ndarray:
         return np.asarray(factor)
     small = material.baseColorTexture.convert("RGB").resize((32, 32), Image.Resampling.BOX)
     encoded = np.asarray(small, dtype=np.float64).reshape(-1, 3) / 255
-    # IEC 61966-2-1 (sRGB), the transfer function
+    # the transfer function of IEC 61966-2-1 (sRGB)
     linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
     return np.asarray(linear.mean(0) * factor)
 
 
 def thumbnail(twin: TwinContent, main: str) -> dict[str, bytes]:
-    """Return the thumbnail of a file by the name that viewers look for, a view on its own ground; empty without a view."""
+    """Return the thumbnail of a file under the name that viewers look for; empty for a twin without a picture.
+
+    The view is padded to a square with the colour of its corner pixel.
+    """
     if twin.picture is None:
         return {}
     with Image.open(io.BytesIO(twin.picture)) as view:

@@ -1,7 +1,7 @@
-"""URDF: one link, or the links and joints of a twin that has some, with paths relative to the file.
+"""URDF export: one link, or the links and joints of an articulated twin, with mesh paths relative to the file.
 
-Written after the URDF specification (wiki.ros.org/urdf/XML/link and /joint); ``<contact>`` is an element of PyBullet (Bullet's
-UrdfParser), which others skip.
+Follows the URDF specification (wiki.ros.org/urdf/XML/link and /joint). ``<contact>`` is an extension of PyBullet (Bullet's
+UrdfParser) that other loaders skip.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from manitwin.twin.loaded_links import joints_of
 
 MESHES = "meshes"
 NO_EFFORT_LIMIT, NO_VELOCITY_LIMIT = 1e3, 1e2
-"""Limits that stand for none, as the specification asks for numbers: far beyond what a thing of such a size meets."""
+"""Values for unknown limits, because the specification requires numbers: far beyond what a small object encounters."""
 
 
 def export(twin: TwinContent) -> Exported:
-    """Write a twin as URDF with meshes beside it. Raises ExportError for mass properties that no rigid body has."""
+    """Write a twin as URDF with meshes beside it. Raises ExportError for mass properties that are impossible for a rigid body."""
     parts, hulls = visual_parts(twin, MESHES), hull_files(twin, MESHES)
     root = new_element("robot", name=twin.name)
     if twin.record.links:
@@ -66,7 +66,7 @@ def _unsaid_limits(twin: TwinContent) -> list[str]:
 
 
 def _add_links(root: etree._Element, twin: TwinContent, parts: tuple[VisualPart, ...], hulls: list[str]) -> None:
-    """Add every link in the frame of the joint that holds it, which has its origin and the axes of the object frame."""
+    """Add every link in a frame at the joint to its parent, with the axes of the object frame."""
     record, joints = twin.record, joints_of(twin.record)
     origins = [np.zeros(3), *(joint.origin_m for joint in joints)]
     for place, link in enumerate(record.links):
@@ -80,7 +80,7 @@ def _add_links(root: etree._Element, twin: TwinContent, parts: tuple[VisualPart,
 def _add_joint(
     root: etree._Element, joint: ArticulatedJoint, parent: str, child: str, origins: list[np.ndarray]
 ) -> None:
-    """Add a joint; at its position 0 the child is where a motion from where it stands brings it."""
+    """Add a joint; the pose of the child at position 0 follows from its motion away from the present position."""
     element = add(root, "joint", name=joint.name, type=joint.kind)
     at_zero = joint.motion(0.0)
     origin_m = at_zero[:3, :3] @ joint.origin_m + at_zero[:3, 3] - origins[joint.parent]
@@ -115,9 +115,7 @@ def _add_link(
     _add_inertial(link, inertial, origin_m)
     for part in parts:
         visual = _add_shape(link, "visual", part.mesh, origin_m)
-        if (
-            part.texture is None
-        ):  # where there is a texture in the mesh's own material, SAPIEN would drop it for this one
+        if part.texture is None:  # SAPIEN would prefer this material to the textured one of the mesh
             add(add(visual, "material", name=part.name), "color", rgba=number_text(*part.rgba))
     for hull in hulls:
         _add_shape(link, "collision", hull, origin_m)

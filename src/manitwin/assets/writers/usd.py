@@ -1,4 +1,4 @@
-"""USD: one stage in the binary form with its textures beside it, or all in one USDZ package."""
+"""USD export: one stage in the binary form with its textures beside it, or everything in one USDZ package."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from manitwin.assets.writers.format_notes import FormatNotes
 from manitwin.assets.writers.simready import thumbnail
 from manitwin.assets.writers.usd_stage import CANNOT_SAY, OF_JOINTS, build_stage, crate
 
-_ALIGNMENT = 64  # USDZ specification, "Layout": file data starts on a multiple of 64 bytes
-_HEADER = 30  # ZIP APPNOTE 4.3.7: a local header without its name and extra field
-_PADDING_ID = 0x1986  # the extra field that Pixar's own writer pads with
+_ALIGNMENT = 64  # USDZ specification, "Layout": file data starts at a multiple of 64 bytes
+_HEADER = 30  # ZIP APPNOTE 4.3.7: size of a local header without name and extra field
+_PADDING_ID = 0x1986  # the extra field that Pixar's own writer uses for padding
 _OF_LINKS = ("mass", "centre of mass", "inertia")
 _LOAD_LINKS = (
     "from pxr import Usd, UsdPhysics\n\n"
@@ -23,18 +23,18 @@ _LOAD_LINKS = (
     "    if prim.HasAPI(UsdPhysics.RigidBodyAPI) or prim.IsA(UsdPhysics.Joint):\n"
     "        print(prim.GetPath(), prim.GetTypeName())"
 )
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date that a ZIP entry has: equal twins give equal packages
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date of a ZIP entry: equal twins give equal packages
 
 
 def export(twin: TwinContent) -> Exported:
-    """Return the stage and its textures as they are in the twin; ``usdcat`` shows the stage as text."""
+    """Return the stage and its textures as files; ``usdcat`` shows the stage as text."""
     stage, textures = build_stage(twin)
     main = f"{twin.name}.usdc"
     return _exported({main: crate(stage.GetRootLayer()), **textures, **thumbnail(twin, main)}, main, twin, "usd")
 
 
 def export_usdz(twin: TwinContent) -> Exported:
-    """Return the package: the stage in USD's binary form first, then the textures; no compression, no dates."""
+    """Return a USDZ package: the stage in USD's binary form first, then the textures, without compression or dates."""
     stage, textures = build_stage(twin)
     main = f"{twin.name}.usdz"
     members = {f"{twin.name}.usdc": crate(stage.GetRootLayer()), **dict(sorted(textures.items()))}
@@ -42,7 +42,7 @@ def export_usdz(twin: TwinContent) -> Exported:
 
 
 def _exported(files: dict[str, bytes], main: str, twin: TwinContent, format_name: str) -> Exported:
-    """Return files with what is said of them: of a twin with links that each of these has its own numbers."""
+    """Return the export of files, with notes on the mass properties of each link for an articulated twin."""
     if not twin.record.links:
         return Exported(files, main, CANNOT_SAY, joints=True)
     notes = FormatNotes.of(format_name)
@@ -52,12 +52,12 @@ def _exported(files: dict[str, bytes], main: str, twin: TwinContent, format_name
 
 
 def _packed(members: dict[str, bytes]) -> bytes:
-    """Return members as a USDZ package in the order given."""
+    """Return a USDZ package with the members in the given order."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
         for name, data in members.items():
             entry = zipfile.ZipInfo(name, _EPOCH)
-            entry.create_system = 3  # the same on Windows
+            entry.create_system = 3  # also on Windows
             unpadded = stream.tell() + _HEADER + len(name.encode()) + 4
             padding = -unpadded % _ALIGNMENT
             entry.extra = struct.pack("<HH", _PADDING_ID, padding) + b"\0" * padding

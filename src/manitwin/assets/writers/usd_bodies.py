@@ -1,4 +1,4 @@
-"""The rigid bodies of a twin in a USD stage: one of what is rigid, one a link of what moves in itself, and the joints between."""
+"""Rigid bodies of a twin in a USD stage: a single body, or one for each link with joints between them."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from manitwin.twin.loaded_links import joints_of
 
 LINKS, JOINTS = "links", "joints"
 _ALONG = np.array([1.0, 0, 0])
-"""The axis of every joint in its own frame: UsdPhysics has X, Y and Z."""
+"""The axis of every joint in its own frame: UsdPhysics supports X, Y and Z."""
 
 
 def define_rigid_twin(
     stage: Usd.Stage, path: Sdf.Path, twin: TwinContent, materials: PreviewMaterials, friction: UsdShade.Material
 ) -> None:
-    """Make the prim at a path the rigid body, with its shapes below it."""
+    """Make the prim at a path a rigid body, with its shapes below it."""
     physical = twin.physical
     tensor = np.array(physical.inertia_kg_m2)
     inertial = TwinInertial(
@@ -42,10 +42,10 @@ def define_links(
 ) -> None:
     """Make the prim at a path an articulation: a body for each link, in a frame at its joint, and the joints between them.
 
-    It stands as the twin stands; the two frames of a joint meet at its position 0. Raises ExportError for mass properties that no
-    body has. Source: UsdPhysics schema, ArticulationRootAPI, RevoluteJoint, PrismaticJoint, DriveAPI (a drive without stiffness
-    is a damper, per degree); MuJoCo's OpenUSD documentation, MjcJointAPI; newton-usd-schemas 0.6, NewtonJointAPI; PhysxSchema,
-    PhysxJointAPI (degrees per second).
+    The stage has the present pose of the twin; the two frames of a joint coincide at position 0. Raises ExportError for mass
+    properties that are impossible for a rigid body. Sources: UsdPhysics schema, ArticulationRootAPI, RevoluteJoint,
+    PrismaticJoint, DriveAPI (a drive without stiffness is a damper, per degree); MuJoCo's OpenUSD documentation, MjcJointAPI;
+    newton-usd-schemas 0.6, NewtonJointAPI; PhysxSchema, PhysxJointAPI (degrees per second).
     """
     UsdPhysics.ArticulationRootAPI.Apply(stage.GetPrimAtPath(path))
     joints, links = joints_of(twin.record), twin.record.links
@@ -68,15 +68,15 @@ def define_links(
 
 
 def _say_name(prim: Usd.Prim, name: str) -> None:
-    """Say the name of a prim that USD cannot write as it is."""
+    """Set the display name of a prim whose name is not a valid USD identifier."""
     if prim.GetName() != name:
         prim.SetDisplayName(name)
 
 
 def _define_body(prim: Usd.Prim, inertial: TwinInertial, origin_m: np.ndarray) -> None:
-    """Make a prim, whose frame has its origin at ``origin_m``, a rigid body with mass, centre of mass and full inertia.
+    """Make a prim with its origin at ``origin_m`` a rigid body with mass, centre of mass and full inertia.
 
-    The inertia is ``R diag(diagonalInertia) R^T`` about the centre of mass, ``R`` the rotation of ``principalAxes``.
+    The inertia is ``R diag(diagonalInertia) R^T`` about the centre of mass, with ``R`` the rotation of ``principalAxes``.
     Source: UsdPhysics schema, MassAPI.
     """
     UsdPhysics.RigidBodyAPI.Apply(prim)

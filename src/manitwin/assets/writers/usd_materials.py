@@ -1,4 +1,4 @@
-"""The materials of a twin as UsdPreviewSurface networks, and the textures beside them."""
+"""Materials of a twin as UsdPreviewSurface networks, with their texture files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SUFFIXES = {b"\x89PNG\r\n\x1a\n": "png", b"\xff\xd8\xff": "jpg"}
 
 
 class PreviewMaterials:
-    """Materials below one scope, each defined once; ``textures`` holds the image files by name beside the stage."""
+    """Materials below one scope, each defined once; ``textures`` holds the image files by name relative to the stage."""
 
     def __init__(self, stage: Usd.Stage, scope: Sdf.Path, images: GlbImages):
         self._stage, self._scope, self._images = stage, scope, images
@@ -28,7 +28,7 @@ class PreviewMaterials:
         self.textures: dict[str, bytes] = {}
 
     def of(self, material: PBRMaterial) -> UsdShade.Material:
-        """Return the material, defined with all its inputs written out."""
+        """Return the USD material for a glTF material, defining it with all inputs on first use."""
         key = _key(material)
         if key not in self._known:
             self._known[key] = self._define(material)
@@ -70,7 +70,7 @@ class PreviewMaterials:
             metal.Set(metallic)
             rough.Set(roughness)
         if source.normalTexture is not None:
-            # UsdPreviewSurface specification, "Normal": 8-bit maps are brought to [-1, 1] by scale and bias
+            # UsdPreviewSurface specification, "Normal": scale and bias map 8-bit textures to [-1, 1]
             reader = self._texture(path, "normal", source.normalTexture, "raw", np.array([2.0, 2.0, 2.0, 1.0]))
             reader.CreateInput("bias", _Types.Float4).Set(Gf.Vec4f(-1, -1, -1, 0))
             surface.CreateInput("normal", _Types.Normal3f).ConnectToSource(reader.CreateOutput("rgb", _Types.Float3))
@@ -87,7 +87,7 @@ class PreviewMaterials:
         reader.CreateInput("file", _Types.Asset).Set(Sdf.AssetPath(f"./{self._file(material, role, image)}"))
         reader.CreateInput("sourceColorSpace", _Types.Token).Set(space)
         for wrap in ("wrapS", "wrapT"):
-            reader.CreateInput(wrap, _Types.Token).Set("repeat")  # glTF's own default
+            reader.CreateInput(wrap, _Types.Token).Set("repeat")  # the default of glTF
         if not np.array_equal(scale, np.ones(4)):
             reader.CreateInput("scale", _Types.Float4).Set(Gf.Vec4f(*scale.tolist()))
         lookup = UsdShade.Shader(self._stage.GetPrimAtPath(material.AppendChild("st")))
@@ -105,7 +105,7 @@ class PreviewMaterials:
 
 
 def unique_name(stage: Usd.Stage, parent: Sdf.Path, name: str) -> str:
-    """Return a valid prim name that no child of ``parent`` has yet."""
+    """Return a valid prim name that no child of ``parent`` has."""
     valid = Tf.MakeValidIdentifier(name)
     taken = {child.GetName() for child in stage.GetPrimAtPath(parent).GetChildren()}
     number = 1
@@ -123,7 +123,7 @@ def _shader(stage: Usd.Stage, material: Sdf.Path, name: str, kind: str) -> UsdSh
 
 
 def _key(material: PBRMaterial) -> str:
-    """Say what a material looks like: equal ones are shared."""
+    """Return a key that is equal for materials of the same appearance, which are shared."""
     images = (material.baseColorTexture, material.metallicRoughnessTexture, material.normalTexture)
     values: list[Any] = [
         material.name,
@@ -138,10 +138,10 @@ def _key(material: PBRMaterial) -> str:
 
 
 class GlbImages:
-    """Encoded images by what they show."""
+    """Encoded images of a GLB, looked up by their pixels."""
 
     def __init__(self, glb: bytes):
-        """Read a GLB that ``formats.glb.write_glb`` has made."""
+        """Read a GLB that ``formats.glb.write_glb`` wrote."""
         self._encoded: dict[str, bytes] = {}
         document, binary = unpack_glb(glb)
         for image in document.get("images", []):
@@ -151,7 +151,7 @@ class GlbImages:
             self._encoded[self.digest(decoded.convert("RGBA" if "A" in decoded.mode else "RGB"))] = data
 
     def encoded(self, image: Image.Image) -> tuple[bytes, str]:
-        """Return an image's file and its suffix: the one in the GLB, or a PNG where it is from elsewhere."""
+        """Return the encoded image and its file suffix: the data in the GLB, or a PNG for an image from elsewhere."""
         data = self._encoded.get(self.digest(image))
         if data is None:
             stream = io.BytesIO()

@@ -1,4 +1,4 @@
-"""The meshes of a twin in a USD stage: what is seen, with its materials, and the convex hulls that collide."""
+"""Meshes of a twin in a USD stage: visual meshes with their materials, and convex collision hulls."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manitwin.assets.writers.usd_materials import PreviewMaterials, unique_name
 from manitwin.formats.meshes.textures import material_of, uv_of
 
 RUNTIME_COLLIDERS = ("MjcCollisionAPI", "NewtonCollisionAPI", "NewtonMeshCollisionAPI")
-"""Applied schemas by which MuJoCo's and Newton's importers know a collider; all their values are the defaults."""
+"""Applied schemas that mark a collider for the importers of MuJoCo and Newton; all their attributes have default values."""
 
 
 def define_visual(
@@ -20,7 +20,7 @@ def define_visual(
 ) -> None:
     """Define a visual part below a frame whose origin is at ``origin_m`` in the object frame.
 
-    Its seams of texture and creases are in face-varying values, its points are each one place.
+    Coincident vertices become one point; texture seams and creases are kept as face-varying values.
     """
     name = unique_name(stage, scope, str(part.metadata.get("name") or "part"))
     mesh = UsdGeom.Mesh.Define(stage, scope.AppendChild(name))
@@ -38,8 +38,8 @@ def define_visual(
 
 
 def _one_point_a_place(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return each place once, in the order of first use, and the place of every vertex ``(V,)``."""
-    positions = positions + np.float32(0)  # no negative zeros
+    """Return distinct positions in order of first use, and the index of the position of every vertex ``(V,)``."""
+    positions = positions + np.float32(0)  # avoids negative zeros
     _, first, inverse = np.unique(positions, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty_like(order)
@@ -54,9 +54,9 @@ def _has_three_points(faces: np.ndarray) -> np.ndarray:
 def _write_normals(
     mesh: UsdGeom.Mesh, normals: np.ndarray, corners: np.ndarray, welded: np.ndarray, points: int
 ) -> None:
-    """Write a normal a point where no crease needs more, else one a corner."""
+    """Write one normal for each point if there are no creases, otherwise one for each face corner."""
     by_point = np.zeros((points, 3), dtype=np.float32)
-    by_point[:, 2] = 1.0  # a point that no face uses
+    by_point[:, 2] = 1.0  # for points that no face uses
     by_point[welded[corners]] = normals[corners]
     smooth = bool(np.array_equal(by_point[welded[corners]], normals[corners]))
     values = by_point if smooth else normals[corners].reshape(-1, 3)
@@ -74,7 +74,7 @@ def _write_texture_coordinates(mesh: UsdGeom.Mesh, uv: np.ndarray, corners: np.n
 
 
 def _unit_normals(part: trimesh.Trimesh) -> np.ndarray:
-    """Return vertex normals ``(V, 3) float32``; +Z where no face gives one."""
+    """Return unit vertex normals ``(V, 3) float32``; +Z where the faces define none."""
     normals = np.array(part.vertex_normals, dtype=np.float64)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.where(lengths < 1e-6, (0.0, 0.0, 1.0), normals / np.maximum(lengths, 1e-6))
@@ -88,9 +88,9 @@ def define_hulls(
     material: UsdShade.Material,
     origin_m: np.ndarray,
 ) -> None:
-    """Define hulls by their numbers, each a convex collider of its own, below a scope that is not rendered.
+    """Define numbered hulls, each a convex collider, below a scope that is not rendered.
 
-    Their vertices are in the object frame, in which the scope's frame has its origin at ``origin_m``.
+    Their vertices are in the object frame, where the origin of the scope's frame is at ``origin_m``.
     """
     UsdGeom.Scope.Define(stage, scope).CreatePurposeAttr(UsdGeom.Tokens.guide)
     for number, (vertices, faces) in hulls.items():
@@ -108,7 +108,7 @@ def define_hulls(
 
 
 def write_topology(mesh: UsdGeom.Mesh, points: np.ndarray, faces: np.ndarray) -> None:
-    """Write triangles as they are: ``points (V, 3) float32``, ``faces (F, 3)``, nothing subdivided."""
+    """Write triangles without subdivision: ``points (V, 3) float32``, ``faces (F, 3)``."""
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(points)))
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(faces), 3, dtype=np.int32)))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(faces, dtype=np.int32).reshape(-1)))

@@ -1,4 +1,4 @@
-"""A twin as one USD stage in memory: metres, Z up, a rigid body or its links and joints, every number written out."""
+"""USD stage of a twin in memory: metres, Z up, one rigid body or an articulation, with every number written explicitly."""
 
 from __future__ import annotations
 
@@ -28,15 +28,16 @@ OF_JOINTS = (
     "have it in N m or N",
     "a drive without stiffness is the damping of a joint, and its greatest force the effort: set a stiffness to drive it",
 )
-"""Said of a twin with joints beside ``CANNOT_SAY``."""
+"""Limitations for an articulated twin, in addition to ``CANNOT_SAY``."""
 
 
 def build_stage(twin: TwinContent) -> tuple[Usd.Stage, dict[str, bytes]]:
-    """Return the stage, and the texture files that it names by path relative to itself.
+    """Return the stage and its texture files, keyed by their path relative to the stage.
 
-    The default prim is the rigid body: an Xform of kind component with ``visual``, ``collision`` and ``materials`` below
-    it. Of a twin with links it is an articulation, with a body for each below ``links``, and its ``joints``. There is no
-    physics scene in it: that is for the scene that references it.
+    The default prim is the rigid body: an Xform of kind component with ``visual``, ``collision`` and ``materials`` below it.
+    For a twin with links it is an articulation, with a body for each link below ``links``, and ``joints``. It contains no
+    physics scene, which belongs to the scene that references it.
+
     Source: USD Physics schema; AOUSD guidelines for asset structure.
     """
     stage = Usd.Stage.CreateInMemory()
@@ -64,7 +65,7 @@ def build_stage(twin: TwinContent) -> tuple[Usd.Stage, dict[str, bytes]]:
 
 
 def crate(layer: Sdf.Layer) -> bytes:
-    """Return a layer in USD's binary form, which the library writes to files only."""
+    """Return a layer in USD's binary form, which the library writes only to files."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "layer.usdc"
         layer.Export(str(file))
@@ -72,7 +73,7 @@ def crate(layer: Sdf.Layer) -> bytes:
 
 
 def _describe(stage: Usd.Stage, root: Usd.Prim, twin: TwinContent) -> None:
-    """Say on the stage and on the prim what this is, where it came from, and how sure its numbers are."""
+    """Write identity, origin and uncertainties of the twin to the stage and the root prim."""
     record, physical, language = twin.record, twin.physical, twin.record.language
     caption = language.caption if language is not None else record.name or "an object"
     credit = f"; {record.source.attribution}" if record.source.attribution else ""
@@ -106,7 +107,7 @@ def _interval(estimate: Estimate) -> dict[str, Any]:
 
 
 def define_physics_material(stage: Usd.Stage, path: Sdf.Path, twin: TwinContent) -> UsdShade.Material:
-    """Define the friction and restitution of the twin's surface; its density stays unsaid, for the mass is said."""
+    """Define friction and restitution of the surface, without density, because the mass is stated."""
     material = UsdShade.Material.Define(stage, path)
     surface = UsdPhysics.MaterialAPI.Apply(material.GetPrim())
     surface.CreateStaticFrictionAttr(twin.physical.friction_static.value)

@@ -1,9 +1,9 @@
-"""Which item of Wikidata a category is, for formats that name classes by it (https://www.wikidata.org, CC0)."""
+"""Wikidata items of object categories, for formats that identify classes by them (https://www.wikidata.org, CC0)."""
 
 from __future__ import annotations
 
 PHYSICAL_OBJECT = "Q223557"
-"""What every twin is: the item of a category that the table has not."""
+"""The item for categories that are not in the table: every twin is a physical object."""
 
 ITEMS = {
     "apple": "Q89", "backpack": "Q5843", "banana": "Q503", "baseball bat": "Q809910", "baseball glove": "Q809894",
@@ -15,14 +15,14 @@ ITEMS = {
     "suitcase": "Q200814", "teddy bear": "Q213477", "toaster": "Q14890", "toothbrush": "Q134205", "umbrella": "Q41607",
     "vase": "Q191851", "wine glass": "Q1531435",
 }  # fmt: skip
-"""Items by category. None is guessed by its number: each was looked up with its label."""
+"""Items by category, each looked up with its label on Wikidata."""
 
 _HEADS = ("bottle", "bowl", "clock", "hammer", "scissors", "spoon", "vase")
-"""A category that ends in such a word is one of its kind: a water bottle is a bottle. (A tuning fork is no fork.)"""
+"""Head nouns that determine the item of a compound: a water bottle is a bottle, but a tuning fork is not a fork."""
 
 
 def item_of(category: str) -> str:
-    """Return the item of a category, of the kind that its last word names, or that of any physical object."""
+    """Return the item of a category, or that of its head noun, or that of any physical object."""
     word = category.strip().lower()
     last = word.rpartition(" ")[2]
     return ITEMS.get(word) or (ITEMS[last] if last in _HEADS else PHYSICAL_OBJECT)

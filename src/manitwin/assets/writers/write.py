@@ -1,4 +1,4 @@
-"""A twin in a format on disk: one folder a format, whole or not at all."""
+"""Writing of a twin in one format to disk: one folder for each format, written atomically."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from manitwin.twin.record_values import Estimate
 from manitwin.twin.store import folder_beside
 
 MAX_NAME = 255
-"""The bytes that a file name may have on ext4, APFS and NTFS alike."""
+"""Largest file name in bytes on ext4, APFS and NTFS."""
 
-_FORBIDDEN = frozenset('<>:"|?*\\')  # Windows takes none of them, and what it takes for a separator is no name here
+_FORBIDDEN = frozenset('<>:"|?*\\')  # Windows forbids these; separators never belong to a name here
 README_FILE = "README.md"
 JOINTS_LOCKED = (
     "its {count} joints: it is one rigid body as the twin stands; the formats mjcf, urdf, sdf, usd and usdz have links"
     " and joints."
 )
-"""Said of a format that a twin with joints was written in."""
+"""README line for a format without joints when the twin has some."""
 
 
 def export_twin(
@@ -36,11 +36,11 @@ def export_twin(
     license_allow: Iterable[str] | None = None,
     on_locked: Callable[[str], object] = lambda name: None,
 ) -> Path:
-    """Write a twin to ``out/<twin name>/<format>/`` with README.md and LICENSE.txt; returns the file to open.
+    """Write a twin to ``out/<twin name>/<format>/`` with README.md and LICENSE.txt, and return the file to open.
 
-    ``on_locked`` is told the format where the twin has joints and its files have not.
-    An earlier export there is replaced. The same twin gives the same bytes. Raises UsageError for an unknown format,
-    ExportError for a licence that is not allowed, a twin that the format cannot take, or a folder that cannot be written.
+    An earlier export there is replaced, and output is deterministic. ``on_locked`` is called with the format if the twin has
+    joints and the files do not. Raises UsageError for an unknown format, and ExportError for a licence that is not allowed, a
+    twin that the format cannot represent, or a folder that cannot be written.
     """
     check_license(twin.record, license_allow)
     exported = exporter(format_name)(twin)
@@ -54,9 +54,9 @@ def export_twin(
 
 
 def write_exported(exported: Exported, folder: Path) -> Path:
-    """Write the files below ``folder``, which is renamed into place when all are there; returns the path of ``main``.
+    """Write the files into a temporary folder, rename it to ``folder``, and return the path of ``main``.
 
-    Raises ExportError for a name that leaves the folder, before anything is written, and where writing fails.
+    Raises ExportError for an unsafe file name, before anything is written, and if writing fails.
     """
     names = {name: PurePosixPath(safe_name(name)) for name in exported.files}
     if exported.main not in names:
@@ -75,7 +75,7 @@ def write_exported(exported: Exported, folder: Path) -> Path:
 
 
 def safe_name(name: str, *, one: bool = False) -> str:
-    """Return a relative ``/``-separated name that stays in its folder; ``one``: of one part. Raises ExportError for any other."""
+    """Return a relative ``/``-separated name that stays in its folder (``one``: a single part), or raise ExportError."""
     parts = name.split("/")
     fine = len(parts) == 1 or not one
     fine = fine and all(
@@ -92,7 +92,7 @@ def safe_name(name: str, *, one: bool = False) -> str:
 
 
 def readme(twin: TwinContent, format_name: str, exported: Exported) -> str:
-    """Return the README of a twin in one format. Raises ExportError as ``inertial_of``."""
+    """Return the README of a twin in one format. Raises ExportError like ``inertial_of``."""
     notes = exported.notes or FormatNotes.of(format_name)
     record = twin.record
     caption = markdown_escaped(record.name or "An object." if record.language is None else record.language.caption)
