@@ -185,9 +185,7 @@ def _point(frame: AnnotatedFrame, to_object: np.ndarray) -> GivenPoint:
     if frame.kind == "contact":
         normal = None
     else:
-        normal = _unit(
-            rotation @ frame.frame_to_asset[:3, 2]
-        )  # the +Z axis of a functional frame points out of the object (twins, RoboTwin)
+        normal = _unit(rotation @ frame.frame_to_asset[:3, 2])  # +Z points out of the object (twins, RoboTwin)
     return GivenPoint(
         position_m=position.tolist(),
         normal=normal,

@@ -1,4 +1,4 @@
-"""Google Scanned Objects: models of Gazebo with one texture each, and their collection's licence."""
+"""Reader of Google Scanned Objects: Gazebo models with one texture each, under the licence of the collection."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.meshes.source import MeshLimits
 
 LICENSE, ATTRIBUTION = "CC-BY-4.0", "Google Research, Google Scanned Objects"
-"""Of the collection as a whole (Downs et al. 2022, arXiv 2204.11918, section 3)."""
+"""Licence and attribution of the whole collection (Downs et al. 2022, arXiv 2204.11918, section 3)."""
 
 _CATEGORY = re.compile(r'categories\s*\{[^}]{0,2000}?first:\s*"([^"]+)"')
 _MAX_TEXT = 1 << 20
 
 
 def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS) -> Asset:
-    """Read a model's folder, or its model.sdf, as the SDF reader does; raises AssetError.
+    """Read a model folder, or its model.sdf, like the SDF reader; raises AssetError.
 
-    Textures are taken from materials/textures where the material names them beside the mesh, as all of the collection do.
+    Textures that a material names beside the mesh are taken from materials/textures, as needed throughout the collection.
     """
     folder = path.parent if path.is_file() else path
     opened = open_sdf(path, root, limits)

@@ -1,4 +1,4 @@
-"""The joints of URDF and SDF elements and of a compiled MJCF, as they are declared: what is wrong with one is for an audit."""
+"""Declared joints of URDF and SDF elements and of a compiled MJCF, without validation, which is left to the audit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from manitwin.formats.xml_file import text_of
 from manitwin.robots.urdf import UrdfTree, child_of, parent_of
 
 _UNLIMITED = 1e15
-"""SDFormat's default is 1e16."""
+"""Values from here on mean unlimited; SDFormat's default is 1e16."""
 _MJCF_KINDS = {
     int(mujoco.mjtJoint.mjJNT_FREE): "free",
     int(mujoco.mjtJoint.mjJNT_BALL): "ball",
@@ -51,7 +51,7 @@ def _sdf_joint(joint: etree._Element) -> DeclaredJoint:
 
 
 def mjcf_joints(model: Any) -> tuple[DeclaredJoint, ...]:
-    """Return the joints of a compiled MJCF: MuJoCo has normalized their axes and made radians of their limits."""
+    """Return the joints of a compiled MJCF, with axes normalized and limits in radians by MuJoCo."""
     joints = []
     for index in range(model.njnt):
         body = int(model.jnt_bodyid[index])

@@ -1,4 +1,4 @@
-"""The published ManiTwin-100K layout: base_rescaled.glb with caption.json and manipulation_annotations.json."""
+"""Reader of the published ManiTwin-100K layout: base_rescaled.glb with caption.json and manipulation_annotations.json."""
 
 from __future__ import annotations
 
@@ -18,18 +18,19 @@ from manitwin.geometry.poses import GLTF_TO_OBJECT, rotation_between, rotation_f
 ANNOTATIONS, CAPTIONS = "manipulation_annotations.json", "caption.json"
 MESHES = ("base_rescaled.glb", "base_rescaled.usdz")
 _KNOWN = frozenset({"bounding_box", "active", "physics"})
-_SIDE_OFF = 0.02  # of the longest side: bounds that are farther apart are not those of this mesh
+_SIDE_OFF = 0.02  # of the longest side: bounds farther apart are not those of this mesh
 _MAX_CAPTIONS = 64
 _PLACE_KEYS = frozenset({"position", "rotation", "face", "dimensions", "projection_circle"})
 _MAX_PLACES = 1000
 
 
 def read(path: Path) -> Asset:
-    """Read an instance's folder, such as ManiTwin-100K/mug/002; raises AssetError.
+    """Read the folder of an instance, such as ManiTwin-100K/mug/002; raises AssetError.
 
-    The asset's axes are those of the annotations: the mesh is turned to them where only so its box is the annotated one.
-    ``rests`` are the places as annotated: the contact point at the plane's origin, the axis upward. Fields that are not
-    known (the layout is known from its users only) are named in a remark.
+    The asset's axes are those of the annotations. The mesh is turned from Y up to Z up if only that matches the annotated
+    bounding box. ``rests`` are the annotated places, with the contact point at the origin of the plane and the axis upward.
+    Unknown fields are remarked, because the layout is known only from code that uses it.
+
     Source: DexVerse, scripts/asset_tools/download_selected_objects.py and object_annotations.py.
     """
     folder = path.parent if path.is_file() else path
@@ -80,7 +81,7 @@ def _annotations(folder: Path, files: AssetFiles) -> dict[str, Any]:
 def _mesh_to_annotation_axes(
     points: np.ndarray, annotations: dict[str, Any], files: AssetFiles
 ) -> tuple[np.ndarray, bool]:
-    """Return what brings the glTF mesh into the annotations' axes, and whether that turns it from Y up to Z up."""
+    """Return the transform from the glTF mesh to the annotations' axes, and whether it turns Y up to Z up."""
     box = json_object(annotations.get("bounding_box"), "bounding_box")
     if not box:
         return np.eye(4), False
@@ -99,7 +100,7 @@ def _mesh_to_annotation_axes(
 
 
 def _up(places: list[DeclaredPlace], turned: bool) -> Literal["y", "z"]:
-    """Return the axis that the first place has upward; that of glTF, turned or not, where it has none of both."""
+    """Return the vertical axis by the first annotated place, or that of the mesh, turned or not, if no place decides."""
     for place in places:
         axis = int(np.abs(place.axis_up).argmax())
         if place.axis_up[axis] > 0.9 and axis > 0:
@@ -129,7 +130,7 @@ def _contact(annotations: dict[str, Any]) -> Contact:
 
 
 def _captions(folder: Path, files: AssetFiles) -> tuple[tuple[str, ...], str | None]:
-    """Return the sentences of caption.json, and its category; a sentence has more than two words."""
+    """Return the sentences of caption.json, texts with more than two words, and its category."""
     file = files.find(CAPTIONS, [folder / CAPTIONS])
     if file is None:
         return (), None
@@ -147,7 +148,7 @@ def _captions(folder: Path, files: AssetFiles) -> tuple[tuple[str, ...], str | N
 
 @dataclass(frozen=True)
 class DeclaredPlace:
-    """A way to set the object down: ``contact_m (3,)`` touches the support, ``axis_up (3,)`` points away from it."""
+    """An annotated placement: ``contact_m (3,)`` touches the support, ``axis_up (3,)`` points away from it."""
 
     name: str
     contact_m: np.ndarray
@@ -155,10 +156,10 @@ class DeclaredPlace:
 
 
 def declared_places(annotations: dict[str, Any], file: str, files: AssetFiles) -> list[DeclaredPlace]:
-    """Return ``active.place`` in the order of the file; raises AssetError for numbers that are none.
+    """Return ``active.place`` in the order of the file; raises AssetError for malformed numbers.
 
-    Published: position is a point on the support, rotation the local axis that is to point upward. Successor:
-    projection_circle.center is a pose (x, y, z, qw, qx, qy, qz) on the support, whose Z axis is taken as upward.
+    In the published layout, position is a point on the support and rotation the local axis that is to point upward. In its
+    successor, projection_circle.center is a pose (x, y, z, qw, qx, qy, qz) on the support, whose Z axis is taken as upward.
     """
     active = json_object(annotations.get("active"), f"{file}: active")
     for key in sorted(active.keys() - {"place"}):

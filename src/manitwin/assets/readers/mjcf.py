@@ -1,4 +1,4 @@
-"""MJCF: the first object of it that is rigid, by MuJoCo's own parser and compiler."""
+"""MJCF reader: the first rigid object of a file, resolved by MuJoCo's own parser and compiler."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ def read(
 ) -> Asset:
     """Read an MJCF file, or the only one in a folder; the asset's axes are those of the object's first body.
 
-    Defaults, frames and shapes are resolved by MuJoCo; meshes and textures are read here, below ``root`` (``root_of`` the path
-    by default). An <inertial> is what the file declares; a mass that follows from a geom's mass or density that the file writes
-    is kept with the centre and inertia that MuJoCo computes of it, with a remark; what only, or mostly, MuJoCo's own default
-    density gives is not declared. ``joints``: what moves is left out, or held as the file stands. ``number``: of the objects
-    that free joints let go the one of this number is read, from 0 (``count_objects``), and where its body has no name it has
-    that of its mesh. A file of planes and height fields alone is shown as sheets, one of soft bodies alone at rest. Raises
-    AssetError naming what is broken. Source: the MJCF reference of MuJoCo.
+    MuJoCo resolves defaults, frames and shapes; meshes and textures are read here, below ``root`` (default: ``root_of`` the
+    path). An <inertial> is declared. A mass that follows from a written geom mass or density is kept, with the centre and
+    inertia that MuJoCo computes, and a remark. A mass that follows mostly from MuJoCo's default density is not declared.
+    ``joints``: moving bodies are left out, locked in the pose of the file, or kept. ``number``: selects, from 0, one of the
+    objects with a free joint (``count_objects``); if its body has no name, that of its mesh is used. A file with only planes
+    and height fields yields sheets, one with only soft bodies their shape at rest. Raises AssetError naming what is broken.
+    Source: MuJoCo's MJCF reference.
     """
     file = only_file(path) if path.is_dir() else path
     files = AssetFiles(root or root_of(path), file.resolve().parent, limits)
@@ -55,7 +55,7 @@ def read(
     source = open_mjcf(file, files)
 
     def chosen(model: Any) -> set[int]:
-        aside = AssetFiles(files.root, missing=list(files.missing))  # what it remarks is said of the whole model
+        aside = AssetFiles(files.root, missing=list(files.missing))  # its remarks would concern the whole model
         return {index for index, _ in _rigid_bodies(file, model, aside, joints, number)}
 
     result = compiled(source, files, chosen)
@@ -85,7 +85,7 @@ def read(
         unit_m=1.0,
         inertial=masses.of(bodies),
         contact=_declared_contact(source, model, shapes, bodies, files),
-        static=ground or _stands_fast(model, bodies[0][0]),  # MuJoCo lets no plane move
+        static=ground or _stands_fast(model, bodies[0][0]),  # MuJoCo does not allow a plane to move
         license=licence,
         attribution=attribution,
         files=files.sorted_files(),
@@ -99,7 +99,7 @@ def read(
 
 
 def count_objects(path: Path, root: Path | None = None) -> int:
-    """Return how many objects of an MJCF file free joints let go; raises AssetError naming what is broken."""
+    """Return the number of objects with a free joint in an MJCF file; raises AssetError naming what is broken."""
     file = only_file(path) if path.is_dir() else path
     files = AssetFiles(root or root_of(path), file.resolve().parent, MESH_LIMITS)
     model = compiled(open_mjcf(file, files), files, lambda _: set()).model
@@ -108,7 +108,7 @@ def count_objects(path: Path, root: Path | None = None) -> int:
 
 
 def _name(result: CompiledMjcf, body: int, file: Path, *, of_mesh: bool) -> str:
-    """Return what an object is called by its first body, ``of_mesh`` by that one's mesh, by the model, or by the file."""
+    """Return the name of an object: of its first body, of that body's mesh (``of_mesh``), of the model, or of the file."""
     model, modelname = result.model, result.spec.modelname
     first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
     meshes = [int(model.geom_dataid[geom]) for geom in range(first, first + count)] if of_mesh else []
@@ -123,7 +123,7 @@ def _links_kept(
     shapes: BodyShapes,
     masses: DeclaredMasses,
 ) -> tuple[tuple[trimesh.Trimesh, ...], tuple[CollisionShape, ...], Articulation]:
-    """Return the shapes of links in their order, each as it would be shown alone, and the links with their joints."""
+    """Return the shapes of the links in order, each as it would be shown alone, and the links with their joints."""
     by_link = [
         [body for body, of in zip(bodies, moving.link_of, strict=True) if of == link]
         for link in range(len(moving.heads))
@@ -141,7 +141,7 @@ def _links_kept(
 
 
 def _soft_asset(path: Path, file: Path, files: AssetFiles) -> Asset:
-    """Return what an MJCF file of soft bodies alone describes: their shapes at rest, in the world's axes."""
+    """Return the asset of an MJCF file with only soft bodies: their shapes at rest, in world axes."""
     files.used.add(file.resolve())
     source = open_mjcf(file, files, keep_soft=True)
     as_shapes_at_rest(source, files)
@@ -174,10 +174,10 @@ def _soft_asset(path: Path, file: Path, files: AssetFiles) -> Asset:
 def _rigid_bodies(
     file: Path, model: Any, files: AssetFiles, joints: Joints, number: int | None = None
 ) -> list[tuple[int, np.ndarray]]:
-    """Return the bodies of a rigid group that has a geom, with their poses in the group's first body.
+    """Return the bodies of one rigid group with a geom, with their poses ``(4, 4)`` in the group's first body.
 
-    It is the first one that a free joint lets go, or that of a ``number``, else the first in whose tree any joint is, else the
-    first; where joints are locked or kept, no other divides bodies.
+    It is the first group with a free joint (or free group ``number``), otherwise the first in whose tree there is a joint,
+    otherwise the first. With locked or kept joints, only free joints separate groups.
     """
     groups: dict[int, list[tuple[int, np.ndarray]]] = {}
     head_of: dict[int, int] = {0: 0}
@@ -190,9 +190,10 @@ def _rigid_bodies(
         own = transform(rotation_from_quaternion_wxyz(model.body_quat[index]), model.body_pos[index])
         poses[index] = np.eye(4) if starts else poses[parent] @ own
         groups.setdefault(head_of[index], []).append((index, poses[index]))
-    world = [(_WORLD, np.eye(4))]  # shapes fixed to it: a static object
+    world = [(_WORLD, np.eye(4))]  # shapes fixed to the world: a static object
     shaped = [g for g in groups.values() if any(is_solid(model, index) for index, _ in g)]
-    jointed = {int(model.body_rootid[body]) for body in model.jnt_bodyid}  # a base that has no joint holds what moves
+    # a base without a joint carries moving bodies
+    jointed = {int(model.body_rootid[body]) for body in model.jnt_bodyid}
     shaped.sort(key=lambda g: (not _is_free(model, g[0][0]), int(model.body_rootid[g[0][0]]) not in jointed))
     if not shaped:
         if is_solid(model, _WORLD):
@@ -206,11 +207,11 @@ def _rigid_bodies(
         free = [group for group in shaped if _is_free(model, group[0][0])]
         if number >= len(free):
             raise AssetError(f"{file.name}: {len(free)} of its objects are free to move; there is no number {number}")
-        # the others that are free are asked for themselves
+        # the other free objects are requested by their own numbers
         shaped = [free[number], *(group for group in shaped if not _is_free(model, group[0][0]))]
     files.remark_left_out([_told(model, group) for group in shaped[1:]], "bodies")
     if joints == "lock":
-        inside = {index for index, _ in shaped[0][1:]}  # the first one's own joints let all of it go
+        inside = {index for index, _ in shaped[0][1:]}  # the joints of the first body move the whole object
         files.remark_locked(
             [model.joint(j).name or f"joint_{j:02d}" for j in range(model.njnt) if int(model.jnt_bodyid[j]) in inside]
         )
@@ -218,7 +219,7 @@ def _rigid_bodies(
 
 
 def _told(model: Any, group: list[tuple[int, np.ndarray]]) -> str:
-    """Return what a group of bodies is called, and whether it moves."""
+    """Return the name of a group of bodies and whether it moves, for a remark."""
     head = group[0][0]
     name = model.body(head).name
     what = f"body {name!r}" if name else "an unnamed body"
@@ -228,7 +229,7 @@ def _told(model: Any, group: list[tuple[int, np.ndarray]]) -> str:
 
 
 def _but(remarks: list[str]) -> str:
-    """Return what there is instead of the geoms of rigid bodies."""
+    """Return a clause on what the file has instead of geoms of rigid bodies."""
     if COMPUTED in remarks:
         return ", but those that a plug-in computes: it is code, and none is run"
     if LEFT_OUT_COMPOSITE in remarks:
@@ -237,7 +238,10 @@ def _but(remarks: list[str]) -> str:
 
 
 def _stands_fast(model: Any, body: int) -> bool:
-    """Tell whether a body is the world, or has no joint where it is not alone: a program adds that of a single object."""
+    """Return whether a body is fixed: the world itself, or a body without joint that is not the only object of the file.
+
+    A single object without a joint counts as movable, because programs add a free joint to it.
+    """
     if body == _WORLD or int(model.body_weldid[body]) != _WORLD:
         return body == _WORLD
     shaped = {int(model.body_rootid[index]) for index in range(1, model.nbody) if is_solid(model, index)}
@@ -252,9 +256,10 @@ def _is_free(model: Any, body: int) -> bool:
 def _declared_contact(
     source: MjcfSource, model: Any, shapes: BodyShapes, bodies: list[tuple[int, np.ndarray]], files: AssetFiles
 ) -> Contact:
-    """Return the sliding friction (MuJoCo has one coefficient, sticking or sliding) where the file writes any.
+    """Return the sliding friction, if the file writes any; MuJoCo has one coefficient for static and dynamic friction.
 
-    A twin has one for its whole surface: that of the largest share of the area of its geoms, the others are its interval.
+    A twin has one friction for its whole surface: that of the geoms with the largest total area, with the range of all as
+    interval.
     """
     geoms = shapes.colliding(bodies)
     if not geoms or not source.writes(("friction",)):
@@ -268,7 +273,7 @@ def _declared_contact(
     for geom in geoms:
         sliding = float(model.geom_friction[geom, 0])
         areas_m2[sliding] = areas_m2.get(sliding, 0.0) + shapes.areas_m2.get(geom, 0.0)
-    most = max(areas_m2, key=lambda sliding: areas_m2[sliding])  # of equal areas that of the first
+    most = max(areas_m2, key=lambda sliding: areas_m2[sliding])  # among equal areas, that of the first
     low, high = min(areas_m2), max(areas_m2)
     if low == high:
         return Contact(most, most)

@@ -1,4 +1,4 @@
-"""What of an MJCF file describes rigid objects; the rest is taken out, and said where an object lacks it."""
+"""Removal of MJCF content that does not describe rigid objects, with remarks where an object loses something."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from manitwin.formats.xml_file import MAX_NUMBER
 
 _SECTIONS = frozenset({"compiler", "default", "asset", "worldbody"})
 ACTING = frozenset({"equality", "tendon", "actuator"})
-"""Sections that act on joints, and are not read."""
+"""Sections that act on joints and are not read."""
 _ASSETS = frozenset({"mesh", "material", "texture", "hfield", "model"})
 _UNSEEN = ("light", "camera")
 _COMPOSITE, _FLEX = "composite", "flexcomp"
@@ -27,18 +27,18 @@ _WORDS = frozenset(
 _OF_SHAPE_AND_MASS = frozenset(
     {"pos", "size", "scale", "fromto", "vertex", "refpos", "mass", "density", "diaginertia", "fullinertia", "friction"}
 )
-"""Attributes whose numbers are those of an object; stiffnesses and limits may be as large as anybody likes."""
+"""Attributes whose numbers an object limits; stiffnesses and limits may have any size."""
 _MAX_ELEMENTS = 100_000
 
 
 def keep_rigid_objects(
     file: Path, root: etree._Element, files: AssetFiles, sizes: dict[str, float], *, keep_soft: bool = False
 ) -> bool:
-    """Take everything out of a parsed MJCF that is no part of a rigid object; return whether there were soft bodies.
+    """Remove everything from a parsed MJCF that does not belong to rigid objects; return whether it had soft bodies.
 
-    Composites and flexes (those only without ``keep_soft``) are soft, plug-ins are code, and neither is read; ``replicate`` and
-    ``attach`` stay, which MuJoCo writes out. ``sizes``: how many elements the models have that it attaches. Raises AssetError
-    for what is too large, or has numbers that no object can have.
+    Composites and flexes (only the former with ``keep_soft``) are soft, and plug-ins are code; neither is read. ``replicate``
+    and ``attach`` stay for MuJoCo to expand. ``sizes``: the number of elements of each attached model. Raises AssetError for a
+    file that is too large or has numbers that are impossible for an object.
     """
     if written_out(root, sizes) > _MAX_ELEMENTS:
         raise AssetError(f"{file.name}: more than {_MAX_ELEMENTS} elements; it is no single object")
@@ -71,16 +71,16 @@ LEFT_OUT_COMPOSITE = _left_out(_COMPOSITE)
 
 
 def written_out(element: etree._Element, sizes: dict[str, float]) -> float:
-    """Return how many elements there are once every <replicate> and <attach> is written out, by ``sizes`` of models.
+    """Return the number of elements after expanding every <replicate> and <attach>, given the ``sizes`` of models.
 
-    What a document attaches of itself is at most all of it so far.
+    An <attach> of the document itself adds at most all elements counted so far.
     """
     count = 0.0
     weights: dict[etree._Element, float] = {}
     for each in element.iter(etree.Element):
         weight = weights.get(each.getparent(), 1.0)
         if each.tag == "replicate":
-            with suppress(ValueError):  # MuJoCo says what is wrong with it
+            with suppress(ValueError):  # MuJoCo reports the error
                 weight *= max(1.0, float(each.get("count", "1")))
         weights[each] = weight
         count += weight
@@ -90,7 +90,7 @@ def written_out(element: etree._Element, sizes: dict[str, float]) -> float:
 
 
 def _leave_out_plugins(root: etree._Element, files: AssetFiles) -> None:
-    """Take out plug-ins, and the meshes and geoms whose shape is what one computes."""
+    """Remove plug-ins, and the meshes and geoms whose shape a plug-in computes."""
     computed = set()
     for plugin in list(root.iter(_CODE)):
         holder = plugin.getparent()
@@ -100,7 +100,7 @@ def _leave_out_plugins(root: etree._Element, files: AssetFiles) -> None:
             holder.getparent().remove(holder)
         elif holder.tag == "geom" and holder.get("type") == "sdf":
             holder.getparent().remove(holder)
-        else:  # it adds a force, say
+        else:  # it adds a force, for example
             continue
         files.remark(COMPUTED)
     for geom in [geom for geom in root.iter("geom") if geom.get("mesh") in computed and computed]:
@@ -122,15 +122,15 @@ def _check_numbers(file: Path, element: etree._Element) -> None:
 
 
 def _check_made_surfaces(file: Path, root: etree._Element, files: AssetFiles) -> None:
-    """Raise AssetError for a height field or a built-in mesh of more points than limits allow: MuJoCo makes room for all.
+    """Raise AssetError for a height field or built-in mesh with too many points, before MuJoCo allocates them.
 
-    The first number of a supersphere and a supertorus is a resolution both ways (MJCF, mesh/params).
+    The first parameter of a supersphere and a supertorus is a resolution in both directions (MJCF, mesh/params).
     """
     sizes = [("height field", f"{field.get('nrow', '')} {field.get('ncol', '')}") for field in root.iter("hfield")]
     for mesh in root.iter("mesh"):
         params, squared = mesh.get("params", ""), mesh.get("builtin", "").startswith("super")
         sizes.append(("built-in mesh", f"{params} {params.partition(' ')[0]}" if squared else params))
-    most = files.limits.max_faces // 2  # two triangles a point
+    most = files.limits.max_faces // 2  # two triangles for each point
     for what, counts in sizes:
         points = 1.0
         for word in counts.split():

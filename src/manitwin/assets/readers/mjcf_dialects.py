@@ -1,4 +1,4 @@
-"""What older MuJoCo and other loaders accept in an MJCF file and MuJoCo of today refuses, rewritten as they read it."""
+"""Rewriting of MJCF dialects: content that older MuJoCo versions or other loaders accept and current MuJoCo refuses."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from manitwin.assets.asset_files import AssetFiles
 _ORIENTATIONS = ("quat", "axisangle", "xyaxes", "zaxis", "euler")
 _PLACED = ("body", "geom", "inertial", "joint", "frame")
 MOST_LEFT_OUT = 16
-"""Kinds of unknown elements and attributes from which on a document is refused; fewer are left out."""
+"""Number of kinds of unknown elements and attributes at which a document is refused; fewer are left out."""
 _UNKNOWN_ATTRIBUTE = re.compile(r"unrecognized attribute: '([^']+)'\s+Element '([^']+)'")
 _UNKNOWN_ELEMENT = re.compile(r"unrecognized element\s+Element '([^']+)'")
 _HOLD_SHAPES = frozenset(
     {"worldbody", "body", "frame", "geom", "inertial", "joint", "freejoint", "asset", "mesh", "default"}
 )
-"""Elements that are never left out: one that MuJoCo does not know stands in a wrong place, and is a part of the asset."""
+"""Elements that are never left out: if MuJoCo refuses one, it is misplaced, and is part of the asset."""
 _ORIGIN = (0.0, 0.0, 0.0)
 _ENDLESS = "0 0 1"
-"""The size of a plane without an end, of half lengths 0; the third number is the spacing of the grid that is drawn."""
+"""Size of an infinite plane, whose half lengths are 0; the third number is the spacing of the drawn grid."""
 _MAIN = "main"
 _CLASSES = ("class", "childclass")
 _NOT_OF_DEFAULTS = ("class",)
-"""The attributes that <default> has."""
+"""The attributes of <default>."""
 
 
 def rewrite_dialects(root: etree._Element, files: AssetFiles) -> None:
-    """Rewrite a parsed MJCF, each thing with a remark: a loader that goes by the letter would refuse the file.
+    """Rewrite a parsed MJCF in place, with a lenient remark for each deviation, since a strict loader refuses the file.
 
-    Top-level classes under other names (older MuJoCo took the first one for all that have no class), attributes of <default>
-    beside its class, coordinates of the world (before 2.3.4) where no body is turned, fixed joints (of PyBullet and SAPIEN),
-    assets of one name (programs that join files take the first), an <inertial> of the world or without a place, planes without a
-    size, and materials and classes that are nowhere written. Sites are no shapes.
+    Handled are: top-level classes with other names (older MuJoCo used the first one for all elements without a class),
+    attributes of <default> besides its class, global coordinates (before 2.3.4) where no body is rotated, fixed joints
+    (PyBullet and SAPIEN), assets of the same name (programs that merge files use the first), an <inertial> of the world or
+    without a position, planes without a size, and undefined materials and classes. Sites are removed, as they are not shapes.
     """
     for site in list(root.iter("site")):
         site.getparent().remove(site)
@@ -51,7 +51,7 @@ def rewrite_dialects(root: etree._Element, files: AssetFiles) -> None:
             files.took_leniently(
                 "a joint is of the type 'fixed', which MuJoCo refuses; its body was read without a joint"
             )
-    for inertial in root.xpath("worldbody/inertial"):  # of a part that a program puts into a body
+    for inertial in root.xpath("worldbody/inertial"):  # of a part that a program inserts into a body
         inertial.getparent().remove(inertial)
         files.took_leniently("the world has an <inertial>, which MuJoCo refuses; it was left out")
     for inertial in root.iter("inertial"):
@@ -68,7 +68,7 @@ def rewrite_dialects(root: etree._Element, files: AssetFiles) -> None:
 
 
 def leave_out_unknown_to_schema(said: str, roots: Iterable[etree._Element], files: AssetFiles) -> bool:
-    """Take out of documents what MuJoCo ``said`` that its schema does not know; return whether that was anything."""
+    """Remove the element or attribute that MuJoCo ``said`` is unknown from documents; return whether any was found."""
     attribute, element = _UNKNOWN_ATTRIBUTE.search(said), _UNKNOWN_ELEMENT.search(said)
     tag = attribute.group(2) if attribute else element.group(1) if element else None
     if tag is None or (attribute is None and tag in _HOLD_SHAPES):
@@ -85,7 +85,7 @@ def leave_out_unknown_to_schema(said: str, roots: Iterable[etree._Element], file
 
 
 def _give_planes_a_size(root: etree._Element, files: AssetFiles) -> None:
-    """Let planes that say no size have no end, as PyBullet has it, where no default has one for them."""
+    """Make planes without a size infinite, as PyBullet does, unless a default for geoms has a size."""
     if any(geom.get("size") is not None for geom in root.iterfind("default//geom")):
         return
     for geom in root.iterfind("worldbody//geom[@type='plane']"):
@@ -95,7 +95,7 @@ def _give_planes_a_size(root: etree._Element, files: AssetFiles) -> None:
 
 
 def _name_top_class(root: etree._Element, files: AssetFiles) -> None:
-    """Call the first top-level class ``main``, and put others with names into it."""
+    """Name the first top-level class ``main``, and nest other named ones in it."""
     tops = root.findall("default")
     named = [top for top in tops if top.get("class", _MAIN) != _MAIN]
     for top in named:
@@ -115,7 +115,7 @@ def _name_top_class(root: etree._Element, files: AssetFiles) -> None:
 
 
 def _take_global_coordinates(root: etree._Element, files: AssetFiles) -> None:
-    """Write places that are given in the world relative to their bodies, as MuJoCo takes them; a turned body is left to it."""
+    """Convert global positions to positions relative to the parent body; files with rotated bodies are left to MuJoCo."""
     compilers = [each for each in root.iterfind("compiler") if each.get("coordinate") == "global"]
     bodies = list(root.iterfind("worldbody//body"))
     if not compilers or any(body.get(key) is not None for body in bodies for key in _ORIENTATIONS):
@@ -124,12 +124,12 @@ def _take_global_coordinates(root: etree._Element, files: AssetFiles) -> None:
         del compiler.attrib["coordinate"]
     files.took_leniently("its coordinates are global, which MuJoCo refuses; they were read as older ones do")
     places: dict[etree._Element, tuple[float, float, float]] = {}
-    for body in bodies:  # one without a place has that of what holds it
+    for body in bodies:  # a body without a position has that of its parent
         places[body] = _three(body.get("pos"), places.get(body.getparent(), _ORIGIN))
     for element in [each for each in root.iterfind("worldbody//*") if each.tag in _PLACED]:
         origin = places.get(element.getparent(), _ORIGIN)
         for key in ("pos", "fromto"):
-            with suppress(ValueError):  # MuJoCo says what is wrong with it
+            with suppress(ValueError):  # MuJoCo reports the error
                 values = [float(word) for word in element.get(key, "").split()]
                 moved = [value - origin[axis % 3] for axis, value in enumerate(values)]
                 if moved:
@@ -145,7 +145,7 @@ def _three(text: str | None, otherwise: tuple[float, float, float]) -> tuple[flo
 
 
 def _leave_out_repeated(root: etree._Element, files: AssetFiles) -> None:
-    """Take out assets that are written twice: parts of robots and scenes bring their own, and are joined by programs."""
+    """Remove assets and names that are defined twice: programs merge parts of robots and scenes that bring their own."""
     seen: set[tuple[str, str]] = set()
     for entry in root.xpath("asset/*[@name]"):
         key = (entry.tag, entry.get("name"))

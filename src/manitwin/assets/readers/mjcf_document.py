@@ -1,6 +1,6 @@
-"""The XML of an MJCF file with all that it is composed of: includes put in, attached models beside it, files by keys.
+"""XML of an MJCF file with its composition resolved: includes inlined, attached models collected, files replaced by keys.
 
-MuJoCo is given texts alone and opens nothing: a mesh, texture or height field is named by a key that stands for its place.
+MuJoCo receives only texts and opens no files: a mesh, texture or height field is named by a key that stands for its path.
 """
 
 from __future__ import annotations
@@ -21,22 +21,24 @@ from manitwin.formats.xml_file import MAX_NUMBER, MAX_XML_BYTES, comments_before
 _MAX_INCLUDES, _MAX_DEPTH = 32, 8
 _HEAD_BYTES = 1 << 16
 _HOME = "folder_of_its_document"
-"""An attribute for as long as documents are put together."""
+"""An attribute used only while documents are composed."""
 UNNAMED = "MuJoCo Model"
-"""What MuJoCo calls a model without a name."""
+"""MuJoCo's name for a model without one."""
 
 
 @dataclass
 class MjcfSource:
-    """The XML that MuJoCo is given, and what was taken from it.
+    """The XML passed to MuJoCo, and what was extracted from it.
 
-    ``texts`` are the comments at its head, and those of <custom> as ``name: data``. ``models`` are the XMLs that it attaches by
-    the names that it has for them, ``places`` by their keys the name that the file writes for a mesh, texture or height field,
-    where it should be, and the name below the compiler's folder; ``homes`` where else, from the folder of the included document
-    that names it. ``soft``: bodies that are not rigid were left out, or are read with ``soft_files`` by the names that the XML
-    has for them. ``acting``: sections that act on joints, and are left out. ``apart`` are the pairs of bodies that the main
-    document excludes from contact, ``paired`` those of geoms that it gives a contact of their own, ``keys`` the positions of
-    its keyframes, ``total_mass_kg`` what all bodies together are scaled to.
+    - ``texts``: the comments at its head, and the entries of <custom> as ``name: data``.
+    - ``models``: attached XMLs by the names that the document uses for them.
+    - ``places``: for the key of a mesh, texture or height field, the written name, the expected path, and the name below the
+      compiler's folder; ``homes``: an alternative path, from the folder of the included document that names it.
+    - ``soft``: soft bodies were left out, or are read from ``soft_files``, keyed by their names in the XML.
+    - ``acting``: sections that act on joints and were left out.
+    - ``apart``: pairs of bodies that the main document excludes from contact; ``paired``: pairs of geoms with their own
+      contact.
+    - ``keys``: the positions of its keyframes; ``total_mass_kg``: the mass to which all bodies together are scaled.
     """
 
     file: Path
@@ -54,12 +56,12 @@ class MjcfSource:
     total_mass_kg: float | None = None
 
     def writes(self, attributes: tuple[str, ...]) -> bool:
-        """Tell whether a geom, or a default for geoms, writes one of these attributes."""
+        """Return whether a geom, or a default for geoms, has one of these attributes."""
         geoms = [geom for root in (self.root, *self.models.values()) for geom in root.iter("geom")]
         return any(geom.get(name) is not None for geom in geoms for name in attributes)
 
     def writes_density(self, density_kg_m3: float) -> bool:
-        """Tell whether a geom, or a default for geoms, writes this very density."""
+        """Return whether a geom, or a default for geoms, has exactly this density."""
         for root in (self.root, *self.models.values()):
             for geom in root.iter("geom"):
                 with suppress(ValueError):
@@ -68,18 +70,18 @@ class MjcfSource:
         return False
 
     def weighs(self) -> bool:
-        """Tell whether the file writes a mass, or a density of which one follows: of geoms, or of all of it together."""
+        """Return whether the file writes a mass or density of geoms, or a total mass."""
         return self.total_mass_kg is not None or self.writes(("mass", "density"))
 
     def model_texts(self) -> dict[str, bytes]:
-        """Return the attached XMLs as texts, and the files of soft bodies."""
+        """Return the attached XMLs as bytes, and the files of soft bodies."""
         return {name: xml_text(root).encode() for name, root in self.models.items()} | self.soft_files
 
 
 def open_mjcf(file: Path, files: AssetFiles, *, keep_soft: bool = False) -> MjcfSource:
-    """Parse an MJCF file with what it includes and attaches; raises AssetError for what is broken or not read.
+    """Parse an MJCF file with everything it includes and attaches; raises AssetError for broken or unsupported content.
 
-    ``keep_soft``: bodies that are not rigid stay.
+    ``keep_soft``: soft bodies stay.
     """
     source = MjcfSource(file, etree.Element("mujoco"))
     source.root = _Composition(source, files, keep_soft).document(file, (file.resolve(),))
@@ -87,7 +89,7 @@ def open_mjcf(file: Path, files: AssetFiles, *, keep_soft: bool = False) -> Mjcf
 
 
 class _Composition:
-    """Reads the documents of one MJCF file, each that it attaches once."""
+    """Reads the documents of one MJCF file, each attached document once."""
 
     def __init__(self, source: MjcfSource, files: AssetFiles, keep_soft: bool):
         self._source, self._files, self._keep_soft = source, files, keep_soft
@@ -95,7 +97,7 @@ class _Composition:
         self._sizes: dict[str, float] = {}
 
     def document(self, file: Path, above: tuple[Path, ...]) -> etree._Element:
-        """Return the root of one document, its models read and its files named by keys."""
+        """Return the root of one document, with its models read and its files replaced by keys."""
         root = read_xml(file, "mujoco")
         comments = comments_before(root)
         self._put_in_includes(file, root, file, {file.resolve()})
@@ -116,9 +118,9 @@ class _Composition:
         return root
 
     def _put_in_includes(self, main: Path, root: etree._Element, file: Path, done: set[Path], depth: int = 0) -> None:
-        """Replace <include> by the children of the included root, as MuJoCo does; each file once.
+        """Replace each <include> by the children of the included root, as MuJoCo does; each file may be included once.
 
-        A file is looked up from the main file's folder, and then from that of the ``file`` which includes it.
+        A file is looked up in the folder of the main file, then in that of the including ``file``.
         """
         while (include := root.find(".//include")) is not None:
             name = (include.get("file") or "").replace("\\", "/")
@@ -138,7 +140,7 @@ class _Composition:
                 parent.insert(position + offset, child)
 
     def _take_models(self, file: Path, root: etree._Element, above: tuple[Path, ...]) -> dict[str, float]:
-        """Read the models that a document attaches; return how many elements each has, by its name."""
+        """Read the models that a document attaches; return their numbers of elements by name."""
         sizes = {}
         for model in root.xpath("asset/model"):
             name = (model.get("file") or "").replace("\\", "/")
@@ -165,7 +167,7 @@ class _Composition:
         return found
 
     def _name_files(self, file: Path, root: etree._Element) -> None:
-        """Give each file that a document names a key, and an unnamed mesh or height field the name that MuJoCo gives it."""
+        """Replace each file name of a document by a key, and give unnamed meshes and height fields MuJoCo's default name."""
         folders = {"mesh": "", "hfield": "", "texture": ""}
         strip = False
         for compiler in root.iterfind("compiler"):
@@ -192,7 +194,7 @@ class _Composition:
 
 
 def _position(key: etree._Element) -> np.ndarray | None:
-    """Return the position of a keyframe, None where it says none that are numbers."""
+    """Return the position of a keyframe, or None if it has none or it is malformed."""
     try:
         position = np.array([float(word) for word in (key.get("qpos") or "").split()])
     except ValueError:
@@ -201,7 +203,7 @@ def _position(key: etree._Element) -> np.ndarray | None:
 
 
 def _total_mass_kg(root: etree._Element) -> float | None:
-    """Take ``settotalmass`` out, which MuJoCo warns of, and return what it says; None where that is no mass."""
+    """Remove ``settotalmass``, which MuJoCo warns about, and return its value; None if it is not a mass."""
     total = None
     for compiler in root.iterfind("compiler"):
         with suppress(ValueError):

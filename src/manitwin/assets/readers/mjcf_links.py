@@ -1,4 +1,4 @@
-"""Which joints of an MJCF file's bodies a twin can have."""
+"""Selection of the joints of an MJCF file that twins support."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _KINDS: dict[int, JointKind] = {
 
 
 def moving_bodies(model: Any, bodies: list[tuple[int, np.ndarray]], files: AssetFiles) -> Tree | None:
-    """Return what moves among bodies with their poses, holders first; None where nothing does.
+    """Return the articulation tree of bodies with their poses, parents first; None if no joint is kept.
 
-    The joints of the first body let all of it go, and are none of the object's.
+    Joints of the first body move the whole object and are not part of it.
     """
     place_of = {index: place for place, (index, _) in enumerate(bodies)}
     nodes: list[Node] = []
@@ -40,7 +40,7 @@ def moving_bodies(model: Any, bodies: list[tuple[int, np.ndarray]], files: Asset
 
 
 def _kept(model: Any, index: int, body_to_asset: np.ndarray) -> tuple[ArticulatedJoint | None, str]:
-    """Return a body's joint in the asset's axes; None for a fixed one, and with the cause for one that cannot be kept."""
+    """Return a body's joint in the asset's axes and "", or None and the reason; the reason is empty for a fixed body."""
     count, number = int(model.body_jntnum[index]), int(model.body_jntadr[index])
     if not count:
         return None, ""

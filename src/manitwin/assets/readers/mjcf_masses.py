@@ -1,4 +1,4 @@
-"""The mass properties that an MJCF file declares: of its <inertial> elements, or of masses and densities of geoms."""
+"""Declared mass properties of an MJCF file: from <inertial> elements, or from masses and densities of geoms."""
 
 from __future__ import annotations
 
@@ -19,28 +19,30 @@ from manitwin.geometry.boxes import box_corners
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 
 _INERTIA_FROM_GEOM = 1  # mjtInertiaFromGeom: true; 2 is auto
-_DENSITY_KG_M3 = 1000.0  # MuJoCo's own, of geoms that say none
+_DENSITY_KG_M3 = 1000.0  # MuJoCo's default for geoms without a density
 _MOST_UNSAID_SHARE = 0.5
-"""Where more of a mass follows from MuJoCo's own density, the file does not declare it: 549 kg with a door of 2."""
+"""Largest share of a mass that may follow from MuJoCo's default density; above it, the mass counts as undeclared."""
 _SAME_PLACE = 0.8
-"""Of the box around two groups of shapes what is in the boxes of both: a thing's look, and what collides in its place."""
+"""Least overlap of the boxes of two groups of shapes, by volume of their common box, for visual and collision shapes of one
+part.
+"""
 
 
 class DeclaredMasses:
-    """Tells what an MJCF file declares of the mass of its bodies."""
+    """Determines what an MJCF file declares about the mass of its bodies."""
 
     def __init__(self, source: MjcfSource, spec: Any, model: Any, files: AssetFiles):
         self._source, self._spec, self._model, self._files = source, spec, model, files
 
     def of(self, bodies: list[tuple[int, np.ndarray]]) -> Inertial:
-        """Return the mass properties of bodies with their poses ``(4, 4)`` in the asset; empty where none are declared."""
+        """Return the mass properties of bodies with poses ``(4, 4)`` in the asset; empty if none are declared."""
         by_index = {body.id: body for body in self._spec.bodies}
         forced = int(self._spec.compiler.inertiafromgeom) == _INERTIA_FROM_GEOM
         massive = [(index, pose) for index, pose in bodies if self._model.body_mass[index] > 0]
         explicit = [index for index, _ in bodies if by_index[index].explicitinertial and not forced]
         if explicit and all(index in explicit for index, _ in massive):
             return combined_inertial([self._inertial(index, pose) for index, pose in bodies if index in explicit])
-        if not (explicit or self._source.weighs()) or self._files.lacks_a_mesh:  # of which nothing is known
+        if not (explicit or self._source.weighs()) or self._files.lacks_a_mesh:  # the mass of a missing mesh is unknown
             return Inertial()
         if not massive:
             return Inertial(0.0, computed=True)
@@ -71,10 +73,10 @@ class DeclaredMasses:
 
     @cached_property
     def _unsaid_kg(self) -> np.ndarray:
-        """What of the mass of each body ``(nbody,)`` follows from no mass or density that the file writes.
+        """The mass of each body ``(nbody,)``, kg, that follows from no written mass or density.
 
-        It is what the bodies lose where geoms of MuJoCo's own density weigh nothing. A file that writes this very density
-        declares it.
+        It is the mass that bodies lose when geoms with MuJoCo's default density are weightless. A file that writes this very
+        density declares it.
         """
         if self._without_unsaid is None:
             return np.zeros(self._model.nbody)
@@ -83,14 +85,14 @@ class DeclaredMasses:
 
     @cached_property
     def _unsaid(self) -> frozenset[int]:
-        """The geoms of which the file writes no mass and no density."""
+        """The geoms for which the file writes neither mass nor density."""
         if self._source.total_mass_kg is not None or self._source.writes_density(_DENSITY_KG_M3):
             return frozenset()
         return frozenset(g.id for g in self._spec.geoms if math.isnan(g.mass) and g.density == _DENSITY_KG_M3)
 
     @cached_property
     def _without_unsaid(self) -> Any:
-        """The model in which geoms of MuJoCo's own density weigh nothing; None where there are none."""
+        """The model in which geoms with MuJoCo's default density are weightless; None if there are no such geoms."""
         if not self._unsaid:
             return None
         trial = self._spec.copy()
@@ -104,10 +106,10 @@ class DeclaredMasses:
             raise AssetError(f"{self._source.file.name}: MuJoCo cannot compile it without its own density") from error
 
     def _said_once(self, bodies: list[tuple[int, np.ndarray]]) -> list[Inertial]:
-        """Return what the file says of bodies each of which has shapes of MuJoCo's own density only where it says others.
+        """Return the declared mass properties of bodies whose undeclared shapes only duplicate declared ones.
 
-        Such a file gives its collision shapes a density and forgets that what is only seen is weighed too. None where a body
-        has shapes elsewhere, or there is nothing to leave out.
+        Such a file gives its collision shapes a density, and does not exclude its visual shapes from the mass. The list is
+        empty if a body has undeclared shapes elsewhere, or no body has any.
         """
         weighed = [index for index, _ in bodies if self._unsaid_kg[index] > 1e-6 * self._model.body_mass[index]]
         if not weighed or not all(_in_one_place(self._model, index, self._unsaid) for index in weighed):
@@ -125,7 +127,7 @@ class DeclaredMasses:
 
 
 def _in_one_place(model: Any, body: int, unsaid: frozenset[int]) -> bool:
-    """Tell whether the geoms of a body that are ``unsaid`` and its other ones are in boxes that are nearly the same."""
+    """Return whether the ``unsaid`` geoms of a body and its other geoms have nearly the same bounding box."""
     first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
     own = range(first, first + count)
     groups = [[g for g in own if (g in unsaid) == each] for each in (True, False)]
@@ -138,7 +140,7 @@ def _in_one_place(model: Any, body: int, unsaid: frozenset[int]) -> bool:
 
 
 def _corners(model: Any, geom: int) -> np.ndarray:
-    """Return points ``(N, 3)`` in the body's axes whose box is that of a geom: a mesh's vertices, else the corners of its box."""
+    """Return points ``(N, 3)`` in body axes with the extent of a geom: the vertices of a mesh, or the corners of its box."""
     mesh = int(model.geom_dataid[geom])
     if mesh >= 0 and int(model.geom_type[geom]) == int(mujoco.mjtGeom.mjGEOM_MESH):
         start = int(model.mesh_vertadr[mesh])

@@ -1,4 +1,4 @@
-"""An MJCF file after MuJoCo's compiler, with the meshes, textures and height fields that are read here and handed to it."""
+"""Compilation of an MJCF file by MuJoCo, with meshes, textures and height fields that are read here."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from manitwin.formats.xml_file import xml_text
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 
 LEAST_MASS_KG, LEAST_INERTIA_KG_M2 = 1e-9, 1e-12
-"""Of a body that moves, so that MuJoCo takes it."""
+"""Mass and inertia of a moving body without any, so that MuJoCo accepts it."""
 _LEAST_ROWS, _FEW_MESHES = 2, 3
 NO_OBJECTS = "planes and height fields were left out: they are no objects"
 _RGB = int(mujoco.mjtTextureRole.mjTEXROLE_RGB)
 _FLAT = int(mujoco.mjtBuiltin.mjBUILTIN_FLAT)
 _PATTERNS = (int(mujoco.mjtBuiltin.mjBUILTIN_GRADIENT), int(mujoco.mjtBuiltin.mjBUILTIN_CHECKER))
 _SIDES = "RLUDFB"
-"""Letters of the sides of a cube in the layout of a texture's grid (MJCF reference, texture/gridlayout)."""
+"""Letters of the cube sides in the layout of a texture grid (MJCF reference, texture/gridlayout)."""
 _CELL = 32
 
 
 @dataclass(frozen=True)
 class CompiledMjcf:
-    """An MJCF file after MuJoCo's compiler: the spec, the model, and by name what was read from files.
+    """A compiled MJCF file: the spec, the model, and the meshes and textures read from files.
 
-    ``meshes`` are the parts of each mesh, scaled, in the axes of its asset.
+    ``meshes`` are the parts of each mesh by name, scaled, in the axes of its asset.
     """
 
     spec: Any
@@ -48,10 +48,10 @@ class CompiledMjcf:
 
 @dataclass(frozen=True)
 class MaterialTextures:
-    """What the textures of materials show, by the material's name.
+    """Appearance of material textures, by the name of the material.
 
-    ``images`` are colour images, ``means`` their linear mean colours ``(3,)``, ``plain`` the sRGB colour ``(3,)`` of those that
-    MuJoCo fills with one or draws a pattern of, ``lost`` has the materials whose image could not be read.
+    ``images`` are colour images, ``means`` their linear mean colours ``(3,)``. ``plain`` are the sRGB colours ``(3,)`` of
+    textures that MuJoCo fills with one colour or a pattern. ``lost`` names the materials whose image could not be read.
     """
 
     images: dict[str, Image.Image]
@@ -61,16 +61,16 @@ class MaterialTextures:
 
 
 def compiled(source: MjcfSource, files: AssetFiles, chosen: Callable[[Any], set[int]] | None = None) -> CompiledMjcf:
-    """Compile an MJCF file; geoms of meshes that are not there are left out.
+    """Compile an MJCF file; geoms of missing meshes are left out.
 
-    ``chosen``: tells of a model which of its bodies are wanted. Then the meshes of others are not read, and stand-ins have their
-    place. A robot of fifty meshes, of which one link is looked at, costs one.
+    ``chosen`` returns the indices of the bodies of a model that are needed. Meshes of other bodies are then replaced by
+    stand-ins instead of being read, so that one link of a robot with fifty meshes costs one mesh.
 
-    Raises AssetError with MuJoCo's own words where it refuses the file.
+    Raises AssetError with MuJoCo's message if it refuses the file.
     """
     name = source.file.name
     spec = _specified(source, files)
-    spec.compiler.fusestatic = False  # both would take away bodies and geoms that the file has
+    spec.compiler.fusestatic = False  # both options would remove bodies and geoms of the file
     spec.compiler.discardvisual = False
     found = _find_meshes(source, spec, files)
     paint = _take_textures(source, spec, files)
@@ -82,7 +82,7 @@ def compiled(source: MjcfSource, files: AssetFiles, chosen: Callable[[Any], set[
         except (ValueError, RuntimeError, mujoco.FatalError) as error:
             if "mass and inertia of moving bodies" not in str(error):
                 raise
-            if not files.missing:  # else it would have one with its meshes
+            if not files.missing:  # otherwise its meshes would give it a mass
                 files.took_leniently("a body of it moves and has no mass, which MuJoCo refuses")
             spec.compiler.boundmass, spec.compiler.boundinertia = LEAST_MASS_KG, LEAST_INERTIA_KG_M2
             model = spec.compile()
@@ -94,7 +94,7 @@ def compiled(source: MjcfSource, files: AssetFiles, chosen: Callable[[Any], set[
 
 
 def _specified(source: MjcfSource, files: AssetFiles) -> Any:
-    """Return MuJoCo's spec of a document, without what its schema does not know; raises AssetError with its words."""
+    """Return MuJoCo's spec of a document after removing what its schema does not know; raises AssetError with its message."""
     for _ in range(MOST_LEFT_OUT):
         try:
             return mujoco.MjSpec.from_string(xml_text(source.root), include=source.model_texts())
@@ -107,12 +107,12 @@ def _specified(source: MjcfSource, files: AssetFiles) -> Any:
 
 
 def _find_meshes(source: MjcfSource, spec: Any, files: AssetFiles) -> dict[str, Path]:
-    """Return the files of meshes by their names; geoms of those that are not there are taken out of the spec."""
+    """Return the files of meshes by name; geoms of missing meshes are removed from the spec."""
     found: dict[str, Path] = {}
     absent = []
     for mesh in list(spec.meshes):
         if not mesh.file:
-            continue  # written out in the file itself
+            continue  # inline data
         path = _find(source, mesh.file, files)
         mesh.file = ""
         if path is None:
@@ -127,7 +127,7 @@ def _find_meshes(source: MjcfSource, spec: Any, files: AssetFiles) -> dict[str, 
 
 
 def _wanted(spec: Any, found: dict[str, Path], chosen: Callable[[Any], set[int]] | None) -> set[str]:
-    """Return the names of the meshes that the chosen bodies have; all where MuJoCo does not compile stand-ins of them."""
+    """Return the names of the meshes of the chosen bodies; all if MuJoCo does not compile the stand-ins."""
     if chosen is None or len(found) < _FEW_MESHES:
         return set(found)
     trial = spec.copy()
@@ -144,14 +144,14 @@ def _wanted(spec: Any, found: dict[str, Path], chosen: Callable[[Any], set[int]]
 
 
 def _stand_in(mesh: Any) -> None:
-    """Give a mesh the shape of a tetrahedron a decimetre large."""
+    """Set the geometry of a mesh to a tetrahedron with edges of 0.1 m along the axes."""
     mesh.uservert, mesh.userface = [0, 0, 0, 0.1, 0, 0, 0, 0.1, 0, 0, 0, 0.1], [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]
 
 
 def _take_meshes(
     spec: Any, found: dict[str, Path], wanted: set[str], files: AssetFiles
 ) -> dict[str, list[trimesh.Trimesh]]:
-    """Read the wanted meshes, hand their vertices to the spec, and return the parts as MuJoCo scales them."""
+    """Read the needed meshes, pass their vertices to the spec, and return the parts as MuJoCo scales them."""
     meshes: dict[str, list[trimesh.Trimesh]] = {}
     for mesh in [mesh for mesh in spec.meshes if mesh.name in found]:
         if mesh.name not in wanted:
@@ -166,20 +166,20 @@ def _take_meshes(
 
 
 def _reference(mesh: Any) -> np.ndarray:
-    """Return what MuJoCo does to vertices before it scales them: moved by -refpos, turned by the inverse of refquat."""
+    """Return the transform that MuJoCo applies before scaling: translation by -refpos, rotation by the inverse of refquat."""
     rotation = rotation_from_quaternion_wxyz(np.array(mesh.refquat)).T
     return transform(rotation, -rotation @ np.array(mesh.refpos))
 
 
 def _take_textures(source: MjcfSource, spec: Any, files: AssetFiles) -> MaterialTextures:
-    """Read the colour textures of materials and take all textures out of the spec."""
+    """Read the colour textures of materials and remove all textures from the spec."""
     shown: dict[str, Image.Image | np.ndarray | None] = {}
     means: dict[str, np.ndarray] = {}
     patterns: set[str] = set()
     for texture in spec.textures:
         if texture.file:
             image = _image(_find(source, texture.file, files), files, files.limits)
-            # one without a name is called as its file, in whose place MuJoCo is given a key
+            # an unnamed texture is named after its file, which was replaced by a key
             for name in {texture.name, Path(source.places[texture.file][0]).stem} - {""}:
                 if name == texture.name or texture.name in ("", Path(texture.file).stem):
                     shown[name] = image
@@ -220,7 +220,7 @@ def _take_textures(source: MjcfSource, spec: Any, files: AssetFiles) -> Material
 
 
 def _mean_color(image: Image.Image, texture: Any) -> np.ndarray:
-    """Return the linear mean colour ``(3,)`` of a texture's image: of those cells of its grid that its layout names."""
+    """Return the linear mean colour ``(3,)`` of a texture image, over the grid cells that its layout names."""
     rows, columns = (max(1, int(count)) for count in texture.gridsize)
     layout = "".join(str(letter) for letter in texture.gridlayout)
     named = [place for place in range(min(rows * columns, len(layout))) if layout[place] in _SIDES]
@@ -236,7 +236,7 @@ def _mean_color(image: Image.Image, texture: Any) -> np.ndarray:
 
 
 def _take_height_fields(source: MjcfSource, spec: Any, files: AssetFiles) -> None:
-    """Read the pictures of height fields and hand their heights to the spec; those without are left out with their geoms."""
+    """Read the pictures of height fields and pass their heights to the spec; those without data are removed with their geoms."""
     for field in list(spec.hfields):
         heights = None
         if field.file:

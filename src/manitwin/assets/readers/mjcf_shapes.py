@@ -1,4 +1,4 @@
-"""The geoms of bodies of a compiled MJCF file as visual parts and collision shapes."""
+"""Geoms of bodies in a compiled MJCF file as visual parts and collision shapes."""
 
 from __future__ import annotations
 
@@ -29,27 +29,29 @@ from manitwin.geometry.poses import inverse, rotation_from_quaternion_wxyz, tran
 SHOWN_GROUPS = 3
 """MuJoCo's viewer shows groups 0 to 2 (mjvOption.geomgroup)."""
 _DEFAULT_RGBA = (0.5, 0.5, 0.5, 1.0)
-"""A geom with any other colour has it, and not its material's (MJCF reference, geom/rgba)."""
+"""Default colour; a geom with any other colour uses it instead of its material's (MJCF reference, geom/rgba)."""
 _KINDS = mujoco.mjtGeom
-_SHEET_M, _UNBOUNDED_M = 1e-3, 1.0  # how thick a plane is shown, and how wide one without an end
+_SHEET_M, _UNBOUNDED_M = 1e-3, 1.0  # shown thickness of a plane, and shown width of an infinite one
 _GROUND_KINDS = (int(_KINDS.mjGEOM_PLANE), int(_KINDS.mjGEOM_HFIELD))
 _MESH_KINDS = (int(_KINDS.mjGEOM_MESH), int(_KINDS.mjGEOM_SDF))
 
 
 def is_solid(model: Any, body: int) -> bool:
-    """Tell whether a body has a shape that is seen or collides, and is no plane and no height field."""
+    """Return whether a body has a visible or colliding shape that is neither a plane nor a height field."""
     start, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
     solid = [geom for geom in range(start, start + count) if int(model.geom_type[geom]) not in _GROUND_KINDS]
     return any(model.geom_group[g] < SHOWN_GROUPS or collides(model, g) for g in solid)
 
 
 def collides(model: Any, geom: int) -> bool:
-    """Tell whether a geom collides with any other."""
+    """Return whether a geom can collide."""
     return bool(model.geom_contype[geom] or model.geom_conaffinity[geom])
 
 
 class BodyShapes:
-    """Reads the geoms of one compiled file; ``planes``: with height fields as sheets, of what has no other shape."""
+    """Reads the geoms of one compiled file; ``planes``: also planes and height fields, as sheets, for files without other
+    shapes.
+    """
 
     def __init__(self, compiled: CompiledMjcf, files: AssetFiles, *, planes: bool = False):
         self._compiled, self._model, self._files, self._planes = compiled, compiled.model, files, planes
@@ -58,10 +60,10 @@ class BodyShapes:
     def of(
         self, bodies: list[tuple[int, np.ndarray]]
     ) -> tuple[tuple[trimesh.Trimesh, ...], tuple[CollisionShape, ...]]:
-        """Return the visual parts and the collision shapes of bodies with their poses.
+        """Return the visual parts and the collision shapes of bodies with their poses ``(4, 4)``.
 
-        A geom collides where contype or conaffinity is not zero. Visual are the others in a group that the viewer shows, with
-        the colliding ones of the same groups; where there are none, the colliding ones in such a group.
+        A geom collides if contype or conaffinity is not zero. Visual are the non-colliding geoms in a group that the viewer
+        shows, and the colliding geoms of the same groups. If there are none, the colliding geoms in visible groups are visual.
         """
         colliding = set(self.colliding(bodies))
         visual: dict[bool, list[trimesh.Trimesh]] = {True: [], False: []}
@@ -80,7 +82,7 @@ class BodyShapes:
         return tuple(visual[False] or visual[True]), tuple(collision)
 
     def colliding(self, bodies: list[tuple[int, np.ndarray]]) -> list[int]:
-        """Return the geoms of bodies that collide."""
+        """Return the colliding geoms of bodies."""
         model = self._model
         return [g for g, _ in self._geoms(bodies) if collides(model, g)]
 
@@ -111,7 +113,7 @@ class BodyShapes:
     def _mesh(self, geom: int, pose: np.ndarray) -> list[trimesh.Trimesh]:
         model, mesh = self._model, int(self._model.geom_dataid[geom])
         parts = self._compiled.meshes.get(model.mesh(mesh).name)
-        if parts is None:  # written out in the file: as MuJoCo has it, in the frame of its inertia
+        if parts is None:  # inline data, in MuJoCo's frame of the mesh inertia
             vertices, faces = _written_out(model, mesh)
             self._files.count(len(faces))
             material = self._material(geom, pictured=False)
@@ -125,9 +127,10 @@ class BodyShapes:
         return [bake_transform(_dressed(part, materials[uv_of(part) is not None]), to_asset) for part in parts]
 
     def _material(self, geom: int, *, pictured: bool) -> PBRMaterial:
-        """Return the material of a geom; ``pictured``: its shape says where a picture lies, else this is its mean colour.
+        """Return the material of a geom; unless ``pictured``, its texture is replaced by the mean colour.
 
-        MuJoCo lays pictures on shapes without texture coordinates by projection. Who measures pictures is told of them all.
+        ``pictured`` says that the shape has texture coordinates; MuJoCo projects textures onto shapes without them. If textures
+        are not decoded, all of them are kept, for audits that list them.
         """
         pictured = pictured or not self._files.limits.decode_textures
         model, index = self._model, int(self._model.geom_matid[geom])
@@ -154,7 +157,7 @@ class BodyShapes:
 
 
 def _dressed(part: trimesh.Trimesh, material: PBRMaterial) -> trimesh.Trimesh:
-    """Return the part with the material of the MJCF file, unless only the mesh file has a picture."""
+    """Return the part with the material of the MJCF file, unless only the mesh file has a texture."""
     own = material_of(part)
     if own.baseColorTexture is not None and material.baseColorTexture is None:
         return part
@@ -175,7 +178,7 @@ def _written_out(model: Any, mesh: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _sheet(size: np.ndarray) -> trimesh.Trimesh:
-    """Return a plane as a sheet under it: half lengths, of which 0 has no end (MJCF reference, geom type)."""
+    """Return a sheet below a plane with half lengths ``size``, of which 0 means infinite (MJCF reference, geom type)."""
     sides = [2 * float(half) if half > 0 else _UNBOUNDED_M for half in size[:2]]
     sheet = trimesh.creation.box((*sides, _SHEET_M))
     sheet.apply_translation((0, 0, -_SHEET_M / 2))
@@ -183,7 +186,7 @@ def _sheet(size: np.ndarray) -> trimesh.Trimesh:
 
 
 def _terrain(model: Any, field: int) -> trimesh.Trimesh:
-    """Return a height field's surface: rows along y from -size[1], columns along x, heights by size[2] (MJCF, hfield)."""
+    """Return the surface of a height field: rows along y from -size[1], columns along x, heights times size[2] (MJCF, hfield)."""
     rows, columns, first = (int(a[field]) for a in (model.hfield_nrow, model.hfield_ncol, model.hfield_adr))
     half_x, half_y, height, _ = (float(size) for size in model.hfield_size[field])
     x, y = np.meshgrid(np.linspace(-half_x, half_x, columns), np.linspace(-half_y, half_y, rows))
@@ -196,7 +199,7 @@ def _terrain(model: Any, field: int) -> trimesh.Trimesh:
 
 
 def _primitive(kind: int, size: np.ndarray) -> trimesh.Trimesh | None:
-    """Return a geom's mesh: sizes are half lengths (MJCF reference, geom size)."""
+    """Return the mesh of a primitive geom, whose sizes are half lengths (MJCF reference, geom size); None for other kinds."""
     if kind == int(_KINDS.mjGEOM_BOX):
         return trimesh.creation.box(2 * size)
     if kind == int(_KINDS.mjGEOM_SPHERE):

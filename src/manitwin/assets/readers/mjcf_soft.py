@@ -1,4 +1,4 @@
-"""Soft bodies of an MJCF file: the shape that they have at rest, as MuJoCo makes it."""
+"""Soft bodies of an MJCF file: their shape at rest, as MuJoCo constructs it."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.meshes.textures import make_part, pbr_material, srgb_to_linear
 
 _MAX_FILE_FACES = 20_000
-"""Of a flex from a file: it goes to MuJoCo as text."""
+"""Largest flex that is read from a file: it is passed to MuJoCo as text."""
 _MAX_GMSH_BYTES = 16 << 20
 _THINNEST_M, _ROD_SIDES = 1e-4, 6
 _OF_MOTION = ("dof", "mass", "inertiabox", "origin")
-"""Attributes of a flex that say how it moves, or how its inside is divided."""
+"""Attributes of a flex that concern its motion, or how its interior is divided."""
 
 
 def as_shapes_at_rest(source: MjcfSource, files: AssetFiles) -> None:
-    """Write the flexes of a document so that MuJoCo makes their shapes of numbers alone, fixed to the bodies that hold them.
+    """Rewrite the flexes of a document so that MuJoCo builds their shapes from data, rigidly fixed to their parent bodies.
 
-    A file of Gmsh goes to MuJoCo as its bytes, one of triangles as numbers.
+    A Gmsh file is passed to MuJoCo as bytes, a triangle mesh as numbers.
     """
     for root in (source.root, *source.models.values()):
         for flex in list(root.iter("flexcomp")):
@@ -61,7 +61,7 @@ def _take_file(flex: etree._Element, source: MjcfSource, files: AssetFiles) -> b
 
 
 def soft_parts(model: Any) -> list[trimesh.Trimesh]:
-    """Return the surfaces of a compiled model's flexes in the world's axes, each in its colour; strings as rods."""
+    """Return the surfaces of a compiled model's flexes in world axes, each with its colour; one-dimensional flexes as rods."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
@@ -82,7 +82,7 @@ def soft_parts(model: Any) -> list[trimesh.Trimesh]:
 
 
 def _string(model: Any, flex: int, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return vertices and faces of a rod along each piece of a string, as thick as the string."""
+    """Return vertices and faces of rods along the segments of a one-dimensional flex, with its radius."""
     start, count = int(model.flex_elemdataadr[flex]), 2 * int(model.flex_elemnum[flex])
     pieces = points[np.array(model.flex_elem[start : start + count], int).reshape(-1, 2)]
     radius_m = max(float(model.flex_radius[flex]), _THINNEST_M)
@@ -91,7 +91,7 @@ def _string(model: Any, flex: int, points: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def _faces(model: Any, flex: int) -> np.ndarray:
-    """Return the triangles ``(F, 3)`` of a flex: its elements where it is a sheet, the shell of one that is filled."""
+    """Return the triangles ``(F, 3)`` of a flex: its elements if it is two-dimensional, otherwise its shell."""
     if int(model.flex_dim[flex]) == 2:
         start, count = int(model.flex_elemdataadr[flex]), 3 * int(model.flex_elemnum[flex])
         return np.array(model.flex_elem[start : start + count], int).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""What a material script of OGRE, Gazebo's renderer, says of colours and textures."""
+"""Parser of material scripts of OGRE, the renderer of Gazebo: colours and textures."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ _PLAIN_SECTIONS = frozenset({"technique", "pass", "texture_unit"})
 
 @dataclass(frozen=True)
 class OgreMaterial:
-    """The look of one material: its first pass of its first technique, and that one's first texture.
+    """Appearance of one material: the first pass of its first technique, and the first texture of that pass.
 
-    ``diffuse`` is sRGB with alpha ``(4,)`` in 0..1, None where the script says none; ``texture`` a file's name; ``scale`` how
-    large the texture is shown, of the surface's own coordinates. ``blended``: its alpha is seen through; ``cut_at``: what has
-    less alpha than this, in 0..1, is not drawn.
+    ``diffuse`` is sRGB with alpha ``(4,)`` in 0..1, None if not stated. ``texture`` is a file name. ``scale`` is the size of
+    the texture in texture coordinates. ``blended``: it is drawn with alpha blending. ``cut_at``: alpha threshold in 0..1 below
+    which nothing is drawn.
     """
 
     diffuse: tuple[float, ...] | None = None
@@ -31,9 +31,9 @@ class OgreMaterial:
 
 
 def ogre_materials(text: str) -> dict[str, OgreMaterial]:
-    """Return the materials of a script by name, with what they inherit from others before them in it.
+    """Return the materials of a script by name, with values inherited from earlier materials of the same script.
 
-    What is broken, or a program's (shaders, variables), is passed over. Source: the OGRE manual, "Material scripts".
+    Malformed statements, shaders and variables are skipped. Source: the OGRE manual, "Material scripts".
     """
     found: dict[str, OgreMaterial] = {}
     lines = _lines(_without_comments(text))
@@ -48,7 +48,7 @@ def ogre_materials(text: str) -> dict[str, OgreMaterial]:
 
 
 class _Lines(Iterator[list[str]]):
-    """The statements of a script, one after the other: words of a line, a brace always alone."""
+    """The statements of a script in order: the words of a line, with each brace separate."""
 
     def __init__(self, lines: list[list[str]]):
         self._lines, self._at = lines, 0
@@ -60,14 +60,14 @@ class _Lines(Iterator[list[str]]):
         return self._lines[self._at - 1]
 
     def opens(self) -> bool:
-        """Tell whether the next statement is an opening brace, and pass over it where it is."""
+        """Return whether the next statement is an opening brace, and skip it if so."""
         there = self._at < len(self._lines) and self._lines[self._at] == ["{"]
         self._at += there
         return there
 
 
 def _without_comments(text: str) -> str:
-    """Return a script without its comments; one that is not closed goes to the end."""
+    """Return a script without comments; an unclosed comment extends to the end."""
     kept, at = [], 0
     while (comment := _COMMENT.search(text, at)) is not None:
         kept.append(text[at : comment.start()])
@@ -111,7 +111,7 @@ def _skip(lines: _Lines) -> None:
 
 
 def _material(lines: _Lines, material: OgreMaterial) -> OgreMaterial:
-    """Return a material whose section is open; of several techniques, passes and textures the first counts."""
+    """Parse a material whose section is open; only the first technique, pass and texture count."""
     open_sections: list[str] = []
     seen: set[str] = set()
     for words in lines:
@@ -159,7 +159,7 @@ def _of_texture(words: list[str], material: OgreMaterial) -> OgreMaterial:
 
 
 def _numbers(words: list[str]) -> list[float] | None:
-    """Return the numbers at the beginning of a statement; None where one is none, such as a ``vertexcolour``."""
+    """Return the numbers of words; None if one is not a finite number, such as ``vertexcolour``."""
     try:
         values = [float(word) for word in words]
     except ValueError:

@@ -1,4 +1,4 @@
-"""What PartNet-Mobility says of an object beside its URDF: the category.
+"""Category of PartNet-Mobility objects, from the metadata beside their URDF.
 
 Source: Xiang et al., SAPIEN: A SimulAted Part-based Interactive ENvironment, CVPR 2020, and the folders of its data set.
 """
@@ -20,9 +20,10 @@ _LONGEST = 60
 
 
 def with_category(asset: Asset, file: Path, files: AssetFiles) -> Asset:
-    """Return the asset of a URDF ``file`` with the category and name that ``meta.json`` beside a ``mobility.urdf`` says.
+    """Return the asset of a URDF ``file`` with the category and name from ``meta.json`` beside a ``mobility.urdf``.
 
-    The name in the file is a digest. Other assets come back as they are, and so do those whose ``meta.json`` is broken.
+    The name in such a URDF is a digest. Other assets are returned unchanged, and those with a broken ``meta.json`` with a
+    remark.
     """
     place = file.resolve().parent / METADATA
     if file.name != DESCRIPTION or not place.is_file() or not place.resolve().is_relative_to(files.root.resolve()):

@@ -1,6 +1,6 @@
-"""RoboTwin object folders (1.0 and 2.0): one variant of a rigid object, as RoboTwin's own loader would take it.
+"""Reader of RoboTwin object folders (1.0 and 2.0): one variant of a rigid object, as RoboTwin's own loader reads it.
 
-Source: RoboTwin envs/utils/create_actor.py ``create_actor`` (which file is used) and envs/utils/actor_utils.py.
+Source: RoboTwin envs/utils/create_actor.py ``create_actor`` (file selection) and envs/utils/actor_utils.py.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from manitwin.geometry.poses import GLTF_TO_OBJECT, OBJECT_TO_GLTF, transform
 
 _NUMBERED = re.compile(r"^\d+_(.+)$")
 _EXTENTS_TOLERANCE = 0.1
-"""RoboTwin's own are those of an oriented box: a tenth apart is another axis, not another rounding."""
+"""RoboTwin's own extents are those of an oriented box; a difference of a tenth indicates different axes rather than rounding."""
 
 
 def read(path: Path) -> Asset:
-    """Read a variant by its model_data file; by its folder, the variant with the lowest number.
+    """Read a variant by its model_data file; for a folder, the variant with the lowest number.
 
-    Meshes and the translations of frames have the file's scale, as in RoboTwin; matrices are kept as they are written.
-    Mass and friction are those of a ``physics<ID>.json`` beside it where there is one: RoboTwin itself reads none for rigid
-    objects. ``rests`` is the pose in which RoboTwin sets down what is ``stable``. Raises AssetError for an articulated
-    object and for what cannot be read.
+    Meshes and the translations of frames are scaled as in RoboTwin; matrices are otherwise unchanged. Mass and friction come
+    from a ``physics<ID>.json`` beside the file, if there is one; RoboTwin itself reads none for rigid objects. ``rests`` is the
+    pose in which RoboTwin places an object marked ``stable``. Raises AssetError for an articulated object and for unreadable
+    files.
     """
     variants = robotwin_data(path) if path.is_dir() else [path]
     if not variants:
@@ -100,7 +100,7 @@ def _other_variants(path: Path, variants: list[Path]) -> list[str]:
 
 
 def _extents_remark(data: RobotwinData, shapes: tuple[CollisionShape, ...]) -> list[str]:
-    """Say where the declared extents are not those along the axes: RoboTwin's clutter takes the second for the height."""
+    """Remark on declared extents that are not along the axes: RoboTwin's clutter code uses the second one as the height."""
     declared = data.content.get("extents")
     if not shapes or not isinstance(declared, list) or len(declared) != 3:
         return []
@@ -117,7 +117,7 @@ def _metres(values: np.ndarray) -> str:
 
 
 def _description(folder: Path, number: str) -> dict[str, Any]:
-    """Return the phrases that RoboTwin keeps for the object, where the folder lies in ``<root>/assets/objects``."""
+    """Return RoboTwin's descriptions of the object, if its folder lies in ``<root>/assets/objects``."""
     objects = folder.resolve().parent
     if objects.name != "objects" or objects.parent.name != "assets":
         return {}
@@ -130,7 +130,7 @@ def _list(value: Any) -> list[Any]:
 
 
 def _inertial(physics: dict[str, Any], file: Path) -> Inertial:
-    """Return the mass properties beside the object, turned from the object frame into the mesh's Y-up axes."""
+    """Return the mass properties from the physics file, rotated from the object frame to the Y-up axes of the mesh."""
     numbers = RobotwinData(file, physics)
     turn = OBJECT_TO_GLTF[:3, :3]
     center, tensor = physics.get("center_of_mass_m"), physics.get("inertia_kg_m2")
@@ -152,7 +152,7 @@ def _contact(physics: dict[str, Any], file: Path) -> Contact:
 
 
 def _estimate(numbers: RobotwinData, key: str) -> float | None:
-    """Return an estimate's value, or a plain number; None where there is neither."""
+    """Return the value of an estimate or a plain number; None if absent."""
     given = numbers.content.get(key)
     if given is None:
         return None

@@ -1,4 +1,4 @@
-"""RoboTwin's ``model_data<ID>.json``: frames and what is said of them, in the spellings of all its versions."""
+"""RoboTwin's ``model_data<ID>.json``: frames and their descriptions, in the spellings of all versions."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from manitwin.errors import AssetError
 from manitwin.formats.json_file import read_json_object
 
 MAX_FRAMES = 10_000
-LARGEST = 1e6  # metres, or scale: what is beyond is no object
+LARGEST = 1e6  # metres or scale factor: larger values are invalid for an object
 FRAME_KEYS: dict[FrameKind, tuple[str, ...]] = {
     "contact": ("contact_points_pose", "contact_pose"),
     "functional": ("functional_matrix",),
     "target": ("target_pose",),
     "orientation": ("orientation_point",),
 }
-"""The first is RoboTwin 2.0's name, the others those of 1.0."""
+"""Keys of each kind of frame: first that of RoboTwin 2.0, then those of 1.0."""
 
 _WORDS = {"contact": "contact_points", "functional": "functional_point", "target": "target_point"}
-_SPELLINGS = ("description", "discription")  # files shipped until 2026 have the second
+_SPELLINGS = ("description", "discription")  # files shipped until 2026 have the second spelling
 _ARTICULATED = ("contact_points", "functional_points", "target_points")
 
 
 @dataclass
 class RobotwinData:
-    """The content of one file; empty where it is not there, as RoboTwin's loader takes it.
+    """Content of one file; empty if it does not exist, as in RoboTwin's loader.
 
-    ``remarks`` are what was noted about it, one line each.
+    ``remarks`` are findings on the content, one line each.
     """
 
     file: Path
@@ -41,7 +41,7 @@ class RobotwinData:
 
     @classmethod
     def read(cls, file: Path) -> RobotwinData:
-        """Read a file; raises AssetError for one that is no JSON object, and for an articulated object's."""
+        """Read a file; raises AssetError if it is not a JSON object, or describes an articulated object."""
         content = read_json(file)
         articulated = [key for key in _ARTICULATED if key in content]
         if articulated or isinstance(content.get("mass"), dict):
@@ -53,7 +53,7 @@ class RobotwinData:
 
     @property
     def scale(self) -> np.ndarray:
-        """The scale ``(3,)`` on the meshes and on the translations of all frames; 1 where none is said."""
+        """The scale ``(3,)`` of meshes and of the translations of all frames; 1 by default."""
         given = self.content.get("scale", 1.0)
         numbers = self._numbers("scale", given)
         if numbers.size not in (1, 3):
@@ -61,10 +61,10 @@ class RobotwinData:
         return np.broadcast_to(numbers.reshape(-1), 3).copy()
 
     def frames(self) -> tuple[AnnotatedFrame, ...]:
-        """Return all frames as they are written, not made orthonormal, but with the scale on their translations.
+        """Return all frames as written, without orthonormalization, with scaled translations.
 
-        Those for grasping say by which direction and along which: minus the second axis, and the third. Raises AssetError
-        for what is no 4x4 matrix of finite numbers.
+        For contact frames, approach is minus the second axis and closing the third axis. Raises AssetError for anything but 4x4
+        matrices of finite numbers.
         """
         found = []
         for kind in FRAME_KEYS:
@@ -76,26 +76,26 @@ class RobotwinData:
         return tuple(found)
 
     def array(self, key: str, shape: tuple[int, ...]) -> np.ndarray:
-        """Return numbers of the file; raises AssetError for another shape, or numbers that are not finite."""
+        """Return numbers of the file as an array; raises AssetError for another shape, or numbers that are not finite."""
         numbers = self._numbers(key, self.content.get(key))
         if numbers.shape != shape:
             raise self._broken(key, f"has the shape {numbers.shape}, not {shape}")
         return numbers
 
     def text(self, key: str) -> str | None:
-        """Return a text of the file, None where there is none."""
+        """Return a text of the file, None if absent or empty."""
         value = self.content.get(key)
         return value.strip() or None if isinstance(value, str) else None
 
     def _matrices(self, kind: FrameKind) -> np.ndarray:
-        """Return matrices ``(N, 4, 4)``; where a name of 1.0 is used, with its ``trans_matrix`` applied."""
+        """Return matrices ``(N, 4, 4)``, with ``trans_matrix`` applied if a key of version 1.0 is used."""
         names = FRAME_KEYS[kind]
         key = next((name for name in names if self.content.get(name) not in (None, [])), None)
         if key is None:
             return np.empty((0, 4, 4))
         matrices = self._numbers(key, self.content[key])
         if matrices.shape == (4, 4):
-            matrices = matrices[None]  # 1.0 has one matrix where 2.0 has a list of them
+            matrices = matrices[None]  # 1.0 has a single matrix where 2.0 has a list
         if matrices.ndim != 3 or matrices.shape[1:] != (4, 4) or len(matrices) > MAX_FRAMES:
             raise self._broken(key, f"is no list of 4x4 matrices (shape {matrices.shape})")
         if (matrices[:, 3] != (0, 0, 0, 1)).any():
@@ -117,14 +117,14 @@ class RobotwinData:
         if kind != "contact":
             return labels
         groups = self._groups(count)
-        if len(texts) < count and len(texts) == len(groups):  # a description a group
+        if len(texts) < count and len(texts) == len(groups):  # one description for each group
             for text, group in zip(texts, groups, strict=True):
                 for i in group:
                     labels[i] = text
         return labels
 
     def _groups(self, count: int) -> list[list[int]]:
-        """Return the groups of contacts without the numbers of contacts that are not there."""
+        """Return the groups of contacts, without indices of contacts that do not exist."""
         groups = self.content.get("contact_points_group") or []
         if not isinstance(groups, list) or not all(isinstance(group, list) for group in groups):
             raise self._broken("contact_points_group", "is no list of lists")
@@ -150,11 +150,11 @@ class RobotwinData:
 
 
 def read_json(file: Path) -> dict[str, Any]:
-    """Read a JSON object from a file, empty where the file is not there; raises AssetError for anything else."""
+    """Read a JSON object from a file, empty if the file does not exist; raises AssetError for anything else."""
     return read_json_object(file, inside=file.parent) if os.path.lexists(file) else {}
 
 
 def _unit(vector: np.ndarray | None) -> np.ndarray | None:
-    """Return a direction; None for none, and for one without length."""
+    """Normalize a direction; return None for None and for a zero vector."""
     length = 0.0 if vector is None else float(np.linalg.norm(vector))
     return None if vector is None or length < 1e-9 else vector / length

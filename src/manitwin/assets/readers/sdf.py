@@ -1,4 +1,4 @@
-"""SDF: the first object of a model, links that fixed joints join taken as one, with the joints of what moves."""
+"""SDF reader: the first object of a model, with links on fixed joints merged, and optionally its movable joints."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 @dataclass(frozen=True)
 class SdfModel:
-    """An SDF model with the links of the object that is read; ``config`` is the model.config beside it.
+    """An SDF model with the links of the selected object; ``config`` is the root of the model.config beside it.
 
-    ``moving`` is what joints of these links a twin can have, None where none is kept.
+    ``moving`` is the tree of supported joints between these links, None if none is kept.
     """
 
     file: Path
@@ -50,12 +50,12 @@ class SdfModel:
 
 
 def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS, *, joints: Joints = "part") -> Asset:
-    """Read an SDF file, or a model's folder; the asset's axes are those of the model.
+    """Read an SDF file, or a model folder; the asset's axes are those of the model.
 
-    Meshes are looked up from the file's folder and from those above it up to ``root`` (``root_of`` the path by default), those
-    of ``model://`` in the folder of the model's name before any other. Links behind joints that move are left out with a remark,
-    or held as the file stands (``joints``); so are nested and included models left out. Raises AssetError naming what is broken.
-    Source: the SDFormat specification, version 1.9.
+    Meshes are looked up in the folder of the file and in those above it up to ``root`` (default: ``root_of`` the path); those
+    of ``model://`` first in the folder with the name of the model. Links behind movable joints are left out with a remark,
+    locked in the pose of the file, or kept (``joints``). Nested and included models are left out with a remark. Raises
+    AssetError naming what is broken. Source: the SDFormat specification, version 1.9.
     """
     opened = open_sdf(path, root, limits, joints=joints)
     return asset_of(opened, path)
@@ -64,7 +64,7 @@ def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS,
 def open_sdf(
     path: Path, folder: Path | None = None, limits: MeshLimits = MESH_LIMITS, *, joints: Joints = "part"
 ) -> SdfModel:
-    """Parse an SDF and choose the object in it; raises AssetError."""
+    """Parse an SDF file and select the object in it; raises AssetError."""
     file = path
     if path.is_dir():
         file = path / MAIN_FILE if is_file_below(path / MAIN_FILE, path) else only_file(path)
@@ -89,9 +89,9 @@ def open_sdf(
 
 
 def _included(file: Path, root: etree._Element, files: AssetFiles) -> tuple[Path, etree._Element]:
-    """Return the file and root of the model that one without a shape is composed of: the first one that it includes.
+    """Return file and root of the first existing model that a file without shapes includes; otherwise the file itself.
 
-    That is one of the model itself, else of the world or the file.
+    Includes of a model come first, then those of the world and of the file.
     """
     for _ in range(_MAX_INCLUDES):
         if root.find(".//visual") is not None or root.find(".//collision") is not None:
@@ -112,17 +112,17 @@ def _included(file: Path, root: etree._Element, files: AssetFiles) -> tuple[Path
 
 
 def _main_files(uri: str, file: Path, files: AssetFiles) -> Iterator[Path]:
-    """Yield where the main file of a named model may lie: what its model.config says, or model.sdf."""
+    """Yield candidate main files of a named model: those that its model.config states, then model.sdf."""
     for config in candidates(f"{uri}/{CONFIG_FILE}", file, files.root):
         if is_file_below(config, files.root) and config.resolve().is_relative_to(files.root.resolve()):
-            with suppress(AssetError):  # then model.sdf is left
+            with suppress(AssetError):  # model.sdf remains
                 said = [(each.text or "").strip() for each in read_xml(config, "model").findall("sdf")]
                 yield from (config.parent / name for name in reversed(said) if name)
     yield from candidates(f"{uri}/{MAIN_FILE}", file, files.root)
 
 
 def asset_of(opened: SdfModel, path: Path) -> Asset:
-    """Return the asset that an SDF's elements describe; raises AssetError."""
+    """Return the asset that the SDF elements describe; raises AssetError."""
 
     def shapes(turn: bool) -> list[Shapes]:
         return SdfShapes(opened.file, opened.frames, opened.files, turn_gltf=turn).by_link(opened.links)
@@ -162,7 +162,7 @@ def asset_of(opened: SdfModel, path: Path) -> Asset:
 
 
 def _articulation(opened: SdfModel, moving: Tree, owners: list[int]) -> Articulation:
-    """Return links and joints; ``owners`` are the places of the links, as they are read, of the visual parts."""
+    """Return links and joints; ``owners`` are the indices of the links of each visual part, before merging."""
     links = []
     for place, head in enumerate(moving.heads):
         mine = tuple(link for link, of in zip(opened.links, moving.link_of, strict=True) if of == place)
@@ -227,7 +227,7 @@ def _of_link(opened: SdfModel, link: etree._Element) -> Inertial:
 
 
 def _declared_contact(opened: SdfModel) -> Contact:
-    """Return the friction of the first collision that says any: Drake's, or ``mu``, to which ``mu2`` is another direction."""
+    """Return the friction of the first collision that declares any: Drake's, or ``mu``; ``mu2`` is for another direction."""
     drake = drake_contact(opened.links, opened.files, opened.file.name)
     surfaces = [surface for link in opened.links for surface in link.findall("collision/surface")]
     said_mu = [(s, text) for s in surfaces if (text := text_of(s, "friction/ode/mu")) is not None]
@@ -235,7 +235,7 @@ def _declared_contact(opened: SdfModel) -> Contact:
     restitution = number(bounces[0], f"{opened.file.name}: restitution_coefficient") if bounces else None
     if drake is not None:
         return replace(drake, restitution=restitution)
-    if not said_mu:  # PyBullet reads its <contact> of URDF in SDF too
+    if not said_mu:  # PyBullet reads its URDF element <contact> in SDF too
         lateral = next((t for link in opened.links if (t := text_of(link, "contact/lateral_friction"))), None)
         friction = None if lateral is None else number(lateral, f"{opened.file.name}: lateral_friction")
         others = next(opened.model.iter("mu", "lateral_friction"), None) is not None
@@ -253,7 +253,7 @@ def _declared_contact(opened: SdfModel) -> Contact:
 
 
 def _licence(opened: SdfModel) -> tuple[str | None, str | None]:
-    """Return licence and attribution: what model.config says in elements of their own, else what comments state."""
+    """Return licence and attribution from elements of model.config, or else from comments."""
     comments = [*comments_before(opened.root), *(comments_before(opened.config) if opened.config is not None else ())]
     licence, attribution = stated_licence(comments)
     if opened.config is not None:

@@ -1,4 +1,4 @@
-"""Which links of an SDF model are read, and which joints of them a twin can have."""
+"""Selection of the links of an SDF model that are read, and of their joints that twins support."""
 
 from __future__ import annotations
 
@@ -21,22 +21,23 @@ from manitwin.assets.readers.sdf_shapes import ModelFrames, pose_of
 from manitwin.formats.xml_file import text_of
 from manitwin.geometry.articulation import ArticulatedJoint
 
-_COUPLES = "gearbox"  # it holds nothing: it couples two joints
+_COUPLES = "gearbox"  # a gearbox couples two joints and holds no link
 _UNLIMITED = 1e15  # SDFormat's default is 1e16
-_AXES_OF_THE_MODEL = (1, 4)  # up to this version an axis was written in the model's frame
+_AXES_OF_THE_MODEL = (1, 4)  # up to this version, axes were written in the model's frame
 
 Links = dict[str, etree._Element]
 Ends = tuple[str, str]
-"""The links of a joint, its parent's first."""
+"""The links of a joint, parent first."""
 
 
 def chosen_links(
     model: etree._Element, frames: ModelFrames, files: AssetFiles, joints: Joints, version: str | None
 ) -> tuple[tuple[etree._Element, ...], Tree | None]:
-    """Return the links of the first object that has a shape, the first of a tree first; and with ``joints="keep"`` what moves.
+    """Return the links of the first object with a shape, root of the tree first, and its joint tree for ``joints="keep"``.
 
-    "part": links on fixed joints are one object, what moves is another. "lock" and "keep": what joints hold is one, as the file
-    stands, which is with all joints at 0. ``version`` is that of the document.
+    With "part", links on fixed joints form one object, and links behind movable joints are others. With "lock" and "keep", all
+    joints connect an object, in the pose of the file, with all joints at position 0. ``version`` is the SDFormat version of the
+    document.
     """
     links: Links = {link.get("name"): link for link in model.findall("link")}
     held = [(joint, ends) for joint in model.findall("joint") if (ends := _ends(joint, frames)) is not None]
@@ -79,16 +80,16 @@ def _tree(
     frames: ModelFrames,
     version: str | None,
 ) -> tuple[list[str], list[Node]]:
-    """Return the links in an order in which those that hold come first, and what each is held by.
+    """Return the link names, parents first, and a node for each link.
 
-    A joint that would hold a link a second time closes a loop, and is left out with a remark. A joint from the child's side
-    turns about the opposite axis.
+    A joint that would attach a link a second time closes a loop, and is left out with a remark. A joint traversed from its
+    child to its parent gets the opposite axis.
     """
     children = {ends[1] for _, ends in held}
     root = next((name for name in names if name not in children), names[0])
     order, left = [root], list(held)
     nodes = [Node(root, None, links[root].find("visual") is not None)]
-    for name in order:  # grows by the links that joints hold to it
+    for name in order:  # grows by the links attached to it
         for joint, ends in [each for each in left if name in each[1]]:
             left.remove((joint, ends))
             other = ends[1] if name == ends[0] else ends[0]
@@ -104,7 +105,7 @@ def _tree(
 def _kept(
     joint: etree._Element, ends: Ends, frames: ModelFrames, version: str | None, *, backward: bool
 ) -> tuple[ArticulatedJoint | None, str]:
-    """Return a joint in the model's axes; None for a fixed one, and with the cause for one that cannot be kept."""
+    """Return a joint in the model's axes and "", or None and the reason; the reason is empty for a fixed joint."""
     written, name = joint.get("type") or "", str(joint.get("name"))
     if written == "fixed":
         return None, ""
@@ -138,16 +139,16 @@ def _kept(
 
 
 def _pose(joint: etree._Element, ends: Ends, frames: ModelFrames) -> np.ndarray:
-    """Return a joint's pose in the model's frame ``(4, 4)``: relative to its child, where it does not say to what."""
+    """Return a joint's pose in the model's frame ``(4, 4)``; by default, poses are relative to the child."""
     pose = joint.find("pose")
     base = (None if pose is None else pose.get("relative_to")) or (joint.findtext("child") or "").strip() or ends[1]
     return frames.to_model(base) @ pose_of(joint, f"joint {joint.get('name')!r}")
 
 
 def _axis(joint: etree._Element, placed: np.ndarray, frames: ModelFrames, version: str | None) -> np.ndarray | None:
-    """Return a joint's axis of length one in the model's frame; None where it has no direction.
+    """Return a joint's unit axis in the model's frame; None if it has no direction.
 
-    It is written in the joint's frame, unless it says otherwise, and up to SDFormat 1.4 in that of the model.
+    It is written in the joint's frame by default, and up to SDFormat 1.4 in that of the model.
     """
     element = joint.find("axis/xyz")
     axis = unit_direction(text_of(joint, "axis/xyz") or "0 0 1")

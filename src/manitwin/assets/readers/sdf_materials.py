@@ -1,4 +1,4 @@
-"""The materials that visuals of SDF name in scripts of OGRE, Gazebo's renderer: colours and textures of their own folder."""
+"""Materials of SDF visuals that refer to scripts of OGRE, the renderer of Gazebo: colours, and textures of the asset."""
 
 from __future__ import annotations
 
@@ -37,27 +37,27 @@ _OF_GAZEBO = {
     "Purple": (1, 0, 1), "Turquoise": (0, 1, 1), "Orange": (1, 0.5088, 0.0468), "Indigo": (0.33, 0, 0.5),
     "Gold": (0.8, 0.64869, 0.120759),
 }  # fmt: skip
-"""Plain colours of the script that Gazebo brings itself (media/materials/scripts/gazebo.material), sRGB."""
+"""Plain colours of Gazebo's own script (media/materials/scripts/gazebo.material), sRGB."""
 
 Candidates = Callable[[str], Iterator[Path]]
-"""Yields where a file or folder that a URI names may lie."""
+"""Yields candidate paths of a file or folder that a URI names."""
 
 
 @dataclass(frozen=True)
 class ScriptedLook:
-    """A material, and how large its texture is shown, of the surface's own coordinates."""
+    """A material, and the size of its texture in texture coordinates."""
 
     material: PBRMaterial
     scale: tuple[float, float]
 
     @property
     def is_picture(self) -> bool:
-        """Tell whether it shows a texture, for which a surface needs texture coordinates."""
+        """Whether it has a texture, for which a surface needs texture coordinates."""
         return self.material.baseColorTexture is not None
 
 
 class ScriptedLooks:
-    """Looks up the scripted materials of visuals; what is not there, or lies outside the asset's folder, is remarked."""
+    """Lookup of scripted materials of visuals; missing ones, or ones outside the asset's root, are remarked."""
 
     def __init__(self, files: AssetFiles, candidates: Candidates):
         self._files, self._candidates = files, candidates
@@ -66,7 +66,7 @@ class ScriptedLooks:
         self._absent: list[str] = []
 
     def of(self, element: etree._Element) -> ScriptedLook | None:
-        """Return the look of a visual's material script; None where it names none, or one that is not there."""
+        """Return the material of a visual's material script; None if it names none or the script is missing."""
         script = element.find("material/script")
         if script is None:
             return None
@@ -80,7 +80,7 @@ class ScriptedLooks:
         return self._found[key]
 
     def remark_absent(self) -> None:
-        """Remark the materials that were asked for and are not there."""
+        """Remark on the requested materials that are missing."""
         names = [repr(name[:60]) for name in dict.fromkeys(self._absent) if name]
         if names:
             more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
@@ -90,9 +90,9 @@ class ScriptedLooks:
             )
 
     def dressed(self, part: trimesh.Trimesh, look: ScriptedLook, shape: str) -> trimesh.Trimesh:
-        """Return a part in a scripted material, which takes the place of its own as in Gazebo.
+        """Return a part with a scripted material in place of its own, as in Gazebo.
 
-        A texture on what has no texture coordinates is left out with a remark that names the ``shape``.
+        If the part has no texture coordinates, a texture is left out with a remark that names the ``shape``.
         """
         material, uv = look.material, uv_of(part)
         if uv is None and look.is_picture:
@@ -127,7 +127,7 @@ class ScriptedLooks:
     def _is_below(self, place: Path) -> bool:
         try:
             return place.exists() and place.resolve().is_relative_to(self._files.root.resolve())
-        except (OSError, ValueError, RuntimeError):  # a name that no file system can hold; a loop of links
+        except (OSError, ValueError, RuntimeError):  # a name that no file system can hold, or a loop of links
             return False
 
     def _script(self, file: Path) -> dict[str, OgreMaterial]:
@@ -165,7 +165,7 @@ class ScriptedLooks:
 
 
 def _scripts_at(place: Path) -> list[Path]:
-    """Return the scripts that a URI means: the file itself, or all of a folder in the order of their names."""
+    """Return the scripts that a path denotes: the file itself, or all scripts in a folder, sorted by name."""
     if place.is_file():
         return [place] if place.suffix == _SUFFIX else []
     return sorted(each for each in place.glob(f"*{_SUFFIX}") if each.is_file())[:_MOST_FILES]

@@ -1,4 +1,4 @@
-"""The frames of an SDF model, and the visual and collision shapes of its links, poses and scales applied."""
+"""Frames of an SDF model, and visual and collision shapes of its links with poses and scales applied."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ MODEL_FRAME = "__model__"
 
 
 def pose_of(element: etree._Element, what: str) -> np.ndarray:
-    """Return the ``<pose>`` of an element ``(4, 4)``, relative to whatever it says; identity where it has none.
+    """Return the ``<pose>`` of an element ``(4, 4)`` in the frame that it refers to; identity by default.
 
-    Roll, pitch and yaw turn about fixed axes x, y, z in that order, in radians unless ``degrees`` says otherwise;
-    ``rotation_format`` may be ``quat_xyzw``. Source: the SDFormat specification, version 1.9, ``pose``.
+    Roll, pitch and yaw rotate about fixed axes x, y, z in this order, in radians unless ``degrees`` is set; ``rotation_format``
+    may be ``quat_xyzw``. Source: the SDFormat specification, version 1.9, ``pose``.
     """
     pose = element.find("pose")
     if pose is None or not (pose.text or "").strip():
@@ -61,7 +61,7 @@ class ModelFrames:
             name = element.get("name") or ""
             what = f"{file.name}: {element.tag} {name!r}"
             if element.tag == "joint" and name in self._base:
-                continue  # before SDFormat 1.7 a joint might have the name of a link, and no pose was relative to it
+                continue  # before SDFormat 1.7, a joint could have the name of a link, and no pose was relative to it
             if not name or name in self._base:
                 raise AssetError(f"{what}: has no name, or that of another element; give each its own")
             default = element.get("attached_to") or MODEL_FRAME
@@ -75,7 +75,7 @@ class ModelFrames:
             self._pose[name] = pose_of(element, what)
 
     def to_model(self, name: str) -> np.ndarray:
-        """Return a frame's pose in the model's frame ``(4, 4)``; raises AssetError where its chain does not end there."""
+        """Return a frame's pose in the model's frame ``(4, 4)``; raises AssetError if its chain does not end there."""
         chain: list[np.ndarray] = []
         seen: set[str] = set()
         at = name
@@ -92,7 +92,7 @@ class ModelFrames:
         return result
 
     def link_of(self, name: str) -> str:
-        """Return the link that a frame is attached to, by name; a link is its own, and an unknown name stays."""
+        """Return the name of the link that a frame is attached to; a link or an unknown name is returned unchanged."""
         seen: set[str] = set()
         while name in self._attached and name not in seen:
             seen.add(name)
@@ -101,7 +101,7 @@ class ModelFrames:
 
 
 class SdfShapes:
-    """Reads shapes of the links of one SDF model; meshes are looked up in the asset's folder and nowhere else."""
+    """Reads the shapes of links of one SDF model; meshes are looked up only below the root of the asset."""
 
     def __init__(self, file: Path, frames: ModelFrames, files: AssetFiles, *, turn_gltf: bool = False):
         self._file, self._frames, self._files, self._turn_gltf = file, frames, files, turn_gltf
@@ -116,15 +116,15 @@ class SdfShapes:
         return [(parts, list(self.collision(link))) for link, parts in zip(placed, seen, strict=True)]
 
     def visual(self, link: etree._Element) -> Iterator[trimesh.Trimesh]:
-        """Yield a link's visual parts in the model's frame."""
+        """Yield the visual parts of a link in the model's frame."""
         for element, what in self._elements(link, "visual"):
             yield from self._placed(element, link, what)
 
     def collision(self, link: etree._Element) -> Iterator[CollisionShape]:
-        """Yield a link's collision shapes in the model's frame.
+        """Yield the collision shapes of a link in the model's frame.
 
-        A mesh counts as its convex hull, as in every other format: Gazebo's own engines take its triangles, which only
-        SDFormat 1.11 can change.
+        A mesh counts as its convex hull, as in every other format. Gazebo's own engines use its triangles, which only SDFormat
+        1.11 can change.
         """
         for index, (element, what) in enumerate(self._elements(link, "collision")):
             parts = self._placed(element, link, what)
@@ -161,7 +161,7 @@ class SdfShapes:
         self, element: etree._Element, shapes: list[etree._Element], what: str, *, textured: bool
     ) -> list[trimesh.Trimesh]:
         shape, color = shapes[0], _diffuse(element, what)
-        if shape.tag == "polyline":  # several: what lies within two of them is a hole
+        if shape.tag == "polyline":  # of several outlines, regions inside two are holes
             return [self._solid(prism_of(shapes, what), shape, color, textured)]
         if shape.tag == "mesh":
             return self._mesh_parts(shape, color, what)
@@ -210,7 +210,7 @@ class SdfShapes:
         return [bake_transform(part, GLTF_TO_OBJECT) for part in parts] if turn else parts
 
     def _submesh(self, shape: etree._Element, mesh: MeshFile, path: Path) -> MeshFile:
-        """Return the parts of a mesh that <submesh> names: in COLLADA those that a node of the name shows, as Gazebo has it."""
+        """Return the parts of a mesh that <submesh> names; in COLLADA, those that a node of this name shows, as in Gazebo."""
         name = text_of(shape, "submesh/name")
         if name is None:
             return mesh

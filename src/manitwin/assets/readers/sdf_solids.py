@@ -1,4 +1,4 @@
-"""The plain shapes of SDF: boxes, balls, cylinders, planes and prisms over closed lines, as meshes in metres."""
+"""Primitive shapes of SDF as meshes in metres: boxes, spheres, cylinders, planes and extruded polylines."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _MAX_POINTS = 10_000
 
 
 def primitive_of(shape: etree._Element, what: str) -> trimesh.Trimesh | None:
-    """Return a box, ellipsoid, sphere, cylinder, capsule or plane, None for any other shape; raises AssetError."""
+    """Return the mesh of a box, ellipsoid, sphere, cylinder, capsule or plane, None for other shapes; raises AssetError."""
     if shape.tag == "box":
         return trimesh.creation.box(_all_positive(shape, "size", what))
     if shape.tag == "ellipsoid":
@@ -32,7 +32,7 @@ def primitive_of(shape: etree._Element, what: str) -> trimesh.Trimesh | None:
 
 
 def _plane(shape: etree._Element, what: str) -> trimesh.Trimesh:
-    """Return the rectangle that a plane shows, as a sheet under it; to collide with it has no end."""
+    """Return the visible rectangle of a plane as a sheet below it; for collisions the plane is infinite."""
     normal = numbers(text_of(shape, "normal") or "0 0 1", 3, f"{what} normal")
     length = float(np.linalg.norm(normal))
     if length == 0:
@@ -47,7 +47,7 @@ def _plane(shape: etree._Element, what: str) -> trimesh.Trimesh:
 
 
 def prism_of(shapes: list[etree._Element], what: str) -> trimesh.Trimesh:
-    """Return the prism over closed lines of points, from z = 0 to the height of the first; raises AssetError."""
+    """Return the extrusion of closed polylines from z = 0 to the height of the first; raises AssetError."""
     lines = [
         [numbers(" ".join((point.text or "").split()), 2, f"{what} point") for point in shape.findall("point")]
         for shape in shapes

@@ -1,4 +1,4 @@
-"""The surface of an SDF <heightmap>, which is a picture of heights."""
+"""Surface of an SDF <heightmap>, which is a picture of heights."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from manitwin.formats.meshes.textures import decode_texture
 from manitwin.formats.xml_file import numbers, text_of
 
 _MOST_POINTS = 257
-"""Along a side: of a finer picture every second point is taken, or every fourth, as far from a terrain's use as that is."""
+"""Largest number of points along a side: a finer picture is subsampled, which is enough for a terrain."""
 _LARGEST = 255.0
 
 
 def terrain(shape: etree._Element, path: Path, files: AssetFiles, what: str) -> trimesh.Trimesh | None:
-    """Return the surface over the middle of its size; None with a remark where the picture cannot be decoded.
+    """Return the surface, centred on its size; None with a remark if the picture cannot be decoded.
 
-    White is as high as <size> says, black is 0 (SDFormat specification 1.9, heightmap). Raises AssetError for a size that none
-    can have.
+    White is as high as <size> states, black is 0 (SDFormat specification 1.9, heightmap). Raises AssetError for a size that is
+    not positive.
     """
     size = numbers(text_of(shape, "size") or "1 1 1", 3, f"{what} size")
     if (size <= 0).any():

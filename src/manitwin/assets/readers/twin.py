@@ -1,4 +1,4 @@
-"""A finished twin as an asset."""
+"""Reader of a finished twin as an asset."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from manitwin.twin.point_records import FunctionalPoint, GraspPoint
 
 
 def read(path: Path) -> Asset:
-    """Read an accepted twin's folder, or its twin.json.
+    """Read the folder of an accepted twin, or its twin.json.
 
-    The frame of a point has its Z along the normal, out of the object. ``rests`` are the placements. Raises AssetError for
-    a folder that cannot be read and for a rejected twin.
+    The frame of a point has its Z axis along the outward normal. ``rests`` are the placements. Raises AssetError for an
+    unreadable folder and for a rejected twin.
     """
     folder = path.parent if path.is_file() else path
     try:
         twin = Twin(folder)
         record, physical = twin.record, twin.physical
-        # what a twin's textures are is told by its digests: their pixels are a sixth of the time to read it
+        # digests identify the textures of a twin; decoding their pixels would take a sixth of the reading time
         visual = tuple(read_glb(folder / "visual.glb", limits=replace(MESH_LIMITS, decode_textures=False)))
         grasps = _grasps(twin)
     except (TwinError, InputError) as error:

@@ -1,4 +1,4 @@
-"""glTF meshes in URDF and SDF: some loaders turn them from Y up to Z up, and files are made for either."""
+"""Up axis of glTF meshes in URDF and SDF: some loaders turn them from Y up to Z up, and files exist for either convention."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _SAME_M = 1e-6
 
 
 def upright_shapes(read: Callable[[bool], list[Shapes]], files: AssetFiles) -> list[Shapes]:
-    """Return the visual parts and collision shapes of each link, meshes of glTF turned to Z up where that fits better.
+    """Return the visual parts and collision shapes of each link, with glTF meshes turned to Z up if that fits better.
 
-    ``read(turn)`` reads them turned or as they are written. Drake and Gazebo turn them, as the format has Y up; SAPIEN does not.
-    Collision shapes that are no glTF tell which of the two a file was made for: the reading in which the boxes of both are
-    closer, summed over the links. Without any they are turned. One box of a whole robot would tell of nothing but the link that
-    reaches farthest.
+    ``read(turn)`` reads them turned or as written. Drake and Gazebo turn them, as the format defines Y up; SAPIEN does not.
+    Collision shapes that are not glTF show the convention of a file: the reading is chosen whose visual and collision boxes are
+    closer, summed over the links. Without such shapes, meshes are turned. One box for a whole robot would depend only on the
+    link that reaches farthest.
     """
     as_written = read(False)
     if not any(file.suffix.lower().lstrip(".") in Y_UP_FORMATS for file in files.used):
@@ -34,14 +34,14 @@ def upright_shapes(read: Callable[[bool], list[Shapes]], files: AssetFiles) -> l
 
 
 def joined(by_link: list[Shapes]) -> tuple[list[trimesh.Trimesh], list[CollisionShape], list[int]]:
-    """Return the visual parts and the collision shapes of all links, and for each visual part the number of its link."""
+    """Concatenate the visual parts and the collision shapes of all links; also return the link index of each visual part."""
     visual = [part for parts, _ in by_link for part in parts]
     collision = [shape for _, shapes in by_link for shape in shapes]
     return visual, collision, [number for number, (parts, _) in enumerate(by_link) for _ in parts]
 
 
 def _apart_m(visual: list[trimesh.Trimesh], collision: list[CollisionShape]) -> float:
-    """Return the largest distance (m) of a side of the collision's box from the visual's; 0 where one of them has none."""
+    """Return the largest distance (m) between sides of the visual and the collision box; 0 if either is empty."""
     seen = [np.asarray(part.vertices) for part in visual if len(part.vertices)]
     felt = [shape.vertices for shape in collision if len(shape.vertices)]
     if not seen or not felt:

@@ -1,4 +1,4 @@
-"""URDF: the first object of it that is rigid, links that fixed joints join taken as one."""
+"""URDF reader: the first rigid object of a file, with links on fixed joints merged, and optionally its movable joints."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ from manitwin.robots.urdf_reader import JOINT_TYPES, UrdfRules, read_urdf
 _TRIPLES = frozenset({"xyz", "rpy", "rgba", "size", "scale"})
 _AXES, _RGBA, _SOFT = 3, 4, "deformable"
 _WORLD = "world"
-"""Drake and Gazebo know it without a <link>."""
+"""A link that Drake and Gazebo know without a <link> element."""
 
 _OF_PYBULLET = ("plane", "cdf")
 
 _OF_SOME_LOADERS = ("spherical", "ball", "screw", "universal")
-"""Joints of PyBullet and MuJoCo (the first) and Drake, which the specification does not have."""
+"""Joint types of PyBullet and MuJoCo (the first) and Drake that are not in the specification."""
 
 RULES = UrdfRules(
     error=AssetError,
@@ -50,7 +50,7 @@ RULES = UrdfRules(
 
 @dataclass(frozen=True)
 class UrdfObject:
-    """The object in a URDF that is read: its links, each with its pose in the first one's frame, and what moves in it."""
+    """The selected object of a URDF: its links with their poses in the frame of the first, and its joint tree."""
 
     file: Path
     tree: UrdfTree
@@ -62,9 +62,9 @@ class UrdfObject:
 def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS, *, joints: Joints = "part") -> Asset:
     """Read a URDF, or the only one in a folder; the asset's axes are those of the first link of the object.
 
-    Meshes are looked up from the file's folder and from those above it up to ``root`` (``root_of`` the path by default), those
-    of ``package://`` in the folder of the package's name before any other. Links behind joints that move are left out with a
-    remark, or held as the file stands (``joints``). Raises AssetError naming what is broken. Source: the URDF XML
+    Meshes are looked up in the folder of the file and in those above it up to ``root`` (default: ``root_of`` the path); those
+    of ``package://`` first in the folder with the name of the package. Links behind movable joints are left out with a remark,
+    locked in the pose of the file, or kept (``joints``). Raises AssetError naming what is broken. Source: the URDF XML
     specification of ROS.
     """
     found = open_urdf(path, root, limits, joints=joints)
@@ -74,7 +74,7 @@ def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS,
 def open_urdf(
     path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS, *, joints: Joints = "part"
 ) -> UrdfObject:
-    """Parse a URDF and choose the object in it; raises AssetError."""
+    """Parse a URDF and select the object in it; raises AssetError."""
     file = only_file(path) if path.is_dir() else path
     files = AssetFiles(root or root_of(path), file.resolve().parent, limits)
     tree = read_urdf(file, RULES, file.name, partial(_as_loaders_take_it, files=files, name=file.name))
@@ -84,7 +84,7 @@ def open_urdf(
 
 
 def _as_loaders_take_it(root: etree._Element, files: AssetFiles, name: str) -> None:
-    """Leave out what tools of others add to shapes, and add the links that joints hang from and the file does not have."""
+    """Rewrite a URDF as lenient loaders read it: without extensions of other tools, and with links that only joints name."""
     _leave_its_namespace(root)
     _give_each_joint_its_name(root, files)
     for soft in root.findall(_SOFT):
@@ -110,7 +110,7 @@ def _as_loaders_take_it(root: etree._Element, files: AssetFiles, name: str) -> N
             files.took_leniently(f"a mesh has {len(factors)} factors of scale, of which the first three were taken")
     for color in root.iter("color"):
         numbers = (color.get("rgba") or "").replace(",", " ").split()
-        if len(numbers) > _RGBA:  # urdfdom leaves such a colour out, and no loader the file
+        if len(numbers) > _RGBA:  # urdfdom drops such a colour, and no loader refuses the file
             color.set("rgba", " ".join(numbers[:_RGBA]))
             files.took_leniently(f"a colour has {len(numbers)} numbers, of which the first four were taken")
     for element in root.iter("origin", "color", "box", "mesh"):
@@ -120,7 +120,7 @@ def _as_loaders_take_it(root: etree._Element, files: AssetFiles, name: str) -> N
 
 
 def _leave_out_pybullets_shapes(root: etree._Element, files: AssetFiles) -> None:
-    """Leave out what only PyBullet collides with: a plane without an end, and a distance field in a file."""
+    """Remove collision shapes that only PyBullet supports: an infinite plane, and a distance field in a file."""
     for collision in [*root.iter("collision")]:
         shapes = [shape for name in _OF_PYBULLET for shape in collision.iterfind(f"geometry/{name}")]
         if shapes:
@@ -129,7 +129,7 @@ def _leave_out_pybullets_shapes(root: etree._Element, files: AssetFiles) -> None
 
 
 def _leave_its_namespace(root: etree._Element) -> None:
-    """Take elements out of the namespace of the whole document, which Drake's descriptions have and loaders overlook."""
+    """Remove the namespace of the whole document from its elements; Drake's descriptions have one, and loaders ignore it."""
     namespace = etree.QName(root).namespace
     for element in root.iter(etree.Element) if namespace else ():
         name = etree.QName(element)
@@ -138,7 +138,7 @@ def _leave_its_namespace(root: etree._Element) -> None:
 
 
 def _give_each_joint_its_name(root: etree._Element, files: AssetFiles) -> None:
-    """Number joints of one name, which PyBullet and MuJoCo's programs tell apart by their places and urdfdom refuses."""
+    """Number joints of the same name: PyBullet and MuJoCo programs identify them by index, while urdfdom refuses them."""
     seen: set[str] = set()
     for joint in root.findall("joint"):
         name = joint.get("name") or ""
@@ -161,7 +161,7 @@ def _add_absent_parents(root: etree._Element, files: AssetFiles) -> None:
 
 
 def asset_of(found: UrdfObject, path: Path, contact: Contact | None = None) -> Asset:
-    """Return the asset that a URDF's elements describe; ``contact`` stands in for what they say of friction."""
+    """Return the asset that the URDF elements describe; ``contact`` replaces their friction."""
 
     def shapes(turn: bool) -> list[Shapes]:
         read = LinkShapes(found.tree, found.file, found.files, turn_gltf=turn)
@@ -195,7 +195,7 @@ def asset_of(found: UrdfObject, path: Path, contact: Contact | None = None) -> A
 
 
 def _articulation(found: UrdfObject, moving: Tree, owners: list[int]) -> Articulation:
-    """Return links and joints; ``owners`` are the places of the links, as they are read, of the visual parts."""
+    """Return links and joints; ``owners`` are the indices of the links of each visual part, before merging."""
     links = []
     for place, head in enumerate(moving.heads):
         mine = tuple(link for link, of in zip(found.links, moving.link_of, strict=True) if of == place)
@@ -204,7 +204,7 @@ def _articulation(found: UrdfObject, moving: Tree, owners: list[int]) -> Articul
 
 
 def _inertial(found: UrdfObject, collision: list[CollisionShape]) -> Inertial:
-    """Return what is declared, or what Isaac Gym's <density> makes of the hulls of the collision shapes."""
+    """Return the declared inertial, or that of the collision hulls filled with Isaac Gym's <density>."""
     declared = declared_inertial(found.links)
     said = [link.find("inertial/density") for link, _ in found.links]
     if declared.mass_kg is not None or all(each is None for each in said):
@@ -218,9 +218,9 @@ def _inertial(found: UrdfObject, collision: list[CollisionShape]) -> Inertial:
 
 
 def declared_inertial(links: tuple[tuple[etree._Element, np.ndarray], ...]) -> Inertial:
-    """Return the mass, the centre of mass and the inertia about it of links with their poses, as declared.
+    """Return mass, centre of mass, and inertia about it, of links with their poses ``(4, 4)``, as declared.
 
-    Links without <inertial> count nothing; the inertia is None where one with a mass gives none.
+    Links without <inertial> are ignored; the inertia is None if a link with a mass has none.
     """
     found = []
     for link, link_to_asset in links:
@@ -237,10 +237,10 @@ def declared_inertial(links: tuple[tuple[etree._Element, np.ndarray], ...]) -> I
 
 
 def _declared_contact(found: UrdfObject) -> Contact:
-    """Return the first of Drake's friction, PyBullet's <contact>, a <gazebo> in a collision, and a <gazebo reference>.
+    """Return the first declaration of Drake's friction, PyBullet's <contact>, a <gazebo> in a link, or a <gazebo reference>.
 
-    PyBullet's lateral_friction is the one coefficient of a body, sticking or sliding. Gazebo's mu1 and mu2 are two
-    directions of one coefficient (SDF specification, friction/ode): the first is taken, with a remark where they differ.
+    PyBullet's lateral_friction is the single coefficient of a body, for static and dynamic friction. Gazebo's mu1 and mu2 apply
+    to two directions (SDF specification, friction/ode): the first is used, with a remark if they differ.
     """
     drake = drake_contact((link for link, _ in found.links), found.files, found.file.name)
     if drake is not None:
@@ -261,7 +261,7 @@ def _declared_contact(found: UrdfObject) -> Contact:
 
 
 def gazebo_friction(found: UrdfObject) -> tuple[float, float | None] | None:
-    """Return mu1 and mu2 of the first <gazebo> of the object's links that has mu1, None where none has."""
+    """Return mu1 and mu2 of the first <gazebo> element of the object's links that has mu1, None if there is none."""
     names = {link.get("name") for link, _ in found.links}
     inside = [element for link, _ in found.links for element in link.iter("gazebo")]
     beside = [element for element in found.tree.element.findall("gazebo") if element.get("reference") in names]

@@ -20,11 +20,11 @@ VIEW = "views/rgb_00.webp"
 
 @dataclass(frozen=True)
 class TwinContent:
-    """A finished twin: object frame (Z up), metres.
+    """The content of a finished twin, in metres in the object frame (Z up).
 
-    ``name`` is a file and element name, unique to the twin. ``hulls`` are vertices ``(V, 3)`` and faces ``(F, 3)``;
-    ``grasps`` the rows of grasps.parquet as columns. ``picture`` is a view of it as a file of pixels; None: it has none.
-    Of a twin with links ``link_of_visual`` is the link of each of ``visual``, none of which is of two.
+    ``name`` is a file and element name, unique to the twin. ``hulls`` are vertices ``(V, 3)`` and faces ``(F, 3)`` of each
+    collision hull. ``grasps`` holds the columns of grasps.parquet. ``picture`` is an encoded picture of a view, or None. For a
+    twin with links, ``link_of_visual`` gives the index of the link of each part in ``visual``; no part spans two links.
     """
 
     name: str
@@ -39,7 +39,7 @@ class TwinContent:
 
     @property
     def physical(self) -> Physical:
-        """The physical properties; an accepted twin has them."""
+        """The physical properties, which every accepted twin has."""
         assert self.record.physical is not None
         return self.record.physical
 
@@ -51,7 +51,7 @@ class TwinContent:
     def of(cls, twin: Twin) -> TwinContent:
         """Read the content of a twin; raise TwinError for a rejected one."""
         record = twin.record
-        twin.physical  # raises TwinError for a rejected twin
+        twin.physical  # noqa: B018  raises TwinError for a rejected twin
         by_link = parts_by_link(twin.visual, twin.face_links(), len(record.links)) if record.links else [twin.visual]
         return cls(
             name=export_name(record),

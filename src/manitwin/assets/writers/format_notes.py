@@ -13,10 +13,10 @@ Y_UP = "glTF's: +Y up; (x, y, z) of the object frame is (x, z, -y)"
 
 @dataclass(frozen=True)
 class FormatNotes:
-    """``says``: where each of ``QUANTITIES`` is. ``load``: code of a few lines by simulator.
+    """Notes on a format: ``says`` maps ``QUANTITIES`` to their place in the files, ``load`` maps simulators to short code.
 
-    In the code ``{main}`` stands for the file to open, ``{folder}`` for the name of its folder, ``{name}`` and ``{NAME}`` for
-    the twin's name.
+    In the code, ``{main}`` stands for the file to open, ``{folder}`` for the name of its folder, and ``{name}`` and ``{NAME}``
+    for the name of the twin.
     """
 
     title: str

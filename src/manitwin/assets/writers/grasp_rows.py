@@ -23,10 +23,10 @@ _HALF = 0.5**0.5
 
 @dataclass(frozen=True)
 class GraspRows:
-    """Grasps of one gripper in the order of the table: ``gripper_to_object (N, 4, 4)``, ``depth_m``, ``width_m (N,)``.
+    """Grasps of one gripper in table order: ``gripper_to_object (N, 4, 4)``, ``depth_m (N,)``, ``width_m (N,)``.
 
-    ``held (N,)`` is the trial's verdict. ``quality (N,)`` in 0..1 is the robustness where it was measured, else the
-    proposer's score.
+    ``held (N,)`` is the outcome of the trial. ``quality (N,)`` in 0..1 is the measured robustness, or the proposer's score
+    where robustness was not measured.
     """
 
     gripper: str
@@ -120,12 +120,12 @@ def best_and_diverse(rows: GraspRows, count: int) -> GraspRows:
 
 @dataclass(frozen=True)
 class GripperAsset:
-    """A parallel gripper as GraspGen and GraspDataGen name it.
+    """A parallel gripper as GraspGen and GraspDataGen define it.
 
-    ``base_link`` is the link of ``usd`` that isaac_grasp's poses are of, ``base_to_grasp_xyzw`` its rotation to the grasp frame
-    (+Z approach, X closing). Each of ``finger_joints`` is the way (m) of one finger from closed, the first
-    that of ``finger_links[0]``, on the closing axis' side ``bite_axis (3,)``. ``open_limit``: at which limit of the joints it
-    is open.
+    ``base_link`` is the link of ``usd`` in whose frame isaac_grasp states poses, and ``base_to_grasp_xyzw`` the rotation from
+    it to the grasp frame (+Z approach, X closing). Each of ``finger_joints`` measures the travel (m) of one finger from the
+    closed position; the first belongs to ``finger_links[0]``, on the side ``bite_axis (3,)`` of the closing axis.
+    ``open_limit`` says at which joint limit the gripper is open.
     """
 
     name: str

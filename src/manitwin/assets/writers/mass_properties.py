@@ -24,9 +24,10 @@ PHYSICS_FILE = "physics.json"
 
 @dataclass(frozen=True)
 class TwinInertial:
-    """Mass, ``center_of_mass_m (3,)`` and ``inertia_kg_m2 (3, 3)`` about it along the axes of the object frame.
+    """Mass, ``center_of_mass_m (3,)`` and the inertia ``inertia_kg_m2 (3, 3)`` about it, in the axes of the object frame.
 
-    The same tensor as ``principal_moments_kg_m2 (3,)`` along axes that ``principal_axes_wxyz`` turns into the object's.
+    ``principal_moments_kg_m2 (3,)`` and ``principal_axes_wxyz``, the rotation from the principal axes to the object frame,
+    describe the same tensor.
     """
 
     mass_kg: float
@@ -96,9 +97,8 @@ def _zero_element(tensor: np.ndarray, axes: np.ndarray, p: int, q: int) -> bool:
         tensor[p, q] = tensor[q, p] = 0.0
         return False
     ratio = float(tensor[q, q] - tensor[p, p]) / (2 * off)
-    tangent = math.copysign(1.0, ratio) / (
-        abs(ratio) + math.hypot(ratio, 1.0)
-    )  # the smaller of the two possible angles
+    # the smaller of the two possible angles
+    tangent = math.copysign(1.0, ratio) / (abs(ratio) + math.hypot(ratio, 1.0))
     cosine = 1 / math.hypot(tangent, 1.0)
     turn = np.eye(3)
     turn[p, p] = turn[q, q] = cosine

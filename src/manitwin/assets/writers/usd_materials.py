@@ -161,5 +161,5 @@ class GlbImages:
 
     @staticmethod
     def digest(image: Image.Image) -> str:
-        """Say what an image shows: its mode, size and pixels."""
+        """Return a digest of an image's mode, size and pixels."""
         return f"{image.mode}:{image.size}:{hashlib.sha256(image.tobytes()).hexdigest()}"
