@@ -1,1 +1,1 @@
-"""Is this asset true? Rules that any asset can be held against, with no GPU and no model."""
+"""Audit of assets: rules that check any asset for physical and formal defects, without a GPU or learned model."""

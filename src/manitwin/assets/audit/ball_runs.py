@@ -1,4 +1,4 @@
-"""Drop a ball into the opening that an asset shows, in physics engines: does what collides leave it open?"""
+"""Ball drop test: whether collision shapes leave the visible opening of a vessel open, in physics engines."""
 
 from __future__ import annotations
 
@@ -13,14 +13,17 @@ from manitwin.geometry.cavity import Opening, find_opening
 from manitwin.geometry.poses import rotation_between
 
 _UPWARD = 0.99
-"""Cosine: an opening to the side is a hollow that gravity empties."""
+"""Least cosine between opening and up direction: gravity empties a hollow that opens to the side."""
 _MOST_FACES = 200_000
-"""Of what is looked into: more is a scan of its own, and looking costs more than all other rules."""
+"""Largest mesh that is searched for an opening; for larger scans, the search costs more than all other rules."""
 
 
 @dataclass(frozen=True)
 class Balls:
-    """The opening that is seen, up being +Z, and in which engines a ball stays in it; ``refused`` by engine, in its words."""
+    """The visible opening, with up along +Z, and whether a ball stays inside in each engine.
+
+    ``refused`` has the error message of each engine that failed.
+    """
 
     opening: Opening | None
     inside: dict[str, bool]
@@ -28,7 +31,7 @@ class Balls:
 
 
 def balls(measured: MeasuredAsset) -> Balls:
-    """Drop a ball into the opening of an asset that has one, in each engine that was asked for."""
+    """Drop a ball into the opening of an asset, if it has one, in each requested engine."""
     visual = measured.visual
     if visual is None or not len(measured.shapes) or len(visual.faces) > _MOST_FACES:
         return Balls(None, {}, {})

@@ -1,4 +1,4 @@
-"""A baseline: the findings that a project knows of already, so that new ones alone fail its checks."""
+"""Baseline of known findings, so that only new ones fail the checks of a project."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ _REMEDY = "write it anew with --write-baseline"
 
 @dataclass(frozen=True)
 class Baseline:
-    """Known findings: for each asset, by its path from ``folder`` (where the baseline lies), the codes of its rules."""
+    """Known findings: the rule codes of each asset, by its path relative to ``folder``, which holds the baseline."""
 
     folder: Path
     codes: dict[str, frozenset[str]]
 
     def without_known(self, each: Audited) -> Audited:
-        """Return what was found of an asset without what is known of it."""
+        """Return the findings of an asset without the known ones."""
         known = self.codes.get(_place(each, self.folder), frozenset())
         return replace(each, findings=tuple(finding for finding in each.findings if finding.code not in known))
 
 
 def read_baseline(file: Path) -> Baseline:
-    """Read a baseline; raises UsageError where it is none."""
+    """Read a baseline; raises UsageError for an invalid one."""
     if not file.exists():
         raise UsageError(f"{file}: no such baseline; {_REMEDY}")
     content = read_json_object(file, UsageError, remedy=_REMEDY)
@@ -44,7 +44,7 @@ def read_baseline(file: Path) -> Baseline:
 
 
 def baseline_text(audited: Sequence[Audited], file: Path) -> str:
-    """Return the baseline of what was found, as it is written to ``file``: sorted, a line for each asset."""
+    """Return the baseline of findings as text for ``file``: JSON, sorted by asset."""
     folder = file.resolve().parent
     found = {_place(each, folder): sorted({finding.code for finding in each.findings}) for each in audited}
     assets = {asset: codes for asset, codes in sorted(found.items()) if codes}

@@ -1,4 +1,4 @@
-"""Read one asset and hold rules against it."""
+"""Audit of one asset: reading it and applying rules."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from manitwin.errors import AssetError, TwinError
 from manitwin.twin.store import RECORD, read_record
 
 STOPS = ("FIL005", "FIL006")
-"""Where one of these holds there is nothing to measure."""
+"""Rules whose findings mean that there is no geometry to measure."""
 
 MODELS = (".sdf",)
-"""Which others include: without one an object lacks a part, as it does without a mesh."""
+"""Models that others include; without one, an object lacks a part, as with a missing mesh."""
 OF_RUNS = tuple(f"RUN00{number}" for number in range(1, 9))
-"""Rules of the one body that is dropped; those of parts that joints move look at all of the file."""
+"""Rules on the drop of a single body; those on moving parts apply to the whole file."""
 OF_THE_WHOLE_SHAPE = (
     "MAS001", "MAS003", "MAS004", "INE005", "COM002", "COM003", "COL", "SCL", "FRM005", "GRA", "PLC", "TWN", *OF_RUNS
 )  # fmt: skip
-"""Rules that measure the shape: where a mesh of it is not there (FIL002 says so), what is left says nothing of it."""
+"""Rules that measure the shape; skipped if a mesh is missing (FIL002), since the rest of the shape is not representative."""
 OF_WHAT_MOVES = ("MAS", "INE", "COM", "COL001", "FRI001", "SCL001", *OF_RUNS)
-"""Rules that are not held against what stands fast: no engine asks it for a mass."""
+"""Rules that do not apply to static assets, for which no engine needs a mass."""
 OF_RIGID_BODIES = (*OF_WHAT_MOVES, "COL", "FRI", "PLC003")
-"""Rules that are not held against what is soft."""
+"""Rules that do not apply to soft assets."""
 
 
 def audit_asset(
@@ -40,10 +40,10 @@ def audit_asset(
     engine: str | None = None,
     root: Path | None = None,
 ) -> list[Finding]:
-    """Hold rules against an asset as an ``engine`` takes it (``as_taken_by``), in their order, and run it in ``engines``.
+    """Apply rules, in order, to an asset as an ``engine`` interprets it (``as_taken_by``), and simulate it in ``engines``.
 
-    One whose geometry cannot be measured gets that finding only, and one of which a mesh is not there none of its shape. Parts
-    that joints move are read again from its files, below ``root``.
+    If the geometry cannot be measured, only that finding is returned; if a mesh is missing, rules on the shape are skipped.
+    Moving parts are read again from the files of the asset, below ``root``.
     """
     asset = as_taken_by(asset, engine)
     if engine in TRIANGLES:
@@ -70,9 +70,9 @@ def audit_path(
     engines: Sequence[str] = (),
     engine: str | None = None,
 ) -> Audited:
-    """Read an asset below a ``root`` and hold rules against it; with ``fix``, mend what is safe first.
+    """Read an asset below ``root`` and apply rules to it; with ``fix``, apply safe corrections first.
 
-    Never raises for an asset's sake.
+    Errors of the asset become findings and are never raised.
     """
     try:
         asset = read_asset(path, root=root, shape_only=True)
@@ -126,5 +126,5 @@ def audit_by_codes(
     engines: Sequence[str] = (),
     engine: str | None = None,
 ) -> Audited:
-    """Audit an asset in a process with limits, to which rules go by their codes."""
+    """Audit an asset in an isolated process, to which rules are passed by their codes."""
     return audit_path(path, [RULES_BY_CODE[code] for code in codes], fix, root, engines, engine)

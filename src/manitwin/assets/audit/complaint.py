@@ -1,4 +1,4 @@
-"""What a rule of the audit finds wrong with an asset."""
+"""A defect that an audit rule finds in an asset."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Complaint:
-    """The message, the file that it is about (None: the whole asset), and the measured values behind it."""
+    """The message, the file concerned (None: the whole asset), and the measured values behind it."""
 
     message: str
     file: Path | None = None

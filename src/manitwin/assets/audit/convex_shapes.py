@@ -1,4 +1,4 @@
-"""Collision shapes as the convex solids that simulators make of them: planes, mass moments, lines through them."""
+"""Convex hulls of collision shapes as simulators build them: half-spaces, mass moments and line intersections."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-_PAIRS_PER_CHUNK = 2_000_000  # (point, plane) pairs at once: bounds the memory
+_PAIRS_PER_CHUNK = 2_000_000  # (point, plane) pairs at once: bounds memory use
 
 
 @dataclass(frozen=True)
 class UniformSolid:
-    """Volume, centre of mass ``(3,)`` and inertia about it for one kilogram, ``(3, 3)`` m2."""
+    """Volume, centre of mass ``(3,)`` and inertia about it per kilogram, ``(3, 3)`` m2."""
 
     volume_m3: float
     center_of_mass_m: np.ndarray
@@ -23,10 +23,10 @@ class UniformSolid:
 
 @dataclass(frozen=True)
 class ConvexShapes:
-    """Convex hulls of vertices: ``planes (P, 4)`` outward, those of hull ``i`` from ``starts[i]`` on; ``boxes (H, 2, 3)``.
+    """Convex hulls: outward ``planes (P, 4)``, those of hull ``i`` from ``starts[i]`` on; ``boxes (H, 2, 3)``.
 
-    ``flat`` are the indices of the given shapes that have no volume, and are left out; ``kept`` those of the others, and
-    ``corners`` how many vertices their hulls have.
+    ``flat`` are the indices of given shapes without volume, which are left out; ``kept`` those of the others, and ``corners``
+    the numbers of their hull vertices.
     """
 
     planes: np.ndarray
@@ -41,7 +41,7 @@ class ConvexShapes:
 
     @classmethod
     def of(cls, shapes: Sequence[np.ndarray]) -> ConvexShapes:
-        """Take the hulls of shapes, each ``(V, 3)`` m."""
+        """Compute the hulls of shapes, each given by vertices ``(V, 3)`` m."""
         planes, triangles, volumes, interior, boxes = [], [], [], [], []
         flat, kept, corners = [], [], []
         for index, vertices in enumerate(shapes):
@@ -75,7 +75,7 @@ class ConvexShapes:
 
     @cached_property
     def uniform(self) -> UniformSolid:
-        """The solid that all shapes make, evenly filled; where two overlap it counts twice.
+        """The union of all shapes with uniform density; overlaps count twice.
 
         Source: second moments of tetrahedra, V/20 (sum of v v^T + s s^T) over the four corners, s their sum.
         """
@@ -90,9 +90,9 @@ class ConvexShapes:
         return UniformSolid(volume, center, inertia_of_second_moment(second / (20 * volume)))
 
     def depth_outside(self, points: np.ndarray) -> np.ndarray:
-        """Return how far points ``(N, 3)`` lie outside all shapes, at least, ``(N,)`` m; negative inside one.
+        """Return a lower bound for the distance of points ``(N, 3)`` outside all shapes, ``(N,)`` m; negative inside one.
 
-        Outside, it is the distance to the farthest plane of the nearest shape: never more than the true distance.
+        Outside, it is the distance to the farthest plane of the nearest shape, which never exceeds the true distance.
         """
         result = np.empty(len(points))
         chunk = max(1, _PAIRS_PER_CHUNK // max(1, len(self.planes)))
@@ -103,7 +103,7 @@ class ConvexShapes:
         return result
 
     def within(self, points: np.ndarray, tolerance_m: float = 0.0) -> np.ndarray:
-        """Tell which points ``(N, 3)`` lie inside a shape whose planes are moved outward by ``tolerance_m``, ``(N,) bool``."""
+        """Return which points ``(N, 3)`` lie inside a shape with planes moved outward by ``tolerance_m``, ``(N,) bool``."""
         inside = np.zeros(len(points), dtype=bool)
         ends = np.append(self.starts, len(self.planes))[1:]
         for start, end, (low, high) in zip(self.starts, ends, self.boxes, strict=True):
@@ -115,9 +115,9 @@ class ConvexShapes:
         return inside
 
     def line_intervals(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return where lines enter and leave every shape, ``(N, H)`` each, along unit ``directions (N, 3)``.
+        """Return the entry and exit parameters of lines for every shape, ``(N, H)`` each, along unit ``directions (N, 3)``.
 
-        Entry is not before exit where a line misses a shape. Source: Cyrus and Beck 1978, clipping by half-spaces.
+        If a line misses a shape, entry is not before exit. Source: Cyrus and Beck 1978, clipping by half-spaces.
         """
         along = self.planes[:, :3] @ directions.T
         offset = self.planes[:, :3] @ origins.T + self.planes[:, 3:]
@@ -132,5 +132,5 @@ class ConvexShapes:
 
 
 def inertia_of_second_moment(second: np.ndarray) -> np.ndarray:
-    """Return the inertia ``(3, 3)`` of a second moment of mass ``(3, 3)`` about the same point."""
+    """Return the inertia ``(3, 3)`` for a second moment of mass ``(3, 3)`` about the same point."""
     return np.trace(second) * np.eye(3) - second

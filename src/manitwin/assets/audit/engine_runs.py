@@ -1,4 +1,4 @@
-"""Drop an asset on a plane in physics engines, as its files say it: what only running shows."""
+"""Drop test of an asset on a plane in physics engines, for defects that only simulation shows."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from manitwin.geometry.poses import rotation_between, transform, transform_point
 from manitwin.geometry.rigid_body import RigidBody
 
 FRICTION = 0.5
-"""Where an asset declares none; it decides how far a thing slides, and not whether it comes to rest."""
+"""Friction if an asset declares none; it affects how far an object slides, not whether it comes to rest."""
 
 DROP_M = 0.005
 SECONDS = 4.0
 
 STEP_S = {"mujoco": 1 / 500, "sapien": 1 / 240, "pybullet": 1 / 240}
-"""The engines, and the step of each that its own documentation and examples use."""
+"""The engines, with the time step that each one's documentation and examples use."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """One drop: ``end (4, 4)`` asset to plane, and whether it is at rest there.
+    """One drop: the final pose ``end (4, 4)``, asset to plane, and whether the asset is at rest.
 
-    ``refused`` has the engine's words where it does not run.
+    ``refused`` has the error message of the engine if it does not run.
     """
 
     engine: str
@@ -38,7 +38,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Drops:
-    """The runs of an asset, from ``start (4, 4)``; ``why_not`` says why there are none."""
+    """The runs of an asset, from ``start (4, 4)``; ``why_not`` is the reason if there are none."""
 
     body: RigidBody | None
     start: np.ndarray | None
@@ -46,19 +46,19 @@ class Drops:
     why_not: str = ""
 
     def height_m(self, run: Run) -> float:
-        """Return how high the centre of mass lies over the plane at the end."""
+        """Return the final height of the centre of mass above the plane."""
         assert self.body is not None and run.end is not None
         return float(transform_points(run.end, self.body.center_of_mass_m[None])[0, 2])
 
     def lowest_m(self, run: Run) -> float:
-        """Return the lowest point of the collision shapes at the end, over the plane."""
+        """Return the final height of the lowest point of the collision shapes above the plane."""
         assert self.body is not None and run.end is not None
         end = run.end
         return min(float((hull @ end[2, :3]).min()) for hull in self.body.hulls) + float(end[2, 3])
 
 
 def drops(measured: MeasuredAsset) -> Drops:
-    """Drop the asset in each engine that was asked for, at its usual step and at half of it."""
+    """Drop the asset in each requested engine, with its usual time step and with half of it."""
     body, why_not = _body(measured)
     if body is None:
         return Drops(None, None, why_not=why_not)

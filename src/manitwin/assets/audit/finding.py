@@ -1,4 +1,4 @@
-"""Rules of the audit, and what they find; nothing that measures is imported here."""
+"""Audit rules and their findings, without imports of any measuring code."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Severity = Literal["error", "warning", "note"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is wrong with one asset, in a line for a person; ``file`` is where, ``values`` what was measured."""
+    """One defect of one asset as a one-line message; ``file`` is its location, ``values`` are measured values."""
 
     code: str
     severity: Severity
@@ -30,7 +30,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Audited:
-    """The findings of one asset; ``format`` is None where it could not be read. ``fixed`` says what was rewritten."""
+    """The findings of one asset; ``format`` is None if it could not be read. ``fixed`` lists what was rewritten."""
 
     asset: str
     format: str | None
@@ -40,10 +40,10 @@ class Audited:
 
 @dataclass(frozen=True)
 class RuleText:
-    """What is said of a rule: a stable code (three letters for the subject, three digits) and texts for a person.
+    """Description of a rule: a stable code (three letters for the subject, three digits) and texts for users.
 
-    ``why`` is the paragraph of documentation: what goes wrong in use, with the public report it is known from; ``remedy``
-    what to do.
+    ``why`` is the paragraph for the documentation: the consequences in use, with the public report that documents them.
+    ``remedy`` says what to do.
     """
 
     code: str
@@ -55,10 +55,10 @@ class RuleText:
 
 @dataclass(frozen=True)
 class Rule(RuleText):
-    """A rule, and how it is checked.
+    """A rule and its check.
 
-    ``check`` yields nothing for an asset that is as it should be, and for one that says nothing of the subject.
-    ``fix`` rewrites files where that is safe, and returns what it did.
+    ``check`` yields nothing for an asset without the defect, and for one that states nothing on the subject. ``fix`` rewrites
+    files if that is safe, and returns what it did.
     """
 
     check: Callable[[MeasuredAsset], Iterator[Complaint]]
@@ -66,5 +66,5 @@ class Rule(RuleText):
 
     @property
     def text(self) -> RuleText:
-        """Return what is said of it, which needs nothing that measures."""
+        """Return the description of the rule, which needs no measuring code."""
         return RuleText(self.code, self.name, self.severity, self.why, self.remedy)

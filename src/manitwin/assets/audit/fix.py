@@ -1,6 +1,6 @@
-"""Corrections that are safe: each follows from what the asset itself declares, and the old file stays beside the new.
+"""Safe corrections: each follows from what the asset itself declares, and the old file is kept beside the new one.
 
-Moving an origin is none of them: other files may refer to the old one.
+Moving an origin is not among them, because other files may refer to the old one.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from manitwin.formats.xml_file import MAX_XML_BYTES, add, edited_document, new_e
 from manitwin.twin.store import write_bytes_atomically
 
 NEARLY = 0.05
-"""How far singular values may be from 1 for the nearest rotation to be what was meant: rounding to one digit."""
+"""Largest deviation of singular values from 1 at which the nearest rotation counts as intended: rounding to one digit."""
 
 _MOMENTS = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 1, 2), ("izz", 2, 2))
 
 
 def write_missing_inertial(asset: Asset) -> str:
-    """Write the centre of mass or inertia that a URDF leaves out, or the inertia that is the template's 1.0.
+    """Write the centre of mass or inertia that a URDF lacks, or an inertia that is the template's 1.0.
 
-    Both are those of the collision hulls, evenly filled with the declared mass. Returns what was done, or why nothing was.
-    Raises AssetError where the file cannot be read any more.
+    Both are those of the collision hulls, uniformly filled with the declared mass. Returns what was done, or why nothing was.
+    Raises AssetError if the file cannot be read any more.
     """
     if asset.format not in ("urdf", "embodiedgen"):
         return f"not fixed: this is written into URDF files only, this is {asset.format}"
@@ -54,9 +54,9 @@ def write_missing_inertial(asset: Asset) -> str:
 
 
 def _complete(inertial: Any, asset: Asset, shapes: ConvexShapes, mass_kg: float) -> list[str]:
-    """Add what is missing to an <inertial> element, and return what that was.
+    """Add missing values to an <inertial> element, and return what was added.
 
-    Both are written along the link's axes, which are the asset's where there is one link.
+    Both are written in the axes of the link, which are those of the asset if there is one link.
     """
     done = []
     solid = shapes.uniform
@@ -85,8 +85,8 @@ def _is_turned(origin: Any) -> bool:
 def orthonormalise_frames(asset: Asset) -> str:
     """Replace the axes of nearly orthonormal RoboTwin frames by the nearest rotation, and return what was done.
 
-    Frames that are mirrored or far from a rotation stay: what was meant is not known. Source: the polar factor by singular
-    value decomposition (Higham 1986).
+    Frames that are mirrored or far from a rotation are left unchanged, as their meaning is unknown. Source: the polar factor by
+    singular value decomposition (Higham 1986).
     """
     if asset.format != "robotwin":
         return f"not fixed: this is written into RoboTwin's model_data only, this is {asset.format}"
@@ -112,7 +112,7 @@ def orthonormalise_frames(asset: Asset) -> str:
 
 
 def _nearest_rotation(axes: np.ndarray) -> np.ndarray | None:
-    """Return the rotation nearest to ``axes (3, 3)`` where they are nearly one, None where they are one or far from it."""
+    """Return the rotation closest to ``axes (3, 3)``; None if they are a rotation already, mirrored, or far from a rotation."""
     if not np.isfinite(axes).all() or np.abs(axes.T @ axes - np.eye(3)).max() < 1e-9:
         return None
     left, stretch, right = np.linalg.svd(axes)
@@ -126,7 +126,7 @@ def _numbers(values: np.ndarray) -> str:
 
 
 def _replace(file: Path, content: bytes) -> None:
-    """Write a file whole, keeping the first version of it as ``<name>.orig``."""
+    """Write a file atomically, keeping its first version as ``<name>.orig``."""
     kept = file.with_name(f"{file.name}.orig")
     if not kept.exists():
         write_bytes_atomically(kept, read_bytes(file, MAX_XML_BYTES, AssetError, inside=file.parent))

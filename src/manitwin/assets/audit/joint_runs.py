@@ -1,4 +1,4 @@
-"""Set a twin with joints down in MuJoCo, the joints free: as it stands, and from both ends of each joint's way."""
+"""Drop test of a twin with free joints in MuJoCo: from its present pose, and from both ends of the joint ranges."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from manitwin.twin.loaded_twin import Twin
 
 DROP_M, SECONDS = 0.005, 4.0
 BEYOND_RAD, BEYOND_M = 0.05, 0.003
-"""How far past its limit a joint may end: MuJoCo's limits are soft, and a link's weight pushes them by less."""
+"""How far past its limit a joint may end: MuJoCo's limits are soft, but the weight of a link pushes them by less."""
 
 
 @dataclass(frozen=True)
 class JointRuns:
-    """The worst of the runs: ``lowest_m`` over the plane, and the joints that end beyond a limit, in words.
+    """The worst of the runs: ``lowest_m`` above the plane, and descriptions of joints that end beyond a limit.
 
-    ``refused`` has the engine's words where it does not run it.
+    ``refused`` has the error message of the engine if it does not run.
     """
 
     lowest_m: float = 0.0
@@ -30,7 +30,7 @@ class JointRuns:
 
 
 def with_joints_free(measured: MeasuredAsset) -> JointRuns:
-    """Release a twin of the audit in its first placement with its joints free."""
+    """Release an audited twin in its first placement with free joints."""
     from manitwin.physics.mujoco.articulated import settle_articulated
 
     path, record = measured.asset.path, measured.record
@@ -42,7 +42,7 @@ def with_joints_free(measured: MeasuredAsset) -> JointRuns:
         body = Twin(path.parent if path.is_file() else path).articulated_body()
         for positions in _starts(body):
             at = pose.copy()
-            at[2, 3] -= min(0.0, _lowest_m(body, pose, positions))  # an open drawer may be deeper than a closed one
+            at[2, 3] -= min(0.0, _lowest_m(body, pose, positions))  # an open drawer may reach deeper than a closed one
             rest = settle_articulated(body, at, drop_m=DROP_M, seconds=SECONDS, positions=positions)
             low = _lowest_m(body, rest.root_to_plane, rest.positions)
             lowest_m = low if abs(low) > abs(lowest_m) else lowest_m
@@ -53,7 +53,7 @@ def with_joints_free(measured: MeasuredAsset) -> JointRuns:
 
 
 def _starts(body: ArticulatedBody) -> list[list[float]]:
-    """Return positions to begin from: as it stands, and all joints at their lower and at their upper limits."""
+    """Return initial joint positions: the present ones, and all joints at their lower and at their upper limits."""
     standing = [joint.stands_at for joint in body.joints]
     ends = [[joint.within(way) for joint in body.joints] for way in (-np.pi / 2, np.pi / 2)]
     return [standing, *(end for end in ends if end != standing)]
@@ -70,7 +70,7 @@ def _lowest_m(body: ArticulatedBody, root_to_plane: np.ndarray, positions: np.nd
 
 
 def _beyond(joint: ArticulatedJoint, position: float) -> str:
-    """Say how far beyond a limit a joint is, '' for one that is not."""
+    """Describe how far a joint is beyond a limit, '' if it is not."""
     way = abs(position - joint.within(position))
     if not np.isfinite(position):
         return f"joint {joint.name} at no number: the simulation blows up"

@@ -1,4 +1,4 @@
-"""An asset with what many rules measure of it, each once and only when asked for."""
+"""Measurements of an asset that several rules share, computed lazily and once."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from manitwin.twin.record import TwinRecord
 from manitwin.twin.store import read_record
 
 SURFACE_SAMPLES = 3000
-"""Points on the visual surface: some 4 mm apart on an object of a hand's size."""
+"""Points on the visual surface: some 4 mm apart on a hand-sized object."""
 
 FEW = 40
-"""Up to so many points are measured one by one: to build a tree over all triangles costs as much."""
+"""Up to this many points are measured individually, because building a tree over all triangles costs as much."""
 
 Measure = TypeVar("Measure")
 
 CLOSED = 1e-3
-"""The sum of the area vectors of a closed surface is zero; up to this share of the area it counts as closed."""
+"""The area vectors of a closed surface sum to zero; up to this share of the area, a surface counts as closed."""
 
 
 @dataclass(frozen=True)
 class SurfaceIntegrals:
-    """Exact integrals over a surface: area, enclosed volume (None: not closed), a thin even shell of one kilogram."""
+    """Exact integrals over a surface: area, enclosed volume (None if open), and a thin uniform shell of one kilogram."""
 
     area_m2: float
     volume_m3: float | None
@@ -48,10 +48,10 @@ class SurfaceIntegrals:
 
 @dataclass
 class MeasuredAsset:
-    """Measurements of one asset, in its own axes and metres; ``engines`` are those that it is to be run in.
+    """Measurements of one asset, in its own axes and metres; ``engines`` are those to simulate it in.
 
-    ``as_drawn``: meshes that collide do so with their triangles, as they do in Gazebo. ``root``: the folder below which the files
-    that the asset names are read.
+    ``as_drawn``: collision meshes collide with their triangles, as in Gazebo. ``root``: the folder below which the files that
+    the asset names are read.
     """
 
     asset: Asset
@@ -61,14 +61,14 @@ class MeasuredAsset:
     _kept: dict[Callable[..., Any], Any] = field(default_factory=dict)
 
     def once(self, measure: Callable[[MeasuredAsset], Measure]) -> Measure:
-        """Return what a function measures of the asset, called once."""
+        """Return the measurement of a function on the asset, computed once."""
         if measure not in self._kept:
             self._kept[measure] = measure(self)
         kept: Measure = self._kept[measure]
         return kept
 
     def complaints(self, check: Callable[[MeasuredAsset], Iterator[Complaint]]) -> list[Complaint]:
-        """Return what a check says of the asset, asked once: other rules are silent where the cause is said already."""
+        """Return the complaints of a check, computed once; rules use them to stay silent on consequences of another defect."""
         if check not in self._kept:
             self._kept[check] = list(check(self))
         kept: list[Complaint] = self._kept[check]
@@ -76,7 +76,7 @@ class MeasuredAsset:
 
     @cached_property
     def visual(self) -> trimesh.Trimesh | None:
-        """All visual parts as one mesh, None where there are none."""
+        """All visual parts as one mesh, None if there are none."""
         parts = [part for part in self.asset.visual if len(part.faces)]
         if not parts:
             return None
@@ -85,7 +85,7 @@ class MeasuredAsset:
 
     @cached_property
     def collision(self) -> trimesh.Trimesh | None:
-        """All collision shapes as they stand, as one mesh; None where there are none."""
+        """All collision shapes as given, as one mesh; None if there are none."""
         shapes = [shape for shape in self.asset.collision if len(shape.faces)]
         if not shapes:
             return None
@@ -94,12 +94,12 @@ class MeasuredAsset:
 
     @cached_property
     def body(self) -> trimesh.Trimesh | None:
-        """The visual mesh, or the collision shapes where there is none."""
+        """The visual mesh, or the collision shapes if there is none."""
         return self.visual if self.visual is not None else self.collision
 
     @cached_property
     def bounds(self) -> np.ndarray | None:
-        """The axis-aligned bounds ``(2, 3)`` of the visual meshes, or of the collision shapes where there are none."""
+        """The axis-aligned bounds ``(2, 3)`` of the visual mesh, or else of the collision shapes."""
         return None if self.body is None else np.asarray(self.body.bounds)
 
     @cached_property
@@ -109,18 +109,18 @@ class MeasuredAsset:
 
     @cached_property
     def up(self) -> np.ndarray:
-        """The axis that stands up ``(3,)``."""
+        """The vertical axis ``(3,)``."""
         return np.array([0.0, 1, 0]) if self.asset.up == "y" else np.array([0.0, 0, 1])
 
     @cached_property
     def lowest_m(self) -> float:
-        """The lowest point along the up axis."""
+        """The lowest coordinate along the up axis."""
         assert self.bounds is not None, "asked of an asset without geometry"
         return float(self.bounds[0] @ self.up)
 
     @cached_property
     def hull(self) -> ConvexShapes:
-        """The convex hull of the body: one shape, or none where it is flat."""
+        """The convex hull of the body: one shape, or none if it is flat."""
         return ConvexShapes.of([] if self.body is None else [np.asarray(self.body.vertices, float)])
 
     @cached_property
@@ -130,19 +130,19 @@ class MeasuredAsset:
 
     @cached_property
     def surface(self) -> SurfaceIntegrals | None:
-        """Integrals over the surface of the body; None without one."""
+        """Integrals over the surface of the body; None without geometry."""
         return None if self.body is None else _integrate(self.body)
 
     @cached_property
     def samples(self) -> np.ndarray:
-        """Points on the surface of the body ``(N, 3)``, even by area, the same at every call."""
+        """Points on the surface of the body ``(N, 3)``, uniform by area and deterministic."""
         if self.body is None or float(self.body.area) <= 0:
             return np.zeros((0, 3))
         return sample_surface(self.body, SURFACE_SAMPLES, np.random.default_rng(0))[0]
 
     @cached_property
     def spacing_m(self) -> float:
-        """How far apart neighbouring samples are in the mean."""
+        """The mean distance between neighbouring samples."""
         return (
             float(np.sqrt(self.body.area / len(self.samples))) if self.body is not None and len(self.samples) else 0.0
         )
@@ -152,9 +152,9 @@ class MeasuredAsset:
         return cKDTree(self.samples)
 
     def distance_m(self, points: np.ndarray, exact_beyond_m: float) -> np.ndarray:
-        """Return the distance of points ``(N, 3)`` to the surface of the body.
+        """Return the distances of points ``(N, 3)`` to the surface of the body.
 
-        Up to the samples first; what is farther from them than ``exact_beyond_m`` is measured exactly.
+        They are distances to the samples; those above ``exact_beyond_m`` are computed exactly.
         """
         assert self.body is not None, "asked of an asset without geometry"
         distance = np.asarray(self._near.query(points)[0], dtype=float)
@@ -167,14 +167,14 @@ class MeasuredAsset:
 
     @cached_property
     def _balls(self) -> tuple[np.ndarray, np.ndarray]:
-        """A ball around every triangle of the body: centres ``(F, 3)`` and radii ``(F,)``."""
+        """Bounding spheres of the triangles of the body: centres ``(F, 3)`` and radii ``(F,)``."""
         assert self.body is not None
         corners = np.asarray(self.body.triangles)
         centers = corners.mean(1)
         return centers, np.sqrt(((corners - centers[:, None]) ** 2).sum(2).max(1))
 
     def _exact_distance(self, point: np.ndarray, bound_m: float) -> float:
-        """Return the distance of one point to the body, tried on the triangles whose balls are within the bound."""
+        """Return the distance of one point to the body, over the triangles whose bounding spheres are within the bound."""
         assert self.body is not None
         centers, radii = self._balls
         near = np.flatnonzero(np.linalg.norm(centers - point, axis=1) - radii <= bound_m)
@@ -184,20 +184,21 @@ class MeasuredAsset:
 
     @cached_property
     def air(self) -> OpenAir | None:
-        """The air in the box of the visual meshes; None without them."""
+        """The free space in the bounding box of the visual mesh; None without one."""
         if self.visual is None or not len(self.hull):
             return None
         return open_air(self.visual, self.up, float(self.hull.volumes_m3.sum()))
 
     @cached_property
     def prior(self) -> Prior | None:
-        """The prior of the asset's category, or of its name; None where unknown."""
-        of_name = None if self.asset.partial else _prior_of_name(self._name_in_words)  # a Bolt that walks is no bolt
+        """The prior of the asset's category, or of its name; None if unknown."""
+        # the name of a robot, such as Bolt, says nothing about one of its parts
+        of_name = None if self.asset.partial else _prior_of_name(self._name_in_words)
         return lookup(self.asset.category) or of_name
 
     @cached_property
     def material_words(self) -> str:
-        """The material as declared, in lower case; the asset's name where none is."""
+        """The declared material in lower case; the name of the asset if none is declared."""
         return (self.asset.contact.material or self._name_in_words).lower()
 
     @property
@@ -216,9 +217,9 @@ class MeasuredAsset:
 
 
 def _prior_of_name(words: str) -> Prior | None:
-    """Return the prior of what a name says, None where its word is wider: a plane is no aeroplane, and a tile no domino.
+    """Return the prior that a name matches, None if the matching word is ambiguous: a plane need not be a toy aeroplane.
 
-    What it is found by has to end with the category's own word, which other names of the category do not.
+    The matching words must end with the last word of the category, which excludes other names of the category.
     """
     found = found_by(words)
     if found is None:
@@ -230,7 +231,7 @@ def _prior_of_name(words: str) -> Prior | None:
 
 
 def _integrate(mesh: trimesh.Trimesh) -> SurfaceIntegrals:
-    """Integrate over triangles exactly (as geometry.mass_properties does), without asking that vertices are shared."""
+    """Integrate over triangles exactly (as geometry.mass_properties does), without requiring shared vertices."""
     origin = mesh.bounds.mean(0)
     corners = (np.asarray(mesh.vertices, float) - origin)[mesh.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2

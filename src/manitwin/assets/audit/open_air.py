@@ -1,4 +1,4 @@
-"""The air around and in an object: what of it is a hollow that something can be put into."""
+"""Free space around and in an object, and the hollow into which something can be put."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from manitwin.geometry.ray_caster import MILLIMETRES
 AIR_SAMPLES = 1500
 _AXES = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
 
-# As geometry.cavity has measured: the smallest vessel (a shoe) holds 5.4 % of its hull, the largest hollow sideways
-# that is none (a clamp's jaws) 5.2 %.
+# Measured by geometry.cavity: the smallest vessel (a shoe) holds 5.4 % of its hull, the largest sideways hollow that is not a
+# vessel (the jaws of a clamp) 5.2 %.
 _LEAST_SHARE_UP = 0.05
 _LEAST_SHARE_SIDEWAYS = 0.10
 
 
 @dataclass(frozen=True)
 class OpenAir:
-    """Points in an object's box from which some axis leads outside.
+    """Points in an object's bounding box from which at least one axis direction leads outside.
 
-    ``points_m (N, 3)``; ``hollow (N,)``: those in the largest hollow, which the object closes on all sides but ``opens (3,)``;
-    None where there is no such hollow. Points that see a wall in every direction count as matter.
+    ``points_m (N, 3)``; ``hollow (N,)`` marks those in the largest hollow, which the object closes on all sides but
+    ``opens (3,)``; None if there is no such hollow. Points that see a wall in every direction count as matter.
     """
 
     points_m: np.ndarray
@@ -34,10 +34,10 @@ class OpenAir:
 
 
 def open_air(mesh: trimesh.Trimesh, up: np.ndarray, hull_volume_m3: float) -> OpenAir:
-    """Look along the six axes from random points in a mesh's box; ``up (3,)`` is an axis.
+    """Cast rays along the six axis directions from random points in a mesh's bounding box; ``up (3,)`` is an axis.
 
-    Works on meshes with seams and on walls without thickness. A hollow that only opens downward is none: scans often
-    lack their bottom.
+    This works on meshes with seams and on walls without thickness. A hollow that only opens downward is ignored, because scans
+    often lack their bottom.
     """
     low, high = mesh.bounds
     points = low + (high - low) * np.random.default_rng(0).random((AIR_SAMPLES, 3))
@@ -62,7 +62,7 @@ def open_air(mesh: trimesh.Trimesh, up: np.ndarray, hull_volume_m3: float) -> Op
 
 
 def _is_deep(hollow: np.ndarray, axis: np.ndarray) -> bool:
-    """Tell whether points ``(N, 3)`` go in along an axis by half of what they are wide: a picture's frame holds nothing."""
+    """Return whether points ``(N, 3)`` are at least half as deep along an axis as wide: a picture frame holds nothing."""
     if not len(hollow):
         return False
     sides = np.ptp(hollow, axis=0)
@@ -71,14 +71,14 @@ def _is_deep(hollow: np.ndarray, axis: np.ndarray) -> bool:
 
 
 def _escapes(mesh: trimesh.Trimesh, points: np.ndarray) -> np.ndarray:
-    """Tell for points ``(N, 3)`` which of the six axes lead outside, ``(N, 6) bool``.
+    """Return for points ``(N, 3)`` which of the six axis directions lead outside, ``(N, 6) bool``.
 
-    Takes the mesh by its indices, unlike ``RayCaster``: the tree over it is most of the cost.
+    Uses the indexed mesh, unlike ``RayCaster``, because building the tree is most of the cost.
     """
     scene = EmbreeScene()
     vertices = (np.asarray(mesh.vertices) * MILLIMETRES).astype(np.float32)
     surface = TriangleMesh(scene, vertices, np.asarray(mesh.faces).astype(np.int32))
     origins = np.repeat((points * MILLIMETRES).astype(np.float32), len(_AXES), axis=0)
     hits = scene.run(origins, np.tile(_AXES.astype(np.float32), (len(points), 1)))
-    del surface  # the scene knows of it, but does not keep it
+    del surface  # the scene refers to it, but does not keep it alive
     return np.asarray(hits < 0).reshape(len(points), len(_AXES))

@@ -1,4 +1,4 @@
-"""A picture of an asset as its files say it: what is seen beside what collides."""
+"""Picture of an asset for reports: visual meshes beside collision shapes."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ PANEL_PX = 320
 """The side of each of the two panels."""
 
 PICTURE = "manitwin.assets.audit.picture:picture_of_path"
-_FINER = 2  # rays along a pixel's side
+_FINER = 2  # supersampling: rays along a pixel's side
 _GROUND_RGB, _GREY = (246, 246, 244), (190, 190, 190)
 _AMBIENT = 0.35
-_LARGEST_M = 1e6  # beyond it nothing is measured, and nothing drawn
+_LARGEST_M = 1e6  # larger coordinates are neither measured nor drawn
 _FIELD_OF_VIEW_DEG = 30.0
 
 
 def audited_picture(path: Path, root: Path | None = None) -> bytes | None:
-    """Return the picture of the asset at a path, made in a process with limits; None where there is nothing to draw."""
+    """Return the picture of the asset at a path, rendered in an isolated process; None if there is nothing to draw."""
     try:
         picture: bytes | None = within_limits(PICTURE, path, root)
     except AssetError:
@@ -43,21 +43,21 @@ def audited_picture(path: Path, root: Path | None = None) -> bytes | None:
 
 
 def picture_of_path(path: Path, root: Path | None = None) -> bytes | None:
-    """Read the asset at a path and return its picture; raises AssetError where it cannot be read."""
+    """Read the asset at a path and return its picture; raises AssetError if it cannot be read."""
     return asset_picture(read_asset(path, root=root))
 
 
 def asset_picture(asset: Asset) -> bytes | None:
-    """Return a PNG of two panels: the visual parts with their textures, and the collision shapes, each in a colour of its own.
+    """Return a PNG with two panels: the textured visual parts, and the collision shapes in different colours.
 
-    Both are seen by one camera, upright. None where nothing has a face, or a vertex is no finite place.
+    Both are rendered by one camera, upright. Returns None if there are no faces, or a vertex is not finite.
     """
     seen = [part for part in asset.visual if len(part.faces)]
     felt = [
         trimesh.Trimesh(shape.vertices, shape.faces, process=False) for shape in asset.collision if len(shape.faces)
     ]
     points = [np.asarray(mesh.vertices, float)[np.unique(mesh.faces)] for mesh in (*seen, *felt)]
-    if not points or not all((np.abs(each) <= _LARGEST_M).all() for each in points):  # NaN is not less either
+    if not points or not all((np.abs(each) <= _LARGEST_M).all() for each in points):  # also false for NaN
         return None
     upright = rotation_between(
         np.array([0.0, 1, 0]) if asset.up == "y" else np.array([0.0, 0, 1]), np.array([0.0, 0, 1])
@@ -84,9 +84,9 @@ def _panel(
     *,
     textured: bool = False,
 ) -> np.ndarray:
-    """Return ``(P, P, 3) uint8`` of parts in one colour each, or with their textures, lit from beside the camera.
+    """Return a picture ``(P, P, 3) uint8`` of parts in one colour each, or textured, lit from beside the camera.
 
-    Both sides of a face are alike.
+    Faces are shaded on both sides.
     """
     picture = np.full((camera.height_px, camera.width_px, 3), _GROUND_RGB, np.uint8)
     if parts:
@@ -109,7 +109,10 @@ def _panel(
 def _put_on_textures(
     colors: np.ndarray, parts: Sequence[trimesh.Trimesh], faces: np.ndarray, points: np.ndarray
 ) -> None:
-    """Set ``colors (N, 3)`` of seen ``points (N, 3)`` on faces of the parts together to those of their textures."""
+    """Set ``colors (N, 3)`` of visible ``points (N, 3)`` to the colours of the parts' textures.
+
+    ``faces (N,)`` are face indices in the concatenation of all parts.
+    """
     first = 0
     for part in parts:
         texture, uv = material_of(part).baseColorTexture, uv_of(part)
@@ -127,7 +130,7 @@ def _put_on_textures(
 
 
 def _plain_color(part: trimesh.Trimesh) -> tuple[int, int, int]:
-    """Return the colour (sRGB) of a part's material; of a textured one the mean of its picture."""
+    """Return the sRGB colour of a part's material; for a textured one, the mean of its texture."""
     material = material_of(part)
     texture = material.baseColorTexture
     if texture is not None:

@@ -1,4 +1,4 @@
-"""Drop a rigid body on a plane, and a ball into a vessel, in PyBullet."""
+"""PyBullet simulations for the audit: a rigid body dropped on a plane, and a ball dropped into a vessel."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ STILL_M_S, STILL_RAD_S = 2e-3, 2e-2
 def drop_in_pybullet(
     body: RigidBody, start: np.ndarray, drop_m: float, seconds: float, timestep_s: float
 ) -> tuple[np.ndarray, bool]:
-    """Release a body above the plane z = 0 and return its pose ``(4, 4)``, and whether it rests.
+    """Release a body above the plane z = 0; return its final pose ``(4, 4)``, and whether it is at rest.
 
-    Poses go in and out by the centre of mass, which is what PyBullet's base position is of a body with an inertial frame of
-    its own (PyBullet Quickstart Guide, ``resetBasePositionAndOrientation``).
+    Poses are converted to and from the principal frame at the centre of mass, which is PyBullet's base frame of a body with its
+    own inertial frame (PyBullet Quickstart Guide, ``resetBasePositionAndOrientation``).
     """
     pybullet = _quiet_import()
     moments, axes = principal_frame(body.inertia_kg_m2)
@@ -41,7 +41,8 @@ def drop_in_pybullet(
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
         floor = pybullet.createMultiBody(0, plane, physicsClientId=client)
         number = _thing(pybullet, client, body, principal_to_object)
-        pybullet.changeDynamics(floor, -1, lateralFriction=1.0, physicsClientId=client)  # friction is their product
+        # the friction of a contact is the product of both
+        pybullet.changeDynamics(floor, -1, lateralFriction=1.0, physicsClientId=client)
         pybullet.changeDynamics(
             number, -1, mass=body.mass_kg, localInertiaDiagonal=moments.tolist(), lateralFriction=body.friction_static,
             linearDamping=0.0, angularDamping=0.0, physicsClientId=client,
@@ -63,7 +64,7 @@ def drop_in_pybullet(
 
 
 def ball_stays_inside_in_pybullet(hulls: Sequence[np.ndarray], opening: Opening) -> bool:
-    """Drop a ball that fits into an opening and tell whether it goes in and stays there (``BallDrop``)."""
+    """Drop a ball that fits into an opening; return whether it enters and stays inside (``BallDrop``)."""
     pybullet, drop = _quiet_import(), BallDrop.of(hulls, opening)
     client = pybullet.connect(pybullet.DIRECT)
     try:
@@ -93,14 +94,14 @@ def _quiet_import() -> Any:
 
 
 def _thing(pybullet: Any, client: int, body: RigidBody, principal_to_object: np.ndarray) -> int:
-    """Add a body whose shapes stand in its principal frame."""
+    """Add a body whose shapes are given in its principal frame."""
     object_to_principal = inverse(principal_to_object)
     hulls = [transform_points(object_to_principal, hull) for hull in body.hulls]
     return int(pybullet.createMultiBody(body.mass_kg, _shape(pybullet, client, hulls), physicsClientId=client))
 
 
 def _shape(pybullet: Any, client: int, hulls: Sequence[np.ndarray]) -> int:
-    """Make a collision shape of hulls: PyBullet takes the hull of each group of an OBJ file."""
+    """Create a collision shape from hulls: PyBullet builds a hull from each group of an OBJ file."""
     lines, count = [], 0
     for index, hull in enumerate(hulls):
         mesh = trimesh.convex.convex_hull(hull)

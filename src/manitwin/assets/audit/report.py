@@ -1,4 +1,4 @@
-"""Findings for a person, for a program, and for whoever reads SARIF."""
+"""Audit reports: text for users, JSON for programs, and SARIF for tools that read it."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ SARIF_SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schem
 
 
 def count_by_severity(audited: Sequence[Audited]) -> dict[str, int]:
-    """Return how many errors, warnings and notes there are."""
+    """Return the numbers of errors, warnings and notes."""
     counts = Counter(finding.severity for each in audited for finding in each.findings)
     return {"error": counts["error"], "warning": counts["warning"], "note": counts["note"]}
 
 
 MANY = 20
-"""From so many assets on what they amount to is said as well."""
+"""Number of assets from which on a digest is added."""
 _SEVERITIES, _NOT_READ = ("error", "warning", "note"), ("FIL001", "FIL005", "FIL006")
 _LISTED, _CAUSE_CHARACTERS = 10, 100
 SAID_ONCE = ("LIC001", "LIC002", "FRI001")
-"""Rules of which most assets of a set have the same fault: of several assets they are said once with their count."""
+"""Rules that most assets of a set violate alike: for several assets they are reported once, with their count."""
 
 
 def text_of(each: Audited, *, leave: Collection[str] = ()) -> str:
-    """Return the lines of one asset without rules to ``leave``, empty where nothing else was found and nothing fixed."""
+    """Return the lines of one asset without the rules in ``leave``; empty if nothing else was found or fixed."""
     each = replace(each, findings=tuple(finding for finding in each.findings if finding.code not in leave))
     if not each.findings and not each.fixed:
         return ""
@@ -48,7 +48,7 @@ def text_of(each: Audited, *, leave: Collection[str] = ()) -> str:
 
 
 def shared_text(audited: Sequence[Audited], codes: Collection[str] = SAID_ONCE) -> str:
-    """Return a line for each of these rules: of how many assets it was found, of which first, and what is said of it."""
+    """Return one line for each of these rules: its count, the first asset concerned, and the message."""
     lines = []
     for code in codes:
         found = [finding for each in audited for finding in each.findings if finding.code == code]
@@ -61,7 +61,7 @@ def shared_text(audited: Sequence[Audited], codes: Collection[str] = SAID_ONCE) 
 
 
 def digest(audited: Sequence[Audited], rules: Sequence[RuleText]) -> str:
-    """Return what many assets amount to, for a person: by rule, what could not be read and why, and the worst assets."""
+    """Return a digest of many assets: counts by rule, causes of unreadable assets, and the assets with most errors."""
     by_rule = Counter(code for each in audited for code in {finding.code for finding in each.findings})
     lines = ["assets by rule"]
     for rule in sorted(rules, key=lambda rule: (_SEVERITIES.index(rule.severity), -by_rule[rule.code], rule.code)):
@@ -82,7 +82,7 @@ def digest(audited: Sequence[Audited], rules: Sequence[RuleText]) -> str:
 
 
 def unread_by_cause(audited: Sequence[Audited]) -> list[tuple[str, list[str]]]:
-    """Return why assets could not be read or measured, with the assets of each cause, the most frequent first."""
+    """Return the causes of unreadable or unmeasurable assets with the assets concerned, most frequent first."""
     unread: dict[str, list[str]] = {}
     for each in audited:
         for finding in each.findings:
@@ -92,14 +92,14 @@ def unread_by_cause(audited: Sequence[Audited]) -> list[tuple[str, list[str]]]:
 
 
 def worst_assets(audited: Sequence[Audited]) -> list[Audited]:
-    """Return the assets with errors, those with most errors first, then with most warnings, then by name."""
+    """Return the assets with errors, sorted by number of errors, then of warnings, then by name."""
     counts = {id(each): count_by_severity([each]) for each in audited}
     found = [each for each in audited if counts[id(each)]["error"]]
     return sorted(found, key=lambda each: (-counts[id(each)]["error"], -counts[id(each)]["warning"], each.asset))
 
 
 def _cause(message: str) -> str:
-    """Return a message without the names and numbers that tell one asset from another."""
+    """Return a message without the names and numbers that are specific to an asset."""
     said = one_line(message).partition(": ")[2] or one_line(message)
     said = re.sub(r"'[^']*'|\"[^\"]*\"", "...", said.partition(";")[0])
     said = re.sub(r"\d+(\.\d+)?", "N", said)
@@ -115,13 +115,13 @@ def summary(audited: Sequence[Audited]) -> str:
 
 
 def explanation(rule: Rule) -> str:
-    """Return all that is known of a rule, for a person."""
+    """Return the full description of a rule for users."""
     fixable = "\nmanitwin audit --fix does it where that is safe." if rule.fix is not None else ""
     return f"{rule.code} {rule.name} ({rule.severity})\n\n{rule.why}\n\n{rule.remedy}{fixable}"
 
 
 def json_of(audited: Sequence[Audited]) -> str:
-    """Return all findings as JSON, sorted as they were found."""
+    """Return all findings as JSON, in their order."""
     content = {
         "manitwin_version": installed_version(),
         "summary": {"assets": len(audited), **count_by_severity(audited)},
@@ -149,7 +149,7 @@ def _finding_json(finding: Finding) -> dict[str, Any]:
 
 
 def sarif_of(audited: Sequence[Audited], rules: Sequence[RuleText]) -> str:
-    """Return all findings as a SARIF log, with the help of every rule that was applied.
+    """Return all findings as a SARIF log, with the help text of every applied rule.
 
     Source: OASIS, Static Analysis Results Interchange Format 2.1.0, sections 3.13 (log), 3.19 (driver), 3.27 (result), 3.49
     (rules).
@@ -201,12 +201,12 @@ def _result_sarif(finding: Finding, rule_index: int) -> dict[str, Any]:
 
 
 def _uri(path: Path) -> str:
-    """Return a path as a URI: relative as it was given, or absolute with its scheme."""
+    """Return a path as a URI: relative as given, or absolute with its scheme."""
     return path.as_uri() if path.is_absolute() else quote(os.fsencode(path))
 
 
 def _plain(value: Any) -> Any:
-    """Return values that JSON has: numbers that are not finite become words."""
+    """Convert values to JSON: numbers that are not finite become strings."""
     if isinstance(value, dict):
         return {key: _plain(each) for key, each in value.items()}
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""Hold rules against many assets, in processes of their own with limits: this one opens none of them, and imports little."""
+"""Audit of many assets in isolated processes; this module opens no assets and imports little."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
 ENGINES = ("mujoco", "sapien", "pybullet")
 TAKEN_BY = ("mujoco", "pybullet", "sapien", "physx", "gazebo")
-"""Engines whose reading of collision shapes can be judged (``taken_by``)."""
+"""Engines whose interpretation of collision shapes can be audited (``taken_by``)."""
 
 AHEAD = 4
-"""Assets handed to every process in advance."""
+"""Number of assets queued for every process."""
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 AUDIT = "manitwin.assets.audit.check:audit_by_codes"
@@ -36,9 +36,10 @@ SELECT = "manitwin.assets.audit.selection:selected_texts"
 def find_all(
     paths: Iterable[Path], fragments: list[Path] | None = None, templates: list[Path] | None = None
 ) -> list[Path]:
-    """Return every asset at or below the paths, each once; raises UsageError for a path that is not there.
+    """Return every asset at or below the paths without duplicates; raises UsageError for a path that does not exist.
 
-    ``fragments`` gets the descriptions without a shape, ``templates`` those with words for numbers: neither are assets.
+    Descriptions without a shape are appended to ``fragments``, and templates with words in place of numbers to ``templates``;
+    neither are assets.
     """
     found: dict[Path, None] = {}
     for path in paths:
@@ -49,14 +50,14 @@ def find_all(
 
 
 def rules_selected(select: Iterable[str] = (), ignore: Iterable[str] = ()) -> tuple[RuleText, ...]:
-    """Return what is said of the rules that ``selection.select_rules`` returns; raises UsageError as it does."""
-    with _one_thread_each():  # of the process that is started for it, and audits
+    """Return the descriptions of the rules that ``selection.select_rules`` returns; raises UsageError like it."""
+    with _one_thread_each():  # for the process started here, which also audits
         rules: tuple[RuleText, ...] = run_isolated(SELECT, list(select), list(ignore))
     return rules
 
 
 def check_engines(engines: Iterable[str]) -> tuple[str, ...]:
-    """Return the engines, each once; raises UsageError for one that is not known or not installed."""
+    """Return the engines without duplicates; raises UsageError for one that is unknown or not installed."""
     chosen = tuple(dict.fromkeys(engines))
     for engine in chosen:
         if engine not in ENGINES:
@@ -67,7 +68,7 @@ def check_engines(engines: Iterable[str]) -> tuple[str, ...]:
 
 
 def check_engine(engine: str | None) -> str | None:
-    """Return the engine whose reading of collision shapes is judged; raises UsageError for one that is not known."""
+    """Return the engine whose interpretation of collision shapes is audited; raises UsageError for an unknown one."""
     if engine is not None and engine not in TAKEN_BY:
         raise UsageError(choose_from("engine", engine, TAKEN_BY))
     return engine
@@ -121,7 +122,7 @@ def _unread(path: Path, cause: str, rules: Sequence[RuleText]) -> Audited:
 
 @contextmanager
 def _one_thread_each() -> Iterator[None]:
-    """Let new processes do linear algebra with one thread, which the libraries only look for as they are loaded."""
+    """Limit linear algebra in new processes to one thread; the libraries read these variables only when loaded."""
     before = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(dict.fromkeys((name for name, value in before.items() if value is None), "1"))
     try:
@@ -152,7 +153,7 @@ def _in_processes(
 
 
 def _begin(memory_bytes: int) -> None:
-    """Prepare a process of the pool: what it imports is not of the time that an asset may take."""
+    """Prepare a process of the pool, so that imports do not count toward the time limit of an asset."""
     import_module(AUDIT.partition(":")[0])
     limit_address_space(memory_bytes)
 
@@ -198,10 +199,11 @@ def audit_assets(
     engines: Iterable[str] = (),
     engine: str | None = None,
 ) -> list[Audited]:
-    """Audit every asset at or below paths and return what was found of each.
+    """Audit every asset at or below paths and return the findings of each.
 
-    ``engine`` (mujoco, pybullet, sapien, physx or gazebo) is the one whose reading of collision shapes is judged; ``engines``
-    (mujoco, sapien, pybullet) also run it. Raises UsageError for a wrong path, code or engine.
+    ``engine`` (mujoco, pybullet, sapien, physx or gazebo) is the one whose interpretation of collision shapes is audited;
+    ``engines`` (mujoco, sapien, pybullet) are those in which assets are simulated too. Raises UsageError for a wrong path, code
+    or engine.
     """
     run_in = check_engines(engines)
     check_engine(engine)

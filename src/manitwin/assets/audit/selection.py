@@ -1,4 +1,4 @@
-"""Which rules are meant: by codes and their beginnings."""
+"""Selection of audit rules by codes and code prefixes."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from manitwin.assets.audit.rules import RULES
 from manitwin.errors import UsageError
 
 ALWAYS = frozenset({"FIL001", "FIL005", "FIL006"})
-"""What cannot be read or measured was not audited at all: only --ignore leaves that out."""
+"""Rules on unreadable or unmeasurable assets, which only --ignore removes, because such assets were not audited at all."""
 
 
 def select_rules(select: Iterable[str] = (), ignore: Iterable[str] = ()) -> tuple[Rule, ...]:
-    """Return the rules that are selected and not ignored; all are selected where nothing is.
+    """Return the rules that are selected and not ignored; all are selected by default.
 
-    Codes are taken in any case. The longer beginning wins: ``select=["INE001"], ignore=["INE"]`` leaves INE001 in; equally
-    long, ``ignore`` does. Raises UsageError for what no code begins with, naming the nearest.
+    Codes are case-insensitive. The longer prefix wins: ``select=["INE001"], ignore=["INE"]`` keeps INE001; for equal length,
+    ``ignore`` wins. Raises UsageError for a prefix of no code, naming the closest one.
     """
     chosen, dropped = _prefixes(select), _prefixes(ignore)
     return tuple(rule for rule in RULES if _is_selected(rule.code, chosen, dropped))
 
 
 def rule_of(code: str) -> Rule:
-    """Return the rule of a whole code; raises UsageError naming the nearest."""
+    """Return the rule of a complete code; raises UsageError naming the closest one."""
     for rule in RULES:
         if rule.code == code.strip().upper():
             return rule
@@ -55,5 +55,5 @@ def _unknown(code: str) -> str:
 
 
 def selected_texts(select: Sequence[str], ignore: Sequence[str]) -> tuple[RuleText, ...]:
-    """Return what is said of the rules that ``select_rules`` returns."""
+    """Return the descriptions of the rules that ``select_rules`` returns."""
     return tuple(rule.text for rule in select_rules(select, ignore))

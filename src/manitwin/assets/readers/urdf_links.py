@@ -1,4 +1,4 @@
-"""Which links of a URDF are read, where they stand, and which joints of them a twin can have."""
+"""Selection of the links of a URDF that are read, their poses, and the joints that twins support."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from manitwin.geometry.articulation import ArticulatedJoint
 from manitwin.robots.urdf import UrdfTree, child_of, origin_of, parent_of
 
 Placed = tuple[etree._Element, np.ndarray]
-"""A link, and its pose in the first one's frame."""
+"""A link element, and its pose ``(4, 4)`` in the frame of the first link."""
 _LET_GO = ("floating", "planar")
 _AXIS = np.array([1.0, 0, 0])
-"""The URDF specification's, where a joint names none."""
+"""The default axis of the URDF specification."""
 
 
 def chosen_links(tree: UrdfTree, files: AssetFiles, joints: Joints) -> tuple[tuple[Placed, ...], Tree | None]:
-    """Return the links of the first object that has a shape, as they stand; and with ``joints="keep"`` what moves in it.
+    """Return the links of the first object with a shape, with their poses, and its joint tree for ``joints="keep"``.
 
-    "part": links on fixed joints are one object, what moves is another. "lock": what moves by joints is one rigid object at
-    joint positions 0; "keep": so too, each joint at the position within its limits that is nearest to 0. What collides or has a
-    mass goes before what is only seen, such as the mark of a footprint.
+    With "part", links on fixed joints form one object, and links behind movable joints are others. With "lock", all links are
+    one rigid object at joint positions 0. With "keep", each joint is at the position within its limits closest to 0. Links with
+    a collision shape or mass have priority over purely visual ones, such as footprint markers.
     """
     links, heads = tree.links, tree.roots()
     held = {child_of(joint): joint for joint in tree.joints.values()}
@@ -40,7 +40,7 @@ def chosen_links(tree: UrdfTree, files: AssetFiles, joints: Joints) -> tuple[tup
     for child, joint in held.items():
         children[parent_of(joint)].append(child)
     groups: list[list[tuple[str, np.ndarray]]] = []
-    for head in heads:  # grows by the links behind joints that move
+    for head in heads:  # grows by the links behind movable joints
         group = [(head, np.eye(4))]
         for name, pose in group:
             for child in children[name]:
@@ -87,7 +87,7 @@ def _nodes(
 
 
 def _kept(joint: etree._Element, child_to_asset: np.ndarray) -> tuple[ArticulatedJoint | None, str]:
-    """Return a joint in the asset's axes; None for a fixed one, and with the cause for one that cannot be kept."""
+    """Return a joint in the asset's axes and "", or None and the reason; the reason is empty for a fixed joint."""
     written, name = joint.get("type") or "", str(joint.get("name"))
     if written == "fixed":
         return None, ""
@@ -120,7 +120,7 @@ def _kept(joint: etree._Element, child_to_asset: np.ndarray) -> tuple[Articulate
 
 
 def _placed(joint: etree._Element, joints: Joints) -> np.ndarray:
-    """Return the pose of a joint's child in its parent."""
+    """Return the pose ``(4, 4)`` of a joint's child in its parent."""
     origin = origin_of(joint)
     kind, axis = JOINT_KINDS.get(joint.get("type") or ""), _axis(joint)
     position = _standing(joint) if joints == "keep" else 0.0
@@ -131,7 +131,7 @@ def _placed(joint: etree._Element, joints: Joints) -> np.ndarray:
 
 
 def _standing(joint: etree._Element) -> float:
-    """Return the position within a joint's limits that is nearest to 0."""
+    """Return the position within a joint's limits that is closest to 0."""
     limits = _limits(joint)
     if joint.get("type") == "continuous" or limits is None or limits[0] is None or limits[1] is None:
         return 0.0
@@ -149,7 +149,7 @@ def _limits(joint: etree._Element) -> Limits:
 
 
 def _axis(joint: etree._Element) -> np.ndarray | None:
-    """Return a joint's axis of length one; None where it has no direction."""
+    """Return a joint's unit axis; None if it has no direction."""
     element = joint.find("axis")
     if element is None:
         return _AXIS

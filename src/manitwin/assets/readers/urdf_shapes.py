@@ -1,4 +1,4 @@
-"""The visual and collision shapes of URDF links, origins and scales applied."""
+"""Visual and collision shapes of URDF links, with origins and scales applied."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _LOST_LIBRARY = re.compile(r"material library '.+' is not there")
 
 
 class LinkShapes:
-    """Reads shapes of the links of one URDF."""
+    """Reads the shapes of links of one URDF."""
 
     def __init__(self, tree: UrdfTree, file: Path, files: AssetFiles, *, turn_gltf: bool = False):
         self._tree, self._file, self._files, self._turn_gltf = tree, file, files, turn_gltf
@@ -44,13 +44,13 @@ class LinkShapes:
     def all(
         self, links: Iterable[tuple[etree._Element, np.ndarray]]
     ) -> tuple[list[trimesh.Trimesh], list[CollisionShape]]:
-        """Return the visual parts and the collision shapes of links with their poses."""
+        """Return the visual parts and the collision shapes of links with their poses ``(4, 4)``."""
         placed = list(links)
         visual = [part for link, pose in placed for part in self.visual(link, pose)]
         return visual, [shape for link, pose in placed for shape in self.collision(link, pose)]
 
     def visual(self, link: etree._Element, link_to_asset: np.ndarray) -> Iterator[trimesh.Trimesh]:
-        """Yield a link's visual parts in the asset's axes; what is written twice at one place is shown once."""
+        """Yield a link's visual parts in the asset's axes; identical visual elements are shown once."""
         seen: set[bytes] = set()
         for index, element in enumerate(link.findall("visual")):
             written = etree.tostring(element, method="c14n")
@@ -66,7 +66,7 @@ class LinkShapes:
     def collision(self, link: etree._Element, link_to_asset: np.ndarray) -> Iterator[CollisionShape]:
         """Yield a link's collision shapes in the asset's axes.
 
-        A mesh counts as its convex hull: PyBullet, SAPIEN and MuJoCo take it so unless they are told otherwise.
+        A mesh counts as its convex hull, which is the default of PyBullet, SAPIEN and MuJoCo.
         """
         for index, element in enumerate(link.findall("collision")):
             to_asset = link_to_asset @ origin_of(element) @ _scale(element)
@@ -77,7 +77,7 @@ class LinkShapes:
                 name = element.get("name") or f"{link.get('name')}_{index:02d}"
                 file = self._mesh_file(element)
                 primitive = geometry_of(element).tag != "mesh"
-                # Isaac Gym collides with a distance field of the mesh, PyBullet with the triangles of what does not move
+                # Isaac Gym collides with a distance field of the mesh, PyBullet with the triangles of static bodies
                 drawn = element.find("sdf") is not None or element.get("concave") == "yes"
                 groups = () if drawn else placed_groups(file, to_asset)
                 yield CollisionShape(name, vertices, faces, True, file, primitive, groups, as_drawn=drawn)
@@ -99,7 +99,8 @@ class LinkShapes:
         path = self._files.find(name, self._candidates(name))
         if path is None or self._files.is_of_unread_format(path):
             return []
-        note = "it was not turned, as ROS does not"  # RViz and Gazebo Classic disagree; ROS takes meshes along the link's axes
+        # RViz and Gazebo Classic disagree; ROS takes meshes along the axes of the link
+        note = "it was not turned, as ROS does not"
         mesh = self._files.mesh(path)
         parts = mesh_parts(self._files, path, mesh, color=color, turned_note=note)
         turn = self._turn_gltf and mesh.format in Y_UP_FORMATS
@@ -125,14 +126,14 @@ class LinkShapes:
 
 
 def candidates(name: str, file: Path, root: Path) -> Iterator[Path]:
-    """Yield where a file that a description names may lie: from the description's folder upward to the root.
+    """Yield candidate paths of a file that a description names, from the description's folder upward to the root.
 
-    What names a package or model (``package://NAME/...``) lies in the folder of that name, or in a folder that holds the
-    package without being called so. Isaac Gym takes names from the folder that its caller says, which is one above.
+    A name of a package or model (``package://NAME/...``) is resolved in the folder of that name, or in a folder that holds the
+    package under another name. Isaac Gym resolves names relative to a folder given by its caller, which is one of those above.
     """
     scheme = next((scheme for scheme in PACKAGE_SCHEMES if name.startswith(scheme)), "")
     inside = name.removeprefix(scheme)
-    inside = inside.lstrip("/") if scheme else inside  # Gazebo takes model:///NAME too
+    inside = inside.lstrip("/") if scheme else inside  # Gazebo accepts model:///NAME too
     folders = list(upward(file.parent, root))
     if not scheme:
         yield file.parent / inside
@@ -147,13 +148,13 @@ def candidates(name: str, file: Path, root: Path) -> Iterator[Path]:
 
 
 def placed_groups(file: Path | None, to_asset: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
-    """Return the groups of a mesh file that was read (``obj_groups``), brought into the asset's axes by ``(4, 4)``."""
+    """Return the groups of a mesh file that was read (``obj_groups``), transformed by ``to_asset (4, 4)``."""
     groups = [] if file is None else obj_groups(file)
     return tuple((transform_points(to_asset, vertices), faces) for vertices, faces in groups)
 
 
 def _scale(element: etree._Element) -> np.ndarray:
-    """Return a mesh's scale as a transform ``(4, 4)``; older exporters write one factor."""
+    """Return a mesh's scale as a transform ``(4, 4)``; older exporters write a single factor."""
     mesh = element.find("geometry/mesh")
     return np.eye(4) if mesh is None else np.diag([*(np.ones(3) * values_of(mesh, "scale", "1")), 1.0])
 
@@ -181,17 +182,17 @@ def mesh_parts(
     turned_note: str,
     scale: np.ndarray | None = None,
 ) -> list[trimesh.Trimesh]:
-    """Return the parts of a mesh file that a description names, in metres and scaled by ``(3,)``.
+    """Return the parts of a mesh file that a description names, in metres and scaled by ``scale (3,)``.
 
-    COLLADA's unit counts and its up axis does not, which ``turned_note`` says. Parts without a material take ``color``, as do
-    those whose material is a name in a library that is not there.
+    The unit of COLLADA is applied and its up axis is not, which ``turned_note`` explains. ``color`` applies to parts without a
+    material, and to parts whose material is only a name in a missing library.
     """
     if mesh.format == "dae" and mesh.up == "y":
         files.remark(f"{path.name}: its COLLADA says that Y is up; {turned_note}")
     unit_m = mesh.unit_m if mesh.format == "dae" and mesh.unit_m is not None else 1.0
     factors = np.ones(3) if scale is None else scale
     parts = [bake_transform(part, np.diag([*(factors * unit_m), 1.0])) for part in mesh.parts]
-    if color is None or mesh.format == "ply":  # a PLY whose texture is lost looks like one that has none
+    if color is None or mesh.format == "ply":  # a PLY with a lost texture is indistinguishable from one without texture
         return parts
     lost = any(_LOST_LIBRARY.match(finding) for finding in mesh.findings)
     return [
@@ -203,9 +204,9 @@ def mesh_parts(
 
 
 def _is_bare(part: trimesh.Trimesh, lost: bool) -> bool:
-    """Whether a mesh file gives a part no material: what has one, also one whose texture is lost, keeps it.
+    """Return whether a mesh file gives a part no material; a part with a lost texture has one.
 
-    ``lost``: a library of materials is not there, and what only has the name of one has none.
+    ``lost``: a material library is missing, so that a part with only the name of a material has none.
     """
     material = material_of(part)
     grey = np.round(np.multiply(DEFAULT_COLOR, 255)).astype(int)

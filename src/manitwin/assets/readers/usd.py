@@ -1,4 +1,4 @@
-"""USD and USDZ of any tool: geometry, mass, friction and what is said of the source."""
+"""Reader of USD and USDZ assets: geometry, mass, friction, joints and source information."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ from manitwin.formats.meshes.usd_skin import Skeletons
 
 
 def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS, *, joints: Joints = "part") -> Asset:
-    """Read a USD file, or the only one in a folder, in a process of its own; the asset's axes are the stage's.
+    """Read a USD file, or the only one in a folder, in an isolated process; the asset's axes are those of the stage.
 
-    Layers, references, payloads and textures are followed inside of ``root`` only (``root_of`` the path by default). With
-    ``joints`` "lock" or "keep" the first of its bodies that joints let move is read, with "part" the whole stage as it stands.
-    Raises AssetError naming what is broken, also where the USD library crashes on it.
+    Layers, references, payloads and textures are followed only inside ``root`` (default: ``root_of`` the path). ``joints``:
+    "lock" and "keep" read the first articulated object, "part" the whole stage in its pose. Raises AssetError naming what is
+    broken, also if the USD library crashes.
     """
     function = "manitwin.assets.readers.usd:read_here"
     try:
@@ -53,7 +53,7 @@ def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS,
 
 
 def read_here(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS, joints: Joints = "part") -> Asset:
-    """Read it in this process, which a broken file may end, below its own folder or a ``root``; raises AssetError."""
+    """Read a USD asset in this process, which a broken file may crash, below its own folder or ``root``; raises AssetError."""
     file = only_file(path) if path.is_dir() else path
     source = MeshSource(file, limits, root=root)
     try:
@@ -111,12 +111,12 @@ def _asset(path: Path, stage: Usd.Stage, layers: LayerFiles, joints: Joints, sou
 def _articulation(
     chosen: Chosen, moving: Tree, seen: Sequence[Seen], felt: Sequence[Felt], units: StageUnits, source: MeshSource
 ) -> tuple[Inertial, Articulation]:
-    """Return the mass properties of the whole, which are unknown where those of a body are, and its links and joints."""
+    """Return the inertial of the whole, unknown if that of a body is unknown, and its links and joints."""
     solid = {chosen.node_of(placed) for _, placed in (*seen, *felt)}
     of_node: list[list[PlacedPrim]] = [[] for _ in chosen.bodies]
     for each in chosen.placed:
         node = chosen.node_of(each)
-        if chosen.bodies[node] is not None or node in solid:  # a ground that is not read weighs nothing
+        if chosen.bodies[node] is not None or node in solid:  # a ground that is not read has no mass
             of_node[node].append(each)
     felt_of: list[list[Felt]] = [[] for _ in chosen.bodies]
     for shape in felt:
@@ -129,7 +129,7 @@ def _articulation(
     for place, head in enumerate(moving.heads):
         mine = [node for node, link in enumerate(moving.link_of) if link == place]
         bodies = [weighed[node] for node in mine if felt_of[node] or weighed[node].mass_kg is not None]
-        # what stands fast and shows nothing is no body of the file's
+        # static prims without visible shapes do not form a body of the file
         named = head if chosen.bodies[head] is not None else next(node for node in mine if chosen.nodes[node].shaped)
         links.append(AssetLink(chosen.nodes[named].name, _together(bodies)))
     unweighed = [link.name for link in links if link.inertial.mass_kg is None]
@@ -140,21 +140,21 @@ def _articulation(
 
 
 def _together(bodies: list[Inertial]) -> Inertial:
-    """Return bodies as one; nothing where a mass of them is not known."""
+    """Combine bodies into one inertial; empty if the mass of one is unknown."""
     if not bodies or any(body.mass_kg is None for body in bodies):
         return Inertial()
     return replace(combined_inertial(bodies), computed=any(body.computed for body in bodies))
 
 
 def _but(layers: LayerFiles) -> str:
-    """Return what there is instead of shapes."""
+    """Return a clause on what the stage has instead of shapes."""
     if layers.missing:
         return f", and layers that it names are not there: {', '.join(sorted(layers.missing)[:3])}"
     return "; it may be a layer of another asset"
 
 
 def _said(stage: Usd.Stage, root: Usd.Prim) -> dict[str, str]:
-    """Return the texts in the custom data of the layer and of the default prim, also one level below; the prim's win."""
+    """Return the texts in the custom data of the root layer and default prim, and one level below; the prim has priority."""
     found: dict[str, str] = {}
     for data in (stage.GetRootLayer().customLayerData, root.GetCustomData() if root else {}):
         for values in (data, *(value for value in data.values() if isinstance(value, dict))):

@@ -1,4 +1,4 @@
-"""Damping, friction and limits of a joint of a USD stage, from UsdPhysics drives and the schemas of PhysX, MuJoCo and Newton."""
+"""Damping, friction and limits of USD joints, from UsdPhysics drives and the schemas of PhysX, MuJoCo and Newton."""
 
 from __future__ import annotations
 
@@ -14,17 +14,21 @@ from manitwin.formats.meshes.source import MeshSource
 
 _UNLIMITED = 1e15
 _FASTEST = 1e6
-"""PhysX's default of the greatest speed of a joint (PhysxJointAPI): so great a limit is read as none."""
+"""PhysX's default for the largest joint velocity (PhysxJointAPI): limits from here on count as none."""
 _NOT_OF_TWINS = (
     "physxJoint:armature", "newton:armature", "mjc:armature", "mjc:stiffness", "physxJoint:jointFriction",
 )  # fmt: skip
-"""Attributes that twins have no field for. PhysX's jointFriction is a coefficient that scales with the force on the joint, no
-friction force or torque of its own."""
+"""Attributes that twins have no field for. PhysX's jointFriction is a coefficient that scales with the joint force, not a
+friction force or torque.
+"""
 
 
 @dataclass(frozen=True)
 class Drive:
-    """``damping`` in N m s/rad or N s/m, ``friction``, ``effort`` in N m or N, ``velocity`` in rad/s or m/s; None: no limit."""
+    """Parameters of a joint in SI units; None: no limit.
+
+    ``damping`` is in N m s/rad or N s/m, ``friction`` and ``effort`` in N m or N, ``velocity`` in rad/s or m/s.
+    """
 
     damping: float = 0.0
     friction: float = 0.0
@@ -33,12 +37,13 @@ class Drive:
 
 
 def drive_of(prim: Usd.Prim, axis: str, units: StageUnits, source: MeshSource, *, slides: bool) -> Drive:
-    """Return what a stage states of a joint about ``axis`` (X, Y or Z), or along it where it ``slides``.
+    """Return the parameters of a joint about ``axis`` (X, Y or Z), or along it if it ``slides``.
 
-    A drive with neither stiffness nor a target velocity is a damper. USD's angles are degrees: a damping is a torque for each
-    degree a second. MuJoCo's values are in its own units, m, kg and rad, and so is the effort that a converter from URDF notes.
-    What twins have no field for is noted as a finding of ``source``. From: UsdPhysics schema, DriveAPI; PhysxSchema,
-    PhysxJointAPI; MuJoCo's OpenUSD documentation, MjcJointAPI; newton-usd-schemas 0.6 and urdf-usd-converter 0.3, NewtonJointAPI.
+    A drive with neither stiffness nor a target velocity is a damper. Angles in USD are degrees, so damping is a torque for each
+    degree per second. Values in MuJoCo's schema, and the effort that a converter from URDF notes, are in m, kg and rad.
+    Attributes without a counterpart in twins are noted as a finding of ``source``. Sources: UsdPhysics schema, DriveAPI;
+    PhysxSchema, PhysxJointAPI; MuJoCo's OpenUSD documentation, MjcJointAPI; newton-usd-schemas 0.6 and urdf-usd-converter 0.3,
+    NewtonJointAPI.
     """
     force = units.kg * units.m if slides else units.kg * units.m**2  # of a force or a torque, without its 1/s^2
     way = units.m if slides else math.radians(1.0)
@@ -73,7 +78,7 @@ def drive_of(prim: Usd.Prim, axis: str, units: StageUnits, source: MeshSource, *
 
 
 def _positive(prim: Usd.Prim, name: str, source: MeshSource) -> float | None:
-    """Return an authored number above 0; None where none is authored, or one so large that it bounds nothing."""
+    """Return an authored number above 0; None if none is authored, or if it is so large that it means unlimited."""
     attribute = prim.GetAttribute(name)
     written = attribute.Get(Usd.TimeCode.EarliestTime()) if attribute and attribute.HasAuthoredValue() else None
     if written is None:

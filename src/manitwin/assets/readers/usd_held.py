@@ -1,4 +1,4 @@
-"""How the joints of a USD stage hold its bodies: where, about or along what, how far, and which of them a twin can have."""
+"""Joints of a USD stage as constraints between bodies: frame, axis, position, limits, and whether twins support them."""
 
 from __future__ import annotations
 
@@ -24,17 +24,18 @@ from manitwin.geometry.poses import inverse, rotation_from_quaternion_wxyz, tran
 _UNLIMITED = 1e15
 _SHORTEST = 1e-9
 _MEETS_M, _MEETS_RAD = 1e-4, 1e-3
-"""So near to each other the frames of a joint meet: they are in single precision, and often of six digits."""
+"""Tolerances within which the two frames of a joint coincide: they have single precision, and often six digits."""
 _SAME_LINE_M = 1e-3
-"""So near to one line hinges that are placed by hand are about the same one."""
+"""Distance within which manually placed hinges count as coaxial."""
 _MIMICS = ("PhysxMimicJointAPI", "NewtonMimicAPI")
 
 
 @dataclass(frozen=True)
 class Held:
-    """How a joint holds a body: ``joint`` in the stage's axes, None where it lets nothing move, with a ``cause`` where it should.
+    """How a joint holds a body: ``joint`` in the stage's axes, None if fixed or unsupported; then ``cause`` is the reason.
 
-    ``motion (4, 4)`` brings the body from where the stage has it to where the joint holds it, what it hangs from left there.
+    ``motion (4, 4)`` moves the body from its pose in the stage to the pose that the joint requires, relative to its parent. The
+    reason is empty for a fixed joint.
     """
 
     joint: ArticulatedJoint | None = None
@@ -49,10 +50,10 @@ def held_together(
     units: StageUnits,
     source: MeshSource,
 ) -> tuple[StageJoint, Held]:
-    """Return which of the joints between two bodies holds the other one to ``body``, and how.
+    """Return the joint among those between two bodies that holds the other one to ``body``, and how it does.
 
-    A fixed one holds whatever the others allow; several hinges about one line are one. Others that are several of a body cannot
-    be kept. Raises AssetError as for each of them.
+    A fixed joint overrides the others, and several coaxial hinges count as one. Other combinations cannot be kept. Raises
+    AssetError for malformed joints.
     """
     joints = [joint for joint in joints if not joint.is_extra] or joints
     fixed = next((joint for joint in joints if joint.kind == "fixed"), None)
@@ -65,7 +66,7 @@ def held_together(
 
 
 def _same_way(first: Held, second: Held) -> bool:
-    """Tell whether two joints let a body move in one way: about one line, or along one direction."""
+    """Return whether two joints allow the same motion: rotation about the same line, or translation along the same direction."""
     one, other = first.joint, second.joint
     if one is None or other is None:
         return one is other and first.cause == second.cause
@@ -81,11 +82,11 @@ def _same_way(first: Held, second: Held) -> bool:
 def _held_by(
     joint: StageJoint, of_path: Mapping[Sdf.Path, PlacedPrim], units: StageUnits, source: MeshSource, *, backward: bool
 ) -> Held:
-    """Return how a joint holds its second end to its first, ``backward``: its first to its second, in m and rad.
+    """Return how a joint holds its second end to its first (``backward``: its first to its second), in m and rad.
 
-    A joint stands where the stage has its bodies, or at the position within its limits that is nearest to it. Where its frames
-    do not meet as the stage stands, the body is put where a simulation would put it, with a remark. Raises AssetError for frames
-    and limits that are not finite.
+    The joint position is that of the bodies in the stage, clipped to its limits. If the frames of the joint do not coincide in
+    the stage, the body is moved to where a simulation would put it, with a remark. Raises AssetError for frames and limits that
+    are not finite.
     """
     if joint.kind == "fixed":
         return Held(motion=_motion(joint, _frames(joint, of_path, units, source), np.eye(4), source, backward=backward))
@@ -99,7 +100,7 @@ def _held_by(
     frames = _frames(joint, of_path, units, source)
     at, (lower, upper) = _standing(*frames, axis, slides=slides), limits
     if lower is not None and upper is not None:
-        if not slides:  # a turn is as far as a whole turn more
+        if not slides:  # angles are equal up to whole turns
             at += 2 * math.pi * round(((lower + upper) / 2 - at) / (2 * math.pi))
         at = min(max(at, lower), upper)
     moved = axis_motion(np.zeros(3), axis, at, slides=slides)
@@ -126,7 +127,7 @@ def _held_by(
 def _motion(
     joint: StageJoint, frames: tuple[np.ndarray, np.ndarray], moved: np.ndarray, source: MeshSource, *, backward: bool
 ) -> np.ndarray:
-    """Return how far the held end is from where the joint has it: its second frame is the first one ``moved (4, 4)``."""
+    """Return the correction ``(4, 4)`` of the held body, after which its joint frame is the other frame ``moved (4, 4)``."""
     first, second = frames
     held = second @ inverse(moved) @ inverse(first) if backward else first @ moved @ inverse(second)
     frame = first if backward else second
@@ -142,7 +143,7 @@ def _motion(
 
 
 def _limits(joint: StageJoint, units: StageUnits, source: MeshSource) -> Limits:
-    """Return the limits in rad or m; (None, None) where one of them is none."""
+    """Return the limits in rad or m; (None, None) if either is unlimited, None for an empty range."""
     if math.isnan(joint.lower) or math.isnan(joint.upper):
         raise AssetError(
             f"{source.path}: the limits of joint {joint.prim.GetPath()} are {joint.lower} and {joint.upper}; give numbers,"
@@ -155,7 +156,7 @@ def _limits(joint: StageJoint, units: StageUnits, source: MeshSource) -> Limits:
         if not all(beyond):
             source.find(f"joint {joint.name[:NAME]!r} has one limit, where twins have two or none: none was taken")
         return None, None
-    # the numbers as they were meant: 0.45, not 0.44999998807907104
+    # the intended decimals: 0.45, not 0.44999998807907104
     lower, upper = (unit_of(joint, units) * float(str(np.float32(end))) for end in (joint.lower, joint.upper))
     return lower, upper
 
@@ -172,7 +173,8 @@ def _frame(
 ) -> np.ndarray:
     """Return the frame ``(4, 4)`` of a joint on one of its ends, in the stage's axes and metres.
 
-    A place counts in the scaled axes of the prim, a turn in its axes without their scale; the world's are those of the stage.
+    Its position is in the scaled axes of the prim, its rotation in the axes without scale; the frame of the world is that of
+    the stage.
     """
     api, named = UsdPhysics.Joint(joint.prim), joint.named[end]
     place = api.GetLocalPos0Attr().Get() if end == 0 else api.GetLocalPos1Attr().Get()
@@ -185,13 +187,13 @@ def _frame(
     to_world = np.diag([units.m] * 3 + [1.0]) if named is None else in_metres(of_path[named.GetPath()], units.m, source)
     left, _, right = np.linalg.svd(to_world[:3, :3])
     axes = left @ right
-    axes = axes if np.linalg.det(axes) > 0 else -axes  # as Gf factors a transform that mirrors
+    axes = axes if np.linalg.det(axes) > 0 else -axes  # as Gf factors a transform with a reflection
     rotation = rotation_from_quaternion_wxyz(wxyz) if np.linalg.norm(wxyz) > _SHORTEST else np.eye(3)
     return transform(axes @ rotation, to_world[:3, :3] @ point + to_world[:3, 3])
 
 
 def _standing(first: np.ndarray, second: np.ndarray, axis: np.ndarray, *, slides: bool) -> float:
-    """Return how far along or about the axis the second frame of a joint stands from the first, in m or rad."""
+    """Return the position of the second frame of a joint relative to the first, along or about the axis, in m or rad."""
     if slides:
         return float((second[:3, 3] - first[:3, 3]) @ (first[:3, :3] @ axis))
     *vector, real = Rotation.from_matrix(first[:3, :3].T @ second[:3, :3]).as_quat()

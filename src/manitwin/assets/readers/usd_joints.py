@@ -1,4 +1,4 @@
-"""The joints of a USD stage: what they join, and how it may move (UsdPhysics)."""
+"""Joints of a USD stage (UsdPhysics): the bodies they connect, and the motion they allow."""
 
 from __future__ import annotations
 
@@ -22,18 +22,19 @@ _KINDS = (
     (UsdPhysics.DistanceJoint, "distance"),
 )
 _WAYS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
-"""What a joint of the base class lets go, unless a LimitAPI of that name holds it: its low is then above its high."""
+"""Degrees of freedom of a joint of the base class; a LimitAPI of this name locks one if its low is above its high."""
 AXES = {"X": np.array([1.0, 0, 0]), "Y": np.array([0, 1.0, 0]), "Z": np.array([0, 0, 1.0])}
 NAME = 60
 
 
 @dataclass(frozen=True)
 class StageJoint:
-    """One joint: ``kind`` in a word, of the base class what its limits leave of it; ``ends`` the bodies, None the world.
+    """One joint of a stage.
 
-    ``named`` are the prims that the file names, of which the bodies are. ``axis`` is X, Y or Z of the joint's frame, as written;
-    ``lower`` and ``upper`` are degrees or the stage's lengths, as written. ``is_extra``: it is excluded from the articulation,
-    as joints that close a loop are.
+    ``kind`` is its type; for the base class it follows from its limits. ``named`` are the prims that the file names, and
+    ``ends`` the bodies to which they belong, None for the world. ``axis`` is X, Y or Z of the joint frame. ``lower`` and
+    ``upper`` are in degrees or lengths of the stage, as written. ``is_extra``: the joint is excluded from the articulation, as
+    joints that close a loop are.
     """
 
     prim: Usd.Prim
@@ -47,12 +48,12 @@ class StageJoint:
 
     @property
     def name(self) -> str:
-        """Its own name."""
+        """The name of the joint."""
         return name_of(self.prim)
 
     @property
     def holds(self) -> bool:
-        """Tell whether it holds what it joins, as ropes do not."""
+        """Whether it constrains its bodies to each other; a distance joint, such as a rope, does not."""
         return self.kind != "distance"
 
     def told(self) -> str:
@@ -61,14 +62,14 @@ class StageJoint:
 
 
 def name_of(prim: Usd.Prim) -> str:
-    """Return a prim's name; what its display name says, where a converter could not write a name as it was."""
+    """Return a prim's display name, which converters write for names that are no valid identifier, or else its name."""
     return str(prim.GetDisplayName() or prim.GetName())
 
 
 def stage_joints(
     placed: Sequence[PlacedPrim], of_path: Mapping[Sdf.Path, PlacedPrim], source: MeshSource
 ) -> list[StageJoint]:
-    """Return the joints of a stage that are not turned off and join two things, in its order."""
+    """Return the enabled joints of a stage that connect two different bodies, in stage order."""
     found = []
     for each in placed:
         if not each.prim.IsA(UsdPhysics.Joint):
@@ -89,7 +90,7 @@ def stage_joints(
 
 
 def _joint(prim: Usd.Prim, of_path: Mapping[Sdf.Path, PlacedPrim]) -> StageJoint | str:
-    """Return a joint; in words why it joins nothing."""
+    """Return a joint, or a phrase on why it connects nothing."""
     api = UsdPhysics.Joint(prim)
     named: list[Usd.Prim | None] = []
     ends: list[Sdf.Path | None] = []
@@ -111,7 +112,7 @@ def _joint(prim: Usd.Prim, of_path: Mapping[Sdf.Path, PlacedPrim]) -> StageJoint
 
 
 def _way(prim: Usd.Prim) -> tuple[str, str, float, float]:
-    """Return how a joint moves: its kind, its axis, and its limits as written."""
+    """Return the kind of a joint, its axis, and its limits as written."""
     for schema, kind in _KINDS:
         if not prim.IsA(schema):
             continue
@@ -136,7 +137,7 @@ def _way(prim: Usd.Prim) -> tuple[str, str, float, float]:
 
 
 def declared_joint(joint: StageJoint, units: StageUnits) -> DeclaredJoint:
-    """Return a joint as the file declares it, its limits in radians or metres."""
+    """Return a joint as the file declares it, with limits in radians or metres."""
     names = [name_of(prim) if prim is not None else "world" for prim in joint.named]
     moves = joint.kind in ("revolute", "prismatic")
     unit = unit_of(joint, units)
@@ -146,5 +147,5 @@ def declared_joint(joint: StageJoint, units: StageUnits) -> DeclaredJoint:
 
 
 def unit_of(joint: StageJoint, units: StageUnits) -> float:
-    """Return what one of a joint's limits is in m or rad."""
+    """Return the unit of a joint's limits in m or rad."""
     return units.m if joint.kind == "prismatic" else math.radians(1.0)

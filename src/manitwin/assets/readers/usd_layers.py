@@ -1,4 +1,4 @@
-"""A USD stage composed of the layers below its root and of nothing else, for files from untrusted sources."""
+"""Composition of a USD stage only from layers below its root, for files from untrusted sources."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ MAX_PRIMS = 100_000
 _MAX_DEPTH = 300
 _HEAD_BYTES = 4096
 _OF_A_MACHINE = re.compile(r"[/\\~]|\w+:")
-"""How a path begins that leads from the root of a file system, a drive or a server: those of whoever made the file."""
+"""Start of a path from the root of a file system, drive or server, specific to the machine that wrote the file."""
 _MOST_PARTS = 16
 
 
 @dataclass(frozen=True)
 class Place:
-    """The location of a layer or texture: a file, and a member of it where the file is a package."""
+    """The location of a layer or texture: a file, and a member of it if the file is a package."""
 
     file: Path
     member: str | None = None
 
 
 class LayerFiles:
-    """The layers of an asset, each opened without composing, then joined by what they name inside of the source's root.
+    """The layers of an asset, opened without composition and linked to each other inside the root of the source.
 
-    Every layer is copied into memory, and each name of another layer in it is replaced by that layer's copy, or taken out
-    where it leads out of the root: composing then opens nothing any more. Value clips, which would be opened later, are
-    taken out too. ``missing`` are names of files that are not there.
+    Every layer is copied into memory, and each layer name in it is replaced by the copy of that layer, or removed if it leads
+    outside the root; composition then opens no files. Value clips, which would be opened later, are removed too. ``missing``
+    are the names of files that do not exist.
     """
 
     def __init__(self, source: MeshSource):
@@ -75,7 +75,7 @@ class LayerFiles:
         return Usd.Stage.Open(root)
 
     def texture(self, layer: Sdf.Layer, name: str) -> bytes | None:
-        """Return the file that ``layer`` names as a texture, or None with a finding."""
+        """Return the content of the texture file that ``layer`` names, or None with a finding."""
         base = self._places[layer.identifier]
         place = self._moved(base, name) or self._locate(base, name, "texture")
         if place is None:
@@ -90,7 +90,7 @@ class LayerFiles:
         return data
 
     def _open(self, place: Place) -> Sdf.Layer | None:
-        """Open a layer as a copy in memory; None where it is not there or no layer, with a finding."""
+        """Open a layer as a copy in memory; return None if there is no such file, or it is not a layer."""
         if place in self._layers:
             return self._layers[place]
         if not place.file.is_file():
@@ -129,7 +129,7 @@ class LayerFiles:
             self._source.find(f"files were read from above its own folder, below the root {self._root.name!r}")
 
     def _join(self, layer: Sdf.Layer, place: Place) -> list[Place]:
-        """Point a layer at the copies of those that it names; returns where the new ones are."""
+        """Replace the layer names in a layer by their copies; return the places of newly opened layers."""
         opened = []
         for named in layer.GetCompositionAssetDependencies():
             if not named:  # a reference to a prim of this layer
@@ -158,7 +158,7 @@ class LayerFiles:
             return None
 
     def _locate(self, base: Place, name: str, what: str) -> Place | None:
-        """Return where a name leads from a layer; None with a finding where that is not inside the folder or package."""
+        """Return the place that a name in a layer denotes; None with a finding if it is outside the root or package."""
         clean = Sdf.Layer.SplitIdentifier(name)[0].replace("\\", "/")
         outside = not clean or clean.startswith(("/", "~")) or re.search(r"[:`\[\]\0]", clean) is not None
         if not outside and base.member is not None:
@@ -178,7 +178,9 @@ class LayerFiles:
         return None
 
     def _moved(self, base: Place, name: str) -> Place | None:
-        """Return the file that a texture of another machine is here: by as much of its path's end as there is by the layer."""
+        """Return the local file for a texture path of another machine, by the longest end of the path that exists near the
+        layer.
+        """
         if base.member is not None or _OF_A_MACHINE.match(name) is None:
             return None
         parts = [part for part in name.replace("\\", "/").split("/") if part not in ("", ".", "..")][-_MOST_PARTS:]
@@ -192,7 +194,7 @@ class LayerFiles:
         return None
 
     def _inside_package(self, file: Path) -> Place:
-        """Return the first layer of a package, or the file itself where it is none."""
+        """Return the first layer of a package, or the file itself if it is not a package."""
         if file.suffix.lower() != ".usdz" or not file.is_file():
             return Place(file)
         if file not in self._archives:
@@ -218,9 +220,9 @@ class LayerFiles:
 
 
 def composed_prims(root: Sdf.Layer, layers: Mapping[str, Sdf.Layer]) -> int | None:
-    """Return an upper bound of the prims that composing ``root`` gives, None where they are nested beyond all use.
+    """Return an upper bound for the number of prims in the composition of ``root``, None if they are nested too deep.
 
-    ``layers`` are all layers by identifier. All variants are counted, and what overrides a prim counts as another.
+    ``layers`` are all layers by identifier. All variants are counted, and an override counts as another prim.
     """
     try:
         return _Expansion(layers).of_stack(root, Sdf.Path.absoluteRootPath, 0)
@@ -238,7 +240,7 @@ class _Expansion:
         self._known: dict[tuple[str, Sdf.Path], int] = {}
 
     def of_stack(self, layer: Sdf.Layer, path: Sdf.Path, depth: int) -> int:
-        """Count below a path in a layer and its sublayers."""
+        """Count the prims at and below a path in a layer and its sublayers."""
         seen: dict[str, Sdf.Layer] = {}
         waiting = [layer]
         while waiting:
@@ -252,10 +254,10 @@ class _Expansion:
         if depth > _MAX_DEPTH:
             raise _TooDeep
         while not path.IsAbsoluteRootPath() and layer.GetPrimAtPath(path) is None:
-            path = path.GetParentPath()  # it lies in what a prim above it refers to
+            path = path.GetParentPath()  # it is defined in the reference of a prim above it
         key = (layer.identifier, path)
         if key not in self._known:
-            self._known[key] = 0  # a circle, which USD takes out
+            self._known[key] = 0  # a cycle, which USD ignores
             spec = layer.pseudoRoot if path.IsAbsoluteRootPath() else layer.GetPrimAtPath(path)
             self._known[key] = 1 + sum(
                 self._of(layer, stack, child.path, depth + 1) for child in _children(spec)
@@ -263,7 +265,9 @@ class _Expansion:
         return self._known[key]
 
     def _targets(self, spec: Sdf.PrimSpec, stack: Sdf.Layer) -> Iterator[tuple[Sdf.Layer, Sdf.Path]]:
-        """Yield where a prim's references, payloads, inherits and specializes lead; ``stack`` is the root of its layers."""
+        """Yield the targets of a prim's references, payloads, inherits and specializes; ``stack`` is the root of its layer
+        stack.
+        """
         for item in [*_items(spec.referenceList), *_items(spec.payloadList)]:
             layer = self._layers.get(item.assetPath) if item.assetPath else stack
             if layer is None:
@@ -288,7 +292,7 @@ def _items(edits: Sdf.PathListOp) -> list[Sdf.Reference]:
 
 
 def _told_of_no_layer(file: Path) -> str | None:
-    """Return what stands in the place of a layer, such as a pointer of Git LFS, and what to do; None of any other file."""
+    """Return what a file is instead of a layer, such as a Git LFS pointer, and a remedy; None for other files."""
     if not file.is_file():
         return None
     with open_regular(file, AssetError) as stream:
@@ -296,9 +300,9 @@ def _told_of_no_layer(file: Path) -> str | None:
 
 
 def _resolved(path: Path) -> Path | None:
-    """Return a path without links; None for a loop of links, or a name that no file system can hold."""
+    """Return a path with links resolved; None for a loop of links, or a name that no file system can hold."""
     try:
         file = path.resolve()
-        return None if file.is_symlink() else file  # from Python 3.13 on a loop is left as it is
+        return None if file.is_symlink() else file  # from Python 3.13 on, a loop is returned unresolved
     except (OSError, ValueError, RuntimeError):
         return None

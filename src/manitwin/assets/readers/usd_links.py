@@ -1,4 +1,4 @@
-"""Which prims of a USD stage are of the first object that moves in itself, and which joints of it a twin can have."""
+"""Selection of the prims of the first articulated object in a USD stage, and of its joints that twins support."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.usd_places import PlacedPrim
 
 Body: TypeAlias = "Sdf.Path | None"
-"""A rigid body by its path, or None: what is of no rigid body, and stands fast."""
+"""The path of a rigid body, or None for prims outside all rigid bodies, which are static."""
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """The prims of the object that is read, which is the ``whole`` stage or what joints hold together; ``joints`` are all of it.
+    """The selected prims: the ``whole`` stage, or one articulated object; ``joints`` are all joints of the stage.
 
-    ``moving`` is what moves, None where nothing does, ``bodies`` and ``nodes`` the bodies in its order. ``partial``: others were
-    left out.
+    ``moving`` is the joint tree, None if no joint is kept, with ``bodies`` and ``nodes`` in its order. ``partial``: other
+    bodies were left out.
     """
 
     placed: tuple[PlacedPrim, ...]
@@ -40,12 +40,12 @@ class Chosen:
     moving: Tree | None = None
 
     def node_of(self, placed: PlacedPrim) -> int:
-        """Return the place of the node that a prim is of."""
+        """Return the index of the node to which a prim belongs."""
         return self.bodies.index(path_of_body(placed))
 
 
 def path_of_body(placed: PlacedPrim) -> Body:
-    """Return the path of the rigid body that a prim is of."""
+    """Return the path of the rigid body to which a prim belongs, None for a static prim."""
     body = body_of(placed)
     return None if body is None else body.GetPath()
 
@@ -53,10 +53,10 @@ def path_of_body(placed: PlacedPrim) -> Body:
 def chosen_bodies(
     stage: Usd.Stage, placed: Sequence[PlacedPrim], units: StageUnits, joints: Joints, source: MeshSource
 ) -> Chosen:
-    """Return what of a stage is read: all of it where nothing moves by joints, or with ``joints="part"``.
+    """Return the part of a stage that is read: all of it if no joint moves, or with ``joints="part"``.
 
-    "lock" and "keep": of what joints hold together the first that moves, as the stage has it; "keep" with the links and joints.
-    What stands fast is of it where a joint names it, or moves what hangs from the world. Raises AssetError.
+    With "lock" and "keep" it is the first articulated object, in the pose of the stage; with "keep" including links and joints.
+    Static prims belong to it if a joint names them, or connects a moving body to the world. Raises AssetError.
     """
     of_path = {each.prim.GetPath(): each for each in placed if not each.copy}
     found = stage_joints(placed, of_path, source)
@@ -98,9 +98,9 @@ def chosen_bodies(
 
 
 def _below(joint: StageJoint, world: Sdf.Path) -> Body:
-    """Return below which prim a joint to the world holds what stands fast; None of one that holds nothing of it.
+    """Return the prim below which static prims belong to a joint to the world; None if the joint holds none of them.
 
-    One that is fixed and names no prim only stands its body there.
+    A fixed joint that names no prim only anchors its body in the world.
     """
     if all(joint.ends):
         return None
@@ -121,7 +121,7 @@ def _is_below(placed: PlacedPrim, paths: Set[Body]) -> bool:
 
 
 def _joined(joints: Sequence[StageJoint], owned: Sequence[tuple[PlacedPrim, Body]]) -> dict[Body, set[Body]]:
-    """Return for each body those that joints hold together with it."""
+    """Return, for each body, the set of bodies that joints connect to it."""
     group: dict[Body, set[Body]] = {body: {body} for _, body in owned}
     for joint in joints:
         first, second = (group[end] for end in joint.ends)
@@ -133,7 +133,7 @@ def _joined(joints: Sequence[StageJoint], owned: Sequence[tuple[PlacedPrim, Body
 
 
 def _left_out(placed: Sequence[PlacedPrim], kept: Set[int], held: Sequence[StageJoint]) -> list[str]:
-    """Return what is said of each body, and of each shape of none, that is not of the object; ``kept`` are ids of what is."""
+    """Return a remark for each body, or shape outside bodies, that does not belong to the object; ``kept`` are ids of prims."""
     moves = {end: joint for joint in held if joint.kind != "fixed" for end in joint.ends}
     left: dict[Body, str] = {}
     for each in placed:
@@ -154,10 +154,10 @@ def _root(
     held: Sequence[StageJoint],
     of_path: Mapping[Sdf.Path, PlacedPrim],
 ) -> Body:
-    """Return the body that the others hang from.
+    """Return the root body of the object.
 
-    That is what stands fast, what a fixed joint holds to the world, what is said to be the root of an articulation, or the first
-    that is no joint's second body.
+    In order of priority: the static prims, a body fixed to the world, a declared articulation root, a body that is not the
+    second body of any joint, the first body.
     """
     anchored = {end for joint in held if joint.kind == "fixed" and None in joint.ends for end in joint.ends}
     said = {body for body in bodies if body and of_path[body].prim.HasAPI(UsdPhysics.ArticulationRootAPI)}
@@ -178,10 +178,11 @@ def _tree(
     units: StageUnits,
     source: MeshSource,
 ) -> tuple[list[Body], list[Node], list[np.ndarray]]:
-    """Return the bodies in an order in which those that hold come first, what each is held by, and how it is moved ``(4, 4)``.
+    """Return the bodies, parents first, a node for each, and the correction ``(4, 4)`` of its pose.
 
-    That is from where the stage has it to where joints hold it, in the stage's axes and metres. A joint that would hold a body a
-    second time closes a loop, and is left out with a remark: of two the one that is excluded from the articulation.
+    The correction moves a body from its pose in the stage to the pose that joints require, in the stage's axes and metres. A
+    joint that would attach a body a second time closes a loop and is left out with a remark; of two such joints, the one
+    excluded from the articulation.
     """
     seen = {body for each, body in kept if is_solid(each.prim) and is_rendered(each) and not each.is_hidden()}
     at: dict[Body, dict[Body, list[StageJoint]]] = {}
@@ -192,7 +193,7 @@ def _tree(
     order, used = [root], set()
     nodes, motions = [Node(_named(root, joints, of_path), None, root in seen)], [np.eye(4)]
     for extra in (False, True):
-        for body in order:  # grows by the bodies that joints hold to it
+        for body in order:  # grows by the bodies attached to it
             for other, between in at.get(body, {}).items():
                 if other in place_of or (not extra and all(joint.is_extra for joint in between)):
                     continue
@@ -213,7 +214,7 @@ def _tree(
 
 
 def _named(body: Body, joints: Sequence[StageJoint], of_path: Mapping[Sdf.Path, PlacedPrim]) -> str:
-    """Return a body's name; of what stands fast that of the prim which a joint names."""
+    """Return a body's name; for static prims, that of the prim which a joint names."""
     if body is not None:
         return name_of(of_path[body].prim)
     named = (joint.named[joint.ends.index(None)] for joint in joints if None in joint.ends)

@@ -1,4 +1,4 @@
-"""The masses, frictions and restitution that the prims of a USD stage declare (UsdPhysics)."""
+"""Declared masses, frictions and restitution of the prims of a USD stage (UsdPhysics)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _LARGEST_UNIT = 1e6
 
 @dataclass(frozen=True)
 class StageUnits:
-    """The units of a stage: one of its lengths in metres, one of its masses in kilograms; ``declared``: it says the length."""
+    """The units of a stage in metres and kilograms; ``declared``: the stage states its length unit."""
 
     m: float
     kg: float
@@ -31,7 +31,7 @@ class StageUnits:
 
     @classmethod
     def of(cls, stage: Usd.Stage, source: MeshSource) -> StageUnits:
-        """Read the units of a stage; raises AssetError for one that is no number above 0."""
+        """Read the units of a stage; raises AssetError for a unit that is not a positive number."""
         said_m, said_kg = metres_per_unit(stage), kilograms_per_unit(stage)
         declared = said_m is not None
         unit_m = float(UsdGeom.LinearUnits.centimeters) if said_m is None else said_m
@@ -48,25 +48,24 @@ class StageUnits:
 
 
 def is_rigid_body(prim: Usd.Prim) -> bool:
-    """Tell whether a prim is a rigid body, and not one that is turned off."""
+    """Return whether a prim is an enabled rigid body."""
     return bool(prim.HasAPI(UsdPhysics.RigidBodyAPI)) and (
         UsdPhysics.RigidBodyAPI(prim).GetRigidBodyEnabledAttr().Get() is not False
     )
 
 
 def body_of(placed: PlacedPrim) -> Usd.Prim | None:
-    """Return the rigid body that a prim is of: itself, or the nearest above it."""
+    """Return the rigid body to which a prim belongs: the prim itself, or its nearest ancestor that is one."""
     return next((prim for prim in placed.lineage() if is_rigid_body(prim)), None)
 
 
 def declared_inertial(
     placed: Sequence[PlacedPrim], felt: Sequence[Felt], units: StageUnits, source: MeshSource
 ) -> Inertial:
-    """Return the mass, the centre of mass and the inertia that MassAPI declares, in kg and m along the stage's axes.
+    """Return mass, centre of mass and inertia declared by MassAPI, in kg and m in the stage's axes.
 
-    A mass on a prim stands for all below it that is of the same rigid body; several beside each other are taken as one body.
-    Values that the schema calls unspecified (no inertia, no centre) are None; a mass of 0 that somebody wrote is kept.
-    Source: UsdPhysics schema, MassAPI.
+    The mass of a prim includes all prims below it in the same rigid body; several separate ones are combined. Values that the
+    schema leaves unspecified (inertia, centre) are None; an authored mass of 0 is kept. Source: UsdPhysics schema, MassAPI.
     """
     bodies: list[Inertial] = []
     taken: set[tuple[Sdf.Path, Usd.Prim | None]] = set()
@@ -91,9 +90,9 @@ def declared_inertial(
 
 
 def of_its_hulls(inertial: Inertial, felt: Sequence[Felt]) -> Inertial:
-    """Return an inertial with the centre and the inertia that it lacks: those of its mass in the hulls of what collides.
+    """Complete an inertial with centre and inertia of its mass, distributed uniformly in the hulls of its collision shapes.
 
-    Source: UsdPhysics schema, MassAPI, which leaves to the collision shapes what is not declared.
+    Source: UsdPhysics schema, MassAPI: undeclared values follow from the collision shapes.
     """
     if inertial.mass_kg is None or not inertial.mass_kg > 0:
         return inertial
@@ -112,9 +111,9 @@ def of_its_hulls(inertial: Inertial, felt: Sequence[Felt]) -> Inertial:
 
 
 def _of_densities(felt: Sequence[Felt], units: StageUnits, source: MeshSource) -> Inertial:
-    """Return what densities make of the convex hulls of collision shapes; nothing where one of them has none.
+    """Return the inertial of collision hulls filled with their densities; empty if a shape has no density.
 
-    A density is that of the nearest MassAPI above a shape, else of the material that is bound to it (UsdPhysics, density).
+    The density is that of the nearest MassAPI at or above a shape, or else of its bound material (UsdPhysics, density).
     """
     filled: list[tuple[np.ndarray, float]] = []
     for shape, placed in felt:
@@ -144,7 +143,7 @@ def _density(placed: PlacedPrim, source: MeshSource) -> float | None:
 
 
 def declared_contact(placed: Sequence[PlacedPrim], felt: Sequence[Felt], source: MeshSource) -> Contact:
-    """Return the friction and restitution of the material bound to the collision shapes; the first where they differ."""
+    """Return friction and restitution of the material bound to the collision shapes; the first one if they differ."""
     found: dict[str, Contact] = {}
     for _, shape in felt:
         material, _ = UsdShade.MaterialBindingAPI(shape.prim).ComputeBoundMaterial("physics")
@@ -178,7 +177,7 @@ def _of_prim(placed: PlacedPrim, units: StageUnits, source: MeshSource) -> Inert
     moments = np.array(api.GetDiagonalInertiaAttr().Get(), dtype=float)
     turn = api.GetPrincipalAxesAttr().Get()
     wxyz = np.array([turn.GetReal(), *turn.GetImaginary()], dtype=float)
-    declared = center is not None and not np.isneginf(np.array(center)).any()  # the fallback, -inf, is unspecified
+    declared = center is not None and not np.isneginf(np.array(center)).any()  # the fallback, -inf, means unspecified
     if not np.isfinite(moments).all() or not np.isfinite(wxyz).all() or (declared and not np.isfinite(center).all()):
         raise AssetError(f"{source.path}: the mass properties of {prim.GetPath()} are not finite; give finite numbers")
     left, stretch, right = np.linalg.svd(to_world[:3, :3] / unit_m)
@@ -194,7 +193,7 @@ def _of_prim(placed: PlacedPrim, units: StageUnits, source: MeshSource) -> Inert
 
 
 def authored_number(attribute: Usd.Attribute, source: MeshSource) -> float | None:
-    """Return an authored number, None where only the schema's fallback is there; raises AssetError for what is not finite."""
+    """Return an authored number, or None for a schema fallback; raises AssetError for a number that is not finite."""
     if not attribute or not attribute.HasAuthoredValue():
         return None
     value: Any = attribute.Get(Usd.TimeCode.EarliestTime())

@@ -1,4 +1,4 @@
-"""MaterialX documents that USD layers refer to, as USD has them: this build of USD has no plug-in for ``.mtlx``."""
+"""Conversion of MaterialX documents to USD layers, because this build of USD has no plug-in for ``.mtlx``."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ _IN_SRGB = "srgb_texture"
 
 
 def mtlx_layer(data: bytes, name: str, source: MeshSource) -> Sdf.Layer:
-    """Return a layer in memory with ``/MaterialX/Materials`` and a material below it for each of a document.
+    """Return an in-memory layer with ``/MaterialX/Materials`` and a material below it for each of a document.
 
-    Each has its surface, and the nodes that this reads, with constants and files; connections between other nodes are by name
-    alone, and documents that it includes are not read. Raises AssetError for what is no MaterialX.
-    Source: the MaterialX specification 1.38; UsdMtlx for the paths of prims.
+    Each material has its surface and the nodes that it reads, with constants and files. Connections between nodes are by name
+    only, and included documents are not read. Raises AssetError for anything but MaterialX. Sources: the MaterialX
+    specification 1.38; UsdMtlx for the prim paths.
     """
     root = parse_xml(data, "materialx", name)
     layer = Sdf.Layer.CreateAnonymous(".usda")
@@ -54,14 +54,14 @@ def mtlx_layer(data: bytes, name: str, source: MeshSource) -> Sdf.Layer:
 
 
 class _Nodes:
-    """The shaders that the nodes of one material become, each once."""
+    """Shaders for the nodes of one material, each created once."""
 
     def __init__(self, stage: Usd.Stage, root: etree._Element, material: Sdf.Path, budget: Iterator[int]):
         self._stage, self._root, self._material, self._budget = stage, root, material, budget
         self._made: dict[etree._Element, UsdShade.Shader] = {}
 
     def shader(self, node: etree._Element) -> UsdShade.Shader | None:
-        """Return the shader of a node with all that it reads; None where there are more nodes than any material has."""
+        """Return the shader of a node with all its inputs; None if there are too many nodes."""
         waiting = [node]
         while waiting:
             each = waiting.pop()
@@ -99,7 +99,7 @@ class _Nodes:
                 shader.CreateInput(name, kind).Set(numbers[0] if count == 1 else tuple(numbers))
 
     def _behind(self, socket: etree._Element, node: etree._Element) -> etree._Element | None:
-        """Return the node that an input reads: one beside its own, or one that an output of a graph names."""
+        """Return the node connected to an input: in the same scope, or through the output of a graph."""
         socket = self._interface(socket, node)
         scope = node.getparent() if node.getparent() is not None else self._root
         if socket.get("nodegraph"):
@@ -110,7 +110,7 @@ class _Nodes:
         return _named(scope, socket.get("nodename"))
 
     def _interface(self, socket: etree._Element, node: etree._Element) -> etree._Element:
-        """Return the input of a graph that an input of a node in it stands for, or that input itself."""
+        """Return the graph input that a node's input refers to, or the input itself."""
         named, graph = socket.get("interfacename"), node.getparent()
         if not named or graph is None:
             return socket
@@ -126,7 +126,7 @@ def _inputs(element: etree._Element) -> list[etree._Element]:
 
 
 def _named(scope: etree._Element | None, name: str | None) -> etree._Element | None:
-    """Return the node of a name in a document or a graph; inputs and outputs are none."""
+    """Return the node of a name in a document or graph, ignoring inputs and outputs."""
     if scope is None or not name:
         return None
     nodes = (each for each in scope if _tag(each) not in ("input", "output", ""))
@@ -134,7 +134,7 @@ def _named(scope: etree._Element | None, name: str | None) -> etree._Element | N
 
 
 def _path(prefix: str, value: str) -> str:
-    """Return a file's path with its prefix, without what an asset path of USD cannot have."""
+    """Return the path of a file with its prefix, without characters that are invalid in USD asset paths."""
     return "".join(each for each in prefix + value if each.isprintable() and each != "@")
 
 

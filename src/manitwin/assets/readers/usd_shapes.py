@@ -1,4 +1,4 @@
-"""The geometry of a USD stage: what is seen, and what collides."""
+"""Visual and collision geometry of a USD stage."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from manitwin.formats.meshes.usd_skin import Skeletons
 from manitwin.formats.meshes.usd_surfaces import PreviewSurfaces, UsdSurface, flat_colored
 from manitwin.formats.meshes.usdz import display_color, mesh_parts, mesh_polygons
 
-_MAX_SIZE_M = 1e6  # what is larger is no object, and its products overflow single precision
+_MAX_SIZE_M = 1e6  # larger objects are invalid, and their products overflow single precision
 _SOLIDS = ("Cube", "Sphere", "Cylinder", "Capsule", "Cone")
 _ALONG = {
     "X": [[0, 0, 1], [1, 0, 0], [0, 1, 0]],
     "Y": [[0, 1, 0], [0, 0, 1], [1, 0, 0]],
     "Z": np.eye(3),
-}  # from along Z
+}  # rotations from an axis along Z
 
 
 Seen = tuple[trimesh.Trimesh, PlacedPrim]
-"""A visual part, and the prim that it is of."""
+"""A visual part, and the prim it comes from."""
 Felt = tuple[CollisionShape, PlacedPrim]
 
 
 class StageShapes:
-    """The shapes of a stage's prims in its world's axes, transforms and scales baked in, in metres."""
+    """The shapes of a stage's prims in world axes and metres, with transforms and scales applied."""
 
     def __init__(
         self,
@@ -60,7 +60,7 @@ class StageShapes:
         return in_metres(placed, self._unit_m, self._source)
 
     def visual(self) -> list[Seen]:
-        """Return what is seen: shapes that are visible and for rendering."""
+        """Return the visual parts: visible shapes with a purpose for rendering."""
         parts: list[Seen] = []
         for placed in self._shapes:
             if placed.is_hidden():
@@ -73,7 +73,7 @@ class StageShapes:
         return parts
 
     def colliders(self) -> Iterator[PlacedPrim]:
-        """Yield the shapes that collide: those with a collision API or below one, and those for guidance only."""
+        """Yield the colliding shapes: those at or below a collision API, and those of purpose guide."""
         for placed in self._shapes:
             owner = nearest_with(placed, UsdPhysics.CollisionAPI)
             if owner is None and UsdGeom.Imageable(placed.prim).ComputePurpose() == UsdGeom.Tokens.guide:
@@ -87,7 +87,7 @@ class StageShapes:
                 yield placed
 
     def collision(self) -> list[Felt]:
-        """Return the collision shapes; ``convex`` where the approximation is a hull, a box or a sphere."""
+        """Return the collision shapes; ``convex`` if the approximation is a hull, a box or a sphere."""
         shapes: list[Felt] = []
         for placed in self.colliders():
             prim = placed.prim
@@ -118,7 +118,7 @@ class StageShapes:
         return mesh, approximation == UsdPhysics.Tokens.convexHull
 
     def _parts(self, placed: PlacedPrim) -> list[trimesh.Trimesh]:
-        """Return a prim's parts in its own axes; of one that is repeated they are made once."""
+        """Return a prim's parts in its own axes; instanced prims are converted once."""
         if placed.prim.GetPath() not in self._made:
             self._made[placed.prim.GetPath()] = self._parts_of(placed.prim)
         return self._made[placed.prim.GetPath()]
@@ -131,7 +131,7 @@ class StageShapes:
         return [make_part(solid.vertices, solid.faces, material=material, name=prim.GetName())]
 
     def _primitive(self, prim: Usd.Prim) -> trimesh.Trimesh:
-        """Return a cube, sphere, cylinder, capsule or cone as a mesh in its own axes and unit."""
+        """Return the mesh of a cube, sphere, cylinder, capsule or cone in its own axes and unit."""
         kind = str(prim.GetTypeName())
         if kind == "Cube":
             return _grey(trimesh.creation.box(np.full(3, self._number(prim, "size"))), prim)
@@ -154,7 +154,7 @@ class StageShapes:
 
     def _number(self, prim: Usd.Prim, name: str) -> float:
         value = float(prim.GetAttribute(name).Get(Usd.TimeCode.EarliestTime()))
-        if not 0 < value * self._unit_m <= _MAX_SIZE_M:  # NaN is neither
+        if not 0 < value * self._unit_m <= _MAX_SIZE_M:  # also refuses NaN
             raise AssetError(
                 f"{self._source.path}: {name} of {prim.GetPath()} is {value}; give more than 0, {_MAX_SIZE_M:g} m at most"
             )
@@ -166,13 +166,13 @@ class StageShapes:
         if UsdGeom.Imageable(prim).ComputePurpose() == UsdGeom.Tokens.guide and not prim.HasAPI(
             UsdPhysics.CollisionAPI
         ):
-            return False  # drawn for people, as lines of grasps are
+            return False  # drawn for users, such as grasp lines
         if prim.IsA(UsdGeom.Gprim):
             self._source.find(f"{prim.GetTypeName()} prims in it were left out")
         return False
 
     def _is_nothing(self, prim: Usd.Prim) -> bool:
-        """Tell whether a shape has no size at all, as marks of URDF have."""
+        """Return whether a shape has zero size, as URDF markers have."""
         sizes = (prim.GetAttribute(name) for name in ("size", "radius", "height") if not prim.IsA(UsdGeom.Mesh))
         nothing = any(each and each.Get(Usd.TimeCode.EarliestTime()) == 0 for each in sizes)
         if nothing:
@@ -192,7 +192,7 @@ class StageShapes:
 
 
 def check_prims(placed: Sequence[PlacedPrim], source: MeshSource) -> None:
-    """Raise AssetError for values that are not of their schemas' types, and for more shapes than one object has."""
+    """Raise AssetError for values that do not have the types of their schemas, and for too many shapes."""
     for prim in {each.prim.GetPath(): each.prim for each in placed}.values():
         check_types(prim, source)
     if sum(each.prim.IsA(UsdGeom.Gprim) for each in placed) > MAX_SHAPES:
@@ -211,22 +211,22 @@ def in_metres(placed: PlacedPrim, unit_m: float, source: MeshSource) -> np.ndarr
 
 
 def is_solid(prim: Usd.Prim) -> bool:
-    """Tell whether a prim is a shape that is read."""
+    """Return whether a prim is a supported shape."""
     return bool(prim.IsA(UsdGeom.Mesh)) or str(prim.GetTypeName()) in _SOLIDS
 
 
 def is_rendered(placed: PlacedPrim) -> bool:
-    """Tell whether a shape is for rendering, and not for guidance or a stand-in."""
+    """Return whether a shape is for rendering, rather than a guide or proxy."""
     return UsdGeom.Imageable(placed.prim).ComputePurpose() not in (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
 
 
 def nearest_with(placed: PlacedPrim, api: type) -> Usd.Prim | None:
-    """Return the prim, or the nearest above it, that has an API."""
+    """Return the prim or its nearest ancestor that has an API, or None."""
     return next((prim for prim in placed.lineage() if prim.HasAPI(api)), None)
 
 
 def _bare_mesh(mesh: UsdGeom.Mesh, source: MeshSource) -> trimesh.Trimesh:
-    """Return a mesh prim's points and polygons, cut into triangles, and nothing else."""
+    """Return the points of a mesh prim with its polygons cut into triangles, without other attributes."""
     polygons = mesh_polygons(mesh, source)
     if polygons is None:
         return _grey(trimesh.Trimesh(), mesh.GetPrim())
@@ -257,7 +257,7 @@ class LayeredSurfaces(PreviewSurfaces):
 
 
 def check_types(prim: Usd.Prim, source: MeshSource) -> None:
-    """Raise AssetError where a value is not of the type that its schema gives it, precision apart."""
+    """Raise AssetError if a value does not have the type of its schema, ignoring precision."""
     definition = prim.GetPrimDefinition()
     for name in definition.GetPropertyNames():
         attribute = prim.GetAttribute(name)

@@ -1,1 +1,1 @@
-"""What the joints of an asset move: its parts as they are loaded, and along the way that the joints let them go."""
+"""Moving parts of an asset: their arrangement at loading and over the ranges of their joints."""

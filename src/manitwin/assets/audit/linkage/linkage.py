@@ -1,7 +1,7 @@
-"""The parts of an asset that its joints move against each other, as they stand when it is loaded.
+"""Rigid parts of an asset and the joints between them, in the pose at loading.
 
-A part is what is rigid in itself: links that fixed joints join are one. All geometry is in one frame, that of the file's root
-(URDF, SDF) or the world (MJCF), with every joint at zero or, where its limits leave zero out, at the nearer limit.
+Links connected by fixed joints form one part. All geometry is in one frame, that of the file's root (URDF, SDF) or the world
+(MJCF), with every joint at zero or, if its limits exclude zero, at the nearer limit.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ TURNS = ("revolute", "hinge", "continuous")
 
 @dataclass(frozen=True)
 class Part:
-    """A rigid part: the vertices ``(V, 3)`` m of each convex shape that collides."""
+    """A rigid part: the vertices ``(V, 3)`` m of each convex collision shape."""
 
     name: str
     shapes: tuple[np.ndarray, ...]
@@ -26,10 +26,10 @@ class Part:
 
 @dataclass(frozen=True)
 class MovingJoint:
-    """A joint between two parts, by their places in ``Linkage.parts``.
+    """A joint between two parts, given by their indices in ``Linkage.parts``.
 
-    ``point (3,)`` lies on the unit ``axis (3,)``, both as the asset stands. ``start`` is where the joint stands, in rad or m
-    as ``lower`` and ``upper`` are; without limits they are None.
+    ``point (3,)`` lies on the unit ``axis (3,)``, both in the pose at loading. ``start`` is the joint position in that pose, in
+    rad or m like ``lower`` and ``upper``, which are None without limits.
     """
 
     name: str
@@ -43,13 +43,13 @@ class MovingJoint:
     upper: float | None = None
 
     def moved(self, by: float) -> np.ndarray:
-        """Return the pose ``(4, 4)`` that moves the child from where it stands by so many rad or m."""
+        """Return the transform ``(4, 4)`` that moves the child from its start pose by this many rad or m."""
         return axis_motion(self.point, self.axis, by, slides=self.kind in SLIDES)
 
 
 @dataclass(frozen=True)
 class Overlap:
-    """Two parts, or a part and the ground, that lie in each other by ``depth_m`` as the asset is loaded."""
+    """Two parts, or a part and the ground, that penetrate each other by ``depth_m`` at loading."""
 
     one: str
     other: str
@@ -58,10 +58,10 @@ class Overlap:
 
 @dataclass(frozen=True)
 class Linkage:
-    """The parts, the joints between them, and what their engine says of overlaps at the start.
+    """The parts, the joints between them, and the overlaps that the engine finds at loading.
 
-    ``overlaps``: as MuJoCo itself has them with the file's own exclusions and ground; None of formats whose engines leave that
-    to the loader. ``collide``: the file, or its usual loaders, let parts of one asset collide with each other.
+    ``overlaps``: as MuJoCo finds them with the file's own exclusions and ground; None for formats whose engines leave collision
+    filtering to the loader. ``collide``: the file, or its usual loaders, let parts of one asset collide with each other.
     """
 
     parts: tuple[Part, ...]
@@ -70,11 +70,11 @@ class Linkage:
     collide: bool = True
 
     def held_by(self, part: int) -> list[MovingJoint]:
-        """Return the joints that hold a part."""
+        """Return the joints whose child is a part."""
         return [joint for joint in self.joints if joint.child == part]
 
     def carried(self, joint: MovingJoint) -> list[int]:
-        """Return the parts that a joint moves: its child, and all that hangs from it."""
+        """Return the parts that a joint moves: its child and all descendants."""
         carried = [joint.child]
         for part in carried:
             carried += [each.child for each in self.joints if each.parent == part and each.child not in carried]

@@ -1,4 +1,4 @@
-"""The parts and joints of an MJCF file, and the overlaps that MuJoCo itself finds as the file is loaded."""
+"""Parts and joints of an MJCF file, and the overlaps that MuJoCo finds at loading."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ _WORLD = 0
 
 
 def read(path: Path, root: Path | None = None) -> Linkage:
-    """Read the parts and joints of an MJCF file in the world's axes; raises AssetError.
+    """Read the parts and joints of an MJCF file in world axes; raises AssetError.
 
-    Bodies without a joint are one part with their parent. Overlaps are those of the initial position, or of the keyframe that has
-    the fewest where the file has some.
+    Bodies without a joint form one part with their parent. Overlaps are those of the initial configuration or keyframe with the
+    smallest total depth.
     """
     file = only_file(path) if path.is_dir() else path
     files = AssetFiles(root or root_of(path), file.resolve().parent, SHAPE_LIMITS)
@@ -56,7 +56,7 @@ def read(path: Path, root: Path | None = None) -> Linkage:
 
 
 def _starts(source: MjcfSource, model: Any) -> list[np.ndarray]:
-    """Return the initial positions that the file has: that of its joints, and those of its keyframes."""
+    """Return the initial configurations of the file: that of its joints, and those of its keyframes."""
     return [np.array(model.qpos0), *(key for key in source.keys if len(key) == model.nq)]
 
 
@@ -102,7 +102,7 @@ def _standing_at(joint: MovingJoint, start: float) -> MovingJoint:
 
 
 def _meet(source: MjcfSource, model: Any, parent: int, child: int) -> bool:
-    """Tell whether the file lets shapes of two parts collide, were they not parent and child."""
+    """Return whether the file lets shapes of two parts collide, apart from the parent-child filter."""
     groups = [
         [b for b in range(model.nbody) if model.body_weldid[b] == model.body_weldid[head]] for head in (parent, child)
     ]
@@ -114,7 +114,7 @@ def _meet(source: MjcfSource, model: Any, parent: int, child: int) -> bool:
 
 
 def _bits(model: Any, field: str, bodies: list[int]) -> int:
-    """Return the bits that any geom of bodies has in contype or conaffinity."""
+    """Return the union of the bits in contype or conaffinity over all geoms of bodies."""
     values = getattr(model, f"geom_{field}")
     return int(
         np.bitwise_or.reduce([int(values[g]) for g in range(model.ngeom) if model.geom_bodyid[g] in bodies] or [0])

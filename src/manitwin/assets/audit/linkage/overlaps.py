@@ -1,4 +1,4 @@
-"""How deep parts lie in each other as an asset is loaded, where its file says nothing of it."""
+"""Penetration depths of parts at loading, for formats that state no collision filter."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from manitwin.assets.audit.linkage.linkage import Linkage, Overlap
 
 
 def overlaps_of(linkage: Linkage) -> tuple[Overlap, ...]:
-    """Return the overlaps at the start of parts that no joint joins to each other: engines keep those that one does apart.
+    """Return the initial overlaps of parts that are not connected by a joint; engines filter the contacts of connected ones.
 
-    Those that MuJoCo has found of an MJCF are taken. Else the depth is how far the deeper of two convex shapes must move out of
-    the other (MuJoCo's ``mj_geomDistance``, by GJK and EPA).
+    For MJCF they are those that MuJoCo found. Otherwise the depth is the penetration depth of the deepest pair of convex shapes
+    (MuJoCo's ``mj_geomDistance``, by GJK and EPA).
     """
     if linkage.overlaps is not None:
         return linkage.overlaps
@@ -43,7 +43,7 @@ def overlaps_of(linkage: Linkage) -> tuple[Overlap, ...]:
 
 
 def _depths(shapes: list[np.ndarray], pairs: list[tuple[int, int]]) -> list[float]:
-    """Return how deep the hulls of pairs of shapes lie in each other (m), 0 where they do not."""
+    """Return the penetration depth (m) of the hulls of pairs of shapes, 0 if they are separate."""
     spec = mujoco.MjSpec()
     used = sorted({index for pair in pairs for index in pair})
     for index in used:

@@ -1,4 +1,4 @@
-"""The parts and joints of a whole URDF, SDF or MJCF, as it stands when it is loaded."""
+"""Reading of the parts and joints of a whole URDF, SDF or MJCF file in its pose at loading."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ MOST_PARTS = 200
 
 
 def read_linkage(path: Path, format: Format, root: Path | None = None) -> Linkage | None:
-    """Read the parts and joints of an asset; None of formats that have none, and of models that stand fast.
+    """Read the parts and joints of an asset; None for other formats, and for static models.
 
-    Raises AssetError for what cannot be read, lacks the mesh of a part, or has more than ``MOST_PARTS``.
+    Raises AssetError for an unreadable asset, one that lacks the mesh of a part, or one with more than ``MOST_PARTS`` parts.
     """
     if format not in _READERS:
         return None
@@ -37,15 +37,15 @@ def read_linkage(path: Path, format: Format, root: Path | None = None) -> Linkag
 
 
 def require_whole(files: AssetFiles, name: str) -> None:
-    """Raise AssetError where a mesh is missing: what is left of the parts says nothing of how they stand."""
+    """Raise AssetError if a mesh is missing, because the remaining parts are not representative."""
     if files.lacks_a_mesh:
         raise AssetError(f"{name}: meshes of its parts are missing: {', '.join(files.missing[:3])}")
 
 
 def part_of(name: str, shapes: Sequence[CollisionShape], *, convex_only: bool = False) -> Part:
-    """Return a part of what collides: the groups of an OBJ file are shapes of their own where they are all solids.
+    """Return a part from collision shapes; the groups of an OBJ file are separate shapes if all of them are solids.
 
-    ``convex_only``: leave out meshes that are not convex, of engines which collide with the triangles.
+    ``convex_only``: leave out concave meshes, for engines that collide with triangles.
     """
     pieces = [piece for shape in shapes for piece in divided(shape, True)]
     hulls = ConvexShapes.of([np.asarray(piece.vertices, float) for piece in pieces])
@@ -62,9 +62,9 @@ def moving_joint(
     axis: np.ndarray | None,
     limits: tuple[float | None, float | None],
 ) -> MovingJoint:
-    """Return a joint at the position that is nearest to zero within its limits.
+    """Return a joint at the position within its limits closest to zero.
 
-    Limits that are none count as absent; one whose axis has no direction is ``fixed``, for there is no way that it could go.
+    Invalid limits count as absent. A joint whose axis has no direction becomes ``fixed``, as it cannot move.
     """
     along = np.array([1.0, 0, 0]) if axis is None else np.asarray(axis, float)
     length = float(np.linalg.norm(along))

@@ -1,4 +1,4 @@
-"""The parts and joints of an SDF model, its joints at zero as its poses have them."""
+"""Parts and joints of an SDF model, with its joints at zero as in its poses."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from manitwin.formats.xml_file import text_of
 
 _TRUE = ("true", "1")
 _AXES_OF_THE_PARENT = (1, 5)
-"""Before this version an axis was in the frame of the model (SDFormat's changelog)."""
+"""Before this version, an axis was in the frame of the model (SDFormat's changelog)."""
 
 
 def read(path: Path, root: Path | None = None) -> Linkage | None:
-    """Read the parts and joints of an SDF model in its frame; None of one that stands fast. Raises AssetError.
+    """Read the parts and joints of an SDF model in its frame; None for a static model. Raises AssetError.
 
-    Gazebo's engines collide with triangles: meshes that are not convex are left out. Its links collide with each other where
-    <self_collide> says so.
+    Gazebo's engines collide with triangles, so concave meshes are left out. Links collide with each other if <self_collide> is
+    set.
     """
     opened = open_sdf(path, root, SHAPE_LIMITS)
     if (text_of(opened.model, "static") or "").lower() in _TRUE:
@@ -47,7 +47,7 @@ def read(path: Path, root: Path | None = None) -> Linkage | None:
 
 
 def _parts(opened: SdfModel, links: list[str]) -> dict[str, int]:
-    """Return the part of each link: those that fixed joints join are one."""
+    """Return the part index of each link; links on fixed joints share one part."""
     group = {name: name for name in links}
     for joint in opened.model.findall("joint"):
         ends = _ends(opened, joint)

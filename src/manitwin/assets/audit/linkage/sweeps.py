@@ -1,7 +1,7 @@
-"""Move each joint through its range: what of the part that it moves goes through the part that holds it?
+"""Sweep test of joints: how much of a moving part passes through its parent over the joint range.
 
-Engines skip contacts between a part and what holds it, so a drawer whose axis points the wrong way slides through the back of
-its cabinet without a word.
+Engines filter contacts between a part and its parent, so that a drawer with a reversed axis slides through the back of its
+cabinet without any warning.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from manitwin.geometry.poses import transform_points
 from manitwin.geometry.sampling import sample_surface
 
 SAMPLES = 120
-"""Points on the surface of the part that moves."""
+"""Points on the surface of the moving part."""
 _STEPS = 24
 _MOST_STEP_RAD = math.radians(5)
 GRAZES_M = 1e-3
-"""Surfaces that slide on each other may overlap by so much: what holds a part is shrunk by it."""
+"""Allowed overlap of surfaces that slide on each other; the parent part is shrunk by it."""
 _HOUSED, _STAYS = 0.02, 0.15
-"""Shares of a part's surface: inside at the least, and the most that this changes, of a part in its bearing."""
+"""Shares of a part's surface for a part in a bearing: the least that lies inside, and the most by which this may change."""
 LEAST_TRAVEL = 0.25
-"""Of the part's longest side: a button that is pressed travels less."""
+"""Least travel of a joint relative to the part's longest side; a button travels less."""
 
 
 @dataclass(frozen=True)
 class Swept:
-    """What a joint does to the part that it moves, as shares of that part's surface.
+    """Effect of a joint on its child part, as shares of the surface of that part.
 
-    ``crossing`` lies outside of what holds it at the start, and passes through that. ``inside`` lies inside it at the start,
-    ``least_inside`` and ``most_inside`` over all positions.
+    ``crossing`` starts outside the parent part and passes through it. ``inside`` starts inside it, with ``least_inside`` and
+    ``most_inside`` over all positions.
     """
 
     joint: MovingJoint
@@ -48,12 +48,12 @@ class Swept:
 
     @property
     def is_housed(self) -> bool:
-        """Tell whether about as much of it lies inside wherever the joint goes: a wheel in its fork, a shaft in its bearing."""
+        """Whether a nearly constant share stays inside over the joint range: a wheel in its fork, a shaft in its bearing."""
         return self.least_inside > _HOUSED and self.most_inside - self.least_inside < _STAYS
 
 
 def swept(linkage: Linkage) -> list[Swept]:
-    """Move every joint that turns or slides from where it stands to both of its limits, the others held."""
+    """Move every revolute or prismatic joint from its start to both limits, with the others fixed."""
     return [
         found
         for joint in linkage.joints
@@ -86,7 +86,7 @@ def _swept(joint: MovingJoint, holder: Part, moved: Part) -> Swept | None:
 
 
 def _ends(joint: MovingJoint) -> list[float]:
-    """Return how far the joint goes from where it stands, rad or m, to its upper and its lower limit; none that it stands at."""
+    """Return the joint travel from the start to the upper and to the lower limit, in rad or m, without zeros."""
     if joint.lower is None or joint.upper is None:
         return [math.pi, -math.pi] if joint.kind not in SLIDES else []
     ways = [joint.upper - joint.start, joint.lower - joint.start]
@@ -101,7 +101,7 @@ def _positions(joint: MovingJoint, end: float) -> np.ndarray:
 
 
 def _surface_points(shapes: Sequence[np.ndarray]) -> np.ndarray:
-    """Return points ``(N, 3)`` on the hulls of shapes, spread by area, the same ones at every call."""
+    """Return points ``(N, 3)`` on the hulls of shapes, uniform by area and deterministic."""
     hulls = [ConvexHull(shape) for shape in shapes]
     vertices, faces = trimesh.util.append_faces([hull.points for hull in hulls], [hull.simplices for hull in hulls])
     mesh = trimesh.Trimesh(vertices, faces, process=False)
@@ -109,7 +109,7 @@ def _surface_points(shapes: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def _shrunk(shapes: ConvexShapes, by_m: float) -> ConvexShapes:
-    """Return shapes whose planes are moved inward."""
+    """Return shapes with their planes moved inward by ``by_m``."""
     planes = shapes.planes.copy()
     planes[:, 3] += by_m
     return ConvexShapes(
@@ -125,7 +125,7 @@ def _shrunk(shapes: ConvexShapes, by_m: float) -> ConvexShapes:
 
 
 def _crossing(within: ConvexShapes, path: Sequence[np.ndarray]) -> np.ndarray:
-    """Tell which points ``(N,)`` of a path pass through a shape on it."""
+    """Return which points ``(N,)`` of a path pass through a shape."""
     crosses = np.zeros(len(path[0]), bool)
     low, high = within.boxes[:, 0].min(0), within.boxes[:, 1].max(0)
     for start, end in itertools.pairwise(path):

@@ -1,4 +1,4 @@
-"""The parts and joints of a URDF: links that fixed joints join are one part."""
+"""Parts and joints of a URDF; links on fixed joints form one part."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from manitwin.robots.urdf import UrdfTree, child_of, origin_of, parent_of
 def read(path: Path, root: Path | None = None) -> Linkage:
     """Read the parts and joints of a URDF, in the axes of its root link; raises AssetError.
 
-    glTF meshes are turned upright, as Drake and Gazebo do.
+    glTF meshes are turned upright, as in Drake and Gazebo.
     """
     found = open_urdf(path, root, SHAPE_LIMITS)
     tree, links = found.tree, found.tree.links
@@ -38,7 +38,7 @@ def read(path: Path, root: Path | None = None) -> Linkage:
 
 
 def _standing(tree: UrdfTree) -> tuple[dict[str, np.ndarray], dict[str, int], list[MovingJoint]]:
-    """Return the pose of each link, parents first, the part that it is of, and the joints between parts."""
+    """Return the pose ``(4, 4)`` of each link, parents first, the part index of each link, and the joints between parts."""
     declared = {joint.name: joint for joint in urdf_joints(tree)}
     hanging: dict[str, list[str]] = {}
     for name, joint in tree.joints.items():
@@ -58,7 +58,7 @@ def _standing(tree: UrdfTree) -> tuple[dict[str, np.ndarray], dict[str, int], li
                 poses[child], parts[child] = pose, parts[link]
                 continue
             parts[child], count = count, count + 1
-            kind = "fixed" if said.follows is not None else said.kind  # another joint moves it
+            kind = "fixed" if said.follows is not None else said.kind  # another joint drives it
             moving = moving_joint(name, kind, (parts[link], parts[child]), pose, said.axis, (said.lower, said.upper))
             joints.append(moving)
             poses[child] = moving.moved(moving.start) @ pose

@@ -1,4 +1,4 @@
-"""All rules, in the order of their codes."""
+"""All audit rules, in the order of the report."""
 
 from __future__ import annotations
 
@@ -29,6 +29,6 @@ MODULES = (
 )  # fmt: skip
 
 RULES: tuple[Rule, ...] = tuple(rule for module in MODULES for rule in module.RULES)
-"""Every rule once, by subject as a person reads a report."""
+"""Every rule, ordered by subject."""
 
 RULES_BY_CODE = {rule.code: rule for rule in RULES}

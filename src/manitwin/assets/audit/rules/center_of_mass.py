@@ -1,4 +1,4 @@
-"""COM: is the centre of mass where matter is?"""
+"""COM rules: plausibility of the centre of mass."""
 
 from __future__ import annotations
 
@@ -12,16 +12,18 @@ from manitwin.assets.audit.fix import write_missing_inertial
 from manitwin.assets.audit.measured import MeasuredAsset
 
 SLACK_M, SLACK_SHARE = 0.001, 0.01
-"""How far outside the hull a centre of mass may be, and which share of the longest side: hulls are rounded."""
+"""Tolerance for a centre of mass outside the hull, in metres and as share of the longest side: hulls are rounded."""
 
 AWAY_SHARE = 0.1
-"""A centre of mass at exactly (0, 0, 0) is taken for forgotten where the shape's is farther away, of the longest side."""
+"""A centre of mass at exactly (0, 0, 0) counts as forgotten if that of the shape is farther away than this share of the longest
+side.
+"""
 SURFACE_SHARE = 0.45
-"""So it is where the shape's is so much of a side away along that side: at its very surface, as the origin of a flat thing is."""
+"""It also counts as forgotten if that of the shape is this share of a side away along it, at the surface of a flat object."""
 
 
 def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a mass and an inertia without the centre; without an inertia either, INE001 says both."""
+    """Report a mass and an inertia without a centre of mass; if the inertia is missing too, INE001 reports both."""
     inertial = measured.asset.inertial
     declared = inertial.mass_kg is not None and inertial.inertia_kg_m2 is not None
     if declared and inertial.center_of_mass_m is None:
@@ -29,9 +31,9 @@ def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def outside(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a centre of mass outside the convex hull of the body."""
+    """Report a centre of mass outside the convex hull of the body."""
     center = measured.asset.inertial.center_of_mass_m
-    if center is None or not len(measured.hull) or measured.asset.inertial.mass_kg == 0:  # MAS002 says so
+    if center is None or not len(measured.hull) or measured.asset.inertial.mass_kg == 0:  # reported by MAS002
         return
     if not np.isfinite(center).all():
         yield Complaint(f"the centre of mass is {_millimetres(center)} mm")
@@ -45,13 +47,13 @@ def outside(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 
 def left_at_origin(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a centre of mass at the origin of a shape whose own is elsewhere."""
+    """Report a centre of mass at the origin if that of the shape is elsewhere."""
     center = measured.asset.inertial.center_of_mass_m
     if center is None or center.any() or not len(measured.hull) or measured.complaints(outside):
         return
-    if measured.asset.inertial.computed:  # it is where its shapes' masses put it
+    if measured.asset.inertial.computed:  # it follows from the masses of the shapes
         return
-    if measured.asset.inertial.mass_kg == 0:  # MAS002 says so
+    if measured.asset.inertial.mass_kg == 0:  # reported by MAS002
         return
     shapes = measured.shapes if len(measured.shapes) else measured.hull
     expected = shapes.uniform.center_of_mass_m
